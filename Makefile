@@ -1,0 +1,75 @@
+# make setup | demo | test | bench | gallery | clean
+PYTHON ?= python3
+WORKERS ?= 2
+
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+DEMO := demo
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint types contracts unit bench gallery clean
+MAKEFLAGS += --no-print-directory
+
+help:
+	@echo "make demo     the bifurcation diagram of Fig. 5, from one simulated orbit, in $(DEMO)/"
+	@echo "make test     lint, types, import contracts, tests"
+	@echo "make bench    run times"
+	@echo "make gallery  the figures of docs/gallery"
+	@echo "make setup    a virtual environment in $(VENV)/ (the others do this by themselves)"
+	@echo "make clean    removes what make and the tests wrote, and keeps $(VENV)/"
+
+setup: $(STAMP)
+
+$(STAMP): pyproject.toml
+	@echo "== setup: $(VENV)"
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+demo: $(STAMP)
+	@echo "== demo: contfric run fig05 --out $(DEMO)"
+	@$(BIN)/contfric run fig05 --out $(DEMO) --force
+	@echo "Figures:"; find $(DEMO) -type f \( -name '*.png' -o -name '*.svg' -o -name '*.pdf' \) | sort | sed 's/^/  /'
+	@echo "Tables and restart data:"; find $(DEMO) -type f \( -name '*.csv' -o -name '*.json' -o -name '*.npz' \) | sort | sed 's/^/  /'
+
+# One after the other whatever -j says, pytest last: its closing line is the last line.
+test: $(STAMP)
+	@$(MAKE) lint
+	@$(MAKE) types
+	@$(MAKE) contracts
+	@$(MAKE) unit
+
+lint: $(STAMP)
+	@echo "== ruff check"
+	@$(BIN)/ruff check --quiet .
+	@echo "== ruff format --check"
+	@$(BIN)/ruff format --check --quiet .
+
+types: $(STAMP)
+	@echo "== mypy"
+	@$(BIN)/mypy --no-error-summary
+
+contracts: $(STAMP)
+	@echo "== lint-imports"
+	@$(BIN)/lint-imports
+
+unit: $(STAMP)
+	@echo "== pytest"
+	@$(BIN)/python -m pytest -n $(WORKERS)
+
+bench: $(STAMP)
+	@echo "== bench"
+	@if ls benchmarks/bench_*.py >/dev/null 2>&1; then \
+	    $(BIN)/python -m pytest benchmarks -o python_files='bench_*.py' --benchmark-only; \
+	else echo "no benchmarks/bench_*.py yet"; fi
+
+gallery: $(STAMP)
+	@echo "== gallery"
+	@set -e; found=no; for script in docs/gallery/*.py; do \
+	    test -f "$$script" || continue; found=yes; echo "$$script"; $(BIN)/python "$$script"; \
+	done; test $$found = yes || echo "no docs/gallery/*.py yet"
+
+clean:
+	@rm -rf build dist $(DEMO) .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
+	@find contfric tests benchmarks docs -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,87 @@
+"""Periodic orbits of friction and other piecewise-smooth oscillators, continued through every event.
+
+A periodic orbit is a declarative signature; the program finds the next signature itself.
+
+>>> import contfric as cf
+>>> cf.load_model("coulomb").defaults["S0"]
+0.4
+
+Nothing heavy is imported until it is used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from contfric.atlas.diagram import Diagram
+    from contfric.atlas.explore import explore
+    from contfric.continuation.branch import Branch
+    from contfric.continuation.events import Bifurcation, EndReason, Kind
+    from contfric.continuation.trace import continue_orbit
+    from contfric.errors import (
+        AperiodicError,
+        ContfricError,
+        ConvergenceError,
+        NotationError,
+        ParameterError,
+        ResultFileError,
+        StudyError,
+    )
+    from contfric.models import Model, load_model, model_names
+    from contfric.orbit.find import find_orbit
+    from contfric.orbit.orbit import Orbit
+    from contfric.orbit.simulation import simulate
+    from contfric.orbit.solve import solve_orbit
+    from contfric.results import load, save
+    from contfric.signature import Signature, load_signature, signature_names, transition_graph
+    from contfric.study import run_study
+
+#: Where each public name lives; imported at first use.
+_HOMES = {
+    "AperiodicError": "contfric.errors",
+    "Bifurcation": "contfric.continuation.events",
+    "Branch": "contfric.continuation.branch",
+    "ContfricError": "contfric.errors",
+    "ConvergenceError": "contfric.errors",
+    "Diagram": "contfric.atlas.diagram",
+    "EndReason": "contfric.continuation.events",
+    "Kind": "contfric.continuation.events",
+    "Model": "contfric.models",
+    "NotationError": "contfric.errors",
+    "Orbit": "contfric.orbit.orbit",
+    "ParameterError": "contfric.errors",
+    "ResultFileError": "contfric.errors",
+    "Signature": "contfric.signature",
+    "StudyError": "contfric.errors",
+    "continue_orbit": "contfric.continuation.trace",
+    "explore": "contfric.atlas.explore",
+    "find_orbit": "contfric.orbit.find",
+    "load": "contfric.results",
+    "load_model": "contfric.models",
+    "load_signature": "contfric.signature",
+    "model_names": "contfric.models",
+    "run_study": "contfric.study",
+    "save": "contfric.results",
+    "signature_names": "contfric.signature",
+    "simulate": "contfric.orbit.simulation",
+    "solve_orbit": "contfric.orbit.solve",
+    "transition_graph": "contfric.signature",
+}
+
+__all__ = [*_HOMES, "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("contfric")
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'contfric' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

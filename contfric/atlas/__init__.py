@@ -1,0 +1,1 @@
+"""Many families: exploring through events."""

@@ -1,0 +1,126 @@
+"""A bifurcation diagram: branches joined by bifurcations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from contfric.continuation.branch import Branch
+from contfric.continuation.events import Bifurcation, End, Kind
+from contfric.models.definition import Model
+
+if TYPE_CHECKING:
+    import networkx as nx
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A bifurcation of the diagram and the branches that meet there.
+
+    Attributes
+    ----------
+    bifurcation : Bifurcation
+        As located on the first branch that reached it.
+    branches : tuple of int
+        Indices of the branches that meet there.
+    """
+
+    bifurcation: Bifurcation
+    branches: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class LooseEnd:
+    """An end of a branch that nothing follows, with its reason."""
+
+    branch: int
+    side: int
+    end: End
+
+    def __str__(self) -> str:
+        return f"branch {self.branch + 1}, {'first' if self.side == 0 else 'last'} point: {self.end}"
+
+
+@dataclass(frozen=True, eq=False)
+class Diagram:
+    """What :func:`contfric.explore` found.
+
+    Attributes
+    ----------
+    model : Model
+    parameter : str
+        The parameter that varies.
+    range : (float, float)
+        Where it was followed.
+    branches : tuple of Branch
+        Computed branches and the mirror images of asymmetric ones.
+    nodes : tuple of Node
+        Bifurcations, each once, with the branches that meet there.
+    loose_ends : tuple of LooseEnd
+        Ends that nothing follows, each with its reason.
+    complete : bool
+        False if the exploration was stopped before it was done.
+    """
+
+    model: Model
+    parameter: str
+    range: tuple[float, float]
+    branches: tuple[Branch, ...]
+    nodes: tuple[Node, ...]
+    loose_ends: tuple[LooseEnd, ...]
+    complete: bool = True
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def bifurcations(self) -> tuple[Bifurcation, ...]:
+        """Every bifurcation once, in the order of the parameter."""
+        found = [node.bifurcation for node in self.nodes]
+        return tuple(sorted(found, key=lambda b: b.params[self.parameter]))
+
+    def of_kind(self, kind: Kind | str) -> tuple[Bifurcation, ...]:
+        """Return the bifurcations of one kind."""
+        return tuple(b for b in self.bifurcations if b.kind is Kind(kind))
+
+    @cached_property
+    def graph(self) -> nx.MultiGraph[int]:
+        """Branches as nodes, joined by the bifurcations at which they meet (networkx)."""
+        import networkx as nx
+
+        graph: nx.MultiGraph[int] = nx.MultiGraph()
+        for i, branch in enumerate(self.branches):
+            graph.add_node(i, name=branch.name, branch=branch)
+        for node in self.nodes:
+            first, *others = node.branches
+            for other in others:
+                graph.add_edge(
+                    first, other, kind=node.bifurcation.kind.value, bifurcation=node.bifurcation
+                )
+        return graph
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the points of all branches as one table, with the branch's number and name."""
+        import pandas as pd
+
+        tables = []
+        for i, branch in enumerate(self.branches):
+            table = branch.to_dataframe()
+            table.insert(0, "branch", i + 1)
+            table.insert(1, "signature", branch.name)
+            tables.append(table)
+        return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+
+    def plot(self, ax: Axes | None = None, row: str = "x_max") -> Axes:
+        """Draw one quantity of all branches with the bifurcations."""
+        from contfric.plot.diagram import plot_diagram_row
+
+        return plot_diagram_row(self, row, ax=ax)
+
+    def __repr__(self) -> str:
+        low, high = self.range
+        return (
+            f"<Diagram of {self.model.name}: {len(self.branches)} branches, {len(self.nodes)} "
+            f"bifurcations, {self.parameter} in [{low:g}, {high:g}]>"
+        )

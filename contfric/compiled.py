@@ -1,0 +1,124 @@
+"""Compiled kernels: numba, cached on disk, with function types fixed beforehand.
+
+Two decorators:
+
+``kernel(signature)``
+    an entry point, compiled for one explicit signature and cached on disk;
+``helper``
+    a small function that is compiled into the kernels that call it, and not cached by itself.
+
+A flow reaches the engine as first-class functions of the fixed types below. That is what lets
+numba cache the engine: a kernel that takes a jitted function as an ordinary argument would be
+compiled anew in every process.
+
+The cache lives in ``$CONTFRIC_CACHE_DIR``, else in ``$NUMBA_CACHE_DIR``, else in the user's cache
+folder (``~/.cache/contfric``). Numba renews a cached kernel only when the file of the kernel itself
+changes, not when a helper in another file does; so the folder's name carries a digest of all
+compiled sources. Where no folder is writable the kernels are compiled in every process: slower,
+never broken.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import warnings
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from numba import types
+from numba.core import config
+from numba.core.errors import NumbaExperimentalFeatureWarning
+
+# First-class functions are what makes the cache possible; numba still calls them experimental.
+warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+f8 = types.float64
+i8 = types.int64
+vector = types.float64[::1]
+matrix = types.float64[:, ::1]
+blocks = types.float64[:, :, ::1]
+indices = types.int64[::1]
+table = types.int64[:, ::1]
+
+#: flow(mode, t0, y0, dt, p, which, y1, jac): state after ``dt``; ``jac`` (n, 2 + n + len(which)) holds
+#: the derivatives with respect to t0, y0, dt and the parameters ``which``; not filled if it is empty.
+flow_signature = types.void(i8, f8, vector, f8, vector, indices, vector, matrix)
+#: observe(c, t, y, p, which, grad): observable c; ``grad`` (1 + n + len(which)), not filled if empty.
+observe_signature = f8(i8, f8, vector, vector, indices, vector)
+#: level(k, p, which, grad): level of surface k; ``grad`` (len(which)), not filled if empty.
+level_signature = f8(i8, vector, indices, vector)
+#: turning(mode, c, t0, y0, dt, p, out): number of interior stationary times of observable c, written
+#: to ``out`` in ascending order; -1 if they do not fit.
+turning_signature = i8(i8, i8, f8, vector, f8, vector, vector)
+#: hit(mode, c, level, on, t0, y0, dt_max, p): the first time after the start at which observable c
+#: takes the level (``on``: it starts there); negative if it does not within ``dt_max``.
+hit_signature = f8(i8, i8, f8, types.boolean, f8, vector, f8, vector)
+#: period(p, which, grad): period of the excitation; 0 for an autonomous model.
+period_signature = f8(vector, indices, vector)
+
+FlowType = types.FunctionType(flow_signature)
+ObserveType = types.FunctionType(observe_signature)
+LevelType = types.FunctionType(level_signature)
+TurningType = types.FunctionType(turning_signature)
+HitType = types.FunctionType(hit_signature)
+PeriodType = types.FunctionType(period_signature)
+
+
+@cache
+def _digest(folder: Path) -> str:
+    """Digest of the compiled sources that a kernel in ``folder`` may have been built from."""
+    root = Path(__file__).parent
+    inside = root in folder.parents
+    # a kernel of the package may use any helper of the package; a user's file only its own folder
+    files = sorted(root.rglob("*.py")) if inside else sorted(folder.glob("*.py"))
+    content = hashlib.sha256()
+    for file in files:
+        text = file.read_bytes()
+        if b"contfric.compiled" in text:
+            content.update(text)
+    return content.hexdigest()[:16]
+
+
+def cache_folder(source: Path) -> Path:
+    """Return the folder that the kernels of a source file are cached in."""
+    chosen = os.environ.get("CONTFRIC_CACHE_DIR") or os.environ.get("NUMBA_CACHE_DIR")
+    base = Path(chosen) if chosen else _user_cache() / "contfric"
+    return base / _digest(source.parent)
+
+
+def _user_cache() -> Path:
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", str(Path.home())))
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches"
+    return Path(os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache")))
+
+
+def kernel(signature: Any) -> Callable[[F], F]:
+    """Compile a function for one explicit signature, with a cache on disk where possible."""
+
+    def decorate(function: F) -> F:
+        folder = cache_folder(Path(function.__code__.co_filename))
+        before = config.CACHE_DIR
+        config.CACHE_DIR = str(folder)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            return numba.njit(signature, cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+        except (OSError, RuntimeError):  # no folder is writable
+            return numba.njit(signature, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+        finally:
+            config.CACHE_DIR = before
+
+    return decorate
+
+
+def helper(function: F) -> F:
+    """Compile a small function into the kernels that call it."""
+    return numba.njit(error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]

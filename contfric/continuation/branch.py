@@ -1,0 +1,209 @@
+"""A branch: the points of one reduced word along a parameter, its bifurcations and its ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.continuation.events import Bifurcation, End
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import IntArray, System, build_system
+from contfric.orbit.words import mirror_pairs
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """A family of orbits of one reduced word, from one end to the other.
+
+    Attributes
+    ----------
+    system : System
+        The boundary-value problem that all points solve.
+    parameter : str
+        The parameter that varies.
+    vector : ndarray, shape (parameters,)
+        The other parameters.
+    values : ndarray, shape (k,)
+        The parameter at each point.
+    joints : ndarray, shape (k, N, 1 + n)
+        Joints of one turn at each point.
+    arc : ndarray, shape (k,)
+        Arclength, in units in which the parameter's range counts 1.
+    margins : ndarray, shape (k, margins)
+        Margins of the inequalities at each point.
+    labels : ndarray, shape (k, labels)
+        Codes of the transparent surfaces crossed; they change at T.
+    turn_multipliers : ndarray or None, shape (k, n)
+        Multipliers of one turn; None if stability was not asked for.
+    bifurcations : tuple of Bifurcation
+        In the order of the branch.
+    ends : (End, End)
+        Why it ends at its first and at its last point.
+    mirrored : bool
+        Whether this is the mirror image of a computed branch.
+    """
+
+    system: System
+    parameter: str
+    vector: FloatArray
+    values: FloatArray
+    joints: FloatArray
+    arc: FloatArray
+    margins: FloatArray
+    labels: IntArray
+    turn_multipliers: NDArray[np.complex128] | None
+    bifurcations: tuple[Bifurcation, ...]
+    ends: tuple[End, End]
+    mirrored: bool = False
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, index: int) -> Orbit:
+        vector = self.vector.copy()
+        vector[self.model.index_of(self.parameter)] = self.values[index]
+        return Orbit(self.system, self.joints[index], vector, 0.0)
+
+    def __iter__(self) -> Iterator[Orbit]:
+        return (self[i] for i in range(len(self)))
+
+    @property
+    def model(self) -> Model:
+        """The model that moves."""
+        return self.system.model
+
+    @property
+    def params(self) -> dict[str, FloatArray]:
+        """Every parameter at every point, shape (k,) each."""
+        columns = {n: np.full(len(self), v) for n, v in self.model.mapping(self.vector).items()}
+        columns[self.parameter] = self.values
+        return columns
+
+    @cached_property
+    def name(self) -> str:
+        """Name of the orbit in the middle of the branch, such as ``2s``."""
+        return self[len(self) // 2].name
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the orbits are their own mirror images."""
+        return self.system.half
+
+    @property
+    def multipliers(self) -> NDArray[np.complex128] | None:
+        """Floquet multipliers of the whole orbit at each point, shape (k, n)."""
+        if self.turn_multipliers is None:
+            return None
+        return self.turn_multipliers**2 if self.system.half else self.turn_multipliers
+
+    @cached_property
+    def stable(self) -> BoolArray | None:
+        """Whether each point is stable, shape (k,); None if stability was not asked for."""
+        if self.turn_multipliers is None:
+            return None
+        return np.asarray(np.all(np.abs(self.turn_multipliers) < 1.0, axis=1))
+
+    @cached_property
+    def stops(self) -> FloatArray:
+        """Displacements at the stops, shape (k, stops)."""
+        surface = self.model.stop_surface
+        x = self.joints[:, :, 1]
+        closed = self.joints[:, 0, 1:] @ self.system.layout.closure.T
+        ends = np.concatenate([x[:, 1:], closed[:, :1]], axis=1)
+        at = [i for i, (_, exit_) in enumerate(self.system.word) if exit_ == surface]
+        if not self.system.half:
+            return ends[:, at]
+        mirrored = (self.joints[:, :, 1:] @ self.system.layout.closure.T)[:, :, 0]
+        second = np.concatenate([mirrored[:, 1:], x[:, :1]], axis=1)
+        return np.concatenate([ends[:, at], second[:, at]], axis=1)
+
+    @property
+    def x_max(self) -> FloatArray:
+        """Largest displacement at each point, shape (k,)."""
+        return np.asarray(self.stops.max(axis=1))
+
+    @property
+    def x_min(self) -> FloatArray:
+        """Smallest displacement at each point, shape (k,)."""
+        return np.asarray(self.stops.min(axis=1))
+
+    @property
+    def asymmetry(self) -> FloatArray:
+        """Asymmetry psi (eq. (4) of the reference) at each point, shape (k,)."""
+        return np.asarray(np.abs(self.x_max + self.x_min) / np.abs(self.x_max - self.x_min))
+
+    def mirror(self) -> Branch:
+        """Return the mirror image of the branch, with mirrored bifurcations."""
+        symmetry = self.model.symmetry
+        if symmetry is None:
+            raise ValueError(f"model '{self.model.name}' has no symmetry")
+        word = mirror_pairs(self.model, self.system.word)
+        system = build_system(self.model, word, self.system.periods, self.system.half)
+        joints = self.joints @ _block(symmetry.array()).T
+        joints[:, :, 0] += self._period_shift()[:, None]
+        images = {id(b): replace(b, orbit=b.orbit.mirror()) for b in self._all_bifurcations()}
+        return replace(
+            self,
+            system=system,
+            joints=joints,
+            bifurcations=tuple(images[id(b)] for b in self.bifurcations),
+            ends=(_mirror_end(self.ends[0], images), _mirror_end(self.ends[1], images)),
+            mirrored=not self.mirrored,
+        )
+
+    def _period_shift(self) -> FloatArray:
+        assert self.model.symmetry is not None
+        fraction = self.model.symmetry.fraction
+        return np.array([fraction * orbit.period / orbit.periods for orbit in self])
+
+    def _all_bifurcations(self) -> list[Bifurcation]:
+        at_ends = [end.bifurcation for end in self.ends if end.bifurcation is not None]
+        return [*self.bifurcations, *at_ends]
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the points as a table: parameters, x_max, x_min, psi, stops, stability (pandas)."""
+        import pandas as pd
+
+        columns: dict[str, Any] = dict(self.params)
+        columns |= {"x_max": self.x_max, "x_min": self.x_min, "psi": self.asymmetry}
+        columns |= {f"stop_{k + 1}": x for k, x in enumerate(self.stops.T)}
+        if self.stable is not None:
+            columns["stable"] = self.stable
+        return pd.DataFrame(columns)
+
+    def plot(self, ax: Axes | None = None, row: str = "x_max") -> Axes:
+        """Draw one quantity of the branch against its parameter."""
+        from contfric.plot.diagram import plot_branches
+
+        return plot_branches([self], row, ax=ax)
+
+    def __repr__(self) -> str:
+        low, high = float(self.values.min()), float(self.values.max())
+        return (
+            f"<Branch {self.name}: {len(self)} points, {self.parameter} in [{low:.6g}, {high:.6g}], "
+            f"ends {self.ends[0].reason.name} and {self.ends[1].reason.name}>"
+        )
+
+
+def _block(matrix: FloatArray) -> FloatArray:
+    block = np.eye(len(matrix) + 1)
+    block[1:, 1:] = matrix
+    return block
+
+
+def _mirror_end(end: End, images: dict[int, Bifurcation]) -> End:
+    if end.bifurcation is None:
+        return end
+    return replace(end, bifurcation=images[id(end.bifurcation)])

@@ -1,0 +1,173 @@
+"""What can happen on a branch: kinds of bifurcation, ends, and how each is recognised.
+
+A margin that reaches zero is a sliding event; which one follows from the model's definition alone:
+
+=========  ======================================  ==========================================
+margin     where                                   kind
+=========  ======================================  ==========================================
+interior   segment that stays on a surface         AS: the stick touches its limit inside
+interior   other segment, surface that switches    GS: the slide touches rest inside
+interior   surface with the same field behind      T
+exit       as the interior of the same segment     AS, GS or T: the exit becomes tangential
+joint      the state at a stop meets a surface     CS if it leaves the stick there (distance to
+                                                   the limit grows outward), SS if it enters it
+=========  ======================================  ==========================================
+
+For CS and SS the sign of the observable's rate at the stop decides: rest is left if the state moves
+out of the region where it can stay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Margin, System, Test, inside_sign
+
+
+class Kind(str, Enum):
+    """Kinds of bifurcation."""
+
+    SN = "SN"
+    BP = "BP"
+    PD = "PD"
+    NS = "NS"
+    CS = "CS"
+    SS = "SS"
+    AS = "AS"
+    GS = "GS"
+    T = "T"
+
+    @property
+    def meaning(self) -> str:
+        """One line for a legend or a table."""
+        return _MEANINGS[self]
+
+
+_MEANINGS = {
+    Kind.SN: "fold (saddle-node)",
+    Kind.BP: "branch point (symmetry breaking)",
+    Kind.PD: "period doubling",
+    Kind.NS: "torus (Neimark-Sacker)",
+    Kind.CS: "crossing-sliding",
+    Kind.SS: "switching-sliding",
+    Kind.AS: "adding-sliding",
+    Kind.GS: "grazing-sliding",
+    Kind.T: "tangency: segments relabelled",
+}
+
+#: Kinds at which a branch of one reduced word cannot go on.
+TERMINAL = frozenset({Kind.CS, Kind.SS, Kind.AS, Kind.GS})
+
+
+class EndReason(str, Enum):
+    """Why a branch ends; the text says it to the user."""
+
+    RANGE = "end of the range asked for"
+    LIMIT = "physical limit of the parameter"
+    CS = "crossing-sliding: the signature changes, the motion is continuous"
+    SS = "switching-sliding: the flow jumps"
+    AS = "adding-sliding: the flow jumps"
+    GS = "grazing-sliding: the flow jumps"
+    BP = "the orbit has become symmetric: its mirror branch goes on from here"
+    PD = "the doubled orbit meets the orbit of half its period"
+    CLOSED = "the branch is a closed curve"
+    START = "the branch starts here"
+    POINTS = "the largest number of points was reached (max_points)"
+    STEP = "the step became too small: Newton does not converge"
+    BROKEN = "the orbit is not finite beyond this point"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True, eq=False)
+class Bifurcation:
+    """A located event on a branch.
+
+    Attributes
+    ----------
+    kind : Kind
+        What it is.
+    params : dict
+        Parameters at which it happens.
+    orbit : Orbit
+        The orbit there, of the branch's signature.
+    tests : tuple of Test
+        For sliding events the margins that vanish; several if events coincide (a group).
+    position : float
+        Arclength on the branch.
+    stable_before, stable_after : bool or None
+        Stability on the two sides in the order of the branch; None if not computed or no side.
+    """
+
+    kind: Kind
+    params: dict[str, float]
+    orbit: Orbit
+    tests: tuple[Test, ...] = ()
+    position: float = 0.0
+    stable_before: bool | None = None
+    stable_after: bool | None = None
+
+    @property
+    def group(self) -> int:
+        """Number of places of the whole orbit at which the event happens at once."""
+        return max(1, len(self.tests)) * (2 if self.orbit.system.half and self.tests else 1)
+
+    @property
+    def label(self) -> str:
+        """Name in the manner of the reference: ``CS_s``, ``SN_1a``."""
+        if self.tests and self.kind is not Kind.T:
+            return f"{self.kind.value}_{'s' if self.orbit.symmetric else 'a'}"
+        return self.kind.value if self.kind is Kind.T else f"{self.kind.value}_{self.orbit.name}"
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{k}={v:.12g}" for k, v in self.params.items())
+        return f"<{self.label}: {values}>"
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """Why a branch ends, with the event if there is one."""
+
+    reason: EndReason
+    message: str = ""
+    bifurcation: Bifurcation | None = field(default=None, repr=False)
+
+    def __str__(self) -> str:
+        return self.message or self.reason.value
+
+
+def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
+    """Classify the vanishing of a margin; see the table of the module."""
+    model = system.model
+    mode = system.word[test.segment][0]
+    if test.margin is not Margin.JOINT:
+        if model.mode_by_name[mode].sliding:
+            return Kind.AS
+        return Kind.T if inside_sign(model, mode, test.surface) == 0 else Kind.GS
+    return Kind.CS if outward_rate(system, test, orbit) >= 0.0 else Kind.SS
+
+
+def outward_rate(system: System, test: Test, orbit: Orbit) -> float:
+    """Rate at which a state that rests at the joint would leave the region where it can rest."""
+    model = system.model
+    resting = next(d for d in model.domains if model.mode_by_name[d.mode].sliding)
+    end = orbit.ends[test.segment]
+    rest_mode = [m.name for m in model.modes].index(resting.mode)
+    return -resting.signs[test.surface] * rate_along(orbit, rest_mode, test.surface, end)
+
+
+def rate_along(orbit: Orbit, mode: int, surface: str, joint: np.ndarray) -> float:
+    """Rate of a surface's observable along a mode at a joint (t, y)."""
+    model = orbit.model
+    n = len(model.states)
+    none = np.empty(0, dtype=np.int64)
+    names = [o.name for o in model.observables]
+    grad, jac, y = np.empty(1 + n), np.empty((n, 2 + n)), np.empty(n)
+    time, state = float(joint[0]), np.ascontiguousarray(joint[1:])
+    model.flow.flow(mode, time, state, 0.0, orbit.vector, none, y, jac)
+    c = names.index(model.surface_by_name[surface].observable)
+    model.flow.observe(c, time, state, orbit.vector, none, grad)
+    return float(grad[0] + grad[1:] @ jac[:, 1 + n])

@@ -1,0 +1,52 @@
+"""Errors that a user can act on: what is wrong, where, and what would be valid."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class ContfricError(Exception):
+    """Base of every error that contfric raises on purpose; its text is one clear message."""
+
+
+class ParameterError(ContfricError):
+    """A parameter is unknown, missing, not finite, or outside of the model's domain of validity."""
+
+
+class NotationError(ContfricError):
+    """A signature text, file or segment list cannot be read, or is no closed walk."""
+
+
+class StudyError(ContfricError):
+    """A study file cannot be read or asks for something that does not exist."""
+
+
+class ResultFileError(ContfricError):
+    """A result file or folder is damaged, missing, or would be overwritten."""
+
+
+class ConvergenceError(ContfricError):
+    """No orbit was found; ``result`` holds the last iterate and its residual when there is one."""
+
+    def __init__(self, message: str, result: object | None = None) -> None:
+        super().__init__(message)
+        self.result = result
+
+
+class AperiodicError(ConvergenceError):
+    """The simulation did not settle on a periodic orbit within its allowance."""
+
+
+def did_you_mean(word: str, valid: Iterable[str]) -> str:
+    """Return ``" (did you mean 'x'?)"`` for the closest valid word, and the list of valid words.
+
+    Examples
+    --------
+    >>> did_you_mean("Omga", ["Omega", "S"])
+    "; did you mean 'Omega'? Valid: Omega, S"
+    """
+    names = [str(name) for name in valid]
+    close = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    hint = f"; did you mean '{close[0]}'?" if close else "."
+    return f"{hint} Valid: {', '.join(names)}"

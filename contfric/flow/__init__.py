@@ -1,0 +1,1 @@
+"""One smooth segment forward, with derivatives, turning points and first roots."""

@@ -1,0 +1,37 @@
+"""What the engine asks of a flow, closed form or integrated: six compiled functions.
+
+The engine knows nothing else of a model's motion: not how a state is advanced, how many states there
+are, or what the excitation looks like. The types of the six functions stand in
+:mod:`contfric.compiled`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class CompiledFlow:
+    """The compiled functions of a model; indices follow the order of its definition.
+
+    Attributes
+    ----------
+    flow : state after a duration in one mode, with its derivatives
+    observe : value of an observable, with its gradient
+    level : level of a surface, with its gradient
+    turning : interior stationary times of an observable along a segment
+    hit : first time at which an observable takes a level
+    period : period of the excitation (0 for an autonomous model), with its gradient
+    """
+
+    flow: Any
+    observe: Any
+    level: Any
+    turning: Any
+    hit: Any
+    period: Any
+
+    def functions(self) -> tuple[Any, Any, Any, Any, Any, Any]:
+        """Return the six functions in the order in which kernels take them."""
+        return (self.flow, self.observe, self.level, self.turning, self.hit, self.period)

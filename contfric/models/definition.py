@@ -1,0 +1,311 @@
+"""What moves: parameters, observables, surfaces, domains, modes and the symmetry of a model.
+
+A model is defined once, here, and everything else derives from it: the transition graph, the
+simulation, the boundary-value problem, admissibility and the drawings.
+
+* An **observable** is a scalar function of time and state, such as the load ``u = x - f(t)``.
+* A **surface** is a level set of an observable: ``F+`` is ``u = S0``.
+* A **mode** is one smooth vector field; a **domain** is the part of a mode between surfaces.
+* A **transition** leads from a domain through a surface into the next domain.
+
+Transitions are derived from the signs of the domains (:meth:`Model.transitions`): crossing a
+transparent surface flips its sign; at a switching surface the motion stays on the surface if a
+domain exists there (a stick), and otherwise leaves it as the model's departures say.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.errors import ParameterError, did_you_mean
+
+if TYPE_CHECKING:
+    from contfric.flow.interface import CompiledFlow
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A real parameter: its name, default value and meaning (nondimensional)."""
+
+    name: str
+    default: float
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A linear inequality ``sum(c * p) >= 0`` (``> 0`` if strict) that parameters must obey."""
+
+    text: str
+    coefficients: Mapping[str, float]
+    strict: bool = False
+    meaning: str = ""
+
+    def value(self, params: Mapping[str, float]) -> float:
+        """Return the left-hand side of the inequality."""
+        return sum(c * params[name] for name, c in self.coefficients.items())
+
+
+@dataclass(frozen=True)
+class Observable:
+    """A scalar function of time and state whose level sets are surfaces."""
+
+    name: str
+    formula: str
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A level set of an observable; ``switching`` if the vector field changes across it."""
+
+    name: str
+    observable: str
+    level: str
+    switching: bool = False
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One smooth vector field.
+
+    ``rank`` is the number of independent directions that survive it (a stick keeps one of two:
+    one multiplier becomes exactly zero); ``sliding`` says that motion stays on a surface.
+    """
+
+    name: str
+    rank: int
+    sliding: bool = False
+
+
+@dataclass(frozen=True)
+class Domain:
+    """A region of one mode: the sign of (observable - level) for every surface, 0 = on it."""
+
+    name: str
+    mode: str
+    signs: Mapping[str, int]
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Departure:
+    """Where a state at rest on a switching surface cannot stay, and the side it leaves to."""
+
+    where: Mapping[str, int]
+    leaves: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """The map ``(t, y) -> (t + fraction * T, matrix @ y)`` that takes solutions to solutions.
+
+    ``surfaces`` names the image of each surface; the sign of (observable - level) is reversed.
+    """
+
+    matrix: tuple[tuple[float, ...], ...]
+    fraction: float
+    surfaces: Mapping[str, str]
+
+    def array(self) -> FloatArray:
+        """Return the state matrix, shape (n, n)."""
+        return np.array(self.matrix, dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A piecewise-smooth oscillator: its definition, and a factory of its compiled flow.
+
+    Attributes
+    ----------
+    states : tuple of str
+        Names of the n states; the first is the displacement that diagrams show.
+    surfaces : tuple of Surface
+        Those of one observable from the highest level down.
+    stop_surface : str
+        Surface on which the displacement is stationary: stops and extrema lie on it.
+    flow_factory : callable
+        Returns the :class:`~contfric.flow.interface.CompiledFlow`; called at first use only.
+    spread : callable
+        ``spread(params)`` returns the half-width of the region that starts are drawn from,
+        shape (n,), nondimensional.
+    """
+
+    name: str
+    title: str
+    states: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    constraints: tuple[Constraint, ...]
+    observables: tuple[Observable, ...]
+    surfaces: tuple[Surface, ...]
+    modes: tuple[Mode, ...]
+    domains: tuple[Domain, ...]
+    departures: tuple[Departure, ...]
+    symmetry: Symmetry | None
+    stop_surface: str
+    flow_factory: Callable[[], CompiledFlow] = field(repr=False)
+    spread: Callable[[Mapping[str, float]], FloatArray] = field(repr=False)
+    references: tuple[str, ...] = ()
+
+    @cached_property
+    def flow(self) -> CompiledFlow:
+        """The compiled flow of this model (loads numba at first use)."""
+        return self.flow_factory()
+
+    @property
+    def defaults(self) -> dict[str, float]:
+        """A fresh mapping of every parameter to its default value."""
+        return {p.name: p.default for p in self.parameters}
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters in the order of the engine's vectors."""
+        return tuple(p.name for p in self.parameters)
+
+    @cached_property
+    def domain_by_name(self) -> dict[str, Domain]:
+        """Domains by their names."""
+        return {d.name: d for d in self.domains}
+
+    @cached_property
+    def mode_by_name(self) -> dict[str, Mode]:
+        """Modes by their names."""
+        return {m.name: m for m in self.modes}
+
+    @cached_property
+    def surface_by_name(self) -> dict[str, Surface]:
+        """Surfaces by their names."""
+        return {s.name: s for s in self.surfaces}
+
+    @cached_property
+    def transitions(self) -> dict[tuple[str, str], str]:
+        """Next domain for each possible (domain, surface); what is absent cannot happen."""
+        found: dict[tuple[str, str], str] = {}
+        for domain in self.domains:
+            for surface in self.surfaces:
+                target = self._next_domain(domain, surface)
+                if target is not None and target != domain.name:
+                    found[domain.name, surface.name] = target
+        return found
+
+    def _next_domain(self, domain: Domain, surface: Surface) -> str | None:
+        sign = domain.signs[surface.name]
+        if sign == 0:
+            return None
+        signs = dict(domain.signs)
+        signs[surface.name] = 0 if surface.switching else -sign
+        return self.domain_at(signs)
+
+    def _resolve_at_rest(self, signs: Mapping[str, int]) -> str | None:
+        staying = self._domain_with(signs)
+        if staying is not None:
+            return staying
+        for departure in self.departures:
+            if all(signs[name] == value for name, value in departure.where.items()):
+                return self._domain_with({**signs, **departure.leaves})
+        return None
+
+    def domain_at(self, signs: Mapping[str, int]) -> str | None:
+        """Return the domain that a state with these signs is in, or leaves to from rest."""
+        if any(signs[s.name] == 0 for s in self.surfaces if s.switching):
+            return self._resolve_at_rest(signs)
+        return self._domain_with(signs)
+
+    def _domain_with(self, signs: Mapping[str, int]) -> str | None:
+        for domain in self.domains:
+            if all(domain.signs[name] == value for name, value in signs.items()):
+                return domain.name
+        return None
+
+    @cached_property
+    def mirror_domain(self) -> dict[str, str]:
+        """Image of each domain under the symmetry; empty if the model has none."""
+        if self.symmetry is None:
+            return {}
+        image: dict[str, str] = {}
+        for domain in self.domains:
+            signs = {self.symmetry.surfaces[s]: -v for s, v in domain.signs.items()}
+            target = self._domain_with(signs)
+            if target is None:
+                raise ParameterError(f"model {self.name}: domain {domain.name} has no mirror image")
+            image[domain.name] = target
+        return image
+
+    def index_of(self, name: str) -> int:
+        """Return the position of a parameter in the engine's vectors.
+
+        Raises
+        ------
+        ParameterError
+            If the model has no such parameter.
+        """
+        names = self.parameter_names
+        if name not in names:
+            raise ParameterError(
+                f"model '{self.name}' has no parameter '{name}'{did_you_mean(name, names)}"
+            )
+        return names.index(name)
+
+    def check_params(self, params: Mapping[str, Any]) -> dict[str, float]:
+        """Return all parameters as floats, defaults filled in.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name, a value that is no finite number, or a violated constraint.
+        """
+        values = self.defaults
+        for name, value in params.items():
+            self.index_of(name)
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+                raise ParameterError(
+                    f"parameter '{name}' must be a number, got {value!r} ({type(value).__name__})"
+                )
+            if not math.isfinite(value):
+                raise ParameterError(f"parameter '{name}' must be finite, got {value!r}")
+            values[name] = float(value)
+        for constraint in self.constraints:
+            left = constraint.value(values)
+            if left < 0 or (constraint.strict and left == 0):
+                shown = ", ".join(f"{n} = {values[n]!r}" for n in constraint.coefficients)
+                raise ParameterError(
+                    f"model '{self.name}' needs {constraint.text}, got {shown}. {constraint.meaning}"
+                )
+        return values
+
+    def vector(self, params: Mapping[str, float]) -> FloatArray:
+        """Return the checked parameters as the engine's vector, shape (parameters,)."""
+        values = self.check_params(params)
+        return np.array([values[name] for name in self.parameter_names], dtype=np.float64)
+
+    def mapping(self, vector: FloatArray) -> dict[str, float]:
+        """Return the engine's vector as a mapping name -> float."""
+        return {name: float(v) for name, v in zip(self.parameter_names, vector, strict=True)}
+
+    def limits(self, name: str, params: Mapping[str, float]) -> tuple[float, float, str, str]:
+        """Return the interval that the constraints leave to one parameter, others fixed.
+
+        Returns
+        -------
+        tuple
+            (lower, upper, reason of the lower end, reason of the upper end).
+        """
+        low, high, why_low, why_high = -math.inf, math.inf, "", ""
+        for constraint in self.constraints:
+            c = constraint.coefficients.get(name, 0.0)
+            if c == 0.0:
+                continue
+            bound = -(constraint.value(params) - c * params[name]) / c
+            if c > 0 and bound >= low:
+                low, why_low = bound, constraint.text
+            elif c < 0 and bound <= high:
+                high, why_high = bound, constraint.text
+        return low, high, why_low, why_high

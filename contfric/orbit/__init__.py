@@ -1,0 +1,1 @@
+"""One periodic orbit: boundary-value problem, Newton, multipliers, admissibility, simulation."""

@@ -1,0 +1,168 @@
+"""From a simulation to a periodic orbit: read off the signature, detect the period, polish."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from contfric.errors import AperiodicError, ConvergenceError
+from contfric.models import load_model
+from contfric.models.definition import Model
+from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
+from contfric.orbit.solve import settle
+from contfric.orbit.system import build_system
+
+#: Longest period that is looked for, in periods of the excitation.
+MOST_PERIODS = 64
+#: A return nearer than this (nondimensional) is worth a Newton solve.
+_NEAR = 1e-2
+#: A return nearer than this is periodic to the resolution of a simulation.
+_EXACT = 1e-10
+#: Periods to follow before the first look, and how much longer before each next one.
+_FIRST, _LONGER = 200, 4
+#: A settled orbit attracts; beyond rounding its multipliers cannot exceed 1.
+_ATTRACTS = 1.0 + 1e-6
+
+
+def find_orbit(
+    model: str | Model,
+    params: Mapping[str, float] | None = None,
+    periods: int | None = None,
+    *,
+    state: ArrayLike | None = None,
+    time: float = 0.0,
+    longest: int = 50_000,
+) -> Orbit:
+    """Simulate until the motion repeats itself, read off its signature and solve for it.
+
+    Parameters
+    ----------
+    periods : int, optional
+        Period wanted, in periods of the excitation; by default any from 1 to 64.
+    state, time : initial condition; by default displaced from rest
+    longest : int
+        Periods to simulate before the motion is called aperiodic.
+
+    Raises
+    ------
+    AperiodicError
+        If no period up to 64 is found; ``result`` is the trajectory's last part.
+    ConvergenceError
+        If the mass stays stuck, or the period found is not the one wanted.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}).name
+    '1a'
+    """
+    model = load_model(model)
+    span, done = _FIRST, 0
+    y: ArrayLike | None = state
+    while True:
+        trajectory = simulate(
+            model, dict(params or {}), state=y, time=time, periods=span, events=10_000_000
+        )
+        _check_motion(trajectory)
+        orbit = _read_off(trajectory)
+        done += span
+        if orbit is not None:
+            return _wanted(orbit, periods)
+        if done >= longest:
+            raise AperiodicError(_advice(trajectory, done), trajectory)
+        span = min(span * _LONGER, longest - done)
+        _, time, y, _ = trajectory.last
+
+
+def _wanted(orbit: Orbit, periods: int | None) -> Orbit:
+    if periods is not None and orbit.periods != periods:
+        raise ConvergenceError(
+            f"the motion settles on an orbit of {orbit.periods} period(s), not {periods}: "
+            f"ask for periods={orbit.periods}, or start elsewhere (state=...)",
+            orbit,
+        )
+    return orbit
+
+
+def _check_motion(trajectory: Trajectory) -> None:
+    if trajectory.end in (SimulationEnd.HELD, SimulationEnd.INFINITE, SimulationEnd.IMPOSSIBLE):
+        raise ConvergenceError(
+            f"no periodic orbit: {trajectory.end.value}. Choose other parameters or another start",
+            trajectory,
+        )
+
+
+def _advice(trajectory: Trajectory, done: int) -> str:
+    where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
+    return (
+        f"the motion at {where} is aperiodic: no period from 1 to {MOST_PERIODS} was found in {done} "
+        "periods. Try another parameter value, another start (state=...), a longer simulation "
+        "(longest=...), or start from a signature (start: {signature: NAME} in a study)"
+    )
+
+
+def _read_off(trajectory: Trajectory) -> Orbit | None:
+    """Return the orbit that the end of a trajectory has settled on, if it has."""
+    for lag, turns, mismatch in recurrences(trajectory):
+        orbit = _orbit_of_lag(trajectory, lag, turns)
+        if orbit is None:
+            continue
+        solved = settle(orbit)
+        if solved.converged and solved.admissible and _attracts(solved, mismatch):
+            return solved
+        if mismatch < _EXACT and solved.status is not Status.CONVERGED:
+            # the simulation repeats itself but the system is singular: one orbit of a continuum
+            return Orbit(
+                orbit.system, orbit.joints, orbit.vector, mismatch, Status.CONVERGED
+            )
+    return None
+
+
+def _attracts(orbit: Orbit, mismatch: float) -> bool:
+    return mismatch < _EXACT or bool(np.all(np.abs(orbit.multipliers) <= _ATTRACTS))
+
+
+def recurrences(trajectory: Trajectory) -> Iterator[tuple[int, int, float]]:
+    """Yield (events, periods, mismatch) of near returns of the last event, shortest first."""
+    model = trajectory.model
+    count = len(trajectory)
+    if count < 2:
+        return
+    vector = model.vector(trajectory.params)
+    period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0)))
+    joints = np.column_stack([trajectory.modes, trajectory.exits])
+    for lag in range(1, count // 2):
+        turns = int(trajectory.cycles[-1] - trajectory.cycles[-1 - lag])
+        slip = float(trajectory.times[-1] - trajectory.times[-1 - lag])
+        if period > 0.0:
+            extra = round(slip / period)
+            turns, slip = turns + extra, slip - extra * period
+        if turns > MOST_PERIODS:
+            return
+        gap = float(np.max(np.abs(trajectory.states[-1] - trajectory.states[-1 - lag])))
+        mismatch = gap + abs(slip)
+        if turns < 1 or mismatch > _NEAR:
+            continue
+        if np.array_equal(joints[-lag:], joints[-2 * lag : -lag]):
+            yield lag, turns, mismatch
+
+
+def _orbit_of_lag(trajectory: Trajectory, lag: int, turns: int) -> Orbit | None:
+    """Return the last ``lag`` events as an unsolved orbit."""
+    model = trajectory.model
+    vector = model.vector(trajectory.params)
+    period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0)))
+    first = len(trajectory) - 1 - lag
+    cycles = trajectory.cycles[first:-1] - trajectory.cycles[first]
+    joints = np.column_stack(
+        [trajectory.times[first:-1] + cycles * period, trajectory.states[first:-1]]
+    )
+    word = trajectory.word[first + 1 :]
+    try:
+        system = build_system(model, word, turns)
+    except ValueError:
+        return None
+    return Orbit(system, joints, vector, np.inf, Status.NOT_CONVERGED)

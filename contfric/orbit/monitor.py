@@ -1,0 +1,251 @@
+"""What is watched on a solved orbit: margins, labels and multipliers, compiled.
+
+Admissibility cannot miss a violation: between its stationary points an observable is monotone, so
+the smallest distance to a bounding surface inside a segment is attained at a stationary point (or at
+the joints, which the exit and joint margins watch). The flow delivers *all* stationary points.
+
+The multipliers are the eigenvalues of the linear map M of one turn on ``z_0 = (t_0, y_0)``. It has
+one eigenvalue 0 for the direction off the section, and one more for each direction that a stick
+takes away; with ``rank <= 2`` directions left the others follow from ``e1 = tr M`` and
+``e2 = (tr(M)^2 - tr(M^2)) / 2`` (the sum of the principal minors), whatever the size of M.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import types
+
+from contfric.compiled import helper, indices, kernel, matrix, vector
+from contfric.orbit.cyclic import turn_map
+from contfric.orbit.newton import (
+    CHECKS,
+    MULTIPLIERS,
+    FunctionsType,
+    LayoutType,
+    last_joint,
+    tangent_at,
+)
+
+#: Most interior stationary points of one observable in one segment; beyond it the orbit is reported
+#: as not finite. A stick of 30 excitation periods has 180 of them with a third harmonic.
+_MOST_TURNINGS = 256
+
+
+@helper
+def interior_margin(functions, mode, surface, c, sign, start, duration, p, times):  # type: ignore[no-untyped-def]
+    """Return the smallest signed distance to a surface at the stationary points; inf without any."""
+    none = np.empty(0, dtype=np.int64)
+    empty = np.empty(0)
+    if duration <= 0.0:
+        return duration
+    found = functions[3](mode, c, start[0], start[1:], duration, p, times)
+    if found < 0:
+        return np.nan
+    least = np.inf
+    target = functions[2](surface, p, none, empty)
+    y = np.empty(start.shape[0] - 1)
+    nothing = np.empty((0, 0))
+    for k in range(found):
+        functions[0](mode, start[0], start[1:], times[k], p, none, y, nothing)
+        value = functions[1](c, start[0] + times[k], y, p, none, empty)
+        least = min(least, sign * (value - target))
+    return least
+
+
+@helper
+def exit_rate(functions, mode, c, after, p):  # type: ignore[no-untyped-def]
+    """Return the rate of observable c along a mode at a state."""
+    none = np.empty(0, dtype=np.int64)
+    n = after.shape[0] - 1
+    grad = np.empty(1 + n)
+    y = np.empty(n)
+    jac = np.empty((n, 2 + n))
+    functions[0](mode, after[0], after[1:], 0.0, p, none, y, jac)
+    functions[1](c, after[0], after[1:], p, none, grad)
+    rate = grad[0]
+    for j in range(n):
+        rate += grad[1 + j] * jac[j, 1 + n]
+    return rate
+
+
+@helper
+def margins(functions, layout, z, p, last, out):  # type: ignore[no-untyped-def]
+    """Fill the margins in the order interior, exit, joint."""
+    none = np.empty(0, dtype=np.int64)
+    empty = np.empty(0)
+    times = np.empty(_MOST_TURNINGS)
+    count = z.shape[0]
+    at = 0
+    for k in range(layout.interior.shape[0]):
+        i, surface, sign = layout.interior[k]
+        after = z[i + 1] if i + 1 < count else last
+        out[at] = interior_margin(
+            functions,
+            layout.modes[i],
+            surface,
+            layout.observables[surface],
+            float(sign),
+            z[i],
+            after[0] - z[i, 0],
+            p,
+            times,
+        )
+        at += 1
+    for i in range(count):
+        after = z[i + 1] if i + 1 < count else last
+        c = layout.observables[layout.exits[i]]
+        out[at] = layout.exit_signs[i] * exit_rate(functions, layout.modes[i], c, after, p)
+        at += 1
+    for k in range(layout.joint.shape[0]):
+        i, surface, sign = layout.joint[k]
+        after = z[i + 1] if i + 1 < count else last
+        value = functions[1](layout.observables[surface], after[0], after[1:], p, none, empty)
+        out[at] = sign * (value - functions[2](surface, p, none, empty))
+        at += 1
+
+
+@helper
+def crossings(functions, layout, k, z, p, last, times):  # type: ignore[no-untyped-def]
+    """Return the surfaces that segment of row k crosses, as digits of one integer, latest first."""
+    none = np.empty(0, dtype=np.int64)
+    empty = np.empty(0)
+    nothing = np.empty((0, 0))
+    i, c, on = layout.labels[k]
+    count = z.shape[0]
+    after = z[i + 1] if i + 1 < count else last
+    surfaces = layout.observables.shape[0]
+    if after[0] <= z[i, 0]:
+        return 0
+    found = functions[3](layout.modes[i], c, z[i, 0], z[i, 1:], after[0] - z[i, 0], p, times)
+    if found < 0:
+        return -1
+    y = np.empty(z.shape[1] - 1)
+    if on >= 0:
+        value = functions[2](on, p, none, empty)
+    else:
+        value = functions[1](c, z[i, 0], z[i, 1:], p, none, empty)
+    code = 0
+    for piece in range(found + 1):
+        if piece < found:
+            functions[0](layout.modes[i], z[i, 0], z[i, 1:], times[piece], p, none, y, nothing)
+            following = functions[1](c, z[i, 0] + times[piece], y, p, none, empty)
+        else:
+            following = functions[1](c, after[0], after[1:], p, none, empty)
+        low, high = min(value, following), max(value, following)
+        first = surfaces - 1 if following > value else 0  # surfaces are listed from the top down
+        for j in range(surfaces):
+            surface = first - j if following > value else j
+            if layout.observables[surface] == c:
+                target = functions[2](surface, p, none, empty)
+                if low < target < high:
+                    code = code * (surfaces + 1) + surface + 1
+        value = following
+    return code
+
+
+@helper
+def spectrum(m, rank, out):  # type: ignore[no-untyped-def]
+    """Write the n eigenvalues of one turn, largest first; return (chi(1), chi(-1)).
+
+    ``chi(s)`` is the product of ``1 - s mu`` over the multipliers mu.
+    """
+    size = m.shape[0]
+    out[:] = 0.0
+    e1 = 0.0
+    for i in range(size):
+        e1 += m[i, i]
+    if rank == 1:
+        out[0] = e1
+        return 1.0 - e1, 1.0 + e1
+    if rank == 2:
+        e2 = 0.0
+        for i in range(size):
+            for j in range(i):
+                e2 += m[i, i] * m[j, j] - m[i, j] * m[j, i]
+        half = 0.5 * e1
+        disc = half * half - e2
+        if disc >= 0.0:
+            big = half + math.copysign(math.sqrt(disc), half)
+            out[0] = big
+            out[1] = e2 / big if big != 0.0 else 0.0
+        else:
+            out[0] = complex(half, math.sqrt(-disc))
+            out[1] = complex(half, -math.sqrt(-disc))
+        return 1.0 - e1 + e2, 1.0 + e1 + e2
+    values = np.linalg.eigvals(m.astype(np.complex128))
+    order = np.argsort(-np.abs(values))
+    one, minus = complex(1.0, 0.0), complex(1.0, 0.0)
+    for k in range(rank):
+        out[k] = values[order[k]]
+        one *= 1.0 - out[k]
+        minus *= 1.0 + out[k]
+    return one.real, minus.real
+
+
+@helper
+def multipliers(layout, pencil, out):  # type: ignore[no-untyped-def]
+    """Write the multipliers of one turn from its pencil; return (chi(1), chi(-1))."""
+    m = pencil.shape[1]
+    n = m - 1
+    close = np.zeros((m, m))
+    close[0, 0] = 1.0
+    close[1:, 1:] = layout.closure
+    turn = np.empty((m, m))
+    if not turn_map(pencil[0], pencil[1], close, turn):
+        out[:] = np.inf
+        return np.nan, np.nan
+    return spectrum(turn, min(layout.rank, n), out)
+
+
+@helper
+def watch(functions, layout, z, p, out, labels):  # type: ignore[no-untyped-def]
+    """Fill margins and labels of an orbit; False if something is not finite."""
+    close = np.empty((z.shape[1], z.shape[1]))
+    close_w = np.empty((z.shape[1], 0))
+    none = np.empty(0, dtype=np.int64)
+    last = np.empty(z.shape[1])
+    times = np.empty(_MOST_TURNINGS)
+    last_joint(functions, layout, z, p, none, last, close, close_w)
+    margins(functions, layout, z, p, last, out)
+    for k in range(layout.labels.shape[0]):
+        labels[k] = crossings(functions, layout, k, z, p, last, times)
+    for k in range(layout.interior.shape[0] + z.shape[0] + layout.joint.shape[0]):
+        if np.isnan(out[k]):
+            return False
+    return True
+
+
+@kernel(
+    types.boolean(
+        FunctionsType,
+        LayoutType,
+        matrix,
+        vector,
+        types.boolean,
+        vector,
+        indices,
+        types.complex128[::1],
+        vector,
+        indices,
+    )
+)
+def examine(  # type: ignore[no-untyped-def]
+    functions, layout, z, p, stability, out, labels, mu, chi, counts
+):
+    """Fill margins and labels or (``stability``) multipliers of one turn and (chi(1), chi(-1))."""
+    if not stability:
+        counts[CHECKS] += 1
+        return watch(functions, layout, z, p, out, labels)
+    counts[MULTIPLIERS] += 1
+    count, m = z.shape
+    which = np.zeros(1, dtype=np.int64)
+    d = np.zeros((1, count, m))
+    e = np.ones((1, 1))
+    tz, tw = np.empty((count, m)), np.empty(1)
+    pencil = np.empty((2, m, m))
+    # where the system is singular at fixed parameters (a multiplier is 1) the pencil is still good
+    tangent_at(functions, layout, z.copy(), p.copy(), which, d, e, tz, tw, pencil, False)
+    chi[0], chi[1] = multipliers(layout, pencil, mu)
+    return True

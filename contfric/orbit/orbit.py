@@ -1,0 +1,391 @@
+"""A periodic orbit: its joints, and what follows from them when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.counts import TALLY
+from contfric.orbit.simulation import signs_at
+from contfric.orbit.system import Margin, System, Word, build_system
+from contfric.orbit.words import half_of, mirror_pairs, passed_domains, whole_of
+from contfric.signature import Signature, reduce_signature
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+ComplexArray = NDArray[np.complex128]
+#: Relative to the orbit's size: an orbit nearer than this to its mirror image is symmetric. Between
+#: rounding (1e-15) and what a branch point still resolves (the square root of it).
+SYMMETRY_TOLERANCE = 1e-9
+#: A multiplier this near to 1 makes the orbit one of a continuum to working precision.
+DEGENERATE = 1e-9
+
+
+class Status(str, Enum):
+    """Outcome of a Newton solve; the text is the advice."""
+
+    CONVERGED = "converged"
+    NOT_CONVERGED = "Newton did not converge: start nearer, from a simulation or a continuation"
+    SINGULAR = "the system is singular: a fold, or an orbit that belongs to a continuum"
+    NOT_FINITE = "an iterate left the region where the flow is finite: start nearer"
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A periodic orbit of a piecewise-smooth model.
+
+    Attributes
+    ----------
+    system : System
+        The boundary-value problem that it solves.
+    joints : ndarray, shape (N, 1 + n)
+        Start time and state of each segment of one turn (half of a symmetric orbit).
+    vector : ndarray, shape (parameters,)
+        Parameters in the order of the model.
+    residual : float
+        Largest residual of the equations, relative to 1 + the size of the unknown.
+    status : Status
+        Whether the orbit is solved; an orbit that is not carries the last iterate.
+    """
+
+    system: System
+    joints: FloatArray
+    vector: FloatArray
+    residual: float
+    status: Status = Status.CONVERGED
+
+    @property
+    def model(self) -> Model:
+        """The model that moves."""
+        return self.system.model
+
+    @property
+    def params(self) -> dict[str, float]:
+        """All parameters by name."""
+        return self.model.mapping(self.vector)
+
+    @property
+    def periods(self) -> int:
+        """Number of excitation periods of the orbit."""
+        return self.system.periods
+
+    @property
+    def converged(self) -> bool:
+        """Whether Newton converged."""
+        return self.status is Status.CONVERGED
+
+    @cached_property
+    def turn(self) -> float:
+        """Duration of one turn (half the orbit if it is solved on its half)."""
+        none = np.empty(0, dtype=np.int64)
+        period = self.model.flow.period(self.vector, none, np.empty(0))
+        return float(self.system.layout.turn * period)
+
+    @property
+    def period(self) -> float:
+        """Duration of the orbit, nondimensional."""
+        return self.turn * (2.0 if self.system.half else 1.0)
+
+    # ------------------------------------------------------------------ the whole cycle
+
+    @property
+    def word(self) -> Word:
+        """Mode and exit surface of each segment of the whole orbit."""
+        return whole_of(self.model, self.system.word, self.system.half)
+
+    @cached_property
+    def cycle(self) -> FloatArray:
+        """Joints of the whole orbit, shape (segments, 1 + n)."""
+        if not self.system.half:
+            return self.joints
+        other = self.joints.copy()
+        other[:, 0] += self.turn
+        other[:, 1:] = self.joints[:, 1:] @ self.system.layout.closure.T
+        return np.vstack([self.joints, other])
+
+    @cached_property
+    def ends(self) -> FloatArray:
+        """End time and state of each segment of the whole orbit, shape (segments, 1 + n)."""
+        ends = np.roll(self.cycle, -1, axis=0)
+        ends[-1, 0] += self.period
+        return ends
+
+    def as_whole(self) -> Orbit:
+        """Return the same orbit as a problem on its whole cycle."""
+        if not self.system.half:
+            return self
+        system = build_system(self.model, self.word, self.periods)
+        return replace(self, system=system, joints=self.cycle)
+
+    def as_half(self) -> Orbit:
+        """Return a symmetric orbit as a problem on its half; any other orbit as it is."""
+        half = None if self.system.half else half_of(self.model, self.system.word, self.periods)
+        if half is None or not self.symmetric:
+            return self
+        system = build_system(self.model, half, self.periods, half=True)
+        return replace(self, system=system, joints=self.joints[: len(half)])
+
+    def doubled(self) -> Orbit:
+        """Return the orbit run through twice, as one of twice the period."""
+        whole = self.as_whole()
+        second = whole.joints.copy()
+        second[:, 0] += whole.period
+        system = build_system(self.model, whole.word * 2, self.periods * 2)
+        return replace(whole, system=system, joints=np.vstack([whole.joints, second]))
+
+    def mirror(self) -> Orbit:
+        """Return the mirror image under the model's symmetry (an orbit of the same parameters)."""
+        symmetry = self.model.symmetry
+        if symmetry is None:
+            raise ValueError(f"model '{self.model.name}' has no symmetry")
+        joints = self.joints.copy()
+        joints[:, 0] += symmetry.fraction * self.period / self.periods
+        joints[:, 1:] = self.joints[:, 1:] @ symmetry.array().T
+        word = mirror_pairs(self.model, self.system.word)
+        system = build_system(self.model, word, self.periods, self.system.half)
+        return replace(self, system=system, joints=joints)
+
+    @cached_property
+    def symmetric(self) -> bool:
+        """Whether the orbit is its own mirror image."""
+        if self.system.half:
+            return True
+        if half_of(self.model, self.system.word, self.periods) is None:
+            return False
+        assert self.model.symmetry is not None
+        n = len(self.joints) // 2
+        image = self.joints[:n].copy()
+        image[:, 0] += 0.5 * self.period
+        image[:, 1:] = image[:, 1:] @ self.model.symmetry.array().T
+        size = 1.0 + float(np.max(np.abs(self.joints)))
+        return float(np.max(np.abs(image - self.joints[n:]))) < SYMMETRY_TOLERANCE * size
+
+    # ------------------------------------------------------------------ what is watched
+
+    @cached_property
+    def _watched(self) -> tuple[FloatArray, NDArray[np.int64], bool]:
+        from contfric.orbit.monitor import examine
+
+        layout = self.system.layout
+        margins = np.empty(len(self.system.tests))
+        labels = np.zeros(len(layout.labels), dtype=np.int64)
+        mu, chi = np.empty(len(self.model.states), dtype=np.complex128), np.empty(2)
+        fine = examine(
+            self.system.functions(),
+            layout,
+            self.joints,
+            self.vector,
+            False,
+            margins,
+            labels,
+            mu,
+            chi,
+            TALLY,
+        )
+        return margins, labels, bool(fine)
+
+    @cached_property
+    def turn_multipliers(self) -> ComplexArray:
+        """Multipliers of one turn, largest first, shape (n,)."""
+        from contfric.orbit.monitor import examine
+
+        mu, chi = np.empty(len(self.model.states), dtype=np.complex128), np.empty(2)
+        unused = np.empty(0)
+        examine(
+            self.system.functions(),
+            self.system.layout,
+            self.joints,
+            self.vector,
+            True,
+            unused,
+            np.empty(0, dtype=np.int64),
+            mu,
+            chi,
+            TALLY,
+        )
+        return mu
+
+    @property
+    def multipliers(self) -> ComplexArray:
+        """Floquet multipliers of the whole orbit, largest first, shape (n,)."""
+        mu = self.turn_multipliers
+        return mu**2 if self.system.half else mu
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers lie inside the unit circle."""
+        return bool(np.all(np.abs(self.turn_multipliers) < 1.0))
+
+    @property
+    def degenerate(self) -> bool:
+        """Whether a multiplier is 1 to working precision: the orbit may belong to a continuum."""
+        return bool(np.any(np.abs(self.multipliers - 1.0) < DEGENERATE))
+
+    @property
+    def margins(self) -> FloatArray:
+        """Margins of the inequalities, in the order of ``system.tests``; positive if obeyed."""
+        return self._watched[0]
+
+    @property
+    def admissible(self) -> bool:
+        """Whether the orbit obeys every inequality inside every segment."""
+        margins, _, fine = self._watched
+        return self.converged and fine and bool(np.all(margins > self._slack))
+
+    @property
+    def _slack(self) -> FloatArray:
+        """A joint may touch a surface (at an event) to rounding; nothing else may."""
+        joint = np.array([t.margin is Margin.JOINT for t in self.system.tests])
+        return np.where(joint, -1e-9, 0.0)
+
+    def violations(self) -> list[str]:
+        """Return what makes the orbit not admissible, one line each."""
+        return [
+            f"segment {test.segment + 1} ({self.system.word[test.segment][0]}): "
+            f"{test.margin.value} margin at {test.surface} is {margin:.3g}"
+            for test, margin, slack in zip(
+                self.system.tests, self.margins, self._slack, strict=True
+            )
+            if not margin > slack
+        ]
+
+    # ------------------------------------------------------------------ what is seen
+
+    @cached_property
+    def signature(self) -> Signature:
+        """The signature, with all seven domains, read off the solved segments."""
+        _, labels, _ = self._watched
+        model, system = self.model, self.system
+        surfaces = [s.name for s in model.surfaces]
+        ends = np.vstack([self.joints[1:], self.cycle[len(self.joints) % len(self.cycle)]])
+        if not system.half:
+            ends[-1, 0] += self.period
+        after = [mode for mode, _ in system.word[1:]] + [self.word[len(system.word) % len(self.word)][0]]
+        domains: list[str] = []
+        for i, (mode, exit_) in enumerate(system.word):
+            signs = signs_at(model, float(ends[i, 0]), ends[i, 1:].copy(), self.vector)
+            crossed: list[str] = []
+            for row, code in zip(system.layout.labels, labels, strict=True):
+                if row[0] == i:
+                    crossed += decode(int(code), surfaces)
+            domains += passed_domains(model, mode, signs, exit_, after[i], crossed)
+        if system.half:
+            domains += [model.mirror_domain[d] for d in domains]
+        plain = Signature(model, tuple(domains), self.periods, symmetric=self.symmetric)
+        return replace(plain, name=plain.auto_name(self.symmetric))
+
+    @property
+    def name(self) -> str:
+        """Name as in the reference: number of sticks, s or a, and segments if not 6."""
+        return self.signature.auto_name(self.symmetric)
+
+    @cached_property
+    def stops(self) -> FloatArray:
+        """Displacements at the stops in the order of the orbit, shape (stops,)."""
+        at = [i for i, (_, exit_) in enumerate(self.word) if exit_ == self.model.stop_surface]
+        return self.ends[at, 1]
+
+    @property
+    def x_max(self) -> float:
+        """Largest displacement, x k / F_0."""
+        return float(self.stops.max())
+
+    @property
+    def x_min(self) -> float:
+        """Smallest displacement, x k / F_0."""
+        return float(self.stops.min())
+
+    @property
+    def asymmetry(self) -> float:
+        """``|max x + min x| / |max x - min x|`` (eq. (4) of the reference)."""
+        return abs(self.x_max + self.x_min) / abs(self.x_max - self.x_min)
+
+    def state(self, time: float) -> FloatArray:
+        """Return the state at a time, shape (n,); any time, by periodicity."""
+        start = float(self.cycle[0, 0])
+        time = start + (time - start) % self.period
+        i = int(np.searchsorted(self.cycle[:, 0], time, side="right")) - 1
+        return self._within(i, time - float(self.cycle[i, 0]))
+
+    def _within(self, i: int, duration: float) -> FloatArray:
+        modes = [m.name for m in self.model.modes]
+        out = np.empty(len(self.model.states))
+        self.model.flow.flow(
+            modes.index(self.word[i][0]),
+            float(self.cycle[i, 0]),
+            self.cycle[i, 1:].copy(),
+            duration,
+            self.vector,
+            np.empty(0, dtype=np.int64),
+            out,
+            np.empty((0, 0)),
+        )
+        return out
+
+    def trajectory(self, points: int = 400) -> tuple[FloatArray, FloatArray, list[str]]:
+        """Return times (k,), states (k, n) and domains (k) along one period, joints included."""
+        times: list[float] = []
+        states: list[FloatArray] = []
+        names: list[str] = []
+        for i, (start, end) in enumerate(zip(self.cycle[:, 0], self.ends[:, 0], strict=True)):
+            count = max(3, int(np.ceil(points * (end - start) / self.period)))
+            for duration in np.linspace(0.0, end - start, count):
+                times.append(float(start + duration))
+                states.append(self._within(i, float(duration)))
+                names.append(self._domain_in(i, times[-1], states[-1]))
+        return np.array(times), np.array(states), names
+
+    def _domain_in(self, i: int, time: float, state: FloatArray) -> str:
+        signs = signs_at(self.model, time, state, self.vector)
+        mode = self.word[i][0]
+        own = [d for d in self.model.domains if d.mode == mode]
+        fitting = [d for d in own if all(d.signs[s] * signs[s] >= 0 for s in signs)]
+        return (fitting or own)[0].name
+
+    def to_dataframe(self, points: int = 400) -> pd.DataFrame:
+        """Return one period as a table: t, the states, the domain (needs pandas)."""
+        import pandas as pd
+
+        times, states, names = self.trajectory(points)
+        columns: dict[str, Any] = {"t": times}
+        columns |= {name: states[:, k] for k, name in enumerate(self.model.states)}
+        return pd.DataFrame({**columns, "domain": names})
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the orbit in the phase plane, coloured by domain."""
+        from contfric.plot.orbit import plot_orbit
+
+        return plot_orbit(self, ax=ax)
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{k}={v:.6g}" for k, v in self.params.items())
+        return f"<Orbit {self.name}: {values}; {self.status.name.lower()}>"
+
+
+def decode(code: int, surfaces: list[str]) -> list[str]:
+    """Return the surfaces crossed, in order, from the digits of a label."""
+    base = len(surfaces) + 1
+    crossed: list[str] = []
+    while code > 0:
+        code, digit = divmod(code, base)
+        crossed.append(surfaces[digit - 1])
+    return crossed[::-1]
+
+
+def orbit_from_signature(
+    signature: Signature, joints: FloatArray, params: Mapping[str, float], half: bool = False
+) -> Orbit:
+    """Return an unsolved orbit of a signature from the joints of its reduced segments."""
+    word = tuple(piece.pair for piece in reduce_signature(signature))
+    model = signature.model
+    system = build_system(model, word, signature.periods, half)
+    return Orbit(system, joints, model.vector(params), np.inf, Status.NOT_CONVERGED)

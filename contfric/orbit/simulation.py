@@ -1,0 +1,271 @@
+"""Simulation from an initial condition: a trajectory as the list of its events."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from contfric.errors import ParameterError, did_you_mean
+from contfric.models import load_model
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.counts import TALLY
+from contfric.orbit.system import IntArray, mode_bounds
+
+
+class SimulationEnd(str, Enum):
+    """How a simulation ended; the text says what it means."""
+
+    EVENTS = "the number of events asked for was reached"
+    TIME = "the time asked for was reached"
+    HELD = "the mass stays at rest for ever: nothing releases it"
+    IMPOSSIBLE = "the model has no transition for an event that was met"
+    INFINITE = "the motion grew beyond all numbers"
+
+
+@dataclass(frozen=True)
+class Tables:
+    """The model's transitions in the form that the compiled simulation takes."""
+
+    observables: IntArray
+    bounds: IntArray
+    following: IntArray
+    sliding: IntArray
+    lies_on: IntArray
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """The events of a trajectory.
+
+    Attributes
+    ----------
+    modes, exits : mode that ends and surface met at each event, shape (events,)
+    cycles, times : completed periods of the excitation and phase in the period, shape (events,)
+    states : state at each event, shape (events, n)
+    end : how the simulation ended
+    last : (periods completed, phase, state, mode) where it ended
+    """
+
+    model: Model
+    params: dict[str, float]
+    modes: IntArray
+    exits: IntArray
+    cycles: IntArray
+    times: FloatArray
+    states: FloatArray
+    end: SimulationEnd
+    last: tuple[int, float, FloatArray, str]
+
+    def __len__(self) -> int:
+        return len(self.modes)
+
+    @property
+    def word(self) -> tuple[tuple[str, str], ...]:
+        """The (mode, exit surface) pairs of the segments that ended."""
+        modes = [m.name for m in self.model.modes]
+        surfaces = [s.name for s in self.model.surfaces]
+        return tuple((modes[m], surfaces[k]) for m, k in zip(self.modes, self.exits, strict=True))
+
+
+@cache
+def tables(model: Model) -> Tables:
+    """Return the transition tables of a model."""
+    surfaces = [s.name for s in model.surfaces]
+    modes = [m.name for m in model.modes]
+    observables = [o.name for o in model.observables]
+    bounds = np.zeros((len(modes), len(surfaces)), dtype=np.int64)
+    for mode, names in mode_bounds(model).items():
+        for name in names:
+            bounds[modes.index(mode), surfaces.index(name)] = 1
+    codes = 1 << len(surfaces)
+    following = np.full(len(modes) * len(surfaces) * codes, -1, dtype=np.int64)
+    for (name, surface), target in model.transitions.items():
+        domain = model.domain_by_name[name]
+        k = surfaces.index(surface)
+        for code in range(codes):
+            if code >> k & 1 or not _matches(domain.signs, surfaces, k, code):
+                continue
+            row = (modes.index(domain.mode) * len(surfaces) + k) * codes + code
+            following[row] = modes.index(model.domain_by_name[target].mode)
+    return Tables(
+        np.array([observables.index(s.observable) for s in model.surfaces], dtype=np.int64),
+        bounds,
+        following,
+        np.array([int(m.sliding) for m in model.modes], dtype=np.int64),
+        np.array([_surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
+    )
+
+
+def _surfaces_under(model: Model, mode: str) -> int:
+    """Return the surfaces that a mode moves on, as bits."""
+    return sum(
+        1 << k
+        for k, surface in enumerate(model.surfaces)
+        if any(d.mode == mode and d.signs[surface.name] == 0 for d in model.domains)
+    )
+
+
+def _matches(signs: object, surfaces: list[str], skipped: int, code: int) -> bool:
+    assert hasattr(signs, "__getitem__")
+    return all(
+        signs[name] == 0 or (signs[name] > 0) == bool(code >> j & 1)
+        for j, name in enumerate(surfaces)
+        if j != skipped
+    )
+
+
+def signs_at(model: Model, t: float, y: FloatArray, vector: FloatArray) -> dict[str, int]:
+    """Return the sign of (observable - level) for every surface at a state."""
+    flow, none, empty = model.flow, np.empty(0, dtype=np.int64), np.empty(0)
+    names = [o.name for o in model.observables]
+    signs = {}
+    for k, surface in enumerate(model.surfaces):
+        value = flow.observe(names.index(surface.observable), t, y, vector, none, empty)
+        signs[surface.name] = int(np.sign(value - flow.level(k, vector, none, empty)))
+    return signs
+
+
+def start_of(
+    model: Model, t: float, y: FloatArray, vector: FloatArray, domain: str | None
+) -> tuple[int, int]:
+    """Return (mode, surfaces that the start lies on and leaves, as bits) of an initial state."""
+    signs = signs_at(model, t, y, vector)
+    name = domain or model.domain_at(signs)
+    if name is None or name not in model.domain_by_name:
+        if domain is not None:
+            raise ParameterError(
+                f"unknown domain '{domain}'{did_you_mean(domain, model.domain_by_name)}"
+            )
+        raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
+    mode = model.domain_by_name[name].mode
+    surfaces = [s.name for s in model.surfaces]
+    on = sum(1 << surfaces.index(k) for k in mode_bounds(model)[mode] if signs[k] == 0)
+    return [m.name for m in model.modes].index(mode), on
+
+
+def simulate(
+    model: str | Model,
+    params: dict[str, float] | None = None,
+    *,
+    state: ArrayLike | None = None,
+    time: float = 0.0,
+    periods: float = 100.0,
+    events: int = 1_000_000,
+    domain: str | None = None,
+) -> Trajectory:
+    """Follow a trajectory, event by event.
+
+    Parameters
+    ----------
+    model, params : the model (or its name) and its parameters; defaults fill in
+    state : initial state, shape (n,); by default the model's rest position shifted by its spread
+    time : initial time, nondimensional
+    periods : time to follow, in periods of the excitation (units of time if there is none)
+    events : most events to follow
+    domain : initial domain, where the state alone does not decide
+
+    Raises
+    ------
+    ParameterError
+        If parameters, state or domain are not valid.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> cf.simulate("coulomb", {"Omega": 0.5}, state=[1.3, 0.0], periods=2).word[0]
+    ('slide-', 'v')
+    """
+    model = load_model(model)
+    vector = model.vector(params or {})
+    y = _checked_state(model, vector, state)
+    if not (np.isfinite(time) and np.isfinite(periods) and periods >= 0):
+        raise ParameterError(f"time and periods must be finite, got {time!r} and {periods!r}")
+    mode, on = start_of(model, time, y, vector, domain)
+    return run(model, vector, mode, on, time, y, periods, events)
+
+
+def run(
+    model: Model,
+    vector: FloatArray,
+    mode: int,
+    on: int,
+    time: float,
+    y: FloatArray,
+    periods: float,
+    events: int,
+) -> Trajectory:
+    """Run the compiled simulation; the state is copied. Rows are grown as they are needed."""
+    from contfric.orbit.trajectory import ALL_EVENTS, simulate as kernel
+
+    model_tables = tables(model)
+    y = y.copy()
+    period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0))) or 1.0
+    pieces: list[tuple[IntArray, IntArray, FloatArray, FloatArray]] = []
+    done, base, left = 0, 0, float(periods)
+    room = int(min(events, max(64.0, 8.0 * periods)))
+    while True:
+        rows = min(room, events - done)
+        joints = np.empty((rows, 2), dtype=np.int64)
+        cycles = np.empty(rows, dtype=np.int64)
+        times, states = np.empty(rows), np.empty((rows, y.shape[0]))
+        end, count, mode, cycle, phase = kernel(
+            model.flow.functions(),
+            model_tables.observables,
+            model_tables.bounds,
+            model_tables.following,
+            model_tables.sliding,
+            model_tables.lies_on,
+            mode,
+            on,
+            time,
+            y,
+            vector,
+            left,
+            joints,
+            cycles,
+            times,
+            states,
+        )
+        TALLY[3] += count
+        pieces.append((joints[:count], cycles[:count] + base, times[:count], states[:count]))
+        done += count
+        if end != ALL_EVENTS or done >= events:
+            break
+        left -= cycle + (phase - time) / period
+        base, time = base + cycle, phase
+        on = (1 << int(joints[-1, 1])) | int(model_tables.lies_on[joints[-1, 0]])
+    all_joints, all_cycles, all_times, all_states = (
+        np.concatenate([piece[k] for piece in pieces]) for k in range(4)
+    )
+    last_mode = model.modes[mode].name if mode >= 0 else ""
+    return Trajectory(
+        model,
+        model.mapping(vector),
+        all_joints[:, 0],
+        all_joints[:, 1],
+        all_cycles,
+        all_times,
+        all_states,
+        list(SimulationEnd)[end],
+        (base + cycle, float(phase), y, last_mode),
+    )
+
+
+def _checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> FloatArray:
+    if state is None:
+        # away from rest, so that symmetric and asymmetric attractors can both be reached
+        half_width: FloatArray = model.spread(model.mapping(vector))
+        y = np.zeros(len(model.states))
+        y[0] = half_width[0]
+        return y
+    y = np.array(state, dtype=np.float64)
+    if y.shape != (len(model.states),) or not np.all(np.isfinite(y)):
+        raise ParameterError(
+            f"a state of '{model.name}' is {len(model.states)} finite numbers "
+            f"({', '.join(model.states)}), got {state!r}"
+        )
+    return y

@@ -1,0 +1,191 @@
+"""Newton at fixed parameters, and orbits of a given signature from many starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from contfric.errors import ConvergenceError
+from contfric.models import load_model
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.counts import TALLY
+from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.simulation import Trajectory, run, start_of
+from contfric.orbit.system import System, Word, build_system
+from contfric.orbit.words import half_of
+from contfric.signature import Signature, reduced_word
+
+#: Starts drawn for one signature: enough for every bundled signature to be found from scratch in
+#: the tests (the rarest needs about 150), at about a tenth of a millisecond each.
+STARTS = 600
+#: Candidates of the smallest mismatch that are handed to Newton.
+CANDIDATES = 40
+
+
+def polish(orbit: Orbit, damped: bool = True) -> Orbit:
+    """Solve the boundary-value problem from an orbit's joints; the status says how it went.
+
+    Parameters
+    ----------
+    damped : bool
+        Whether long corrections are cut: for starts that may be far.
+    """
+    from contfric.orbit.newton import solve
+
+    joints, vector = orbit.joints.copy(), orbit.vector.copy()
+    m = joints.shape[1]
+    status, _, _, residual = solve(
+        orbit.system.functions(),
+        orbit.system.layout,
+        joints,
+        vector,
+        damped,
+        np.empty((2, m, m)),
+        TALLY,
+    )
+    return Orbit(orbit.system, joints, vector, float(residual), list(Status)[int(status)])
+
+
+def solve_orbit(
+    model: str | Model,
+    signature: str | Path | Signature,
+    params: Mapping[str, float],
+    *,
+    seed: int = 0,
+) -> Orbit:
+    """Find an admissible orbit of a signature at given parameters, stable or not.
+
+    Short simulations from many starts are searched for stretches that walk the signature's word;
+    those that nearly close are handed to Newton.
+
+    Parameters
+    ----------
+    signature : str, path or Signature
+        A bundled name (``"2s"``), a YAML file, or an object. If it says ``symmetric``, only orbits
+        that are (or are not) their own mirror image count.
+    seed : int
+        Seed of the starts; the same seed gives the same orbit.
+
+    Raises
+    ------
+    ConvergenceError
+        If no start leads to such an orbit; ``result`` holds the nearest unsolved or inadmissible one.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4}).stable
+    True
+    """
+    model = load_model(model)
+    if not isinstance(signature, Signature):
+        from contfric.signature import load_signature
+
+        signature = load_signature(signature, model)
+    vector = model.vector(params)
+    word = reduced_word(signature)
+    half = half_of(model, word, signature.periods) if signature.symmetric else None
+    if half is not None:
+        system = build_system(model, half, signature.periods, half=True)
+    else:
+        system = build_system(model, word, signature.periods)
+    nearest: Orbit | None = None
+    for orbit in _solved_starts(system, vector, seed):
+        if orbit.converged and orbit.admissible and _is_wanted(orbit, signature):
+            return orbit
+        if nearest is None or (orbit.converged, -orbit.residual) > (
+            nearest.converged,
+            -nearest.residual,
+        ):
+            nearest = orbit
+    raise ConvergenceError(_explain(signature, model.mapping(vector), nearest), nearest)
+
+
+def _is_wanted(orbit: Orbit, signature: Signature) -> bool:
+    return signature.symmetric is None or signature.symmetric == orbit.symmetric
+
+
+def _explain(signature: Signature, params: Mapping[str, float], nearest: Orbit | None) -> str:
+    name = signature.name or str(signature)
+    where = ", ".join(f"{k} = {v:.6g}" for k, v in params.items())
+    text = f"no admissible orbit '{name}' was found at {where}"
+    if nearest is None:
+        text += ": no start walks this signature"
+    elif not nearest.converged:
+        text += f"; the best start ended with residual {nearest.residual:.2g} ({nearest.status.value})"
+    elif not nearest.admissible:
+        text += "; a solution exists that violates: " + "; ".join(nearest.violations()[:3])
+    else:
+        kind = "symmetric" if nearest.symmetric else "asymmetric"
+        text += f"; the orbits found are {kind}"
+    if signature.example:
+        at = ", ".join(f"{k} = {v:g}" for k, v in signature.example.items())
+        text += f". The signature is known to exist at {at}: solve there and continue"
+    return text
+
+
+def _solved_starts(system: System, vector: FloatArray, seed: int) -> Iterator[Orbit]:
+    """Yield Newton's results from the best-closing stretches, nearest first, round by round."""
+    tried: list[FloatArray] = []
+    for batch in range(4):
+        found = sorted(
+            _matching_stretches(system, vector, seed + batch, STARTS // 4), key=lambda pair: pair[0]
+        )
+        for _, joints in found[:CANDIDATES]:
+            if any(np.max(np.abs(joints - other)) < 1e-3 for other in tried):
+                continue
+            tried.append(joints)
+            yield polish(Orbit(system, joints, vector.copy(), np.inf, Status.NOT_CONVERGED))
+
+
+def _matching_stretches(
+    system: System, vector: FloatArray, seed: int, starts: int
+) -> Iterator[tuple[float, FloatArray]]:
+    """Yield (mismatch, joints) of simulated stretches that walk the word of one turn."""
+    model = system.model
+    rng = np.random.default_rng(seed)
+    spread = model.spread(model.mapping(vector))
+    period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0))) or 10.0
+    turn = system.layout.turn
+    for _ in range(starts):
+        y = rng.uniform(-1.0, 1.0, spread.shape) * spread
+        if rng.random() < 0.5:
+            y[1:] = 0.0  # at rest: the start of a stick or of a slide
+        time = rng.uniform(0.0, period)
+        mode, on = start_of(model, time, y, vector, None)
+        trajectory = run(model, vector, mode, on, time, y, 2.0 + 2.0 * turn, 40 * (1 + int(turn)))
+        yield from stretches(trajectory, system, period)
+
+
+def stretches(
+    trajectory: Trajectory, system: System, period: float
+) -> Iterator[tuple[float, FloatArray]]:
+    """Yield (mismatch, joints) for each place where a trajectory walks the system's word."""
+    word, count = trajectory.word, system.segments
+    clock = trajectory.times + trajectory.cycles * period
+    points = np.column_stack([clock, trajectory.states])
+    closure, turn = system.layout.closure, system.layout.turn * period
+    for i in range(1, len(word) - count + 1):
+        if not _same(word[i : i + count], system.word):
+            continue
+        joints = points[i - 1 : i - 1 + count].copy()
+        gap = points[i - 1 + count, 1:] - joints[0, 1:] @ closure.T
+        slip = points[i - 1 + count, 0] - joints[0, 0] - turn
+        joints[:, 0] -= np.floor(joints[0, 0] / period) * period
+        yield float(np.max(np.abs(gap)) + abs(slip)), joints
+
+
+def _same(stretch: Word, word: Word) -> bool:
+    return stretch == word
+
+
+def settle(orbit: Orbit) -> Orbit:
+    """Solve an orbit, on its half if it turns out symmetric."""
+    solved = polish(orbit)
+    if not solved.converged:
+        return solved
+    half = solved.as_half()
+    return solved if half is solved else replace(polish(half))

@@ -1,0 +1,163 @@
+"""Event-exact simulation, compiled: from one event to the next, no time step.
+
+A trajectory is a sequence of segments. In each mode the first root over all surfaces that bound it
+ends the segment (the flow guarantees that none is missed), and the model's transitions say which mode
+follows. Time is kept as (number of periods, phase in the period), so that the phase loses nothing over
+any number of periods.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import types
+
+from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, vector
+from contfric.orbit.newton import FunctionsType
+
+#: How a simulation ended.
+ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE = range(5)
+#: A sliding mode that is not left within this many periods is never left; a slide gets far more.
+_HOLD_PERIODS, _SLIDE_PERIODS = 1.001, 1e4
+
+
+@helper
+def sign_code(functions, observables, surface, t, y, p):  # type: ignore[no-untyped-def]
+    """Return the sides of all surfaces but one, as bits."""
+    none = np.empty(0, dtype=np.int64)
+    empty = np.empty(0)
+    code = 0
+    for k in range(observables.shape[0]):
+        if k == surface:
+            continue
+        value = functions[1](observables[k], t, y, p, none, empty)
+        if value > functions[2](k, p, none, empty):
+            code |= 1 << k
+    return code
+
+
+@helper
+def first_hit(functions, observables, bounds, mode, on, t, y, p, longest):  # type: ignore[no-untyped-def]
+    """Return (time, surface) of the first bounding surface that is met; (-1, -1) if none."""
+    none = np.empty(0, dtype=np.int64)
+    empty = np.empty(0)
+    best, which = longest, -1
+    for k in range(observables.shape[0]):
+        if bounds[mode, k] == 0:
+            continue
+        tau = functions[4](
+            mode, observables[k], functions[2](k, p, none, empty), (on >> k) & 1 == 1, t, y, best, p
+        )
+        if tau >= 0.0 and (which < 0 or tau < best):
+            best, which = tau, k
+    return (best, which) if which >= 0 else (-1.0, -1)
+
+
+@kernel(
+    types.Tuple((i8, i8, i8, i8, f8))(
+        FunctionsType,
+        indices,
+        table,
+        indices,
+        indices,
+        indices,
+        i8,
+        i8,
+        f8,
+        vector,
+        vector,
+        f8,
+        table,
+        indices,
+        vector,
+        matrix,
+    )
+)
+def simulate(  # type: ignore[no-untyped-def]
+    functions,
+    observables,
+    bounds,
+    following,
+    sliding,
+    lies_on,
+    mode,
+    on,
+    t,
+    y,
+    p,
+    periods,
+    joints,
+    cycles,
+    times,
+    states,
+):
+    """Follow a trajectory from ``(t, y)`` in a mode until all rows are full or time is over.
+
+    Parameters
+    ----------
+    observables, bounds, following, sliding, lies_on : the model's tables
+    on : surfaces that the start lies on and leaves, as bits
+    periods : time allowed, in periods of the excitation (in units of time if it has none)
+    joints : rows (mode that ends, surface it exits by) of the events, shape (events, 2)
+    cycles, times, states : periods completed, phase and state at the events
+
+    ``y`` is advanced in place to the state after the last event, or at the end of the time.
+
+    Returns
+    -------
+    tuple
+        (how it ended, events written, mode, periods completed, phase).
+    """
+    none = np.empty(0, dtype=np.int64)
+    empty = np.empty(0)
+    nothing = np.empty((0, 0))
+    period = functions[5](p, none, empty)
+    unit = period if period > 0.0 else 1.0
+    cycle = 0
+    if period > 0.0:
+        cycle = int(math.floor(t / period))
+        t -= cycle * period
+    first_cycle, first_time = cycle, t
+    after = np.empty(y.shape[0])
+    for event in range(joints.shape[0]):
+        left = (periods - (cycle - first_cycle)) * unit - (t - first_time)
+        if period <= 0.0:
+            left = periods - (t - first_time)
+        allowance = (_HOLD_PERIODS if sliding[mode] else _SLIDE_PERIODS) * unit
+        tau, surface = first_hit(
+            functions, observables, bounds, mode, on, t, y, p, min(left, allowance)
+        )
+        if surface < 0:
+            if left > allowance:
+                return HELD, event, mode, cycle, t
+            functions[0](mode, t, y, left, p, none, after, nothing)
+            y[:] = after
+            t += left
+            if period > 0.0:
+                turns = int(math.floor(t / period))
+                cycle += turns
+                t -= turns * period
+            return ALL_TIME, event, mode, cycle, t
+        functions[0](mode, t, y, tau, p, none, after, nothing)
+        y[:] = after
+        t += tau
+        while period > 0.0 and t >= period:
+            t -= period
+            cycle += 1
+        joints[event, 0] = mode
+        joints[event, 1] = surface
+        cycles[event] = cycle
+        times[event] = t
+        states[event] = y
+        for j in range(y.shape[0]):
+            if not math.isfinite(y[j]):
+                return INFINITE, event, mode, cycle, t
+        code = sign_code(functions, observables, surface, t, y, p)
+        row = (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code
+        before = mode
+        mode = following[row]
+        if mode < 0:
+            return IMPOSSIBLE, event + 1, mode, cycle, t
+        on = (1 << surface) | lies_on[before]
+    return ALL_EVENTS, joints.shape[0], mode, cycle, t

@@ -1,0 +1,47 @@
+"""Where the files that ship with contfric are: in a wheel, and in a source checkout."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal, TypeAlias, get_args
+
+from contfric.errors import ContfricError, did_you_mean
+
+#: Kinds of files that ship with contfric.
+Kind: TypeAlias = Literal["signatures", "studies"]
+
+_PACKAGE = Path(__file__).resolve().parent
+_PLACES: dict[str, tuple[Path, Path]] = {
+    "signatures": (_PACKAGE / "_data" / "signatures", _PACKAGE.parent / "signatures"),
+    "studies": (_PACKAGE / "_data" / "studies", _PACKAGE.parent / "docs" / "studies"),
+}
+
+
+def bundled_dir(kind: Kind) -> Path:
+    """Return the folder of the bundled files of one kind.
+
+    Parameters
+    ----------
+    kind : {"signatures", "studies"}
+        Which files.
+
+    Raises
+    ------
+    ContfricError
+        For an unknown kind, or if the installation has no such folder.
+
+    Examples
+    --------
+    >>> (bundled_dir("signatures") / "1a.yaml").is_file()
+    True
+    """
+    if kind not in _PLACES:
+        raise ContfricError(f"no bundled '{kind}'{did_you_mean(str(kind), get_args(Kind))}")
+    # the wheel's copy comes first: the parent of an installed package is site-packages
+    for place in _PLACES[kind]:
+        if place.is_dir():
+            return place
+    tried = " nor ".join(str(place) for place in _PLACES[kind])
+    raise ContfricError(
+        f"the bundled {kind} are missing (neither {tried} exists); reinstall contfric"
+    )

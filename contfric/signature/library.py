@@ -1,0 +1,104 @@
+"""The library of signatures: files that ship with contfric or with installed packages.
+
+A package adds a folder of signature files by the entry point group ``contfric.signatures``; the
+entry is the path of the folder, or a function that returns it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.metadata import entry_points
+from pathlib import Path
+
+from contfric.errors import NotationError, did_you_mean
+from contfric.models import Model
+from contfric.resources import bundled_dir
+from contfric.signature.yaml_lines import read_yaml
+
+ENTRY_POINTS = "contfric.signatures"
+SUFFIXES = (".yaml", ".yml")
+
+
+def signature_names(model: str | Model | None = None) -> list[str]:
+    """Return the names (stems of the files) of the library, sorted.
+
+    Parameters
+    ----------
+    model : str or Model, optional
+        Keep those of this model only.
+
+    Examples
+    --------
+    >>> signature_names("coulomb")[:3]
+    ['0s', '1a', '1a-9seg']
+    """
+    wanted = _model_name(model)
+    kept = (path for path in _files() if wanted in (None, _entry(path, "model")))
+    return sorted({path.stem for path in kept})
+
+
+def signature_path(name: str, model: str | Model | None = None) -> Path:
+    """Return the file of a signature, by its stem (``2a-14seg``) or its name (``2a, 14seg``).
+
+    Parameters
+    ----------
+    model : str or Model, optional
+        Prefer a signature of this model where several have the name.
+
+    Raises
+    ------
+    NotationError
+        If there is no such signature.
+
+    Examples
+    --------
+    >>> signature_path("2a, 14seg").name
+    '2a-14seg.yaml'
+    """
+    wanted = _model_name(model)
+    other_model: Path | None = None
+    unreadable: list[str] = []
+    for path in _files():
+        known = _entry(path, "name")
+        if known is None:
+            unreadable.append(str(path))
+        if name in (path.stem, known):
+            if wanted in (None, _entry(path, "model")):
+                return path
+            other_model = other_model or path
+    if other_model is not None:
+        return other_model
+    broken = f". Unreadable: {', '.join(unreadable)}" if unreadable else ""
+    hint = did_you_mean(name, signature_names())
+    raise NotationError(f"unknown signature '{name}'{hint}{broken}")
+
+
+def _model_name(model: str | Model | None) -> str | None:
+    return model.name if isinstance(model, Model) else model
+
+
+def _entry(path: Path, key: str) -> str | None:
+    """Return one entry of a file, None if there is none: a broken file must not hide the others."""
+    try:
+        value = read_yaml(path).data.get(key)
+    except NotationError:
+        return None
+    return value if isinstance(value, str) else None
+
+
+def _files() -> Iterator[Path]:
+    """Yield all files of the library; bundled ones first, so that a plugin cannot replace one."""
+    for folder in _folders():
+        yield from sorted(path for path in folder.iterdir() if path.suffix in SUFFIXES)
+
+
+def _folders() -> Iterator[Path]:
+    yield bundled_dir("signatures")
+    for entry in entry_points(group=ENTRY_POINTS):
+        loaded = entry.load()
+        folder = loaded() if callable(loaded) else loaded
+        if not isinstance(folder, (str, Path)) or not Path(folder).is_dir():
+            raise NotationError(
+                f"entry point '{entry.name}' of {ENTRY_POINTS} gives no folder: {folder!r}"
+            )
+        yield Path(folder)

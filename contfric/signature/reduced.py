@@ -1,0 +1,150 @@
+"""Reduced words: signatures without the surfaces across which the vector field is the same.
+
+Whether a slide crosses ``F+`` inside is a label and no part of the dynamics. In the reduced word
+consecutive domains of one mode, joined by a transparent surface, are one segment; orbits before
+and after an event T have the same reduced word.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TypeAlias
+
+from contfric.errors import NotationError
+from contfric.models import Model
+from contfric.signature.cyclic import least_rotation, primitive_length, rotated
+from contfric.signature.notation import Signature
+
+#: Stands for the surface at the end of a segment that is the whole orbit and has no end. None of
+#: those that it crosses inside will do: they are labels, and would make the word depend on them.
+NEVER = ""
+
+#: (mode, surface at its end).
+ReducedPair: TypeAlias = tuple[str, str]
+ReducedWord: TypeAlias = tuple[ReducedPair, ...]
+
+
+@dataclass(frozen=True)
+class ReducedSegment:
+    """One smooth piece: its mode, the surface at its end and the domains that it passes."""
+
+    mode: str
+    exit: str
+    domains: tuple[str, ...]
+
+    @property
+    def pair(self) -> ReducedPair:
+        """What the reduced word keeps of it."""
+        return self.mode, self.exit
+
+
+def reduce_signature(signature: Signature) -> tuple[ReducedSegment, ...]:
+    """Return the reduced segments, in an order that does not depend on the signature's rotation.
+
+    The first one makes :func:`reduced_word` least; where the word repeats itself, the domains
+    decide. A walk that never changes its mode is a single segment, and its end is :data:`NEVER`.
+
+    Examples
+    --------
+    >>> from contfric.models import load_model
+    >>> from contfric.signature.notation import parse_signature
+    >>> walk = parse_signature("x0v+ -> stick -> x-v+", load_model("coulomb"))
+    >>> [segment.domains for segment in reduce_signature(walk)]
+    [('x-v+', 'x0v+'), ('stick',)]
+    """
+    pieces = _fused(signature)
+    model = signature.model
+    pieces = rotated(pieces, least_rotation([_key(piece.pair, model) for piece in pieces]))
+    block = primitive_length([piece.pair for piece in pieces])
+    order = {domain.name: i for i, domain in enumerate(model.domains)}
+    path = [tuple(order[name] for name in piece.domains) for piece in pieces]
+    blocks = [tuple(path[i : i + block]) for i in range(0, len(path), block)]
+    return rotated(pieces, block * least_rotation(blocks))
+
+
+def reduced_word(signature: Signature) -> ReducedWord:
+    """Return the (mode, exit) pairs of the reduced segments, in canonical rotation.
+
+    Examples
+    --------
+    >>> from contfric.models import load_model
+    >>> from contfric.signature.notation import parse_signature
+    >>> reduced_word(parse_signature("x0v+ -> stick -> x-v+", load_model("coulomb")))
+    (('slide+', 'v'), ('stick', 'F-'))
+    """
+    return tuple(segment.pair for segment in reduce_signature(signature))
+
+
+def canonical_word(word: ReducedWord, model: Model) -> ReducedWord:
+    """Return the least rotation of a word, by the order of modes and surfaces in the model."""
+    word = tuple(word)
+    return rotated(word, least_rotation([_key(pair, model) for pair in word]))
+
+
+def mirror_pair(pair: ReducedPair, model: Model) -> ReducedPair:
+    """Return the image of one (mode, exit) pair under the symmetry of the model.
+
+    Raises
+    ------
+    NotationError
+        If the model has no symmetry, or the pair is not of this model.
+    """
+    if model.symmetry is None:
+        raise NotationError(f"model '{model.name}' has no symmetry: there is no mirror image")
+    mode, surface = pair
+    surfaces = {NEVER: NEVER, **model.symmetry.surfaces}
+    for domain in model.domains:
+        if domain.mode == mode and surface in surfaces:
+            image = model.domain_by_name[model.mirror_domain[domain.name]]
+            return image.mode, surfaces[surface]
+    raise NotationError(f"model '{model.name}' has no mode '{mode}' with surface '{surface}'")
+
+
+def mirror_word(word: ReducedWord, model: Model) -> ReducedWord:
+    """Return the mirror image of a word in canonical rotation, ready to be compared.
+
+    Examples
+    --------
+    >>> from contfric.models import load_model
+    >>> mirror_word((("slide+", "v"), ("stick", "F-")), load_model("coulomb"))
+    (('slide-', 'v'), ('stick', 'F+'))
+    """
+    return canonical_word(tuple(mirror_pair(pair, model) for pair in word), model)
+
+
+def fuses(model: Model, mode: str, surface: str, next_mode: str) -> bool:
+    """Return whether the field is the same on both sides of a joint."""
+    return mode == next_mode and not model.surface_by_name[surface].switching
+
+
+def _key(pair: ReducedPair, model: Model) -> tuple[int, int]:
+    mode, surface = pair
+    try:
+        return tuple(model.mode_by_name).index(mode), (NEVER, *model.surface_by_name).index(surface)
+    except ValueError:
+        raise NotationError(f"model '{model.name}' has no segment {pair}") from None
+
+
+def _fused(signature: Signature) -> tuple[ReducedSegment, ...]:
+    """Fuse the segments; the first piece starts at the first joint that does not fuse."""
+    model, names, surfaces = signature.model, signature.canonical, _canonical_surfaces(signature)
+    modes = [model.domain_by_name[name].mode for name in names]
+    count = len(names)
+    after = rotated(tuple(modes), 1)
+    ends = [i for i in range(count) if not fuses(model, modes[i], surfaces[i], after[i])]
+    if not ends:
+        return (ReducedSegment(modes[0], NEVER, names),)
+    starts = [ends[-1] - count, *ends]
+    return tuple(
+        # start may be negative: the first piece can begin before the end of the list
+        ReducedSegment(
+            modes[end], surfaces[end], tuple(names[i] for i in range(start + 1, end + 1))
+        )
+        for start, end in pairwise(starts)
+    )
+
+
+def _canonical_surfaces(signature: Signature) -> tuple[str, ...]:
+    canonical = Signature(signature.model, signature.canonical, signature.periods)
+    return canonical.surfaces

@@ -1,0 +1,98 @@
+"""YAML files with the line of every entry, so that an error can say where it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
+
+from contfric.errors import NotationError
+
+if TYPE_CHECKING:
+    import yaml
+
+#: Where an entry is: keys and list indices from the top.
+Address: TypeAlias = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class LocatedYaml:
+    """The content of a YAML file whose top is a mapping, and the line of each entry, from 1."""
+
+    path: Path
+    data: dict[str, Any]
+    lines: dict[Address, int]
+
+    def line(self, address: Address) -> int:
+        """Return the line of an entry, or of the nearest entry around it."""
+        while address and address not in self.lines:
+            address = address[:-1]
+        return self.lines.get(address, 1)
+
+    def fail(self, address: Address, message: str) -> NoReturn:
+        """Raise the error ``file.yaml:LINE: message``."""
+        raise NotationError(f"{self.path}:{self.line(address)}: {message}")
+
+
+def read_yaml(path: Path) -> LocatedYaml:
+    """Read a YAML file.
+
+    Raises
+    ------
+    NotationError
+        If the file cannot be read, is no YAML, is no mapping or has a key twice.
+
+    Examples
+    --------
+    >>> from contfric.resources import bundled_dir
+    >>> read_yaml(bundled_dir("signatures") / "1a.yaml").data["periods"]
+    1
+    """
+    import yaml
+
+    text = _text(path)
+    try:
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        data = yaml.safe_load(text)
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise NotationError(f"{path}:{line}: no valid YAML: {error.problem}") from None
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        # ValueError: scalars that look like a date but are none
+        raise NotationError(f"{path}:1: no valid YAML: {error}") from None
+    if node is None or not isinstance(data, dict):
+        raise NotationError(f"{path}:1: must be a mapping of keys to values")
+    located = LocatedYaml(path, data, {(): node.start_mark.line + 1})
+    _locate(located, node, ())
+    return located
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise NotationError(f"cannot read {path}: {error.strerror or error}") from None
+    except UnicodeDecodeError as error:
+        raise NotationError(f"{path}:1: is no UTF-8 text: {error.reason}") from None
+
+
+def _locate(located: LocatedYaml, node: yaml.Node, address: Address) -> None:
+    """Enter the lines of everything below a node; duplicate keys are an error."""
+    import yaml
+
+    # an alias may refer to a node around itself; a signature file nests two levels at most
+    if len(address) > 2:
+        return
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            below = (*address, str(key.value))
+            if below in located.lines:
+                first = located.lines[below]
+                located.lines[below] = key.start_mark.line + 1
+                located.fail(below, f"key '{key.value}' is given twice (first in line {first})")
+            located.lines[below] = key.start_mark.line + 1
+            _locate(located, value, below)
+    elif isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            located.lines[(*address, index)] = item.start_mark.line + 1
+            _locate(located, item, (*address, index))
