@@ -26,10 +26,13 @@ class Node:
         As located on the first branch that reached it.
     branches : tuple of int
         Indices of the branches that meet there.
+    mirrored : bool
+        Whether it is the mirror image of another node: the same values, on the mirror branches.
     """
 
     bifurcation: Bifurcation
     branches: tuple[int, ...]
+    mirrored: bool = False
 
 
 @dataclass(frozen=True)
@@ -76,8 +79,8 @@ class Diagram:
 
     @property
     def bifurcations(self) -> tuple[Bifurcation, ...]:
-        """Every bifurcation once, in the order of the parameter."""
-        found = [node.bifurcation for node in self.nodes]
+        """Every bifurcation once (mirror images are not listed), in the order of the parameter."""
+        found = [node.bifurcation for node in self.nodes if not node.mirrored]
         return tuple(sorted(found, key=lambda b: b.params[self.parameter]))
 
     def of_kind(self, kind: Kind | str) -> tuple[Bifurcation, ...]:

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 
@@ -63,6 +64,10 @@ _MEANINGS = {
 TERMINAL = frozenset({Kind.CS, Kind.SS, Kind.AS, Kind.GS})
 
 
+#: Stops of a located event are good to about 1e-10; asymmetry this small is not seen in a diagram.
+_SYMMETRIC_STOPS = 1e-7
+
+
 class EndReason(str, Enum):
     """Why a branch ends; the text says it to the user."""
 
@@ -78,6 +83,7 @@ class EndReason(str, Enum):
     START = "the branch starts here"
     POINTS = "the largest number of points was reached (max_points)"
     STEP = "the step became too small: Newton does not converge"
+    SINGULAR = "several conditions fail at once: the equations are singular beyond this point"
     BROKEN = "the orbit is not finite beyond this point"
     INTERRUPTED = "interrupted"
 
@@ -115,11 +121,21 @@ class Bifurcation:
         """Number of places of the whole orbit at which the event happens at once."""
         return max(1, len(self.tests)) * (2 if self.orbit.system.half and self.tests else 1)
 
+    @cached_property
+    def symmetric(self) -> bool:
+        """Whether the motion at the event is its own mirror image, whatever the words that meet."""
+        if self.orbit.symmetric:
+            return True
+        stops = self.orbit.stops
+        if self.orbit.model.symmetry is None or len(stops) % 2:
+            return False
+        return bool(np.max(np.abs(np.sort(stops) + np.sort(stops)[::-1])) < _SYMMETRIC_STOPS)
+
     @property
     def label(self) -> str:
         """Name in the manner of the reference: ``CS_s``, ``SN_1a``."""
         if self.tests and self.kind is not Kind.T:
-            return f"{self.kind.value}_{'s' if self.orbit.symmetric else 'a'}"
+            return f"{self.kind.value}_{'s' if self.symmetric else 'a'}"
         return self.kind.value if self.kind is Kind.T else f"{self.kind.value}_{self.orbit.name}"
 
     def __repr__(self) -> str:

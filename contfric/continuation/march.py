@@ -291,7 +291,9 @@ def sign_value(kind, index, target, sign, tests, labels, w):  # type: ignore[no-
         value = 1.0 if labels[index] == int(target) else -1.0
     else:
         value = sign * (w - target)
-    return value if math.isfinite(value) else -1.0
+    if math.isnan(value):
+        return -1.0
+    return min(value, 1e3)  # a margin without stationary points is infinite
 
 
 @kernel(
@@ -349,7 +351,8 @@ def locate(  # type: ignore[no-untyped-def]
     Returns
     -------
     float
-        Position in the step, from 0 to 1; negative if no trial point could be solved.
+        Position in the step, from 0 to 1; -1 if no trial point could be solved; -2 minus the
+        position of the last good point if it is Newton that fails behind it.
     """
     which = np.array([active])
     count, m = za.shape
@@ -360,6 +363,7 @@ def locate(  # type: ignore[no-untyped-def]
     f_low, f_high, f_old, x_old = np.nan, np.nan, np.nan, 0.0
     x, stage = 0.0, 0
     best_x, best_w, best_slope = 0.0, wa, tw
+    lost = False
     for _ in range(120):
         z[:, :] = za + x * (zb - za)
         p[active] = wa + x * (wb - wa)
@@ -395,6 +399,7 @@ def locate(  # type: ignore[no-untyped-def]
         else:
             x_old, f_old = (high, f_high)
             high, f_high = x, f
+            lost = not fine
         width = high - low
         if f == 0.0 or width <= 4e-16:
             break
@@ -421,4 +426,32 @@ def locate(  # type: ignore[no-untyped-def]
     )
     p[active] = best_w
     slope_out[0] = best_slope
-    return best_x
+    return -2.0 - best_x if lost else best_x
+
+
+@kernel(
+    types.Tuple((types.boolean, f8))(
+        FunctionsType,
+        LayoutType,
+        matrix,
+        vector,
+        i8,
+        matrix,
+        f8,
+        f8,
+        types.boolean,
+        vector,
+        indices,
+        types.complex128[::1],
+        indices,
+    )
+)
+def begin(  # type: ignore[no-untyped-def]
+    functions, layout, z, p, active, tz, tw, scale, stability, tests, labels, mu, counts
+):
+    """Solve for the first point of a branch, normal to (tz, tw); (solved, p' of the tangent)."""
+    which = np.array([active])
+    fine, slope, _ = settle(
+        functions, layout, z, p, which, tz, tw, scale, stability, tests, labels, mu, counts
+    )
+    return fine, slope

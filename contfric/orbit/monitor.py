@@ -39,7 +39,7 @@ def interior_margin(functions, mode, surface, c, sign, start, duration, p, times
     none = np.empty(0, dtype=np.int64)
     empty = np.empty(0)
     if duration <= 0.0:
-        return duration
+        return np.inf  # the joint and exit margins watch a segment that vanishes
     found = functions[3](mode, c, start[0], start[1:], duration, p, times)
     if found < 0:
         return np.nan

@@ -1,1 +1,57 @@
-"""Results drawn on matplotlib axes."""
+"""Results drawn on matplotlib axes.
+
+Every function takes the axes (or the figure) to draw on, makes new ones if there are none, returns
+what it drew on and never shows anything. What is drawn is taken from the results and from the
+definition of their model alone.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from contfric.plot.diagram import plot_branches, plot_diagram, plot_diagram_row
+    from contfric.plot.graph import plot_diagram_graph, plot_transition_graph
+    from contfric.plot.orbit import plot_orbit, plot_orbit_in_time, plot_orbit_panels
+    from contfric.plot.save import new_figure, save_figure
+    from contfric.plot.style import ROWS
+
+#: Where each public name lives; imported at first use.
+_HOMES = {
+    "ROWS": "contfric.plot.style",
+    "new_figure": "contfric.plot.save",
+    "plot_branches": "contfric.plot.diagram",
+    "plot_diagram": "contfric.plot.diagram",
+    "plot_diagram_graph": "contfric.plot.graph",
+    "plot_diagram_row": "contfric.plot.diagram",
+    "plot_orbit": "contfric.plot.orbit",
+    "plot_orbit_in_time": "contfric.plot.orbit",
+    "plot_orbit_panels": "contfric.plot.orbit",
+    "plot_transition_graph": "contfric.plot.graph",
+    "save_figure": "contfric.plot.save",
+}
+
+__all__ = [
+    "ROWS",
+    "new_figure",
+    "plot_branches",
+    "plot_diagram",
+    "plot_diagram_graph",
+    "plot_diagram_row",
+    "plot_orbit",
+    "plot_orbit_in_time",
+    "plot_orbit_panels",
+    "plot_transition_graph",
+    "save_figure",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'contfric.plot' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

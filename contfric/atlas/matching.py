@@ -1,0 +1,73 @@
+"""Whether two orbits, or two events, are the same up to rotation and mirror image."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.continuation.branch import Branch
+from contfric.continuation.events import Bifurcation
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.solve import polish
+from contfric.orbit.words import mirror_pairs
+from contfric.signature import ReducedWord, canonical_word
+
+#: Events whose parameters agree to this (relative to the range) and whose stops agree to
+#: `_SAME_STOPS` are one: far above the accuracy of a located event (1e-10), far below what a diagram
+#: resolves.
+_SAME_PARAMETER, _SAME_STOPS = 1e-8, 1e-4
+#: Orbits solved at the same parameter are one if their stops agree to this.
+_SAME_ORBIT = 1e-8
+
+
+def identity(orbit: Orbit) -> frozenset[ReducedWord]:
+    """Return the orbit's reduced word and its mirror image, canonical."""
+    model, word = orbit.model, orbit.word
+    words = {canonical_word(word, model)}
+    if model.symmetry is not None:
+        words.add(canonical_word(mirror_pairs(model, word), model))
+    return frozenset(words)
+
+
+def distance(a: FloatArray, b: FloatArray) -> float:
+    """Return the Hausdorff distance of two sets of numbers."""
+    gaps = np.abs(a[:, None] - b[None, :])
+    return float(max(gaps.min(axis=1).max(), gaps.min(axis=0).max()))
+
+
+def stops_distance(a: FloatArray, b: FloatArray, mirror: bool) -> float:
+    """Return the distance of two sets of stops, mirrored if that is nearer."""
+    return min(distance(a, b), distance(-a, b)) if mirror else distance(a, b)
+
+
+def same_event(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> bool:
+    """Tell whether two branches have met the same event (or its mirror image)."""
+    if a.kind is not b.kind:
+        return False
+    if abs(a.params[parameter] - b.params[parameter]) > _SAME_PARAMETER * width:
+        return False
+    mirror = a.orbit.model.symmetry is not None
+    return stops_distance(a.orbit.stops, b.orbit.stops, mirror) < _SAME_STOPS
+
+
+def on_branch(orbit: Orbit, branch: Branch) -> bool:
+    """Tell whether an orbit (or its mirror image) lies on a branch.
+
+    Where the branch passes the orbit's parameter it is solved there and compared.
+    """
+    if orbit.periods != branch.system.periods or orbit.system.half != branch.system.half:
+        return False
+    if identity(orbit) != identity(branch[0]):
+        return False
+    value = orbit.params[branch.parameter]
+    mirror = orbit.model.symmetry is not None
+    below = branch.values - value
+    for i in np.flatnonzero(below[:-1] * below[1:] <= 0.0):
+        step = branch.values[i + 1] - branch.values[i]
+        share = 0.0 if step == 0.0 else -below[i] / step
+        joints = branch.joints[i] + share * (branch.joints[i + 1] - branch.joints[i])
+        guess = Orbit(branch.system, joints, orbit.vector, np.inf, Status.NOT_CONVERGED)
+        solved = polish(guess, damped=False)
+        if solved.converged and stops_distance(orbit.stops, solved.stops, mirror) < _SAME_ORBIT:
+            return True
+    return False

@@ -1,0 +1,351 @@
+"""One branch, both ways, to its ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.continuation.branch import Branch
+from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
+from contfric.continuation.locate import locate_events, locate_value
+from contfric.continuation.points import (
+    EXTRA,
+    FIRST_STEP,
+    MOST_POINTS,
+    SMALLEST_STEP,
+    Point,
+    Settings,
+    first_point,
+    settings_of,
+)
+from contfric.errors import ConvergenceError
+from contfric.models.definition import FloatArray
+from contfric.orbit.counts import TALLY
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import IntArray
+
+#: Points that one call of the compiled march may write: long enough to cost nothing, short enough
+#: for Ctrl-C to be answered at once.
+_CHUNK = 512
+
+#: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).
+_AT_LIMIT = 1e-6
+
+Progress = Callable[[str], None]
+
+
+@dataclass(eq=False)
+class Side:
+    """One side of a branch while it grows, from its first point outward."""
+
+    points: list[Point]
+    end: End
+    bifurcations: list[Bifurcation] = field(default_factory=list)
+
+
+@dataclass(eq=False)
+class _Rows:
+    """Arrays that the compiled march writes to; row 0 holds the point to start from."""
+
+    joints: FloatArray
+    values: FloatArray
+    tangents: FloatArray
+    slopes: FloatArray
+    arc: FloatArray
+    tests: FloatArray
+    labels: IntArray
+    mu: NDArray[np.complex128]
+
+    @classmethod
+    def after(cls, point: Point, room: int) -> _Rows:
+        rows = cls(
+            np.empty((room, *point.joints.shape)),
+            np.empty(room),
+            np.empty((room, *point.joints.shape)),
+            np.empty(room),
+            np.empty(room),
+            np.empty((room, len(point.tests))),
+            np.zeros((room, len(point.labels)), dtype=np.int64),
+            np.zeros((room, len(point.mu)), dtype=np.complex128),
+        )
+        rows.joints[0], rows.values[0] = point.joints, point.value
+        rows.tangents[0], rows.slopes[0] = point.tangent, point.slope
+        rows.arc[0], rows.tests[0] = point.arc, point.tests
+        rows.labels[0], rows.mu[0] = point.labels, point.mu
+        return rows
+
+    def point(self, k: int) -> Point:
+        return Point(
+            self.joints[k],
+            float(self.values[k]),
+            self.tangents[k],
+            float(self.slopes[k]),
+            self.tests[k],
+            self.labels[k],
+            self.mu[k],
+            float(self.arc[k]),
+        )
+
+
+def continue_orbit(
+    orbit: Orbit,
+    parameter: str,
+    range: tuple[float, float],
+    *,
+    max_step: float | None = None,
+    stability: bool = True,
+    max_points: int = MOST_POINTS,
+    progress: Progress | None = None,
+) -> Branch:
+    """Continue an orbit in one parameter, both ways, to the ends of its branch.
+
+    Folds, branch points, period doublings and tangencies are passed; a sliding event ends it.
+
+    Parameters
+    ----------
+    parameter : str
+        Name of the parameter, such as ``"Omega"``.
+    range : (float, float)
+        Where it may go; clipped to the model's limits.
+    max_step : float, optional
+        Largest step along the branch, as a share of the range; 0.02 by default.
+    stability : bool
+        Whether multipliers are evaluated; without them BP and PD are not detected.
+    max_points : int
+        Most points of each side; a branch that reaches it says so.
+
+    Raises
+    ------
+    ParameterError
+        If the parameter, the range or the step is not valid.
+    ConvergenceError
+        If the orbit is not solved.
+
+    Notes
+    -----
+    What detection cannot see: two events of the same kind within one step whose test functions do
+    not betray it by a parabola through three points. A smaller ``max_step`` shows them.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> [end.reason.name for end in cf.continue_orbit(orbit, "Omega", (0.4, 0.6)).ends]
+    ['SS', 'CS']
+    """
+    if not orbit.converged:
+        raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
+    settings = settings_of(orbit, parameter, range, max_step, stability, max_points)
+    orbit = orbit.as_half()
+    start = first_point(orbit, settings)
+    if start is None:
+        raise ConvergenceError(
+            "the orbit has no unique continuation: the system is singular there (a bifurcation, or "
+            "an orbit of a continuum). Move the parameter a little and solve again",
+            orbit,
+        )
+    ahead = trace_side(orbit, start, settings, progress=progress)
+    if ahead.end.reason is EndReason.CLOSED:
+        return assemble(orbit, settings, ahead, replace_end(ahead.end))
+    behind = trace_side(orbit, start.reversed(), settings, progress=progress)
+    return join(orbit, settings, behind, ahead)
+
+
+def replace_end(end: End) -> End:
+    """Return an end without its event, for the other side of a closed branch."""
+    return End(end.reason, end.message)
+
+
+def trace_side(
+    orbit: Orbit,
+    start: Point,
+    settings: Settings,
+    *,
+    first_step: float = FIRST_STEP,
+    progress: Progress | None = None,
+) -> Side:
+    """Follow a branch from a point along its tangent until it ends."""
+    side = Side([start], End(EndReason.START))
+    step = first_step * settings.largest
+    while True:
+        finished, step = _advance(orbit, side, settings, step)
+        if progress is not None:
+            last = side.points[-1].value
+            progress(f"{len(side.points)} points, {settings.parameter} = {last:.6g}")
+        if finished:
+            return side
+
+
+def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple[bool, float]:
+    """March once and deal with what stopped it; (whether the side is finished, next step)."""
+    from contfric.continuation import march as kernels
+
+    last = side.points[-1]
+    room = min(_CHUNK, settings.most_points - len(side.points)) + 1
+    if room < 2:
+        side.end = End(EndReason.POINTS)
+        return True, step
+    rows = _Rows.after(last, room)
+    options = np.array(
+        [step, settings.largest, SMALLEST_STEP, settings.low, settings.high, settings.scale]
+    )
+    why, count, step = kernels.march(
+        orbit.system.functions(),
+        orbit.system.layout,
+        orbit.vector,
+        orbit.model.index_of(settings.parameter),
+        options,
+        settings.stability,
+        rows.joints,
+        rows.values,
+        rows.tangents,
+        rows.slopes,
+        rows.arc,
+        rows.tests,
+        rows.labels,
+        rows.mu,
+        TALLY,
+    )
+    side.points += [rows.point(k) for k in range(1, count + 1)]
+    if why == kernels.STEP:
+        side.end = End(EndReason.STEP)
+        return True, step
+    if why == kernels.BROKEN:
+        side.end = End(EndReason.BROKEN)
+        return True, step
+    if why == kernels.CLOSED:
+        side.end = End(EndReason.CLOSED)
+        return True, step
+    if why == kernels.FULL:
+        return False, step
+    return _resolve(orbit, side, settings), step
+
+
+def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
+    """Locate what happened over the last step; True if the side ends there."""
+    before, after = side.points[-2], side.points[-1]
+    limit = _limit_crossed(orbit, before, after, settings)
+    for bifurcation, point in locate_events(orbit, before, after, settings):
+        if limit is not None and point.arc > limit[0].arc - _AT_LIMIT * (after.arc - before.arc):
+            break
+        if bifurcation.kind is Kind.T and _is_start(side, before, point, after):
+            before.labels = after.labels  # where a stop lies on a surface its label is arbitrary
+            continue
+        ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, orbit)
+        if ends is None:
+            side.bifurcations.append(bifurcation)
+            continue
+        side.points[-1] = point
+        side.end = End(ends, bifurcation=None if point.lost else bifurcation)
+        return True
+    if np.any(after.tests[:-EXTRA] < 0.0) and limit is None:
+        side.points.pop()
+        side.end = End(EndReason.SINGULAR)
+        return True
+    if limit is None:
+        return False
+    side.points[-1], reason = limit
+    kind = EndReason.LIMIT if reason else EndReason.RANGE
+    side.end = End(kind, f"{kind.value}: {reason}" if reason else "")
+    return True
+
+
+def _is_start(side: Side, before: Point, point: Point, after: Point) -> bool:
+    """Tell whether a change of labels happens at the very start of a side, at an event."""
+    start = before is side.points[0]
+    return start and point.arc - before.arc < _AT_LIMIT * (after.arc - before.arc)
+
+
+def _limit_crossed(
+    orbit: Orbit, before: Point, after: Point, settings: Settings
+) -> tuple[Point, str] | None:
+    if settings.low <= after.value <= settings.high:
+        return None
+    upper = after.value > settings.high
+    target = settings.high if upper else settings.low
+    point = locate_value(orbit, before, after, settings, target)
+    return point, settings.high_reason if upper else settings.low_reason
+
+
+def _ends_branch(bifurcation: Bifurcation, orbit: Orbit) -> EndReason | None:
+    """Return why a branch ends at a bifurcation, or None if it goes on."""
+    if bifurcation.kind in TERMINAL:
+        return EndReason[bifurcation.kind.name]
+    if not orbit.system.half and bifurcation.kind is Kind.BP and bifurcation.orbit.system.half:
+        return EndReason.BP
+    if bifurcation.kind is Kind.PD and bifurcation.orbit.periods < orbit.periods:
+        return EndReason.PD
+    return None
+
+
+def join(orbit: Orbit, settings: Settings, behind: Side, ahead: Side) -> Branch:
+    """Return one branch from the two sides of its start."""
+    points = [*reversed(behind.points[1:]), *ahead.points]
+    shift = behind.points[-1].arc
+    arc = [shift - p.arc for p in reversed(behind.points[1:])] + [
+        shift + p.arc for p in ahead.points
+    ]
+    back = [
+        replace(
+            b,
+            position=shift - b.position,
+            stable_before=b.stable_after,
+            stable_after=b.stable_before,
+        )
+        for b in reversed(behind.bifurcations)
+    ]
+    front = [replace(b, position=shift + b.position) for b in ahead.bifurcations]
+    first, last = behind.end, ahead.end
+    if first.bifurcation is not None:
+        b = first.bifurcation
+        first = replace(
+            first,
+            bifurcation=replace(
+                b,
+                position=shift - b.position,
+                stable_before=b.stable_after,
+                stable_after=b.stable_before,
+            ),
+        )
+    if last.bifurcation is not None:
+        moved = replace(last.bifurcation, position=shift + last.bifurcation.position)
+        last = replace(last, bifurcation=moved)
+    return _branch(orbit, settings, points, arc, (*back, *front), (first, last))
+
+
+def assemble(orbit: Orbit, settings: Settings, side: Side, first: End) -> Branch:
+    """Return a branch of one side, with the end at which it starts."""
+    arc = [p.arc for p in side.points]
+    return _branch(orbit, settings, side.points, arc, tuple(side.bifurcations), (first, side.end))
+
+
+def _branch(
+    orbit: Orbit,
+    settings: Settings,
+    points: list[Point],
+    arc: list[float],
+    bifurcations: tuple[Bifurcation, ...],
+    ends: tuple[End, End],
+) -> Branch:
+    events = [end.bifurcation for end in ends]
+    listed = (
+        *([events[0]] if events[0] is not None else []),
+        *bifurcations,
+        *([events[1]] if events[1] is not None else []),
+    )
+    return Branch(
+        orbit.system,
+        settings.parameter,
+        orbit.vector,
+        np.array([p.value for p in points]),
+        np.array([p.joints for p in points]),
+        np.array(arc),
+        np.array([p.tests[:-EXTRA] for p in points]),
+        np.array([p.labels for p in points]),
+        np.array([p.mu for p in points]) if settings.stability else None,
+        listed,
+        ends,
+    )

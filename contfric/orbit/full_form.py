@@ -1,0 +1,77 @@
+"""The same orbit as a problem in all of the model's domains, one segment for each.
+
+In the reduced form surfaces with the same field on both sides are labels. In the full form they are
+joints, with one equation each. Both have the same solutions; the full form is a check, and what a
+hand-assembled problem would be.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.solve import polish
+from contfric.orbit.system import build_system
+from contfric.signature import crossing
+
+
+def full_form(orbit: Orbit) -> Orbit:
+    """Return the orbit solved with one segment for each domain that it visits.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> full_form(cf.find_orbit("coulomb", {"Omega": 0.5})).system.segments
+    6
+    """
+    whole = orbit.as_whole()
+    domains = whole.signature.segments
+    joints: list[FloatArray] = []
+    word: list[tuple[str, str]] = []
+    at = 0
+    for i, (mode, exit_) in enumerate(whole.word):
+        place = whole.cycle[i].copy()
+        entry = whole.word[i - 1][1]
+        while True:
+            joints.append(place)
+            here, there = domains[at], domains[(at + 1) % len(domains)]
+            surface = crossing(whole.model, here, there)
+            at += 1
+            if surface is None or surface == exit_ and _last(whole, domains, at, i):
+                word.append((mode, exit_))
+                break
+            word.append((mode, surface))
+            place = _crossing_point(whole, mode, surface, place, entry)
+            entry = surface
+    system = build_system(whole.model, tuple(word), whole.periods, domains=domains)
+    guess = Orbit(system, np.array(joints), whole.vector.copy(), np.inf, Status.NOT_CONVERGED)
+    return polish(guess, damped=False)
+
+
+def _last(orbit: Orbit, domains: tuple[str, ...], at: int, i: int) -> bool:
+    """Tell whether the segment of the reduced word ends with the domain just passed."""
+    model = orbit.model
+    following = domains[at % len(domains)]
+    through = crossing(model, domains[at - 1], following)
+    assert through is not None
+    same_mode = model.domain_by_name[following].mode == orbit.word[i][0]
+    return not same_mode or model.surface_by_name[through].switching
+
+
+def _crossing_point(
+    orbit: Orbit, mode: str, surface: str, place: FloatArray, entry: str
+) -> FloatArray:
+    """Return time and state of the first crossing of a surface after a place in a mode."""
+    model, flow = orbit.model, orbit.model.flow
+    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
+    number = [m.name for m in model.modes].index(mode)
+    k = [s.name for s in model.surfaces].index(surface)
+    c = [o.name for o in model.observables].index(model.surfaces[k].observable)
+    target = flow.level(k, orbit.vector, none, empty)
+    start, state = float(place[0]), np.ascontiguousarray(place[1:])
+    on = entry == surface
+    tau = flow.hit(number, c, target, on, start, state, orbit.period, orbit.vector)
+    after = np.empty(len(model.states))
+    flow.flow(number, start, state, tau, orbit.vector, none, after, np.empty((0, 0)))
+    return np.array([start + tau, *after])

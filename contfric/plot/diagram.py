@@ -1,0 +1,256 @@
+"""Bifurcation diagrams: branches against their parameter, with the events on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from contfric.plot.events import Mark, draw_marks, label_marks, marks_of
+from contfric.plot.protocols import BifurcationLike, BranchLike, DiagramLike
+from contfric.plot.runs import stability_runs
+from contfric.plot.save import axes_or_new, figure_or_new
+from contfric.plot.style import (
+    GREY,
+    LINE_WIDTH,
+    MARKERS,
+    MIRROR_WIDTH,
+    OTHER_MARKER,
+    ROWS,
+    SMALL,
+    STABLE,
+    TEXT,
+    UNKNOWN,
+    UNKNOWN_WIDTH,
+    UNSTABLE,
+    branch_colours,
+    greyish,
+    lighter,
+    parameter_label,
+    row_of,
+)
+
+_OUTSIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
+
+
+def plot_branches(
+    branches: Sequence[BranchLike],
+    row: str = "x_max",
+    ax: Axes | None = None,
+    *,
+    events: bool = True,
+    legend: bool = True,
+) -> Axes:
+    """Draw one quantity of some branches against their parameter.
+
+    Stable parts are solid, unstable ones dashed, and they meet at the located bifurcation.
+
+    Parameters
+    ----------
+    branches : sequence of Branch
+    row : {"x_max", "x_min", "stops", "psi"}
+        The quantity.
+    ax : Axes, optional
+        Where to draw; new axes by default.
+    events : bool
+        Whether to mark and label the branches' bifurcations.
+    legend : bool
+        Whether to draw the legend.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> branch = cf.continue_orbit(orbit, "Omega", (0.4, 0.6))
+    >>> plot_branches([branch], "psi").get_ylabel()
+    '$\\\\psi$'
+    """
+    found = [b for branch in branches for b in branch.bifurcations] if events else []
+    return _plot_row(axes_or_new(ax), branches, found, row, legend, outside=ax is None)
+
+
+def plot_diagram_row(
+    diagram: DiagramLike,
+    row: str = "x_max",
+    ax: Axes | None = None,
+    events: bool = True,
+    legend: bool = True,
+) -> Axes:
+    """Draw one quantity of all branches of a diagram, with its bifurcations.
+
+    Parameters
+    ----------
+    diagram : Diagram
+    row : {"x_max", "x_min", "stops", "psi"}
+        The quantity.
+    ax : Axes, optional
+        Where to draw; new axes by default.
+    events : bool
+        Whether to mark and label the bifurcations.
+    legend : bool
+        Whether to draw the legend.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> ax = plot_diagram_row(cf.explore(orbit, "Omega", (0.4, 0.6)), "psi")
+    """
+    found = diagram.bifurcations if events else ()
+    new = axes_or_new(ax)
+    new.set_xlim(*diagram.range)
+    return _plot_row(new, diagram.branches, found, row, legend, outside=ax is None)
+
+
+def plot_diagram(
+    diagram: DiagramLike,
+    rows: Sequence[str] = ("x_max", "stops", "psi"),
+    fig: Figure | None = None,
+) -> list[Axes]:
+    """Draw a diagram in several rows over one parameter axis, as Figs. 4-7 of the reference.
+
+    Parameters
+    ----------
+    diagram : Diagram
+    rows : sequence of {"x_max", "x_min", "stops", "psi"}
+        The quantities from top to bottom.
+    fig : Figure, optional
+        An empty figure to draw in; a new one by default.
+
+    Returns
+    -------
+    list of Axes
+        One for each row.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> axes = plot_diagram(cf.explore(orbit, "Omega", (0.4, 0.6)), rows=("x_max", "psi"))
+    """
+    for row in rows:
+        row_of(row)
+    fig = figure_or_new(fig, 8.4, 1.2 + 2.4 * len(rows))
+    axes = list(fig.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0])
+    axes[0].set_xlim(*diagram.range)
+    axes[0].set_title(fixed_parameters(diagram.branches), fontsize=TEXT)
+    marks = [
+        marks_of(diagram.bifurcations, diagram.branches, ROWS[row].attribute, diagram.parameter)
+        for row in rows
+    ]
+    for ax, row, found in zip(axes, rows, marks, strict=True):
+        _draw_row(ax, diagram.branches, found, row)
+        ax.label_outer()
+    fig.align_ylabels(axes)
+    handles = _handles(diagram.branches, marks[0])
+    if fig.get_layout_engine() is None:
+        axes[0].legend(handles=handles, fontsize=SMALL, **_OUTSIDE)
+    else:
+        fig.legend(handles=handles, fontsize=SMALL, frameon=False, loc="outside right upper")
+    for ax, found in zip(axes, marks, strict=True):
+        label_marks(ax, found)
+    return axes
+
+
+def fixed_parameters(branches: Sequence[BranchLike]) -> str:
+    """Return the parameters that do not vary and are not zero, for a title."""
+    if not branches:
+        return ""
+    first = branches[0]
+    shown = first.model.mapping(first.vector)
+    shown.pop(first.parameter, None)
+    return ", ".join(f"{parameter_label(n)} = {v:.6g}" for n, v in shown.items() if v != 0.0)
+
+
+def _plot_row(
+    ax: Axes,
+    branches: Sequence[BranchLike],
+    events: Sequence[BifurcationLike],
+    row: str,
+    legend: bool,
+    *,
+    outside: bool,
+) -> Axes:
+    attribute = row_of(row).attribute
+    parameter = branches[0].parameter if branches else ""
+    marks = marks_of(events, branches, attribute, parameter)
+    _draw_row(ax, branches, marks, row)
+    if legend and outside:
+        ax.legend(handles=_handles(branches, marks), fontsize=SMALL, frameon=False, **_OUTSIDE)
+    label_marks(ax, marks)
+    if legend and not outside:
+        ax.legend(handles=_handles(branches, marks), fontsize=SMALL, framealpha=0.8, loc="best")
+    return ax
+
+
+def _draw_row(ax: Axes, branches: Sequence[BranchLike], marks: Sequence[Mark], row: str) -> None:
+    colours = branch_colours(b.name for b in branches)
+    twins = {b.name for b in branches if not b.mirrored} if row_of(row).even else set()
+    for branch in sorted(branches, key=lambda b: not b.mirrored):
+        if branch.mirrored and branch.name in twins:
+            continue  # it lies on its original
+        _draw_branch(ax, branch, row_of(row).attribute, colours[branch.name])
+    draw_marks(ax, marks)
+    ax.margins(y=0.12)
+    ax.set_ylabel(row_of(row).label, fontsize=TEXT + 1)
+    if branches:
+        ax.set_xlabel(parameter_label(branches[0].parameter), fontsize=TEXT + 1)
+    ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
+
+
+def _draw_branch(ax: Axes, branch: BranchLike, attribute: str, colour: str) -> None:
+    width = MIRROR_WIDTH if branch.mirrored else LINE_WIDTH
+    colour = lighter(colour) if branch.mirrored else colour
+    for run in stability_runs(branch, attribute):
+        known = run.stable is not None
+        lines = ax.plot(
+            run.x,
+            run.y,
+            color=colour if known else greyish(colour),
+            linestyle=UNKNOWN if not known else STABLE if run.stable else UNSTABLE,
+            linewidth=width if known else UNKNOWN_WIDTH,
+            solid_capstyle="butt",
+            zorder=2.0 + 0.5 * bool(run.stable) - 0.3 * branch.mirrored,
+        )
+        for line in lines:
+            line.set_gid(branch.name)
+
+
+def _handles(branches: Sequence[BranchLike], marks: Sequence[Mark]) -> list[Line2D]:
+    """Return the entries of the legend: branches, meaning of the lines, meaning of the markers."""
+    colours = branch_colours(b.name for b in branches)
+    handles = [_line(name, colour) for name, colour in colours.items()]
+    if any(b.mirrored for b in branches):
+        handles.append(_line("mirror image: lighter", lighter(GREY), width=MIRROR_WIDTH))
+    known = {bool(s) for b in branches if b.stable is not None for s in b.stable}
+    if True in known:
+        handles.append(_line("stable", GREY))
+    if False in known:
+        handles.append(_line("unstable", GREY, style=UNSTABLE))
+    if any(b.stable is None for b in branches):
+        handles.append(_line("stability not computed", GREY, width=UNKNOWN_WIDTH))
+    kinds = {m.kind.value: m.kind for m in marks}
+    order = [*MARKERS, *(k for k in kinds if k not in MARKERS)]
+    return handles + [_marker(k, kinds[k].meaning) for k in order if k in kinds]
+
+
+def _line(label: str, colour: str, style: Any = STABLE, width: float = LINE_WIDTH) -> Line2D:
+    return Line2D([], [], color=colour, linestyle=style, linewidth=width, label=label)
+
+
+def _marker(kind: str, meaning: str) -> Line2D:
+    look = MARKERS.get(kind, OTHER_MARKER)
+    return Line2D(
+        [],
+        [],
+        linestyle="none",
+        marker=look.shape,
+        markersize=look.size,
+        markerfacecolor=look.face,
+        markeredgecolor=look.edge,
+        markeredgewidth=0.8,
+        label=f"{kind}: {meaning}",
+    )

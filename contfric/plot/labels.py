@@ -1,0 +1,171 @@
+"""Labels beside points, off the lines and off each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.text import Annotation
+from matplotlib.transforms import Bbox
+
+from contfric.models.definition import FloatArray
+from contfric.plot.style import GREY, SMALL
+
+#: Distances from the point to the label that are tried, in points; leader lines beyond the first.
+_DISTANCES = (5.0, 12.0, 20.0, 30.0, 42.0, 56.0)
+_DIRECTIONS = 16
+#: Costs: a pixel of line beneath the label, a marker, another label, and beyond the axes.
+_LINE, _MARKER, _LABEL, _BEYOND = 1.0, 15.0, 500.0, 500.0
+#: Spacing at which lines are sampled, and distance at which equal labels are one, in pixels.
+_SPACING, _ONE = 3.0, 14.0
+#: Half of the size of a marker and the radius of a neighbourhood, in points.
+_MARKER_RADIUS, _NEAR = 4.0, 18.0
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """A point, in data coordinates, and the text that belongs to it."""
+
+    x: float
+    y: float
+    text: str
+
+
+def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
+    """Write a text beside each point where it hides as little as possible.
+
+    Equal texts at points that cannot be told apart are written once. Call it when everything else
+    is drawn and the limits of the axes are set.
+    """
+    pixels = _settled(ax)
+    todo = _merged(ax, sorted(anchors, key=lambda a: (a.x, a.y)))
+    lines, markers = _line_pixels(ax), _marker_pixels(ax, _MARKER_RADIUS * pixels)
+    taken: list[Bbox] = []
+    placed: list[Annotation] = []
+    for anchor in todo:
+        at = np.asarray(ax.transData.transform((anchor.x, anchor.y)))
+        label = _annotation(ax, anchor, (0.0, 0.0), leader=False)
+        size = np.asarray(label.get_window_extent().size) + 2.0 * pixels
+        label.remove()
+        centre, distance = _best_place(ax, at, size, pixels, lines, markers, taken)
+        taken.append(_box(centre, size))
+        offset = (centre - at) / pixels
+        leader = distance > _DISTANCES[0]
+        placed.append(_annotation(ax, anchor, (float(offset[0]), float(offset[1])), leader=leader))
+    return placed
+
+
+def near(ax: Axes, anchor: Anchor, others: Sequence[Anchor]) -> bool:
+    """Tell whether a point lies so near to others that its label would be taken for theirs."""
+    reach = _NEAR * _settled(ax)
+    at = ax.transData.transform((anchor.x, anchor.y))
+    return any(np.hypot(*(ax.transData.transform((o.x, o.y)) - at)) < reach for o in others)
+
+
+def _settled(ax: Axes) -> float:
+    """Let the layout decide where the axes are; return the pixels of a point."""
+    root = ax.get_figure(root=True)
+    if not isinstance(root, Figure):
+        return 1.0
+    root.draw_without_rendering()
+    return float(root.dpi) / 72.0
+
+
+def _merged(ax: Axes, anchors: Sequence[Anchor]) -> list[Anchor]:
+    kept: list[Anchor] = []
+    for anchor in anchors:
+        at = ax.transData.transform((anchor.x, anchor.y))
+        same = (k for k in kept if k.text == anchor.text)
+        if all(np.hypot(*(ax.transData.transform((k.x, k.y)) - at)) > _ONE for k in same):
+            kept.append(anchor)
+    return kept
+
+
+def _annotation(
+    ax: Axes, anchor: Anchor, offset: tuple[float, float], *, leader: bool
+) -> Annotation:
+    arrow = {"arrowstyle": "-", "color": GREY, "linewidth": 0.6, "shrinkA": 0.0, "shrinkB": 3.0}
+    return ax.annotate(
+        anchor.text,
+        (anchor.x, anchor.y),
+        xytext=offset,
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        fontsize=SMALL,
+        arrowprops=arrow if leader else None,
+        zorder=6,
+    )
+
+
+def _best_place(
+    ax: Axes,
+    at: FloatArray,
+    size: FloatArray,
+    pixels: float,
+    lines: FloatArray,
+    markers: FloatArray,
+    taken: Sequence[Bbox],
+) -> tuple[FloatArray, float]:
+    """Return the centre of the cheapest place, in pixels, and its distance in points."""
+    best, place = math.inf, (at, _DISTANCES[0])
+    for distance in _DISTANCES:
+        for k in range(_DIRECTIONS):
+            angle = 2.0 * math.pi * (k + 1) / _DIRECTIONS
+            towards = np.array([math.cos(angle), math.sin(angle)])
+            centre = at + towards * (distance * pixels) + 0.5 * size * np.clip(1.5 * towards, -1, 1)
+            box = _box(centre, size)
+            cost = 0.8 * distance + 1.5 * (1.0 - towards[1]) + _LINE * _inside(box, lines)
+            cost += _MARKER * _inside(box, markers)
+            cost += _LABEL * sum(box.overlaps(other) for other in taken)
+            cost += _BEYOND * (not _contains(ax.bbox, box))
+            if cost < best:
+                best, place = cost, (centre, distance)
+    return place
+
+
+def _box(centre: FloatArray, size: FloatArray) -> Bbox:
+    return Bbox([centre - 0.5 * size, centre + 0.5 * size])
+
+
+def _inside(box: Bbox, points: FloatArray) -> int:
+    within = (points > box.min) & (points < box.max)
+    return int(np.count_nonzero(within.all(axis=1)))
+
+
+def _contains(outer: Bbox, inner: Bbox) -> bool:
+    return bool(np.all(inner.min >= outer.min) and np.all(inner.max <= outer.max))
+
+
+def _line_pixels(ax: Axes) -> FloatArray:
+    """Return points along all lines of the axes, evenly spaced in pixels, shape (m, 2)."""
+    found = [np.empty((0, 2))]
+    for line in ax.lines:
+        if line.get_linestyle() in ("None", "none", "", " ") or not line.get_visible():
+            continue
+        points = np.asarray(line.get_transform().transform(line.get_xydata()))
+        points = points[np.isfinite(points).all(axis=1)]
+        if len(points) > 1:
+            found.append(_sampled(points))
+    return np.vstack(found)
+
+
+def _sampled(points: FloatArray) -> FloatArray:
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    at = np.arange(0.0, along[-1] + _SPACING, _SPACING)
+    return np.column_stack([np.interp(at, along, column) for column in points.T])
+
+
+def _marker_pixels(ax: Axes, radius: float) -> FloatArray:
+    """Return the centres and four outer points of all markers, in pixels, shape (m, 2)."""
+    found = [np.empty((0, 2))]
+    for line in ax.lines:
+        if line.get_marker() not in ("None", "none", "", " ", None):
+            found.append(np.asarray(line.get_transform().transform(line.get_xydata())))
+    centres = np.vstack(found)
+    around = radius * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
+    return (centres[:, None, :] + around).reshape(-1, 2)

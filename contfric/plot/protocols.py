@@ -1,0 +1,194 @@
+"""What the drawings need to know of an orbit, a branch and a diagram.
+
+Drawing stands below the results that it draws; it knows them by what they offer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.models import Model
+from contfric.models.definition import FloatArray
+
+
+class SignatureLike(Protocol):
+    """A closed walk through the domains of a model."""
+
+    @property
+    def segments(self) -> Sequence[str]:
+        """Names of the domains in the order of the visit."""
+
+
+class OrbitLike(Protocol):
+    """A periodic orbit."""
+
+    @property
+    def model(self) -> Model:
+        """The model that moves."""
+
+    @property
+    def params(self) -> Mapping[str, float]:
+        """All parameters by name."""
+
+    @property
+    def vector(self) -> FloatArray:
+        """Parameters in the order of the model."""
+
+    @property
+    def name(self) -> str:
+        """Name such as ``2s``."""
+
+    @property
+    def period(self) -> float:
+        """Duration of the orbit."""
+
+    @property
+    def word(self) -> Sequence[tuple[str, str]]:
+        """Mode and exit surface of each segment."""
+
+    @property
+    def cycle(self) -> FloatArray:
+        """Start time and state of each segment, shape (segments, 1 + n)."""
+
+    @property
+    def ends(self) -> FloatArray:
+        """End time and state of each segment, shape (segments, 1 + n)."""
+
+    @property
+    def stops(self) -> FloatArray:
+        """Displacements at the stops, shape (stops,)."""
+
+    def state(self, time: float) -> FloatArray:
+        """Return the state at a time, shape (n,)."""
+
+
+class KindLike(Protocol):
+    """A kind of bifurcation."""
+
+    @property
+    def value(self) -> str:
+        """Short name such as ``SN``."""
+
+    @property
+    def meaning(self) -> str:
+        """One line for a legend."""
+
+
+class BifurcationLike(Protocol):
+    """A located event."""
+
+    @property
+    def kind(self) -> KindLike:
+        """What it is."""
+
+    @property
+    def params(self) -> Mapping[str, float]:
+        """Parameters at which it happens."""
+
+    @property
+    def orbit(self) -> OrbitLike:
+        """The orbit there."""
+
+    @property
+    def label(self) -> str:
+        """Name such as ``CS_s``."""
+
+    @property
+    def position(self) -> float:
+        """Arclength on the branch."""
+
+    @property
+    def stable_before(self) -> bool | None:
+        """Stability before the event, in the order of the branch."""
+
+    @property
+    def stable_after(self) -> bool | None:
+        """Stability after the event, in the order of the branch."""
+
+
+class BranchLike(Protocol):
+    """A family of orbits along a parameter."""
+
+    @property
+    def model(self) -> Model:
+        """The model that moves."""
+
+    @property
+    def name(self) -> str:
+        """Name such as ``2s``."""
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether this is the mirror image of a computed branch."""
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the orbits are their own mirror images."""
+
+    @property
+    def parameter(self) -> str:
+        """The parameter that varies."""
+
+    @property
+    def vector(self) -> FloatArray:
+        """The other parameters."""
+
+    @property
+    def values(self) -> FloatArray:
+        """The parameter at each point, shape (k,)."""
+
+    @property
+    def arc(self) -> FloatArray:
+        """Arclength at each point, shape (k,)."""
+
+    @property
+    def turn_multipliers(self) -> NDArray[np.complex128] | None:
+        """Multipliers at each point, shape (k, n); None if not computed."""
+
+    @property
+    def stable(self) -> NDArray[np.bool_] | None:
+        """Stability at each point, shape (k,); None if not computed."""
+
+    @property
+    def bifurcations(self) -> Sequence[BifurcationLike]:
+        """Events in the order of the branch."""
+
+
+class NodeLike(Protocol):
+    """A bifurcation and the branches that meet there."""
+
+    @property
+    def bifurcation(self) -> BifurcationLike:
+        """The event."""
+
+    @property
+    def branches(self) -> Sequence[int]:
+        """Indices of the branches that meet there."""
+
+
+class DiagramLike(Protocol):
+    """Branches joined by bifurcations."""
+
+    @property
+    def parameter(self) -> str:
+        """The parameter that varies."""
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Where it was followed."""
+
+    @property
+    def branches(self) -> Sequence[BranchLike]:
+        """The branches."""
+
+    @property
+    def nodes(self) -> Sequence[NodeLike]:
+        """Each bifurcation with the branches that meet there."""
+
+    @property
+    def bifurcations(self) -> Sequence[BifurcationLike]:
+        """Each bifurcation once."""

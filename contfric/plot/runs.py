@@ -1,0 +1,133 @@
+"""A branch cut into stable and unstable runs, exactly at its bifurcations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from contfric.models.definition import FloatArray
+from contfric.plot.protocols import BifurcationLike, BranchLike
+
+#: In units of the length of the branch: a point this near to an event is the event.
+_SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Run:
+    """Part of a branch with one stability: x has shape (m,), y (m, quantities)."""
+
+    stable: bool | None
+    x: FloatArray
+    y: FloatArray
+
+
+@dataclass(frozen=True)
+class _Vertex:
+    arc: float
+    x: float
+    y: FloatArray
+    before: bool | None
+    after: bool | None
+    located: bool
+
+
+def quantity(source: object, attribute: str) -> FloatArray:
+    """Return a quantity of a branch, shape (k, quantities), or of an orbit, (quantities,)."""
+    values = np.asarray(getattr(source, attribute), dtype=np.float64)
+    if hasattr(source, "values"):
+        return values.reshape(len(values), -1)
+    return np.atleast_1d(values)
+
+
+def stability_runs(branch: BranchLike, attribute: str) -> list[Run]:
+    """Cut a branch where its stability changes.
+
+    Consecutive runs share the point of change, which is the located bifurcation. A branch whose
+    stability was not computed is one run with ``stable`` None.
+    """
+    vertices = _vertices(branch, attribute)
+    runs: list[Run] = []
+    start = 0
+    states = list(_between(vertices))
+    for k in range(1, len(states) + 1):
+        if k == len(states) or states[k] is not states[start]:
+            part = vertices[start : k + 1]
+            x, y = np.array([v.x for v in part]), np.array([v.y for v in part])
+            runs.append(Run(states[start], x, y))
+            start = k
+    return runs
+
+
+def _vertices(branch: BranchLike, attribute: str) -> list[_Vertex]:
+    """Return points and located events in the order of the branch."""
+    columns = quantity(branch, attribute)
+    tolerance = _SAME * max(float(np.ptp(branch.arc)), 1e-300)
+    events = [_event_vertex(branch, b, columns, attribute) for b in branch.bifurcations]
+    taken = np.array([v.arc for v in events])
+    points = [v for v in _points(branch, columns) if not np.any(np.abs(taken - v.arc) <= tolerance)]
+    return sorted([*events, *points], key=lambda v: v.arc)
+
+
+def _points(branch: BranchLike, columns: FloatArray) -> Iterator[_Vertex]:
+    stable = branch.stable
+    positions = np.array([b.position for b in branch.bifurcations])
+    for k, (arc, x) in enumerate(zip(branch.arc, branch.values, strict=True)):
+        state = None if stable is None else bool(stable[k])
+        yield _Vertex(float(arc), float(x), columns[k], state, state, False)
+        if stable is None or k + 1 == len(columns) or stable[k] == stable[k + 1]:
+            continue
+        after = float(branch.arc[k + 1])
+        if not np.any((positions >= arc) & (positions <= after)):
+            yield _change(branch, columns, k)
+
+
+def _change(branch: BranchLike, columns: FloatArray, k: int) -> _Vertex:
+    """Return the change between two points that no event explains, by linear interpolation."""
+    assert branch.stable is not None and branch.turn_multipliers is not None
+    size = np.abs(branch.turn_multipliers[k : k + 2]).max(axis=1) - 1.0
+    w = float(size[0] / (size[0] - size[1])) if size[0] != size[1] else 0.5
+    mix = [(1.0 - w) * a[k] + w * a[k + 1] for a in (branch.arc, branch.values, columns)]
+    before, after = bool(branch.stable[k]), bool(branch.stable[k + 1])
+    return _Vertex(float(mix[0]), float(mix[1]), np.asarray(mix[2]), before, after, True)
+
+
+def _event_vertex(
+    branch: BranchLike, event: BifurcationLike, columns: FloatArray, attribute: str
+) -> _Vertex:
+    near = np.array([np.interp(event.position, branch.arc, column) for column in columns.T])
+    y = aligned(quantity(event.orbit, attribute), near)
+    x = event.params[branch.parameter]
+    return _Vertex(event.position, x, y, event.stable_before, event.stable_after, True)
+
+
+def aligned(values: FloatArray, reference: FloatArray) -> FloatArray:
+    """Return the rotation of a cyclic list that is nearest to a reference.
+
+    The reference itself is returned if the numbers of values differ.
+
+    Examples
+    --------
+    >>> aligned(np.array([2.0, 1.0]), np.array([1.1, 2.1]))
+    array([1., 2.])
+    """
+    if values.shape != reference.shape:
+        return reference
+    rotations = [np.roll(values, k) for k in range(len(values))]
+    return min(rotations, key=lambda r: float(np.sum((r - reference) ** 2)))
+
+
+def _between(vertices: list[_Vertex]) -> Iterator[bool | None]:
+    """Yield the stability of each piece between consecutive vertices; solved points decide."""
+    last: bool | None = None
+    for left, right in zip(vertices, vertices[1:], strict=False):
+        if not left.located:
+            last = left.after
+        elif not right.located:
+            last = right.before
+        elif left.after is not None:
+            last = left.after
+        elif right.before is not None:
+            last = right.before
+        yield last

@@ -1,0 +1,188 @@
+"""How things look: colours, markers, line styles and the names on the axes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from matplotlib.colors import to_hex, to_rgb
+
+from contfric.errors import ParameterError, did_you_mean
+from contfric.models import Model
+
+#: Palette that stays distinguishable to colour-blind readers (M. Okabe and K. Ito, 2008).
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
+GREY = "#6E6E6E"
+
+#: Colours of the four typical branches; the others take `_OTHERS` in the order of their names.
+_TYPICAL = {"2s": BLUE, "0s": BLACK, "1a": VERMILLION, "2a": GREEN}
+_OTHERS = (PURPLE, ORANGE, SKY, "#8B6B00", "#7A3E9D", "#A50F15", GREY)
+
+#: Dark and light of one hue for a domain and its mirror image.
+_DOMAIN_PAIRS = ((BLUE, SKY), (VERMILLION, "#F2A45C"), (GREEN, "#7BCBA9"), (PURPLE, "#EBC3D8"))
+
+STABLE, UNSTABLE, UNKNOWN = "-", (0, (4.0, 2.2)), "-"
+LINE_WIDTH, MIRROR_WIDTH, UNKNOWN_WIDTH = 1.7, 1.1, 0.9
+SMALL, TEXT = 8.0, 10.0
+
+
+@dataclass(frozen=True)
+class Marker:
+    """How one kind of event is marked: bifurcations of smooth systems are black."""
+
+    shape: str
+    face: str = BLACK
+    size: float = 6.0
+    edge: str = BLACK
+
+
+MARKERS = {
+    "SN": Marker("o", size=5.5),
+    "BP": Marker("D", size=5.5),
+    "PD": Marker("s", size=5.5),
+    "NS": Marker("p", size=6.5),
+    "CS": Marker("^", face="white", size=6.5),
+    "SS": Marker("v", face=YELLOW, size=6.5),
+    "AS": Marker("<", face=YELLOW, size=6.5),
+    "GS": Marker(">", face=YELLOW, size=6.5),
+    "T": Marker("|", face=GREY, edge=GREY, size=6.0),
+}
+OTHER_MARKER = Marker("*", face="white", size=7.0)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity of a diagram: the attribute of branch and orbit, and the name on the axis."""
+
+    attribute: str
+    label: str
+    even: bool = False  # the same for an orbit and its mirror image
+
+
+#: What a row of a diagram can show.
+ROWS = {
+    "x_max": Row("x_max", r"$x_{\max}$"),
+    "x_min": Row("x_min", r"$x_{\min}$"),
+    "stops": Row("stops", r"$x$ at stops"),
+    "psi": Row("asymmetry", r"$\psi$", even=True),
+}
+
+_GREEK = frozenset(
+    "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu nu xi rho sigma tau phi chi psi "
+    "omega Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega".split()
+)
+
+
+def row_of(name: str) -> Row:
+    """Return a row by its name.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such row.
+    """
+    if name not in ROWS:
+        raise ParameterError(f"no row '{name}' in a diagram{did_you_mean(name, ROWS)}")
+    return ROWS[name]
+
+
+def parameter_label(name: str) -> str:
+    r"""Return the name of a parameter as mathematics.
+
+    Examples
+    --------
+    >>> parameter_label("S0"), parameter_label("Omega")
+    ('$S_{0}$', '$\\Omega$')
+    """
+    found = re.fullmatch(r"([A-Za-z]+?)_?(\d*)", name)
+    if found is None:
+        return name
+    word, index = found.groups()
+    body = f"\\{word}" if word in _GREEK else word if len(word) == 1 else rf"\mathrm{{{word}}}"
+    return f"${body}_{{{index}}}$" if index else f"${body}$"
+
+
+def surface_label(name: str) -> str:
+    """Return the name of a surface as mathematics.
+
+    Examples
+    --------
+    >>> surface_label("F+")
+    '$F^{+}$'
+    """
+    found = re.fullmatch(r"([A-Za-z]+)([+-]?)", name)
+    if found is None:
+        return name
+    word, sign = found.groups()
+    return f"${word}^{{{sign}}}$" if sign else f"${word}$"
+
+
+def event_label(label: str) -> str:
+    r"""Return the label of an event as mathematics.
+
+    Examples
+    --------
+    >>> event_label("SN_1a")
+    '$\\mathrm{SN}_{1a}$'
+    >>> event_label("T")
+    '$\\mathrm{T}$'
+    """
+    kind, _, index = label.partition("_")
+    if not index:
+        return rf"$\mathrm{{{kind}}}$"
+    index = re.sub(r"[A-Za-z]{2,}", lambda m: rf"\mathrm{{{m.group()}}}", index)
+    index = index.replace(", ", r",\,").replace(" ", r"\ ")
+    return rf"$\mathrm{{{kind}}}_{{{index}}}$"
+
+
+def lighter(colour: str, share: float = 0.45) -> str:
+    """Return a colour mixed with white."""
+    return to_hex([c + (1.0 - c) * share for c in to_rgb(colour)])
+
+
+def greyish(colour: str, share: float = 0.55) -> str:
+    """Return a colour mixed with grey."""
+    return to_hex([c + (0.6 - c) * share for c in to_rgb(colour)])
+
+
+def branch_colours(names: Iterable[str]) -> dict[str, str]:
+    """Return a colour for each name of a branch, the same in every row of a diagram.
+
+    Examples
+    --------
+    >>> branch_colours(["1a", "2s"])
+    {'1a': '#D55E00', '2s': '#0072B2'}
+    """
+    distinct = list(dict.fromkeys(names))
+    others = iter(sorted(set(distinct) - set(_TYPICAL)))
+    cycle = {name: _OTHERS[k % len(_OTHERS)] for k, name in enumerate(others)}
+    return {name: _TYPICAL.get(name) or cycle[name] for name in distinct}
+
+
+def domain_colours(model: Model) -> dict[str, str]:
+    """Return a colour for each domain: dark and light of one hue for mirror images.
+
+    A domain that is its own mirror image, such as the stick, is black.
+
+    Examples
+    --------
+    >>> from contfric.models import load_model
+    >>> domain_colours(load_model("coulomb"))["stick"]
+    '#000000'
+    """
+    found: dict[str, str] = {}
+    hues = iter(range(len(model.domains)))
+    for domain in model.domains:
+        image = model.mirror_domain.get(domain.name)
+        if domain.name in found:
+            continue
+        if image == domain.name:
+            found[domain.name] = BLACK
+            continue
+        dark, light = _DOMAIN_PAIRS[next(hues) % len(_DOMAIN_PAIRS)]
+        found[domain.name] = dark
+        if image is not None:
+            found[image] = light
+    return {domain.name: found[domain.name] for domain in model.domains}

@@ -1,0 +1,178 @@
+"""One file per result: an uncompressed npz of plain arrays, with a JSON header among them.
+
+Nothing in it is executed when it is read (no pickle). The header says what the file holds, the
+version of the format, and the name of the model, from which the equations are rebuilt.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from contfric.atlas.diagram import Diagram
+from contfric.continuation.branch import Branch
+from contfric.errors import ParameterError, ResultFileError
+from contfric.models import load_model
+from contfric.models.definition import Model
+from contfric.orbit.orbit import Orbit
+from contfric.results.files import replacing
+from contfric.results.pack import Arrays, Header, Packer
+from contfric.results.unpack import Unpacker
+
+Saveable: TypeAlias = Orbit | Branch | Diagram
+
+#: Version of the format; it grows when an older contfric could not read what is written.
+FORMAT = 1
+
+_MARK = "contfric result"
+_HEADER = "header"
+_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, KeyError, IndexError, TypeError)
+
+
+def save(x: Saveable, path: str | Path) -> None:
+    """Write an orbit, a branch or a diagram to a file; a file of that name is replaced.
+
+    Raises
+    ------
+    ResultFileError
+        If the file cannot be written, or the object cannot be saved.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> from tempfile import mkdtemp
+    >>> file = Path(mkdtemp()) / "1a.npz"
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> cf.save(orbit, file)
+    >>> bool((cf.load(file).joints == orbit.joints).all())
+    True
+    """
+    if not isinstance(x, (Orbit, Branch, Diagram)):
+        raise ResultFileError(
+            f"only an Orbit, a Branch or a Diagram can be saved, got {type(x).__name__}"
+        )
+    packer = Packer(x.model)
+    content = _content(x, packer)
+    header: Header = {
+        "mark": _MARK,
+        "format": FORMAT,
+        "model": x.model.name,
+        "parameters": list(x.model.parameter_names),
+        "states": list(x.model.states),
+        "content": content,
+        "pool": packer.finish(),
+    }
+    text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    with replacing(Path(path)) as temporary:
+        _write(temporary, {_HEADER: text, **packer.arrays})
+
+
+def _write(path: Path, arrays: Arrays) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, array, allow_pickle=False)
+
+
+def _content(x: Saveable, packer: Packer) -> Header:
+    if isinstance(x, Orbit):
+        return {"kind": "orbit", "index": packer.orbit(x)}
+    if isinstance(x, Branch):
+        return {"kind": "branch", "index": packer.branch(x)}
+    return {"kind": "diagram", **packer.diagram(x)}
+
+
+def load(path: str | Path, model: Model | None = None) -> Saveable:
+    """Read an orbit, a branch or a diagram from a file that :func:`save` wrote.
+
+    Parameters
+    ----------
+    model : Model, optional
+        The model of the file; needed for one that is not known by its name.
+
+    Raises
+    ------
+    ResultFileError
+        If the file is missing, damaged, of another program, or of a newer contfric.
+    """
+    path = Path(path)
+    arrays = _read(path)
+    try:
+        header: Header = json.loads(bytes(arrays.pop(_HEADER)).decode())
+        if header["mark"] != _MARK:
+            raise ValueError("the header is not one of contfric")
+    except _DAMAGE:
+        raise ResultFileError(
+            f"{path} was not written by contfric: give a file of cf.save"
+        ) from None
+    if header.get("format") != FORMAT:
+        raise ResultFileError(
+            f"{path} is in format {header.get('format')}, this contfric reads format {FORMAT}: "
+            "read it with the version that wrote it, or run its study again"
+        )
+    try:
+        owner = _owner(path, header, model)
+        return _restored(header["content"], Unpacker(owner, header["pool"], arrays))
+    except _DAMAGE as error:
+        raise ResultFileError(_damaged(path, error)) from None
+
+
+def _restored(content: Header, pool: Unpacker) -> Saveable:
+    kind = content["kind"]
+    if kind == "orbit":
+        return pool.orbits[content["index"]]
+    if kind == "branch":
+        return pool.branches[content["index"]]
+    if kind == "diagram":
+        return pool.diagram(content)
+    raise ValueError(f"unknown kind of result {kind!r}")
+
+
+def _read(path: Path) -> Arrays:
+    try:
+        # an npz is a zip; anything else np.load would try to read in other ways
+        with path.open("rb") as file:
+            if file.read(2) != b"PK":
+                raise zipfile.BadZipFile("it is no npz file")
+            file.seek(0)
+            with np.load(file, allow_pickle=False) as archive:
+                return {name: archive[name] for name in archive.files}
+    except OSError as error:
+        raise ResultFileError(f"cannot read {path}: {error.strerror or error}") from None
+    except _DAMAGE as error:
+        raise ResultFileError(_damaged(path, error)) from None
+
+
+def _damaged(path: Path, error: Exception) -> str:
+    return (
+        f"{path} is damaged or incomplete ({type(error).__name__}: {error}): restore a copy, or "
+        "run its study again"
+    )
+
+
+def _owner(path: Path, header: Header, model: Model | None) -> Model:
+    name = header["model"]
+    try:
+        owner = load_model(name) if model is None else model
+    except ParameterError as error:
+        raise ResultFileError(
+            f"{path} holds results of the model '{name}', which is not installed ({error}): "
+            "install the package that offers it, or pass load(..., model=...)"
+        ) from None
+    known: dict[str, Any] = {
+        "model": owner.name,
+        "parameters": list(owner.parameter_names),
+        "states": list(owner.states),
+    }
+    for key, value in known.items():
+        if header[key] != value:
+            raise ResultFileError(
+                f"{path} was written for {key} {header[key]}, the model has {value}: run its study "
+                "again"
+            )
+    return owner

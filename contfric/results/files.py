@@ -1,0 +1,71 @@
+"""Files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from contfric.errors import ResultFileError
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_CLOSED = (errno.EROFS, errno.EACCES, errno.EPERM)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a temporary file in the same folder, which takes the place of ``path`` at the end.
+
+    Until then ``path`` is what it was: a failure or Ctrl-C leaves neither half of a file nor a
+    temporary one.
+
+    Raises
+    ------
+    ResultFileError
+        If the file cannot be written; the message says what can be done.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> path = Path(mkdtemp()) / "a.txt"
+    >>> with replacing(path) as temporary:
+    ...     _ = temporary.write_text("whole")
+    >>> path.read_text()
+    'whole'
+    """
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    try:
+        yield temporary
+        _flush(temporary)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise ResultFileError(unwritable(path, error)) from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _flush(path: Path) -> None:
+    """Have the disk accept the data: some report that they are full only now."""
+    descriptor = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def unwritable(path: Path, error: OSError) -> str:
+    """Return the message for a file or folder that cannot be written: why, and what to do."""
+    if error.errno in _FULL:
+        remedy = "free some space, or write to another disk"
+    elif error.errno in _CLOSED:
+        remedy = "the folder is read-only: write to another one"
+    elif error.errno in (errno.ENOTDIR, errno.EEXIST, errno.EISDIR):
+        remedy = "a file stands where a folder should be, or the other way round: use another name"
+    elif error.errno == errno.ENOENT:
+        remedy = f"make the folder {path.parent} first"
+    else:
+        remedy = "write to another place"
+    return f"cannot write {path}: {error.strerror or error}; {remedy}"

@@ -1,0 +1,138 @@
+"""From a header and arrays back to orbits, branches and diagrams."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+
+from contfric.atlas.diagram import Diagram, LooseEnd, Node
+from contfric.continuation.branch import Branch
+from contfric.continuation.events import Bifurcation, End, EndReason, Kind
+from contfric.models.definition import Model
+from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.system import Margin, System, Test, build_system
+from contfric.results.pack import BRANCH_ARRAYS, Arrays, Header
+
+
+@dataclass(frozen=True, eq=False)
+class Unpacker:
+    """Rebuilds objects by their indices, each once."""
+
+    model: Model
+    header: Header
+    arrays: Arrays
+
+    @cached_property
+    def systems(self) -> list[System]:
+        """The boundary-value problems."""
+        return [
+            build_system(
+                self.model,
+                tuple((str(mode), str(exit_)) for mode, exit_ in entry["word"]),
+                entry["periods"],
+                entry["half"],
+            )
+            for entry in self.header["systems"]
+        ]
+
+    @cached_property
+    def orbits(self) -> list[Orbit]:
+        """The single orbits: a start, and those of the bifurcations."""
+        joints, vectors = self.arrays["orbit_joints"], self.arrays["orbit_vectors"]
+        residuals = self.arrays["orbit_residuals"].tolist()
+        entries = self.header["orbits"]
+        systems = [self.systems[entry["system"]] for entry in entries]
+        starts = [0, *accumulate(system.segments for system in systems)]
+        self._expect(joints.shape == (starts[-1], 1 + len(self.model.states)))
+        self._expect(len(vectors) == len(residuals) == len(entries))
+        self._expect(not entries or vectors.shape[1] == len(self.model.parameters))
+        return [
+            Orbit(
+                system,
+                joints[start : start + system.segments].copy(),
+                vectors[i].copy(),
+                residuals[i],
+                Status[entries[i]["status"]],
+            )
+            for i, (system, start) in enumerate(zip(systems, starts[:-1], strict=True))
+        ]
+
+    @cached_property
+    def bifurcations(self) -> list[Bifurcation]:
+        """The bifurcations."""
+        values = iter(self.arrays["bifurcation_params"].tolist())
+        positions = self.arrays["bifurcation_positions"].tolist()
+        return [
+            Bifurcation(
+                Kind(entry["kind"]),
+                {name: next(values) for name in entry["params"]},
+                self.orbits[entry["orbit"]],
+                tuple(Test(Margin(m), segment, s) for m, segment, s in entry["tests"]),
+                position,
+                entry["stable_before"],
+                entry["stable_after"],
+            )
+            for entry, position in zip(self.header["bifurcations"], positions, strict=True)
+        ]
+
+    @cached_property
+    def ends(self) -> list[End]:
+        """The ends of branches."""
+        return [
+            End(
+                EndReason[entry["reason"]],
+                entry["message"],
+                None if entry["bifurcation"] is None else self.bifurcations[entry["bifurcation"]],
+            )
+            for entry in self.header["ends"]
+        ]
+
+    @cached_property
+    def branches(self) -> list[Branch]:
+        """The branches."""
+        return [self._branch(i, entry) for i, entry in enumerate(self.header["branches"])]
+
+    def _branch(self, index: int, entry: Header) -> Branch:
+        system = self.systems[entry["system"]]
+        found = {name: self.arrays[f"branch{index}_{name}"] for name in BRANCH_ARRAYS}
+        shape = (len(found["values"]), system.segments, 1 + len(self.model.states))
+        self._expect(found["joints"].shape == shape)
+        self._expect(found["vector"].shape == (len(self.model.parameters),))
+        self._expect(len(found["arc"]) == len(found["margins"]) == len(found["labels"]) == shape[0])
+        stability = entry["stability"]
+        first, last = (self.ends[i] for i in entry["ends"])
+        return Branch(
+            system=system,
+            parameter=entry["parameter"],
+            turn_multipliers=self.arrays[f"branch{index}_turn_multipliers"] if stability else None,
+            bifurcations=tuple(self.bifurcations[i] for i in entry["bifurcations"]),
+            ends=(first, last),
+            mirrored=entry["mirrored"],
+            **found,
+        )
+
+    def diagram(self, entry: Header) -> Diagram:
+        """Return the diagram of a header entry."""
+        low, high = self.arrays["range"].tolist()
+        return Diagram(
+            model=self.model,
+            parameter=entry["parameter"],
+            range=(low, high),
+            branches=tuple(self.branches[i] for i in entry["branches"]),
+            nodes=tuple(
+                Node(self.bifurcations[n["bifurcation"]], tuple(n["branches"]), n["mirrored"])
+                for n in entry["nodes"]
+            ),
+            loose_ends=tuple(
+                LooseEnd(loose["branch"], loose["side"], self.ends[loose["end"]])
+                for loose in entry["loose_ends"]
+            ),
+            complete=entry["complete"],
+            notes=tuple(entry["notes"]),
+        )
+
+    @staticmethod
+    def _expect(holds: bool) -> None:
+        if not holds:
+            raise ValueError("arrays do not fit each other")

@@ -1,0 +1,62 @@
+"""Studies by name: those that ship with contfric; any other by its path."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from contfric.errors import StudyError, did_you_mean
+from contfric.resources import bundled_dir
+
+SUFFIXES = (".yaml", ".yml")
+
+
+def study_names() -> list[str]:
+    """Return the names of the bundled studies, sorted.
+
+    Examples
+    --------
+    >>> "fig05" in study_names()
+    True
+    """
+    return sorted(path.stem for path in bundled_dir("studies").iterdir() if path.suffix in SUFFIXES)
+
+
+def study_path(source: str | Path) -> Path:
+    """Return the file of a study, by its path or its bundled name.
+
+    Parameters
+    ----------
+    source : str or Path
+        A text that ends in ``.yaml`` or ``.yml``, or has a folder in it, is a path.
+
+    Raises
+    ------
+    StudyError
+        If there is no such study.
+
+    Examples
+    --------
+    >>> study_path("fig05").name
+    'fig05.yaml'
+    """
+    text = str(source)
+    if isinstance(source, Path) or text.endswith(SUFFIXES) or "/" in text or "\\" in text:
+        return _file(Path(source))
+    for suffix in SUFFIXES:
+        path = bundled_dir("studies") / f"{text}{suffix}"
+        if path.is_file():
+            return path
+    names = study_names()
+    hint = did_you_mean(text, names)
+    raise StudyError(f"unknown study '{text}'{hint}. A file needs its suffix: {text}.yaml")
+
+
+def _file(path: Path) -> Path:
+    if path.is_file():
+        return path
+    if path.is_dir():
+        raise StudyError(f"{path} is a folder; give the YAML file of a study")
+    near = [p.name for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
+    hint = did_you_mean(path.name, sorted(near)) if near else ""
+    bundled = ", ".join(study_names())
+    raise StudyError(f"there is no file {path}{hint}. Bundled studies: {bundled}")

@@ -1,0 +1,41 @@
+"""The figures of a run. Matplotlib is loaded here, and only when a figure is drawn."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from contfric.atlas.diagram import Diagram
+from contfric.errors import StudyError
+from contfric.orbit.orbit import Orbit
+from contfric.results import replacing
+from contfric.study.drawings import Drawing
+from contfric.study.schema import FigureKind
+
+#: Size in inches: width, height, height added by each row of a diagram.
+_SIZES = {
+    FigureKind.DIAGRAM: (8.4, 1.2, 2.4),
+    FigureKind.ORBIT: (8.4, 4.2, 0.0),
+    FigureKind.TRANSITIONS: (7.0, 5.0, 0.0),
+}
+
+
+def paint(path: Path, drawing: Drawing, orbit: Orbit, diagram: Diagram | None) -> None:
+    """Draw a figure and write it."""
+    from contfric.plot.diagram import plot_diagram
+    from contfric.plot.graph import plot_transition_graph
+    from contfric.plot.orbit import plot_orbit_panels
+    from contfric.plot.save import new_figure, save_figure
+
+    width, height, row_height = _SIZES[drawing.kind]
+    figure = new_figure(width, height + row_height * len(drawing.rows))
+    if drawing.kind is FigureKind.DIAGRAM:
+        if diagram is None:
+            raise StudyError(f"{drawing.file}: there is no diagram to draw")
+        plot_diagram(diagram, rows=[row.value for row in drawing.rows], fig=figure)
+    elif drawing.kind is FigureKind.ORBIT:
+        plot_orbit_panels(orbit, fig=figure)
+    else:
+        axes = figure.add_subplot()
+        plot_transition_graph(orbit.model, ax=axes, signature=orbit.signature)
+    with replacing(path) as temporary:
+        save_figure(figure, temporary)

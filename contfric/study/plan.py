@@ -1,0 +1,178 @@
+"""What a study will compute, step by step, and what it will not, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+from contfric.study.read import Study
+from contfric.study.schema import ContinueTask, ExploreTask, FigureKind, Want
+
+RECORD = "run.json"
+POINTS = "points.csv"
+BIFURCATIONS = "bifurcations.csv"
+ORBIT = "orbit.npz"
+BRANCH = "branch.npz"
+DIAGRAM = "diagram.npz"
+#: Files that every run may write, figures apart.
+RESULT_FILES = (RECORD, POINTS, BIFURCATIONS, ORBIT, BRANCH, DIAGRAM)
+
+
+class StepName(str, Enum):
+    """The steps of a run, in their order."""
+
+    ORBIT = "orbit"
+    EXPLORE = "explore"
+    CONTINUE = "continue"
+    TABLES = "tables"
+    DATA = "data"
+    FIGURES = "figures"
+    RECORD = "record"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step: what it does, and the files that it writes."""
+
+    name: StepName
+    does: str
+    files: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """Something that is not computed, loaded or written, and why."""
+
+    what: str
+    why: str
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.why}"
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The steps of a study and what it leaves out."""
+
+    study: Study
+    steps: tuple[Step, ...]
+    skipped: tuple[Skipped, ...]
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the files that a run writes, in their order."""
+        return tuple(file for step in self.steps for file in step.files)
+
+    def __str__(self) -> str:
+        study = self.study
+        values = ", ".join(f"{name} = {value:g}" for name, value in study.params.items())
+        lines = [f"{study.name}: {study.title}", f"model {study.model.name}, start at {values}", ""]
+        for number, step in enumerate(self.steps, start=1):
+            lines.append(f"{number}. {step.name.value}: {step.does}")
+            if step.files:
+                lines.append(f"   -> {', '.join(step.files)}")
+        if self.skipped:
+            lines += ["", "skipped:", *(f"- {item}" for item in self.skipped)]
+        return "\n".join(lines)
+
+
+def make_plan(study: Study) -> Plan:
+    """Return what a study computes and what it skips; nothing is computed.
+
+    Examples
+    --------
+    >>> from contfric.study import read_study
+    >>> [step.name.value for step in make_plan(read_study("fig05")).steps]
+    ['orbit', 'explore', 'tables', 'data', 'figures', 'record']
+    """
+    return Plan(study, tuple(_steps(study)), tuple(_skipped(study)))
+
+
+def _steps(study: Study) -> Iterator[Step]:
+    task = study.task
+    yield Step(StepName.ORBIT, _start_text(study))
+    if task is not None:
+        name = StepName.EXPLORE if isinstance(task, ExploreTask) else StepName.CONTINUE
+        yield Step(name, _task_text(study, task))
+    yield Step(
+        StepName.TABLES,
+        f"one row a point: {', '.join(['parameters', *table_quantities(study)])}"
+        + ("" if task is None else "; one row a bifurcation"),
+        (POINTS,) if task is None else (POINTS, BIFURCATIONS),
+    )
+    yield Step(StepName.DATA, "all that a restart needs", _data_files(task))
+    if study.drawings:
+        shown = [
+            f"{d.kind.value} ({', '.join(row.value for row in d.rows)})" if d.rows else d.kind.value
+            for d in study.drawings
+        ]
+        files = tuple(drawing.file for drawing in study.drawings)
+        yield Step(StepName.FIGURES, ", ".join(shown), files)
+    yield Step(StepName.RECORD, "version, study, counts, timings, what was skipped", (RECORD,))
+
+
+def _start_text(study: Study) -> str:
+    start = study.content.start
+    if study.orbit is not None:
+        return f"read from {start.orbit}"
+    if study.signature is not None:
+        return f"solve for the signature {study.signature.name or study.signature}"
+    text = "simulate until the motion repeats itself, read off its signature, solve for it"
+    if start.simulate and start.simulate.state is not None:
+        text += f"; from the state {start.simulate.state}"
+    if start.simulate and start.simulate.periods is not None:
+        text += f"; {start.simulate.periods} period(s)"
+    return text
+
+
+def _task_text(study: Study, task: ExploreTask | ContinueTask) -> str:
+    low, high = task.range
+    where = f"{task.parameter} from {low:g} to {high:g}"
+    if isinstance(task, ContinueTask):
+        text = f"the branch of the first orbit, {where}"
+    else:
+        text = f"every branch that can be reached, {where}"
+    return text + (", with multipliers" if study.wants(Want.STABILITY) else "")
+
+
+def _data_files(task: ExploreTask | ContinueTask | None) -> tuple[str, ...]:
+    if task is None:
+        return (ORBIT,)
+    return ORBIT, DIAGRAM if isinstance(task, ExploreTask) else BRANCH
+
+
+#: Columns of each quantity.
+COLUMNS = {
+    Want.EXTREMA: "x_max, x_min",
+    Want.ASYMMETRY: "psi",
+    Want.STOPS: "stop_1, ...",
+    Want.STABILITY: "stable",
+}
+
+
+def table_quantities(study: Study) -> list[str]:
+    """Return the columns that a study wants beyond the parameters."""
+    return [columns for want, columns in COLUMNS.items() if study.wants(want)]
+
+
+def _skipped(study: Study) -> Iterator[Skipped]:
+    start, task = study.content.start, study.task
+    if start.simulate is None:
+        origin = "a saved orbit" if study.orbit is not None else "a signature"
+        yield Skipped("simulation to a steady state", f"the start is {origin}")
+    if task is None:
+        yield Skipped("continuation", "neither 'explore' nor 'continue' is given")
+    elif isinstance(task, ContinueTask):
+        yield Skipped("other branches", "'continue' follows one branch only")
+    if not study.wants(Want.STABILITY):
+        lost = "" if task is None else ", and BP and PD with them"
+        yield Skipped(f"multipliers{lost}", "not wanted (stability)")
+    for want, columns in COLUMNS.items():
+        if want is not Want.STABILITY and not study.wants(want):
+            yield Skipped(f"columns {columns}", f"not wanted ({want.value})")
+    kinds = {drawing.kind for drawing in study.drawings}
+    if not kinds:
+        yield Skipped("matplotlib", "no figures")
+    if FigureKind.TRANSITIONS not in kinds:
+        yield Skipped("networkx", "no figure of the transitions")

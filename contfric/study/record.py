@@ -1,0 +1,103 @@
+"""The record of a run: what was asked, what was done and how often, what was skipped."""
+
+from __future__ import annotations
+
+import json
+import platform
+import sys
+from collections.abc import Mapping
+from dataclasses import asdict
+from datetime import datetime, timezone
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from contfric.atlas.diagram import Diagram
+from contfric.continuation.branch import Branch
+from contfric.orbit.counts import Counts
+from contfric.orbit.orbit import Orbit
+from contfric.results import replacing
+from contfric.study.plan import Plan
+from contfric.study.tables import listed_nodes
+
+#: Modules that a run loads only if the study needs them.
+WATCHED = (
+    "numba",
+    "matplotlib",
+    "networkx",
+    "scipy.optimize",
+    "pandas",
+    "pydantic",
+    "yaml",
+)
+
+
+def record_of(
+    plan: Plan,
+    counts: Counts,
+    timings: Mapping[str, float],
+    orbit: Orbit,
+    diagram: Diagram | None,
+) -> dict[str, Any]:
+    """Return the record of a run as plain data; status and files are added by the run."""
+    return {
+        "contfric": version("contfric"),
+        "python": platform.python_version(),
+        "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "name": plan.study.name,
+        "title": plan.study.title,
+        "study": plan.study.as_dict(),
+        "counts": asdict(counts),
+        "modules": {name: name in sys.modules for name in WATCHED},
+        "module_count": len(sys.modules),
+        "timings": {name: round(seconds, 6) for name, seconds in timings.items()},
+        "skipped": [asdict(item) for item in plan.skipped],
+        "start": {
+            "signature": orbit.name,
+            "segments": str(orbit.signature),
+            "periods": orbit.periods,
+            "params": orbit.params,
+            "residual": orbit.residual,
+        },
+        **(_diagram_entries(diagram) if diagram is not None else {}),
+    }
+
+
+def _diagram_entries(diagram: Diagram) -> dict[str, Any]:
+    return {
+        "parameter": diagram.parameter,
+        "complete": diagram.complete,
+        "branches": [_branch_entry(i, b) for i, b in enumerate(diagram.branches, start=1)],
+        "bifurcations": [
+            {
+                "kind": node.bifurcation.kind.value,
+                "label": node.bifurcation.label,
+                "branches": [i + 1 for i in node.branches],
+                "params": node.bifurcation.params,
+                "group": node.bifurcation.group,
+                "stable_before": node.bifurcation.stable_before,
+                "stable_after": node.bifurcation.stable_after,
+            }
+            for node in listed_nodes(diagram)
+        ],
+        "loose_ends": [str(end) for end in diagram.loose_ends],
+        "notes": list(diagram.notes),
+    }
+
+
+def _branch_entry(number: int, branch: Branch) -> dict[str, Any]:
+    return {
+        "branch": number,
+        "signature": branch.name,
+        "mirrored": branch.mirrored,
+        "points": len(branch),
+        "from": float(branch.values.min()),
+        "to": float(branch.values.max()),
+        "ends": [str(end) for end in branch.ends],
+    }
+
+
+def write_record(path: Path, record: Mapping[str, Any]) -> None:
+    """Write the record as JSON."""
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")

@@ -1,0 +1,168 @@
+"""The schema of a study file: what may stand where, and of which type."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class Want(str, Enum):
+    """Quantities that a study may ask for, beyond the parameters and the names of the orbits."""
+
+    STABILITY = "stability"
+    ASYMMETRY = "asymmetry"
+    EXTREMA = "extrema"
+    STOPS = "stops"
+
+
+class FigureKind(str, Enum):
+    """Kinds of figures."""
+
+    DIAGRAM = "diagram"
+    ORBIT = "orbit"
+    TRANSITIONS = "transitions"
+
+
+class Row(str, Enum):
+    """Rows of a diagram."""
+
+    X_MAX = "x_max"
+    X_MIN = "x_min"
+    STOPS = "stops"
+    PSI = "psi"
+
+    @property
+    def needs(self) -> Want:
+        """The quantity that the row shows."""
+        return _NEEDS[self]
+
+
+_NEEDS = {
+    Row.X_MAX: Want.EXTREMA,
+    Row.X_MIN: Want.EXTREMA,
+    Row.STOPS: Want.STOPS,
+    Row.PSI: Want.ASYMMETRY,
+}
+
+
+class Format(str, Enum):
+    """Formats of figures."""
+
+    PNG = "png"
+    SVG = "svg"
+    PDF = "pdf"
+
+
+# YAML has texts where Python has enumerations: these fields alone are converted
+_Wants = Annotated[list[Annotated[Want, Field(strict=False)]], Field()]
+_Rows = Annotated[list[Annotated[Row, Field(strict=False)]], Field(min_length=1)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class Simulated(_Part):
+    """Start from a simulation: the orbit that the motion settles on."""
+
+    state: list[float] | None = Field(
+        None, description="a list of finite numbers, one for each state of the model"
+    )
+    time: float = Field(0.0, description="a finite number: the initial time")
+    periods: int | None = Field(
+        None, ge=1, le=64, description="a whole number from 1 to 64: the period wanted"
+    )
+    longest: int = Field(
+        50_000, ge=200, description="a whole number >= 200: periods to simulate at most"
+    )
+
+
+class Start(_Part):
+    """Where the first orbit comes from: exactly one of the three."""
+
+    simulate: Simulated | None = Field(
+        None, description="a mapping with any of state, time, periods, longest"
+    )
+    signature: str | None = Field(
+        None, min_length=1, description="the name of a signature, or the path of its file"
+    )
+    orbit: str | None = Field(None, min_length=1, description="the path of a saved orbit (.npz)")
+
+
+class _Task(_Part):
+    parameter: str = Field(description="the name of a parameter of the model")
+    range: list[float] = Field(
+        min_length=2, max_length=2, description="two finite numbers [low, high]"
+    )
+    max_step: float | None = Field(
+        None,
+        gt=0.0,
+        le=1.0,
+        description="a number in (0, 1]: largest step, as a share of the range",
+    )
+
+
+class ContinueTask(_Task):
+    """Follow the branch of the first orbit to its ends."""
+
+
+class ExploreTask(_Task):
+    """Follow all branches that can be reached from the first orbit."""
+
+    max_periods: int | None = Field(
+        None, ge=1, description="a whole number >= 1: longest period followed through doublings"
+    )
+
+
+class Figure(_Part):
+    """One figure."""
+
+    kind: Annotated[FigureKind, Field(strict=False)] = Field(
+        description="one of diagram, orbit, transitions"
+    )
+    rows: _Rows | None = Field(
+        None, description="a list of rows of a diagram: any of x_max, x_min, stops, psi"
+    )
+    file: str | None = Field(None, min_length=1, description="the name of the figure's file")
+    format: Annotated[Format, Field(strict=False)] | None = Field(
+        None, description="one of png, svg, pdf"
+    )
+
+
+class StudyFile(_Part):
+    """The content of a study file.
+
+    Examples
+    --------
+    >>> StudyFile(model="coulomb", want=["stability"]).want
+    [<Want.STABILITY: 'stability'>]
+    """
+
+    title: str | None = Field(None, description="a text")
+    model: str = Field(description="the name of a model")
+    params: dict[str, float] = Field({}, description="a mapping of parameters to finite numbers")
+    start: Start = Field(
+        Start(simulate=Simulated()),
+        description="'simulate', or a mapping with one of simulate, signature, orbit",
+    )
+    explore: ExploreTask | None = Field(
+        None, description="a mapping with parameter, range, and optionally max_step, max_periods"
+    )
+    continue_: ContinueTask | None = Field(
+        None,
+        alias="continue",
+        description="a mapping with parameter, range, and optionally max_step",
+    )
+    want: _Wants = Field([], description="a list with any of stability, asymmetry, extrema, stops")
+    figures: list[Figure] = Field([], description="a list of mappings, each with its kind")
+
+    @property
+    def task(self) -> ExploreTask | ContinueTask | None:
+        """What is done with the first orbit; None if nothing is."""
+        return self.explore or self.continue_
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what the file says, as plain data."""
+        return self.model_dump(mode="json", by_alias=True, exclude_unset=True)

@@ -1,0 +1,97 @@
+"""The tables of a run: points and bifurcations as CSV, every number to its last digit."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contfric.atlas.diagram import Diagram, Node
+from contfric.continuation.branch import Branch
+from contfric.orbit.orbit import Orbit
+from contfric.results import replacing
+from contfric.study.read import Study
+from contfric.study.schema import Want
+
+
+def write_points(path: Path, study: Study, sources: Sequence[Branch | Orbit]) -> None:
+    """Write one row for each point: branch, signature, parameters, and what the study wants.
+
+    Branches have different numbers of stops; the columns of those that a branch lacks stay empty.
+    """
+    tables = [_columns(study, source) for source in sources]
+    names = list(dict.fromkeys(name for table in tables for name in table))
+    # stop_3 of one branch belongs behind stop_2 of another, before what follows the stops
+    stops = sorted((n for n in names if n.startswith("stop_")), key=lambda n: int(n[5:]))
+    last = [n for n in names if n == "stable"]
+    header = [n for n in names if n not in stops and n not in last] + stops + last
+    rows = (
+        (number, source.name, *row)
+        for number, (source, table) in enumerate(zip(sources, tables, strict=True), start=1)
+        for row in _rows(table, header)
+    )
+    _write(path, ["branch", "signature", *header], rows)
+
+
+def _rows(table: dict[str, list[Any]], header: list[str]) -> Iterable[tuple[Any, ...]]:
+    count = len(next(iter(table.values())))
+    empty = [""] * count
+    return zip(*(table.get(name, empty) for name in header), strict=True)
+
+
+def _columns(study: Study, source: Branch | Orbit) -> dict[str, list[Any]]:
+    """Return the wanted columns of a branch, or of one orbit; what is not wanted is not computed."""
+    params: dict[str, Any] = dict(source.params)
+    columns = {name: np.atleast_1d(value).tolist() for name, value in params.items()}
+    if study.wants(Want.EXTREMA):
+        columns["x_max"] = np.atleast_1d(source.x_max).tolist()
+        columns["x_min"] = np.atleast_1d(source.x_min).tolist()
+    if study.wants(Want.ASYMMETRY):
+        columns["psi"] = np.atleast_1d(source.asymmetry).tolist()
+    if study.wants(Want.STOPS):
+        stops = np.atleast_2d(source.stops)
+        columns |= {f"stop_{k}": x.tolist() for k, x in enumerate(stops.T, start=1)}
+    if study.wants(Want.STABILITY):
+        columns["stable"] = np.atleast_1d(np.asarray(source.stable)).tolist()
+    return columns
+
+
+def write_bifurcations(path: Path, diagram: Diagram) -> None:
+    """Write one row for each bifurcation, in the order of the parameter; mirror images are not."""
+    names = diagram.model.parameter_names
+    rows = (
+        (
+            node.bifurcation.kind.value,
+            node.branches[0] + 1,
+            diagram.branches[node.branches[0]].name,
+            *(node.bifurcation.params[name] for name in names),
+            _known(node.bifurcation.stable_before),
+            _known(node.bifurcation.stable_after),
+        )
+        for node in listed_nodes(diagram)
+    )
+    header = ["kind", "branch", "signature", *names, "stable_before", "stable_after"]
+    _write(path, header, rows)
+
+
+def listed_nodes(diagram: Diagram) -> list[Node]:
+    """Return every bifurcation once with its branches, in the order of the parameter."""
+    own = (node for node in diagram.nodes if not node.mirrored)
+    return sorted(own, key=lambda node: node.bifurcation.params[diagram.parameter])
+
+
+def _known(value: bool | None) -> str:
+    return "" if value is None else str(value)
+
+
+def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    with (
+        replacing(path) as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as file,
+    ):
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
