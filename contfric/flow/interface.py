@@ -8,6 +8,7 @@ are, or what the excitation looks like. The types of the six functions stand in
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 
@@ -32,6 +33,19 @@ class CompiledFlow:
     hit: Any
     period: Any
 
-    def functions(self) -> tuple[Any, Any, Any, Any, Any, Any]:
-        """Return the six functions in the order in which kernels take them."""
-        return (self.flow, self.observe, self.level, self.turning, self.hit, self.period)
+    def functions(self) -> tuple[Any, ...]:
+        """Return the six functions as kernels take them."""
+        return self._first_class
+
+    @cached_property
+    def _first_class(self) -> tuple[Any, ...]:
+        from contfric import compiled as c
+
+        return (
+            c.FirstClass(self.flow, c.flow_signature),
+            c.FirstClass(self.observe, c.observe_signature),
+            c.FirstClass(self.level, c.level_signature),
+            c.FirstClass(self.turning, c.turning_signature),
+            c.FirstClass(self.hit, c.hit_signature),
+            c.FirstClass(self.period, c.period_signature),
+        )

@@ -218,7 +218,7 @@ class Orbit:
     def multipliers(self) -> ComplexArray:
         """Floquet multipliers of the whole orbit, largest first, shape (n,)."""
         mu = self.turn_multipliers
-        return mu**2 if self.system.half else mu
+        return whole_multipliers(mu) if self.system.half else mu
 
     @property
     def stable(self) -> bool:
@@ -369,6 +369,13 @@ class Orbit:
     def __repr__(self) -> str:
         values = ", ".join(f"{k}={v:.6g}" for k, v in self.params.items())
         return f"<Orbit {self.name}: {values}; {self.status.name.lower()}>"
+
+
+def whole_multipliers(mu: ComplexArray) -> ComplexArray:
+    """Return the multipliers of two equal turns; of a pair the one with positive argument first."""
+    squares: ComplexArray = mu**2
+    swap = squares.imag[..., :1] < 0
+    return np.where(swap, squares.conj(), squares)
 
 
 def decode(code: int, surfaces: list[str]) -> list[str]:
