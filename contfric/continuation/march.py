@@ -61,6 +61,24 @@ def product(za, wa, zb, wb, scale):  # type: ignore[no-untyped-def]
 
 
 @helper
+def apart(za, wa, zb, wb, scale):  # type: ignore[no-untyped-def]
+    """Return the distance of two points in the scaled product."""
+    total = 0.0
+    for i in range(za.shape[0]):
+        for j in range(za.shape[1]):
+            total += (za[i, j] - zb[i, j]) ** 2
+    return math.sqrt(total / za.shape[0] + (wa - wb) ** 2 * scale)
+
+
+@helper
+def copy_to(target, source):  # type: ignore[no-untyped-def]
+    """Copy a matrix."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[i, j] = source[i, j]
+
+
+@helper
 def border_rows(tz, tw, scale, d, e):  # type: ignore[no-untyped-def]
     """Write a tangent as a border row."""
     for i in range(tz.shape[0]):
@@ -95,7 +113,9 @@ def settle(  # type: ignore[no-untyped-def]
     norm = math.sqrt(product(new_z, new_w[0], new_z, new_w[0], scale))
     if not math.isfinite(norm) or norm == 0.0:
         return False, tw, False
-    tz[:, :] = new_z / norm
+    for i in range(count):
+        for j in range(m):
+            tz[i, j] = new_z[i, j] / norm
     slope = new_w[0] / norm
     counts[CHECKS] += 1
     finite = watch(functions, layout, z, p, tests, labels)
@@ -151,14 +171,12 @@ def changed(before, after, labels_before, labels_after):  # type: ignore[no-unty
 @helper
 def returned(z, w, start_z, start_w, tz, tw, last_z, last_w, scale, step):  # type: ignore[no-untyped-def]
     """Tell whether a step passes the start of the branch again in the same direction."""
-    gap = z - start_z
-    dw = w - start_w
-    if math.sqrt(product(gap, dw, gap, dw, scale)) > 1.5 * step:
+    if apart(z, w, start_z, start_w, scale) > 1.5 * step:
         return False
-    back = last_z - start_z
-    behind = product(back, last_w - start_w, tz, tw, scale)
-    ahead = product(gap, dw, tz, tw, scale)
-    return behind < 0.0 <= ahead
+    start = product(start_z, start_w, tz, tw, scale)
+    behind = product(last_z, last_w, tz, tw, scale)
+    ahead = product(z, w, tz, tw, scale)
+    return behind < start <= ahead
 
 
 @kernel(
@@ -199,7 +217,7 @@ def march(  # type: ignore[no-untyped-def]
     step, largest, smallest, low, high, scale = options
     which = np.array([active])
     count, m = zs.shape[1], zs.shape[2]
-    z, tz = np.empty((count, m)), np.empty((count, m))
+    z, tz, guess = np.empty((count, m)), np.empty((count, m)), np.empty((count, m))
     trial = p.copy()
     value = np.empty(tests.shape[1])
     label = np.empty(labels.shape[1], dtype=np.int64)
@@ -207,10 +225,13 @@ def march(  # type: ignore[no-untyped-def]
     while k + 1 < ws.shape[0]:
         if step < smallest:
             return STEP, k, step
-        z[:, :] = zs[k] + step * tzs[k]
+        for i in range(count):
+            for j in range(m):
+                z[i, j] = zs[k, i, j] + step * tzs[k, i, j]
+                guess[i, j] = z[i, j]
+                tz[i, j] = tzs[k, i, j]
         trial[active] = ws[k] + step * tws[k]
         guess_w = trial[active]
-        tz[:, :] = tzs[k]
         fine, slope, finite = settle(
             functions,
             layout,
@@ -234,8 +255,7 @@ def march(  # type: ignore[no-untyped-def]
                 step *= 0.25
                 continue
             return BROKEN, k, step
-        gap = z - (zs[k] + step * tzs[k])
-        miss = math.sqrt(product(gap, trial[active] - guess_w, gap, trial[active] - guess_w, scale))
+        miss = apart(z, trial[active], guess, guess_w, scale)
         cosine = product(tz, slope, tzs[k], tws[k], scale)
         angle = math.acos(min(1.0, max(-1.0, cosine)))
         if (angle > _MOST_ANGLE or miss > _MOST_MISS * step) and step > 4.0 * smallest:
@@ -245,9 +265,14 @@ def march(  # type: ignore[no-untyped-def]
             step *= 0.25
             continue
         k += 1
-        zs[k], tzs[k], ws[k], tws[k] = z, tz, trial[active], slope
+        copy_to(zs[k], z)
+        copy_to(tzs[k], tz)
+        ws[k], tws[k] = trial[active], slope
         arc[k] = arc[k - 1] + step
-        tests[k], labels[k] = value, label
+        for j in range(value.shape[0]):
+            tests[k, j] = value[j]
+        for j in range(label.shape[0]):
+            labels[k, j] = label[j]
         factor = min(1.6, max(0.4, _WANTED_ANGLE / max(angle, 1e-6)))
         following = min(largest, step * factor)
         if changed(tests[k - 1], value, labels[k - 1], label):
@@ -365,9 +390,11 @@ def locate(  # type: ignore[no-untyped-def]
     best_x, best_w, best_slope = 0.0, wa, tw
     lost = False
     for _ in range(120):
-        z[:, :] = za + x * (zb - za)
+        for i in range(count):
+            for j in range(m):
+                z[i, j] = za[i, j] + x * (zb[i, j] - za[i, j])
         p[active] = wa + x * (wb - wa)
-        t[:, :] = tz
+        copy_to(t, tz)
         fine, slope, _ = settle(
             functions, layout, z, p, which, t, tw, scale, stability, tests, labels, mu, counts
         )
@@ -379,8 +406,8 @@ def locate(  # type: ignore[no-untyped-def]
             f = sign_value(kind, index, target, sign, tests, labels, p[active])
             if f >= 0.0 or stage == 1:
                 best_x, best_w, best_slope = x, p[active], slope
-                best_z[:, :] = z
-                best_t[:, :] = t
+                copy_to(best_z, z)
+                copy_to(best_t, t)
         if stage == 0:
             f_low, stage, x = f, 1, 1.0
             if f <= 0.0:
@@ -404,15 +431,14 @@ def locate(  # type: ignore[no-untyped-def]
         if f == 0.0 or width <= 4e-16:
             break
         x = next_trial(low, high, f_low, f_high, x_old, f_old, x)
-    za[:, :] = best_z
-    tz[:, :] = best_t
+    copy_to(za, best_z)
+    copy_to(tz, best_t)
     p[active] = best_w
-    settled_z = best_z.copy()
-    t[:, :] = tz
+    copy_to(t, tz)
     _, slope, _ = settle(
         functions,
         layout,
-        settled_z,
+        best_z,
         p,
         which,
         t,

@@ -110,39 +110,61 @@ def solve_cyclic(a, b, c, r, close, close_w, d, e, s, z, w, p, q):  # type: igno
     rows = np.zeros((2 * m, width))
     kept = np.zeros((count, m, width))
     border = np.zeros((free, width))
-    for i in range(m):
-        for j in range(m):
-            rows[m + i, j] = a[0, i, j]
-            rows[m + i, 2 * m + j] = b[0, i, j]
-        rows[m + i, 3 * m : 3 * m + free] = c[0, i]
-        rows[m + i, 3 * m + free :] = r[0, i]
-    for k in range(free):
-        border[k, :m] = d[k, 0]
-        border[k, 3 * m : 3 * m + free] = e[k]
-        border[k, 3 * m + free :] = s[k]
-        if count > 1:
-            border[k, 2 * m : 3 * m] = d[k, 1]
-    for i in range(1, count):
-        shift_rows(rows, border, m)
-        for row in range(m):
-            for j in range(m):
-                rows[m + row, j] = 0.0
-                rows[m + row, m + j] = a[i, row, j]
-                rows[m + row, 2 * m + j] = b[i, row, j]
-            rows[m + row, 3 * m : 3 * m + free] = c[i, row]
-            rows[m + row, 3 * m + free :] = r[i, row]
+    first_border(border, d, e, s, m)
+    for i in range(count):
+        if i > 0:
+            shift_rows(rows, border, m)
+        fill_rows(rows, a, b, c, r, i, 0 if i == 0 else m)
+        if i == 0:
+            continue
         if i + 1 < count:
             for k in range(free):
-                border[k, 2 * m : 3 * m] = d[k, i + 1]
+                for j in range(m):
+                    border[k, 2 * m + j] = d[k, i + 1, j]
         if not eliminate_joint(rows, border, m):
             return False
-        kept[i] = rows[:m]
-    p[:, :] = rows[m:, :m]
-    q[:, :] = rows[m:, 2 * m : 3 * m]
+        for j in range(m):
+            for k in range(width):
+                kept[i, j, k] = rows[j, k]
+    for i in range(m):
+        for j in range(m):
+            p[i, j] = rows[m + i, j]
+            q[i, j] = rows[m + i, 2 * m + j]
     if not solve_ends(rows, border, close, close_w, m, free, z, w):
         return False
     back_substitute(kept, close, close_w, z, w, m, free)
     return True
+
+
+@helper
+def first_border(border, d, e, s, m):  # type: ignore[no-untyped-def]
+    """Start the border rows: their parts on z_0, z_1, the parameters and the right-hand sides."""
+    free, right = e.shape[0], s.shape[1]
+    for k in range(free):
+        for j in range(m):
+            border[k, j] = d[k, 0, j]
+            if d.shape[1] > 1:
+                border[k, 2 * m + j] = d[k, 1, j]
+        for j in range(free):
+            border[k, 3 * m + j] = e[k, j]
+        for j in range(right):
+            border[k, 3 * m + free + j] = s[k, j]
+
+
+@helper
+def fill_rows(rows, a, b, c, r, i, at):  # type: ignore[no-untyped-def]
+    """Write the equations of segment i to the last m rows, with z_i in the columns from ``at``."""
+    m, free, right = a.shape[1], c.shape[2], r.shape[2]
+    for row in range(m):
+        for j in range(3 * m):
+            rows[m + row, j] = 0.0
+        for j in range(m):
+            rows[m + row, at + j] = a[i, row, j]
+            rows[m + row, 2 * m + j] = b[i, row, j]
+        for j in range(free):
+            rows[m + row, 3 * m + j] = c[i, row, j]
+        for j in range(right):
+            rows[m + row, 3 * m + free + j] = r[i, row, j]
 
 
 @helper
@@ -183,8 +205,11 @@ def solve_ends(rows, border, close, close_w, m, free, z, w):  # type: ignore[no-
             rhs[i, k] = rows[m + i, at] if i < m else border[i - m, at]
     if not dense_solve(small, rhs):
         return False
-    z[0] = rhs[:m]
-    w[:, :] = rhs[m:]
+    for k in range(right):
+        for j in range(m):
+            z[0, j, k] = rhs[j, k]
+        for j in range(free):
+            w[j, k] = rhs[m + j, k]
     return True
 
 
@@ -200,18 +225,19 @@ def back_substitute(kept, close, close_w, z, w, m, free):  # type: ignore[no-unt
             for j in range(free):
                 after[i, k] += close_w[i, j] * w[j, k]
     for i in range(count - 1, 0, -1):
-        row = kept[i]
         for j in range(m - 1, -1, -1):
             for k in range(right):
-                value = row[j, 3 * m + free + k]
+                value = kept[i, j, 3 * m + free + k]
                 for n in range(m):
-                    value -= row[j, n] * z[0, n, k] + row[j, 2 * m + n] * after[n, k]
+                    value -= kept[i, j, n] * z[0, n, k] + kept[i, j, 2 * m + n] * after[n, k]
                 for n in range(free):
-                    value -= row[j, 3 * m + n] * w[n, k]
+                    value -= kept[i, j, 3 * m + n] * w[n, k]
                 for n in range(j + 1, m):
-                    value -= row[j, m + n] * z[i, n, k]
-                z[i, j, k] = value / row[j, m + j]
-        after[:, :] = z[i]
+                    value -= kept[i, j, m + n] * z[i, n, k]
+                z[i, j, k] = value / kept[i, j, m + j]
+        for j in range(m):
+            for k in range(right):
+                after[j, k] = z[i, j, k]
 
 
 @helper

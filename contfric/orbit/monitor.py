@@ -6,8 +6,7 @@ the joints, which the exit and joint margins watch). The flow delivers *all* sta
 
 The multipliers are the eigenvalues of the linear map M of one turn on ``z_0 = (t_0, y_0)``. It has
 one eigenvalue 0 for the direction off the section, and one more for each direction that a stick
-takes away; with ``rank <= 2`` directions left the others follow from ``e1 = tr M`` and
-``e2 = (tr(M)^2 - tr(M^2)) / 2`` (the sum of the principal minors), whatever the size of M.
+takes away; those are exactly zero, and the characteristic polynomial of the others is cut off there.
 """
 
 from __future__ import annotations
@@ -146,42 +145,95 @@ def crossings(functions, layout, k, z, p, last, times):  # type: ignore[no-untyp
 
 
 @helper
-def spectrum(m, rank, out):  # type: ignore[no-untyped-def]
-    """Write the n eigenvalues of one turn, largest first; return (chi(1), chi(-1)).
+def characteristic(m, rank, e):  # type: ignore[no-untyped-def]
+    """Fill e[k], k <= rank, with the elementary symmetric functions of the eigenvalues of m.
 
-    ``chi(s)`` is the product of ``1 - s mu`` over the multipliers mu.
+    Faddeev and LeVerrier: ``k e_k = tr(m b_k)``, ``b_1 = 1``, ``b_{k+1} = e_k - m b_k``; a matrix
+    of rank r has no others.
     """
     size = m.shape[0]
-    out[:] = 0.0
-    e1 = 0.0
+    b, product = np.zeros((size, size)), np.zeros((size, size))
     for i in range(size):
-        e1 += m[i, i]
-    if rank == 1:
-        out[0] = e1
-        return 1.0 - e1, 1.0 + e1
-    if rank == 2:
-        e2 = 0.0
+        b[i, i] = 1.0
+    e[0] = 1.0
+    for k in range(1, rank + 1):
+        trace = 0.0
         for i in range(size):
-            for j in range(i):
-                e2 += m[i, i] * m[j, j] - m[i, j] * m[j, i]
-        half = 0.5 * e1
-        disc = half * half - e2
+            for j in range(size):
+                value = 0.0
+                for n in range(size):
+                    value += m[i, n] * b[n, j]
+                product[i, j] = value
+            trace += product[i, i]
+        e[k] = trace / k
+        for i in range(size):
+            for j in range(size):
+                b[i, j] = (e[k] if i == j else 0.0) - product[i, j]
+
+
+@helper
+def polynomial_roots(e, rank, out):  # type: ignore[no-untyped-def]
+    """Write the roots of ``z^r - e_1 z^{r-1} + e_2 z^{r-2} - ..``, by the iteration of Aberth."""
+    if rank == 1:
+        out[0] = e[1]
+        return
+    if rank == 2:
+        half = 0.5 * e[1]
+        disc = half * half - e[2]
         if disc >= 0.0:
             big = half + math.copysign(math.sqrt(disc), half)
             out[0] = big
-            out[1] = e2 / big if big != 0.0 else 0.0
+            out[1] = e[2] / big if big != 0.0 else 0.0
         else:
             out[0] = complex(half, math.sqrt(-disc))
             out[1] = complex(half, -math.sqrt(-disc))
-        return 1.0 - e1 + e2, 1.0 + e1 + e2
-    values = np.linalg.eigvals(m.astype(np.complex128))
-    order = np.argsort(-np.abs(values))
-    one, minus = complex(1.0, 0.0), complex(1.0, 0.0)
+        return
+    radius = 0.0
+    for k in range(1, rank + 1):
+        radius = max(radius, abs(e[k]) ** (1.0 / k))
     for k in range(rank):
-        out[k] = values[order[k]]
-        one *= 1.0 - out[k]
-        minus *= 1.0 + out[k]
-    return one.real, minus.real
+        angle = 0.4 + 2.0 * math.pi * k / rank  # off the real axis, where real roots would stall
+        out[k] = radius * complex(math.cos(angle), math.sin(angle))
+    for _ in range(60):
+        largest = 0.0
+        for k in range(rank):
+            value, slope = complex(1.0, 0.0), complex(0.0, 0.0)
+            for j in range(1, rank + 1):
+                slope = slope * out[k] + value
+                value = value * out[k] + (e[j] if j % 2 == 0 else -e[j])
+            if value == 0.0:
+                continue
+            others = complex(0.0, 0.0)
+            for j in range(rank):
+                if j != k and out[j] != out[k]:
+                    others += 1.0 / (out[k] - out[j])
+            step = value / (slope - value * others)
+            out[k] -= step
+            largest = max(largest, abs(step))
+        if largest <= 1e-16 * radius:
+            return
+
+
+@helper
+def spectrum(m, rank, out):  # type: ignore[no-untyped-def]
+    """Write the n eigenvalues of one turn; return (chi(1), chi(-1)).
+
+    ``chi(s)`` is the product of ``1 - s mu`` over the multipliers mu.
+    """
+    e = np.zeros(rank + 1)
+    characteristic(m, rank, e)
+    for k in range(out.shape[0]):
+        out[k] = 0.0
+    polynomial_roots(e, rank, out)
+    for i in range(1, rank):  # largest first
+        for j in range(i, 0, -1):
+            if abs(out[j]) > abs(out[j - 1]) * (1.0 + 1e-14):
+                out[j], out[j - 1] = out[j - 1], out[j]
+    one, minus = 0.0, 0.0
+    for k in range(rank + 1):
+        one += e[k] if k % 2 == 0 else -e[k]
+        minus += e[k]
+    return one, minus
 
 
 @helper
@@ -191,10 +243,13 @@ def multipliers(layout, pencil, out):  # type: ignore[no-untyped-def]
     n = m - 1
     close = np.zeros((m, m))
     close[0, 0] = 1.0
-    close[1:, 1:] = layout.closure
+    for i in range(n):
+        for j in range(n):
+            close[1 + i, 1 + j] = layout.closure[i, j]
     turn = np.empty((m, m))
     if not turn_map(pencil[0], pencil[1], close, turn):
-        out[:] = np.inf
+        for k in range(n):
+            out[k] = np.inf
         return np.nan, np.nan
     return spectrum(turn, min(layout.rank, n), out)
 

@@ -67,11 +67,12 @@ def last_joint(functions, layout, z, p, which, out, close, close_w):  # type: ig
     grad = np.zeros(which.shape[0])
     period = functions[5](p, which, grad)
     out[0] = z[0, 0] + layout.turn * period
-    close[:, :] = 0.0
+    for i in range(n + 1):
+        for j in range(n + 1):
+            close[i, j] = 0.0
+        for k in range(which.shape[0]):
+            close_w[i, k] = layout.turn * grad[k] if i == 0 else 0.0
     close[0, 0] = 1.0
-    close_w[:, :] = 0.0
-    for k in range(which.shape[0]):
-        close_w[0, k] = layout.turn * grad[k]
     for i in range(n):
         value = 0.0
         for j in range(n):
@@ -91,9 +92,11 @@ def assemble(functions, layout, z, p, which, last, a, b, c, r):  # type: ignore[
     grad = np.zeros(1 + n + q)
     level_grad = np.zeros(q)
     worst = 0.0
-    a[:, :, :] = 0.0
-    b[:, :, :] = 0.0
     for i in range(count):
+        for j in range(m):
+            for k in range(m):
+                a[i, j, k] = 0.0
+                b[i, j, k] = 0.0
         after = z[i + 1] if i + 1 < count else last
         functions[0](layout.modes[i], z[i, 0], z[i, 1:], after[0] - z[i, 0], p, which, y1, jac)
         for j in range(n):
@@ -234,8 +237,11 @@ def tangent_at(functions, layout, z, p, which, d, e, tz, tw, pencil, polish):  #
         return False, worst
     if polish:
         move(z, p, which, dz, dw, 1.0)
-    tz[:, :] = dz[:, :, 1]
-    tw[:] = dw[:, 1]
+    for i in range(count):
+        for j in range(m):
+            tz[i, j] = dz[i, j, 1]
+    for k in range(q):
+        tw[k] = dw[k, 1]
     return True, worst
 
 
