@@ -44,7 +44,9 @@ class LooseEnd:
     end: End
 
     def __str__(self) -> str:
-        return f"branch {self.branch + 1}, {'first' if self.side == 0 else 'last'} point: {self.end}"
+        return (
+            f"branch {self.branch + 1}, {'first' if self.side == 0 else 'last'} point: {self.end}"
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -41,7 +41,7 @@ _PASSED = frozenset({Kind.SN, Kind.T, Kind.NS})
 #: Ends that the exploration goes on from.
 _FOLLOWED = frozenset({EndReason.CS, EndReason.BP, EndReason.PD})
 #: Ends that need no follower.
-_FINAL = frozenset({EndReason.RANGE, EndReason.LIMIT, EndReason.CLOSED})
+_FINAL = frozenset({EndReason.RANGE, EndReason.LIMIT, EndReason.CLOSED, EndReason.UNBOUNDED})
 #: First step away from an event, in largest steps: the new word is proved close to it.
 _NEAR_EVENT = 0.01
 #: A branch that gets no farther than this (arclength) from the event it starts at has left it in the
@@ -163,7 +163,7 @@ class _Exploration:
             )
             if _went_somewhere(side):
                 b = event.bifurcation
-                first = End(EndReason.CS, f"{EndReason.START.value}: {_where(b, settings.parameter)}")
+                first = _first_end(EndReason.CS, b, side, settings)
                 return assemble(orbit, settings, side, first)
         return None
 
@@ -217,7 +217,7 @@ class _Exploration:
             self.notes.append(f"{at}: the branch that leaves is not admissible")
             return
         side.points.insert(0, departure.origin)
-        first = End(reason, f"{EndReason.START.value}: {at}", event.bifurcation)
+        first = _first_end(reason, event.bifurcation, side, self.settings)
         self._add_from(assemble(orbit, self.settings, side, first), event)
 
     # ---------------------------------------------------------------- period doubling
@@ -309,6 +309,14 @@ def _where(bifurcation: Bifurcation, parameter: str) -> str:
     return f"{bifurcation.label} at {parameter} = {bifurcation.params[parameter]:.10g}"
 
 
+def _first_end(reason: EndReason, b: Bifurcation, side: Side, settings: Settings) -> End:
+    """Return the end of a branch at the event that it starts from."""
+    mu = side.points[min(1, len(side.points) - 1)].mu
+    stable = bool(np.all(np.abs(mu) < 1.0)) if settings.stability else None
+    here = replace(b, position=0.0, stable_before=None, stable_after=stable)
+    return End(reason, f"{EndReason.START.value}: {_where(b, settings.parameter)}", here)
+
+
 def _went_somewhere(side: Side) -> bool:
     return side.points[-1].arc - side.points[0].arc > _NOWHERE
 
@@ -352,7 +360,7 @@ def _diagram(
     nodes: list[Node] = []
     for event in state.events:
         computed = tuple(place[i] for i in event.branches)
-        symmetric = event.bifurcation.orbit.symmetric
+        symmetric = event.bifurcation.symmetric
         mirrored = tuple(image.get(i, place[i]) for i in event.branches)
         if symmetric:
             nodes.append(Node(event.bifurcation, tuple(dict.fromkeys((*computed, *mirrored)))))

@@ -93,8 +93,12 @@ class Branch:
 
     @cached_property
     def name(self) -> str:
-        """Name of the orbit in the middle of the branch, such as ``2s``."""
-        return self[len(self) // 2].name
+        """Name such as ``2s``: that of the longest part between tangencies (T)."""
+        changes = np.flatnonzero(np.any(np.diff(self.labels, axis=0) != 0, axis=1)) + 1
+        edges = np.concatenate([[0], changes, [len(self)]])
+        spans = self.arc[edges[1:] - 1] - self.arc[edges[:-1]]
+        longest = int(np.argmax(spans))
+        return self[int(edges[longest] + edges[longest + 1]) // 2].name
 
     @property
     def symmetric(self) -> bool:

@@ -84,6 +84,7 @@ class EndReason(str, Enum):
     POINTS = "the largest number of points was reached (max_points)"
     STEP = "the step became too small: Newton does not converge"
     SINGULAR = "several conditions fail at once: the equations are singular beyond this point"
+    UNBOUNDED = "the amplitude grows without bound: resonance"
     BROKEN = "the orbit is not finite beyond this point"
     INTERRUPTED = "interrupted"
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.events import Bifurcation, Kind, kind_of_margin
-from contfric.continuation.points import EXTRA, Point, Settings
+from contfric.continuation.points import Point, Settings
 from contfric.models.definition import FloatArray
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
-from contfric.orbit.system import Test, build_system
+from contfric.orbit.system import Margin, Test, build_system
 from contfric.orbit.words import half_of
 
 #: Margins below this at a located event vanish with it: they form a group. Located margins are
@@ -30,6 +30,13 @@ _NEARLY = 1e-2
 _VERTEX_CHI = 1e-4
 
 
+#: Share of the period below which a stick at a tangential release has vanished: the square root of
+#: the rounding of its quadratic margin.
+_VANISHED = 1e-5
+#: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
+_COMPLEX = 1e-6
+
+
 def locate_events(
     orbit: Orbit, before: Point, after: Point, settings: Settings
 ) -> list[tuple[Bifurcation, Point]]:
@@ -40,9 +47,10 @@ def locate_events(
     sliding = _sliding_events(orbit, before, after, settings)
     first = min((point.arc for _, point in sliding), default=np.inf)
     step = after.arc - before.arc
+    beyond = sliding[0][1] if sliding else after
     smooth = [
         (b, point)
-        for b, point in _smooth_events(orbit, before, after, settings)
+        for b, point in _smooth_events(orbit, before, after, settings, beyond)
         if point.arc < first - _SAME * step
     ]
     return sorted([*smooth, *sliding], key=lambda pair: pair[1].arc)
@@ -59,7 +67,7 @@ def _trial(
     sign: float,
 ) -> Point | None:
     """Locate one change of sign; None if no point could be solved on the way."""
-    from contfric.continuation.march import BY_TEST, locate
+    from contfric.continuation.bracket import BY_TEST, locate
 
     system = orbit.system
     active = orbit.model.index_of(settings.parameter)
@@ -96,7 +104,15 @@ def _trial(
         # Newton fails behind this point: the last good one, marked as such
         arc = before.arc - (at + 2.0) * (after.arc - before.arc)
         return Point(
-            joints, float(vector[active]), tangent, float(slope[0]), tests, labels, mu, arc, lost=True
+            joints,
+            float(vector[active]),
+            tangent,
+            float(slope[0]),
+            tests,
+            labels,
+            mu,
+            arc,
+            lost=True,
         )
     arc = before.arc + at * (after.arc - before.arc)
     return Point(joints, float(vector[active]), tangent, float(slope[0]), tests, labels, mu, arc)
@@ -106,7 +122,7 @@ def locate_value(
     orbit: Orbit, before: Point, after: Point, settings: Settings, target: float
 ) -> Point:
     """Return the point at which the parameter takes a value."""
-    from contfric.continuation.march import BY_PARAMETER
+    from contfric.continuation.bracket import BY_PARAMETER
 
     sign = 1.0 if before.value > target else -1.0
     if before.value == target:
@@ -126,7 +142,7 @@ def locate_value(
 def _sliding_events(
     orbit: Orbit, before: Point, after: Point, settings: Settings
 ) -> list[tuple[Bifurcation, Point]]:
-    from contfric.continuation.march import BY_TEST
+    from contfric.continuation.bracket import BY_TEST
 
     margins = len(orbit.system.tests)
     located: list[tuple[int, Point]] = []
@@ -141,6 +157,8 @@ def _sliding_events(
     first, point = min(located, key=lambda pair: pair[1].arc)
     here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     kind = kind_of_margin(orbit.system, orbit.system.tests[first], here)
+    if _is_degenerate(here, kind, orbit.system.tests[first]):
+        point.lost = True
     group = tuple(
         test
         for k, test in enumerate(orbit.system.tests)
@@ -154,40 +172,52 @@ def _sliding_events(
     return [(_bifurcation(kind, here, before, None, point, settings, group), point)]
 
 
+def _is_degenerate(here: Orbit, kind: Kind, test: Test) -> bool:
+    """Tell whether a stick vanishes just where its release becomes tangential.
+
+    CS and AS at once: the margin vanishes quadratically, and the orbit is one of a continuum (as at
+    Omega = 1/2, where a slide lasts a whole natural period whatever its amplitude).
+    """
+    start, end = here.cycle[test.segment, 0], here.ends[test.segment, 0]
+    return kind is Kind.AS and end - start < _VANISHED * here.period
+
+
 def _is_free(first: Test, other: Test) -> bool:
     """Tell whether two vanishing margins are two events: not the same surface at the same place."""
     return (first.segment, first.surface) != (other.segment, other.surface)
 
 
 def _smooth_events(
-    orbit: Orbit, before: Point, after: Point, settings: Settings
+    orbit: Orbit, before: Point, after: Point, settings: Settings, beyond: Point
 ) -> list[tuple[Bifurcation, Point]]:
-    from contfric.continuation.march import BY_TEST, CHI_MINUS, CHI_ONE, FOLD
+    """Return folds, branch points, doublings, tori and tangencies; ``beyond`` is good behind them."""
+    from contfric.continuation.bracket import BY_TEST
+    from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
 
     base = len(orbit.system.tests)
     found: list[tuple[Bifurcation, Point]] = []
-    folded: Point | None = None
-    for column in (FOLD, CHI_ONE, CHI_MINUS):
+    folded = False
+    for column in (FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR):
         a, b = before.tests[base + column], after.tests[base + column]
-        if not a * b < 0.0:
-            continue
-        point = _trial(
-            orbit, before, after, settings, BY_TEST, base + column, 0.0, float(np.sign(a))
-        )
+        if not a * b < 0.0 or (column == CHI_ONE and folded):
+            continue  # chi(1) of a fold vanishes with it
+        sign = float(np.sign(a))
+        point = _trial(orbit, before, after, settings, BY_TEST, base + column, 0.0, sign)
         if point is None or point.lost or _is_pole(point.tests[base + column], a, b):
             continue
         if column == FOLD:
-            folded = point
-            found.append(_fold(orbit, before, after, point, settings))
+            folded = True
+            found.append(_fold(orbit, before, beyond, point, settings))
             continue
-        if column == CHI_ONE:
-            if folded is not None:
-                continue  # the multiplier 1 of the fold itself
-            kind = Kind.BP
-        else:
-            kind = Kind.BP if orbit.system.half else Kind.PD
+        kind = Kind.BP
+        if column == CHI_PAIR:
+            if abs(point.mu[0].imag) < _COMPLEX:
+                continue  # two real multipliers with product 1: nothing happens
+            kind = Kind.NS
+        elif column == CHI_MINUS and not orbit.system.half:
+            kind = Kind.PD
         here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
-        found.append((_bifurcation(kind, here, before, after, point, settings), point))
+        found.append((_bifurcation(kind, here, before, beyond, point, settings), point))
     return [*found, *_tangencies(orbit, before, after, settings)]
 
 
@@ -200,7 +230,7 @@ def _tangencies(
     orbit: Orbit, before: Point, after: Point, settings: Settings
 ) -> list[tuple[Bifurcation, Point]]:
     """Return the events T: changes of the surfaces that a segment crosses."""
-    from contfric.continuation.march import BY_LABEL
+    from contfric.continuation.bracket import BY_LABEL
 
     found: list[tuple[Bifurcation, Point]] = []
     active = orbit.model.index_of(settings.parameter)
@@ -213,14 +243,14 @@ def _tangencies(
                 break
             here = point.orbit(orbit.system, orbit.vector, active)
             test = Test(*_label_place(orbit, k))
-            found.append((_bifurcation(Kind.T, here, before, after, point, settings, (test,)), point))
+            found.append(
+                (_bifurcation(Kind.T, here, point, point, point, settings, (test,)), point)
+            )
             break
     return found
 
 
-def _label_place(orbit: Orbit, k: int) -> tuple[object, int, str]:
-    from contfric.orbit.system import Margin
-
+def _label_place(orbit: Orbit, k: int) -> tuple[Margin, int, str]:
     segment, observable, _ = orbit.system.layout.labels[k]
     name = orbit.model.observables[int(observable)].name
     return Margin.INTERIOR, int(segment), name

@@ -14,16 +14,18 @@ from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System
 
-#: Largest step by default, where the range of the parameter counts 1: at least 50 points.
-LARGEST_STEP = 0.02
+#: Largest step by default, where the range of the parameter counts 1 (and grows with the size of the
+#: state): about 100 points over the range.
+LARGEST_STEP = 0.01
 #: First step, in largest steps: the curvature is not known yet.
-FIRST_STEP = 0.05
+FIRST_STEP = 0.1
 #: Smallest step: at the resolution of a branch in double precision, far below any feature of one.
 SMALLEST_STEP = 1e-10
 #: Most points of one side of a branch by default.
 MOST_POINTS = 20_000
-#: Extra columns of the tests behind the margins: fold, chi(1), chi(-1).
-EXTRA = 3
+#: Extra columns of the tests behind the margins; the first is the slope of the parameter. (Repeated
+#: from the compiled steps, which are not imported before something is traced; a test compares them.)
+EXTRA = 4
 
 
 @dataclass(frozen=True)

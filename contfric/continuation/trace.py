@@ -111,7 +111,8 @@ def continue_orbit(
     range : (float, float)
         Where it may go; clipped to the model's limits.
     max_step : float, optional
-        Largest step along the branch, as a share of the range; 0.02 by default.
+        Largest step along the branch, as a share of the range (times 1 + the size of the
+        state); 0.01 by default.
     stability : bool
         Whether multipliers are evaluated; without them BP and PD are not detected.
     max_points : int
@@ -210,14 +211,14 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         TALLY,
     )
     side.points += [rows.point(k) for k in range(1, count + 1)]
-    if why == kernels.STEP:
-        side.end = End(EndReason.STEP)
-        return True, step
-    if why == kernels.BROKEN:
-        side.end = End(EndReason.BROKEN)
-        return True, step
-    if why == kernels.CLOSED:
-        side.end = End(EndReason.CLOSED)
+    reasons = {
+        kernels.STEP: EndReason.STEP,
+        kernels.BROKEN: EndReason.BROKEN,
+        kernels.CLOSED: EndReason.CLOSED,
+        kernels.UNBOUNDED: EndReason.UNBOUNDED,
+    }
+    if why in reasons:
+        side.end = End(reasons[why])
         return True, step
     if why == kernels.FULL:
         return False, step

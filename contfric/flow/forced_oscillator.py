@@ -303,7 +303,9 @@ def next_root(mode, c, order, target, on, sign, t0, y0, start, end, p):  # type:
         if w <= 0.0:
             return tau, sign
         window = window_of(w, sign * q1, natural)
-        step = safe_step(w, sign * q1, sign * q2, third_bound(mode, c, order, p, size, window), window)
+        step = safe_step(
+            w, sign * q1, sign * q2, third_bound(mode, c, order, p, size, window), window
+        )
         tau += step
         if step < window and reached(step, tau):
             return tau, sign

@@ -115,9 +115,7 @@ def _read_off(trajectory: Trajectory) -> Orbit | None:
             return solved
         if mismatch < _EXACT and solved.status is not Status.CONVERGED:
             # the simulation repeats itself but the system is singular: one orbit of a continuum
-            return Orbit(
-                orbit.system, orbit.joints, orbit.vector, mismatch, Status.CONVERGED
-            )
+            return Orbit(orbit.system, orbit.joints, orbit.vector, mismatch, Status.CONVERGED)
     return None
 
 

@@ -38,7 +38,7 @@ def full_form(orbit: Orbit) -> Orbit:
             here, there = domains[at], domains[(at + 1) % len(domains)]
             surface = crossing(whole.model, here, there)
             at += 1
-            if surface is None or surface == exit_ and _last(whole, domains, at, i):
+            if surface is None or (surface == exit_ and _last(whole, domains, at, i)):
                 word.append((mode, exit_))
                 break
             word.append((mode, surface))

@@ -39,9 +39,7 @@ from contfric.orbit.cyclic import solve_cyclic
 from contfric.orbit.system import Layout
 
 #: Type of the model's functions and of a layout, as kernels take them.
-FunctionsType = types.Tuple(
-    (FlowType, ObserveType, LevelType, TurningType, HitType, PeriodType)
-)
+FunctionsType = types.Tuple((FlowType, ObserveType, LevelType, TurningType, HitType, PeriodType))
 LayoutType = types.NamedTuple(
     [indices, indices, indices, vector, table, table, table, matrix, f8, i8], Layout
 )

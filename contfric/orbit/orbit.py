@@ -269,7 +269,9 @@ class Orbit:
         ends = np.vstack([self.joints[1:], self.cycle[len(self.joints) % len(self.cycle)]])
         if not system.half:
             ends[-1, 0] += self.period
-        after = [mode for mode, _ in system.word[1:]] + [self.word[len(system.word) % len(self.word)][0]]
+        after = [mode for mode, _ in system.word[1:]] + [
+            self.word[len(system.word) % len(self.word)][0]
+        ]
         domains: list[str] = []
         for i, (mode, exit_) in enumerate(system.word):
             signs = signs_at(model, float(ends[i, 0]), ends[i, 1:].copy(), self.vector)

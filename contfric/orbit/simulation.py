@@ -199,7 +199,8 @@ def run(
     events: int,
 ) -> Trajectory:
     """Run the compiled simulation; the state is copied. Rows are grown as they are needed."""
-    from contfric.orbit.trajectory import ALL_EVENTS, simulate as kernel
+    from contfric.orbit.trajectory import ALL_EVENTS
+    from contfric.orbit.trajectory import simulate as kernel
 
     model_tables = tables(model)
     y = y.copy()

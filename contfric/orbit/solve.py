@@ -115,7 +115,9 @@ def _explain(signature: Signature, params: Mapping[str, float], nearest: Orbit |
     if nearest is None:
         text += ": no start walks this signature"
     elif not nearest.converged:
-        text += f"; the best start ended with residual {nearest.residual:.2g} ({nearest.status.value})"
+        text += (
+            f"; the best start ended with residual {nearest.residual:.2g} ({nearest.status.value})"
+        )
     elif not nearest.admissible:
         text += "; a solution exists that violates: " + "; ".join(nearest.violations()[:3])
     else:

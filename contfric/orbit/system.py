@@ -166,7 +166,9 @@ def build_system(
         modes=np.array([names.index(mode) for mode, _ in word], dtype=np.int64),
         exits=np.array([surfaces.index(exit_) for _, exit_ in word], dtype=np.int64),
         observables=_surface_observables(model),
-        exit_signs=np.array([_exit_sign(model, i, e) for i, (_, e) in zip(inside, word, strict=True)]),
+        exit_signs=np.array(
+            [_exit_sign(model, i, e) for i, (_, e) in zip(inside, word, strict=True)]
+        ),
         interior=interior,
         joint=joint,
         labels=_label_rows(model, word, half, bool(domains)),
@@ -186,9 +188,7 @@ def _mode_after(model: Model, word: Word, half: bool) -> str:
 @cache
 def mirror_mode(model: Model) -> dict[str, str]:
     """Image of each mode under the symmetry."""
-    return {
-        d.mode: model.domain_by_name[model.mirror_domain[d.name]].mode for d in model.domains
-    }
+    return {d.mode: model.domain_by_name[model.mirror_domain[d.name]].mode for d in model.domains}
 
 
 def _segment_domains(

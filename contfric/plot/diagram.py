@@ -10,10 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from contfric.plot.events import Mark, draw_marks, label_marks, marks_of
+from contfric.plot.labels import settle
 from contfric.plot.protocols import BifurcationLike, BranchLike, DiagramLike
 from contfric.plot.runs import stability_runs
 from contfric.plot.save import axes_or_new, figure_or_new
 from contfric.plot.style import (
+    BESIDE,
     GREY,
     LINE_WIDTH,
     MARKERS,
@@ -33,8 +35,6 @@ from contfric.plot.style import (
     row_of,
 )
 
-_OUTSIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
-
 
 def plot_branches(
     branches: Sequence[BranchLike],
@@ -44,7 +44,7 @@ def plot_branches(
     events: bool = True,
     legend: bool = True,
 ) -> Axes:
-    """Draw one quantity of some branches against their parameter.
+    r"""Draw one quantity of some branches against their parameter.
 
     Stable parts are solid, unstable ones dashed, and they meet at the located bifurcation.
 
@@ -58,7 +58,8 @@ def plot_branches(
     events : bool
         Whether to mark and label the branches' bifurcations.
     legend : bool
-        Whether to draw the legend.
+        Whether to draw the legend: beside new axes, or inside yours, there without the meaning of
+        the markers.
 
     Examples
     --------
@@ -66,7 +67,7 @@ def plot_branches(
     >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     >>> branch = cf.continue_orbit(orbit, "Omega", (0.4, 0.6))
     >>> plot_branches([branch], "psi").get_ylabel()
-    '$\\\\psi$'
+    '$\\psi$'
     """
     found = [b for branch in branches for b in branch.bifurcations] if events else []
     return _plot_row(axes_or_new(ax), branches, found, row, legend, outside=ax is None)
@@ -147,9 +148,10 @@ def plot_diagram(
     fig.align_ylabels(axes)
     handles = _handles(diagram.branches, marks[0])
     if fig.get_layout_engine() is None:
-        axes[0].legend(handles=handles, fontsize=SMALL, **_OUTSIDE)
+        axes[0].legend(handles=handles, fontsize=SMALL, **BESIDE)
     else:
         fig.legend(handles=handles, fontsize=SMALL, frameon=False, loc="outside right upper")
+    settle(axes[0])
     for ax, found in zip(axes, marks, strict=True):
         label_marks(ax, found)
     return axes
@@ -179,10 +181,11 @@ def _plot_row(
     marks = marks_of(events, branches, attribute, parameter)
     _draw_row(ax, branches, marks, row)
     if legend and outside:
-        ax.legend(handles=_handles(branches, marks), fontsize=SMALL, frameon=False, **_OUTSIDE)
+        ax.legend(handles=_handles(branches, marks), fontsize=SMALL, frameon=False, **BESIDE)
+    settle(ax)
     label_marks(ax, marks)
-    if legend and not outside:
-        ax.legend(handles=_handles(branches, marks), fontsize=SMALL, framealpha=0.8, loc="best")
+    if legend and not outside:  # there is no room for the meaning of the markers
+        ax.legend(handles=_handles(branches, ()), fontsize=SMALL - 1.0, loc="best")
     return ax
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
 
@@ -22,8 +22,8 @@ _DIRECTIONS = 16
 _LINE, _MARKER, _LABEL, _BEYOND = 1.0, 15.0, 500.0, 500.0
 #: Spacing at which lines are sampled, and distance at which equal labels are one, in pixels.
 _SPACING, _ONE = 3.0, 14.0
-#: Half of the size of a marker and the radius of a neighbourhood, in points.
-_MARKER_RADIUS, _NEAR = 4.0, 18.0
+#: Radius of a neighbourhood, in points.
+_NEAR = 18.0
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
     """Write a text beside each point where it hides as little as possible.
 
     Equal texts at points that cannot be told apart are written once. Call it when everything else
-    is drawn and the limits of the axes are set.
+    is drawn, the limits of the axes are set and the layout has settled (:func:`settle`).
     """
-    pixels = _settled(ax)
+    pixels = _point_size(ax)
     todo = _merged(ax, sorted(anchors, key=lambda a: (a.x, a.y)))
-    lines, markers = _line_pixels(ax), _marker_pixels(ax, _MARKER_RADIUS * pixels)
+    lines, markers = _line_pixels(ax), _marker_pixels(ax)
     taken: list[Bbox] = []
     placed: list[Annotation] = []
     for anchor in todo:
@@ -61,18 +61,29 @@ def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
 
 def near(ax: Axes, anchor: Anchor, others: Sequence[Anchor]) -> bool:
     """Tell whether a point lies so near to others that its label would be taken for theirs."""
-    reach = _NEAR * _settled(ax)
+    reach = _NEAR * _point_size(ax)
     at = ax.transData.transform((anchor.x, anchor.y))
     return any(np.hypot(*(ax.transData.transform((o.x, o.y)) - at)) < reach for o in others)
 
 
-def _settled(ax: Axes) -> float:
-    """Let the layout decide where the axes are; return the pixels of a point."""
-    root = ax.get_figure(root=True)
-    if not isinstance(root, Figure):
-        return 1.0
-    root.draw_without_rendering()
-    return float(root.dpi) / 72.0
+def settle(ax: Axes) -> None:
+    """Let the layout of the figure decide where its axes are; labels are placed in pixels."""
+    root = _root(ax)
+    if root is not None:
+        root.draw_without_rendering()
+
+
+def _point_size(ax: Axes) -> float:
+    root = _root(ax)
+    return float(root.dpi) / 72.0 if root is not None else 1.0
+
+
+def _root(ax: Axes) -> Figure | None:
+    """Return the figure that axes, perhaps inside subfigures, belong to."""
+    found: object = ax.figure
+    while isinstance(found, SubFigure):
+        found = found.figure
+    return found if isinstance(found, Figure) else None
 
 
 def _merged(ax: Axes, anchors: Sequence[Anchor]) -> list[Anchor]:
@@ -160,12 +171,16 @@ def _sampled(points: FloatArray) -> FloatArray:
     return np.column_stack([np.interp(at, along, column) for column in points.T])
 
 
-def _marker_pixels(ax: Axes, radius: float) -> FloatArray:
-    """Return the centres and four outer points of all markers, in pixels, shape (m, 2)."""
+def _marker_pixels(ax: Axes) -> FloatArray:
+    """Return points all over the markers of the axes, in pixels, shape (m, 2)."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+    ring = np.column_stack([np.cos(angles), np.sin(angles)])
+    disc = np.vstack([np.zeros((1, 2)), 0.5 * ring, ring])
     found = [np.empty((0, 2))]
     for line in ax.lines:
-        if line.get_marker() not in ("None", "none", "", " ", None):
-            found.append(np.asarray(line.get_transform().transform(line.get_xydata())))
-    centres = np.vstack(found)
-    around = radius * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
-    return (centres[:, None, :] + around).reshape(-1, 2)
+        if line.get_marker() in ("None", "none", "", " ", None):
+            continue
+        radius = 0.5 * float(line.get_markersize()) * _point_size(ax)
+        centres = np.asarray(line.get_transform().transform(line.get_xydata()))
+        found.append((centres[:, None, :] + radius * disc).reshape(-1, 2))
+    return np.vstack(found)

@@ -110,6 +110,14 @@ class BifurcationLike(Protocol):
         """Stability after the event, in the order of the branch."""
 
 
+class EndLike(Protocol):
+    """Why a branch ends."""
+
+    @property
+    def bifurcation(self) -> BifurcationLike | None:
+        """The event that ends it, if any."""
+
+
 class BranchLike(Protocol):
     """A family of orbits along a parameter."""
 
@@ -156,6 +164,10 @@ class BranchLike(Protocol):
     @property
     def bifurcations(self) -> Sequence[BifurcationLike]:
         """Events in the order of the branch."""
+
+    @property
+    def ends(self) -> Sequence[EndLike]:
+        """Why it ends at its first and at its last point."""
 
 
 class NodeLike(Protocol):

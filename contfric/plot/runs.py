@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -72,7 +73,7 @@ def _vertices(branch: BranchLike, attribute: str) -> list[_Vertex]:
 
 def _points(branch: BranchLike, columns: FloatArray) -> Iterator[_Vertex]:
     stable = branch.stable
-    positions = np.array([b.position for b in branch.bifurcations])
+    positions = np.array([_position(branch, b) for b in branch.bifurcations])
     for k, (arc, x) in enumerate(zip(branch.arc, branch.values, strict=True)):
         state = None if stable is None else bool(stable[k])
         yield _Vertex(float(arc), float(x), columns[k], state, state, False)
@@ -96,10 +97,19 @@ def _change(branch: BranchLike, columns: FloatArray, k: int) -> _Vertex:
 def _event_vertex(
     branch: BranchLike, event: BifurcationLike, columns: FloatArray, attribute: str
 ) -> _Vertex:
-    near = np.array([np.interp(event.position, branch.arc, column) for column in columns.T])
+    arc = _position(branch, event)
+    near = np.array([np.interp(arc, branch.arc, column) for column in columns.T])
     y = aligned(quantity(event.orbit, attribute), near)
     x = event.params[branch.parameter]
-    return _Vertex(event.position, x, y, event.stable_before, event.stable_after, True)
+    return _Vertex(arc, x, y, event.stable_before, event.stable_after, True)
+
+
+def _position(branch: BranchLike, event: BifurcationLike) -> float:
+    """Return the arclength of an event; one that ends the branch may come from another branch."""
+    for side, end in enumerate(branch.ends):
+        if end.bifurcation is event:
+            return float(branch.arc[-side])
+    return event.position
 
 
 def aligned(values: FloatArray, reference: FloatArray) -> FloatArray:
@@ -121,13 +131,12 @@ def aligned(values: FloatArray, reference: FloatArray) -> FloatArray:
 def _between(vertices: list[_Vertex]) -> Iterator[bool | None]:
     """Yield the stability of each piece between consecutive vertices; solved points decide."""
     last: bool | None = None
-    for left, right in zip(vertices, vertices[1:], strict=False):
+    for left, right in pairwise(vertices):
         if not left.located:
             last = left.after
         elif not right.located:
             last = right.before
-        elif left.after is not None:
-            last = left.after
-        elif right.before is not None:
-            last = right.before
+        else:  # two events: what they say, unless they contradict each other
+            said = {left.after, right.before} - {None}
+            last = said.pop() if len(said) == 1 else last
         yield last

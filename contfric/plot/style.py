@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from matplotlib.colors import to_hex, to_rgb
 
@@ -26,6 +27,9 @@ _DOMAIN_PAIRS = ((BLUE, SKY), (VERMILLION, "#F2A45C"), (GREEN, "#7BCBA9"), (PURP
 STABLE, UNSTABLE, UNKNOWN = "-", (0, (4.0, 2.2)), "-"
 LINE_WIDTH, MIRROR_WIDTH, UNKNOWN_WIDTH = 1.7, 1.1, 0.9
 SMALL, TEXT = 8.0, 10.0
+
+#: Where a legend beside the axes stands.
+BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
 
 
 @dataclass(frozen=True)
@@ -70,8 +74,11 @@ ROWS = {
 }
 
 _GREEK = frozenset(
-    "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu nu xi rho sigma tau phi chi psi "
-    "omega Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega".split()
+    (
+        *("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda"),
+        *("mu", "nu", "xi", "rho", "sigma", "tau", "phi", "chi", "psi", "omega"),
+        *("Gamma", "Delta", "Theta", "Lambda", "Xi", "Pi", "Sigma", "Phi", "Psi", "Omega"),
+    )
 )
 
 
@@ -139,12 +146,17 @@ def event_label(label: str) -> str:
 
 def lighter(colour: str, share: float = 0.45) -> str:
     """Return a colour mixed with white."""
-    return to_hex([c + (1.0 - c) * share for c in to_rgb(colour)])
+    return _mixed(colour, 1.0, share)
 
 
 def greyish(colour: str, share: float = 0.55) -> str:
     """Return a colour mixed with grey."""
-    return to_hex([c + (0.6 - c) * share for c in to_rgb(colour)])
+    return _mixed(colour, 0.6, share)
+
+
+def _mixed(colour: str, other: float, share: float) -> str:
+    red, green, blue = (c + (other - c) * share for c in to_rgb(colour))
+    return to_hex((red, green, blue))
 
 
 def branch_colours(names: Iterable[str]) -> dict[str, str]:

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 #: Where an entry is: keys and list indices from the top.
 Address: TypeAlias = tuple[str | int, ...]
+#: Levels of nesting whose lines are kept.
+_DEEPEST = 4
 
 
 @dataclass(frozen=True)
@@ -80,8 +82,8 @@ def _locate(located: LocatedYaml, node: yaml.Node, address: Address) -> None:
     """Enter the lines of everything below a node; duplicate keys are an error."""
     import yaml
 
-    # an alias may refer to a node around itself; a signature file nests two levels at most
-    if len(address) > 2:
+    # an alias may refer to a node around itself; a study nests four levels at most
+    if len(address) > _DEEPEST:
         return
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:

@@ -13,8 +13,8 @@ from contfric.study.schema import FigureKind
 
 #: Size in inches: width, height, height added by each row of a diagram.
 _SIZES = {
-    FigureKind.DIAGRAM: (8.4, 1.2, 2.4),
-    FigureKind.ORBIT: (8.4, 4.2, 0.0),
+    FigureKind.DIAGRAM: (9.6, 1.2, 2.4),
+    FigureKind.ORBIT: (9.0, 6.2, 0.0),
     FigureKind.TRANSITIONS: (7.0, 5.0, 0.0),
 }
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from contfric.study.read import Study
-from contfric.study.schema import ContinueTask, ExploreTask, FigureKind, Want
+from contfric.study.schema import ContinueTask, ExploreTask, Want
 
 RECORD = "run.json"
 POINTS = "points.csv"
@@ -171,8 +171,5 @@ def _skipped(study: Study) -> Iterator[Skipped]:
     for want, columns in COLUMNS.items():
         if want is not Want.STABILITY and not study.wants(want):
             yield Skipped(f"columns {columns}", f"not wanted ({want.value})")
-    kinds = {drawing.kind for drawing in study.drawings}
-    if not kinds:
+    if not study.drawings:
         yield Skipped("matplotlib", "no figures")
-    if FigureKind.TRANSITIONS not in kinds:
-        yield Skipped("networkx", "no figure of the transitions")

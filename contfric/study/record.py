@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import datetime, timezone
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,14 @@ WATCHED = (
 )
 
 
+def package_version() -> str:
+    """Return the version of contfric; a source folder that is not installed has none."""
+    try:
+        return version("contfric")
+    except PackageNotFoundError:
+        return "unknown (not installed)"
+
+
 def record_of(
     plan: Plan,
     counts: Counts,
@@ -41,7 +49,7 @@ def record_of(
 ) -> dict[str, Any]:
     """Return the record of a run as plain data; status and files are added by the run."""
     return {
-        "contfric": version("contfric"),
+        "contfric": package_version(),
         "python": platform.python_version(),
         "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "name": plan.study.name,
@@ -86,13 +94,16 @@ def _diagram_entries(diagram: Diagram) -> dict[str, Any]:
 
 
 def _branch_entry(number: int, branch: Branch) -> dict[str, Any]:
+    # a fold lies beyond the points on both sides of it
+    events = [b.params[branch.parameter] for b in branch.bifurcations]
+    values = [float(branch.values.min()), float(branch.values.max()), *events]
     return {
         "branch": number,
         "signature": branch.name,
         "mirrored": branch.mirrored,
         "points": len(branch),
-        "from": float(branch.values.min()),
-        "to": float(branch.values.max()),
+        "from": min(values),
+        "to": max(values),
         "ends": [str(end) for end in branch.ends],
     }
 

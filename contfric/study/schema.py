@@ -102,6 +102,13 @@ class _Task(_Part):
         le=1.0,
         description="a number in (0, 1]: largest step, as a share of the range",
     )
+    max_points: int | None = Field(
+        None, ge=10, description="a whole number >= 10: most points of each side of a branch"
+    )
+
+    def options(self) -> dict[str, Any]:
+        """Return what is given beyond the parameter and the range, as arguments."""
+        return self.model_dump(exclude={"parameter", "range"}, exclude_none=True)
 
 
 class ContinueTask(_Task):
@@ -113,6 +120,9 @@ class ExploreTask(_Task):
 
     max_periods: int | None = Field(
         None, ge=1, description="a whole number >= 1: longest period followed through doublings"
+    )
+    max_branches: int | None = Field(
+        None, ge=1, description="a whole number >= 1: most branches to compute"
     )
 
 
@@ -148,12 +158,14 @@ class StudyFile(_Part):
         description="'simulate', or a mapping with one of simulate, signature, orbit",
     )
     explore: ExploreTask | None = Field(
-        None, description="a mapping with parameter, range, and optionally max_step, max_periods"
+        None,
+        description="a mapping with parameter and range; also max_step, max_points, max_periods, "
+        "max_branches",
     )
     continue_: ContinueTask | None = Field(
         None,
         alias="continue",
-        description="a mapping with parameter, range, and optionally max_step",
+        description="a mapping with parameter and range; also max_step, max_points",
     )
     want: _Wants = Field([], description="a list with any of stability, asymmetry, extrema, stops")
     figures: list[Figure] = Field([], description="a list of mappings, each with its kind")

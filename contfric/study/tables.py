@@ -43,7 +43,7 @@ def _rows(table: dict[str, list[Any]], header: list[str]) -> Iterable[tuple[Any,
 
 
 def _columns(study: Study, source: Branch | Orbit) -> dict[str, list[Any]]:
-    """Return the wanted columns of a branch, or of one orbit; what is not wanted is not computed."""
+    """Return the columns of a branch, or of one orbit; what is not wanted is not computed."""
     params: dict[str, Any] = dict(source.params)
     columns = {name: np.atleast_1d(value).tolist() for name, value in params.items()}
     if study.wants(Want.EXTREMA):

@@ -1,0 +1,248 @@
+"""The commands; each returns its exit code. What is heavy is imported where it is used."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from contfric.cli.exits import Exit
+from contfric.errors import ContfricError, NotationError, ParameterError, ResultFileError
+
+if TYPE_CHECKING:
+    from contfric.models import Model
+    from contfric.study import StudyResult
+
+Command: TypeAlias = Callable[[argparse.Namespace], int]
+
+
+def say(text: str) -> None:
+    """Print a message for the user, beside the data."""
+    print(f"contfric: {text}", file=sys.stderr)
+
+
+# ---------------------------------------------------------------------------------- studies
+
+
+def run(options: argparse.Namespace) -> int:
+    """``contfric run STUDY``."""
+    from contfric.cli.progress import ProgressLine
+    from contfric.study import run_study
+    from contfric.study.run import RunStatus
+
+    with ProgressLine(options.quiet) as progress:
+        result = run_study(options.study, options.out, force=options.force, progress=progress)
+    if options.json:
+        print(json.dumps(result.info, indent=2))
+    elif not options.quiet and result.files:
+        _print_summary(result)
+    if result.status is not RunStatus.INTERRUPTED:
+        return Exit.DONE
+    say(_interrupted_text(result))
+    return Exit.INTERRUPTED
+
+
+def _print_summary(result: StudyResult) -> None:
+    from contfric.cli.summary import findings, headline
+
+    print(*headline(result.info), *findings(result.info), "", sep="\n")
+    print(f"written to {result.out}: {', '.join(path.name for path in result.files)}")
+
+
+def _interrupted_text(result: StudyResult) -> str:
+    if not result.files:
+        return "interrupted before an orbit was found: there is nothing to save"
+    found = f"{len(result.diagram.branches)} branches" if result.diagram else "the first orbit"
+    return f"interrupted: what was found until then ({found}) is saved in {result.out}"
+
+
+def explain(options: argparse.Namespace) -> int:
+    """``contfric explain STUDY``."""
+    from contfric.study import make_plan, read_study
+
+    print(make_plan(read_study(options.study)))
+    return Exit.DONE
+
+
+def info(options: argparse.Namespace) -> int:
+    """``contfric info DIR``."""
+    from contfric.cli.summary import findings, headline, work
+    from contfric.study.plan import RECORD
+
+    path: Path = options.folder / RECORD
+    try:
+        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        lines = [*headline(record), *findings(record), *work(record)]
+    except OSError as error:
+        raise ResultFileError(
+            f"{options.folder} is no folder of a run: cannot read {path} ({error.strerror})"
+        ) from None
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        raise ResultFileError(
+            f"{path} is damaged ({type(error).__name__}: {error}): run the study again"
+        ) from None
+    print("\n".join(lines))
+    _check_files(options.folder, record["files"])
+    return Exit.DONE
+
+
+def _check_files(folder: Path, names: list[str]) -> None:
+    """Read the restart data, so that a damaged file is found today and not when it is needed."""
+    from contfric.results import load
+
+    for name in names:
+        if not (folder / name).is_file():
+            raise ResultFileError(f"{folder / name} is missing: run the study again")
+        if name.endswith(".npz"):
+            load(folder / name)
+
+
+# ------------------------------------------------------------------------------- signatures
+
+
+def list_signatures(options: argparse.Namespace) -> int:
+    """``contfric signatures list``."""
+    from contfric.cli.summary import table
+    from contfric.signature import load_signature, signature_names
+
+    rows = [["name", "model", "periods", "segments"]]
+    for name in signature_names(options.model):
+        try:
+            signature = load_signature(name, options.model)
+        except NotationError as error:
+            say(f"skipped: {error}")
+            continue
+        rows.append([name, signature.model.name, str(signature.periods), str(signature)])
+    print(*table(rows), sep="\n")
+    return Exit.DONE
+
+
+def show_signature(options: argparse.Namespace) -> int:
+    """``contfric signatures show NAME``."""
+    from contfric.signature import load_signature
+
+    signature = load_signature(options.name)
+    lines = [
+        f"name: {json.dumps(signature.name or str(signature), ensure_ascii=False)}",
+        f"model: {signature.model.name}",
+        f"periods: {signature.periods}",
+        f"segments: {signature}",
+    ]
+    if signature.symmetric is not None:
+        lines.append(f"symmetric: {str(signature.symmetric).lower()}")
+    if signature.example:
+        values = ", ".join(f"{name}: {value!r}" for name, value in signature.example.items())
+        lines.append(f"example: {{{values}}}")
+    print(*lines, sep="\n")
+    return Exit.DONE
+
+
+def check_signatures(options: argparse.Namespace) -> int:
+    """``contfric signatures check FILE...``: every file is checked, also behind a wrong one."""
+    from contfric.signature.schema import read_signature
+
+    wrong = 0
+    for path in options.files:
+        try:
+            signature = read_signature(path)
+        except ContfricError as error:
+            wrong += 1
+            print(f"contfric: error: {error}", file=sys.stderr)
+        else:
+            print(f"{path}: {signature.name}, {len(signature.segments)} segments: fine")
+    return Exit.BAD_INPUT if wrong else Exit.DONE
+
+
+# ------------------------------------------------------------------------ graph, simulation
+
+
+def graph(options: argparse.Namespace) -> int:
+    """``contfric graph``."""
+    from contfric.models import load_model
+
+    model = load_model(options.model)
+    if options.out is not None:
+        _draw_graph(model, options.out)
+        say(f"written to {options.out}")
+        return Exit.DONE
+    for (source, surface), target in model.transitions.items():
+        print(f"{source} -> {target} ({surface})")
+    return Exit.DONE
+
+
+def _draw_graph(model: Model, path: Path) -> None:
+    formats = (".png", ".svg", ".pdf")
+    if path.suffix.lower() not in formats:
+        raise ResultFileError(
+            f"cannot draw to '{path}': its ending is none of {', '.join(formats)}"
+        )
+    from contfric.plot.graph import plot_transition_graph
+    from contfric.plot.save import new_figure, save_figure
+    from contfric.results import replacing
+
+    figure = new_figure(7.0, 5.0)
+    plot_transition_graph(model, ax=figure.add_subplot())
+    with replacing(path) as temporary:
+        save_figure(figure, temporary)
+
+
+def simulate(options: argparse.Namespace) -> int:
+    """``contfric simulate``: mode that ended and surface met at each event."""
+    from contfric.models import load_model
+    from contfric.orbit import simulation
+
+    model = load_model(options.model)
+    params = dict(_assignment(text) for text in options.params)
+    state = None if options.state is None else _state(options.state)
+    found = simulation.simulate(
+        model,
+        params,
+        state=state,
+        time=options.time,
+        periods=options.periods,
+        events=options.events,
+        domain=options.domain,
+    )
+    writer = csv.writer(sys.stdout, lineterminator="\n")
+    writer.writerow(["cycle", "phase", *model.states, "mode", "surface"])
+    columns = (found.cycles.tolist(), found.times.tolist(), *found.states.T.tolist())
+    for row, pair in zip(zip(*columns, strict=True), found.word, strict=True):
+        writer.writerow([*row, *pair])
+    sys.stdout.flush()
+    say(f"{len(found)} events: {found.end.value}")
+    if options.find:
+        _say_what_settles(model, params, state, options.time)
+    return Exit.DONE
+
+
+def _say_what_settles(
+    model: Model, params: dict[str, float], state: list[float] | None, time: float
+) -> None:
+    from contfric.orbit.find import find_orbit
+
+    orbit = find_orbit(model, params, state=state, time=time)
+    multipliers = ", ".join(f"{value:.6g}" for value in orbit.multipliers)
+    say(f"settles on {orbit.name} over {orbit.periods} period(s): {orbit.signature}")
+    say(f"x from {orbit.x_min:.12g} to {orbit.x_max:.12g}, multipliers {multipliers}")
+
+
+def _assignment(text: str) -> tuple[str, float]:
+    name, sign, value = text.partition("=")
+    if not sign or not name.strip():
+        raise ParameterError(f"-p takes NAME=VALUE, such as -p Omega=0.5; got '{text}'")
+    return name.strip(), _number(value, f"parameter '{name.strip()}'")
+
+
+def _state(text: str) -> list[float]:
+    return [_number(part, "--state: each part") for part in text.split(",")]
+
+
+def _number(text: str, what: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ParameterError(f"{what} must be a number, got '{text}'") from None

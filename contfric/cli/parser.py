@@ -1,0 +1,155 @@
+"""What the command line accepts."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from contfric.cli import commands
+from contfric.errors import ContfricError, did_you_mean
+
+_COMMANDS = ("run", "explain", "info", "signatures", "graph", "simulate")
+_DEBUG = "show the traceback of an error"
+
+
+class UsageError(ContfricError):
+    """The command line cannot be read."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line, and raised."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message} (see: {self.prog} --help)")
+
+
+class _Version(argparse.Action):
+    """Print the version; it is looked up only then."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from contfric.study.record import package_version
+
+        print(f"contfric {package_version()}")
+        parser.exit()
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Return the options; ``options.command(options)`` runs the command.
+
+    Raises
+    ------
+    UsageError
+        If the arguments are not valid.
+    """
+    first = next((a for a in arguments if not a.startswith("-")), None)
+    if first is not None and first not in _COMMANDS:
+        raise UsageError(f"unknown command '{first}'{did_you_mean(first, _COMMANDS)}")
+    return _parser().parse_args(_joined(arguments))
+
+
+def _joined(arguments: Sequence[str]) -> list[str]:
+    """Join ``--state -1,0`` to ``--state=-1,0``: argparse takes a leading minus for an option."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and joined[-1] == "--state":
+            joined[-1] = f"--state={argument}"
+        else:
+            joined.append(argument)
+    return joined
+
+
+def _parser() -> _Parser:
+    parser = _Parser(
+        prog="contfric",
+        description="Periodic orbits and bifurcations of dry-friction oscillators.",
+        epilog="STUDY is the path of a YAML file or the name of a bundled study, such as fig05.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
+    parser.add_argument("--debug", action="store_true", help=_DEBUG)
+    subparsers = parser.add_subparsers(metavar="COMMAND", required=True)
+
+    def add(name: str, command: commands.Command, text: str) -> argparse.ArgumentParser:
+        return _described(subparsers.add_parser(name, help=text, description=text), command)
+
+    _fill_run(add("run", commands.run, "compute what a study wants, and write the results"))
+    _fill_explain(add("explain", commands.explain, "print the plan of a study; compute nothing"))
+    _fill_info(add("info", commands.info, "print what a run folder holds"))
+    _fill_signatures(add("signatures", commands.list_signatures, "list, show or check signatures"))
+    _fill_graph(add("graph", commands.graph, "print or draw the transitions of a model"))
+    _fill_simulate(add("simulate", commands.simulate, "print the events of a trajectory as CSV"))
+    return parser
+
+
+def _described(
+    parser: argparse.ArgumentParser, command: commands.Command
+) -> argparse.ArgumentParser:
+    # SUPPRESS: `contfric --debug run` must not be undone by the default of `run`
+    parser.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help=_DEBUG)
+    parser.set_defaults(command=command)
+    return parser
+
+
+def _fill_run(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("study", metavar="STUDY")
+    parser.add_argument("--out", metavar="DIR", help="folder of the results (default: ./NAME)")
+    parser.add_argument("--json", action="store_true", help="print run.json to stdout")
+    parser.add_argument("--force", action="store_true", help="replace results of an earlier run")
+    parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
+
+
+def _fill_explain(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("study", metavar="STUDY")
+
+
+def _fill_info(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", metavar="DIR", type=Path, help="folder of a run")
+
+
+def _fill_signatures(parser: argparse.ArgumentParser) -> None:
+    actions = parser.add_subparsers(metavar="list|show|check", required=True)
+    listing = actions.add_parser("list", help="names, periods and segments of all signatures")
+    _described(listing, commands.list_signatures)
+    listing.add_argument("--model", help="those of this model only")
+    showing = actions.add_parser("show", help="one signature, as a signature file")
+    _described(showing, commands.show_signature)
+    showing.add_argument("name", metavar="NAME", help="a name, or the path of a file")
+    checking = actions.add_parser("check", help="read signature files and say what is wrong")
+    _described(checking, commands.check_signatures)
+    checking.add_argument("files", metavar="FILE", nargs="+", type=Path)
+
+
+def _fill_graph(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--model", default="coulomb", help="name of the model (%(default)s)")
+    parser.add_argument("--out", metavar="FILE", type=Path, help="draw it: .png, .svg or .pdf")
+
+
+def _fill_simulate(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--model", default="coulomb", help="name of the model (%(default)s)")
+    add("-p", dest="params", metavar="NAME=VALUE", action="append", default=[], help="a parameter")
+    add("--state", metavar="X,V", help="initial state, numbers joined by commas")
+    add("--time", type=_number, default=0.0, help="initial time (%(default)s)")
+    add("--domain", help="initial domain, where the state alone does not decide")
+    add("--periods", type=_number, default=100.0, help="excitation periods (%(default)s)")
+    add("--events", type=_count, default=1_000_000, help="most events to follow (%(default)s)")
+    add("--find", action="store_true", help="say on stderr what the motion settles on")
+
+
+def _number(text: str) -> float:
+    return float(text)
+
+
+_number.__name__ = "number"  # argparse names the type in its message
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise ValueError(text)
+    return value
+
+
+_count.__name__ = "whole number >= 1"

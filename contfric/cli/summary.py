@@ -1,0 +1,81 @@
+"""A run in words: its record as text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+Record = dict[str, Any]
+
+
+def headline(record: Record) -> Iterator[str]:
+    """Yield the title, the status and the start."""
+    start = record["start"]
+    values = ", ".join(f"{name} = {value:g}" for name, value in start["params"].items())
+    yield f"{record['name']}: {record['title']}"
+    yield f"status    {record['status']}; contfric {record['contfric']}, {record['date']}"
+    yield f"start     {start['signature']} over {start['periods']} period(s), {values}"
+    yield f"          {start['segments']}"
+
+
+def findings(record: Record) -> Iterator[str]:
+    """Yield branches, bifurcations and loose ends as tables."""
+    if "branches" not in record:
+        return
+    name = record["parameter"]
+    rows = [["branch", "name", "points", name, "", "ends"]]
+    for branch in record["branches"]:
+        if branch["mirrored"]:
+            rows[-1][1] += " and mirror"
+            continue
+        number, points = str(branch["branch"]), str(branch["points"])
+        low, high = f"{branch['from']:.8g}", f"{branch['to']:.8g}"
+        ends = "; ".join(branch["ends"])
+        rows.append([number, branch["signature"], points, low, high, ends])
+    yield ""
+    yield from table(rows)
+    yield from _bifurcations(record)
+    yield ""
+    if record["loose_ends"]:
+        yield "loose ends (nothing follows them)"
+        yield from (f"  {text}" for text in record["loose_ends"])
+    else:
+        yield "no loose ends"
+    if not record["complete"]:
+        yield "incomplete: the exploration was interrupted"
+
+
+def _bifurcations(record: Record) -> Iterator[str]:
+    name = record["parameter"]
+    names = {branch["branch"]: branch["signature"] for branch in record["branches"]}
+    rows = [["event", name, "branches"]]
+    for event in record["bifurcations"]:
+        joined = ", ".join(f"{names[i]} ({i})" for i in event["branches"])
+        rows.append([event["label"], f"{event['params'][name]:.13g}", joined])
+    yield ""
+    yield from table(rows)
+
+
+def work(record: Record) -> Iterator[str]:
+    """Yield what was done: notes, counts, times, what was skipped, files."""
+    yield from (f"note      {text}" for text in record.get("notes", []))
+    yield ""
+    counts = ", ".join(
+        f"{value} {name.replace('_', ' ')}" for name, value in record["counts"].items()
+    )
+    times = ", ".join(f"{name} {seconds:.3g} s" for name, seconds in record["timings"].items())
+    yield f"counts    {counts}"
+    yield f"times     {times}"
+    for index, item in enumerate(record["skipped"]):
+        yield f"{'skipped' if index == 0 else '':10}{item['what']}: {item['why']}"
+    for failure in record["failures"]:
+        yield f"failed    {failure}"
+    yield f"files     {', '.join(record['files'])}"
+
+
+def table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield rows as lines with aligned columns."""
+    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        yield "  ".join(cells).rstrip()

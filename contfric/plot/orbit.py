@@ -1,0 +1,174 @@
+"""One orbit: in the phase plane, in the plane of the observables, and in time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from contfric.errors import ParameterError
+from contfric.plot.labels import place_labels, settle
+from contfric.plot.orbit_artists import (
+    BAND,
+    along,
+    draw_arrow,
+    draw_levels,
+    draw_moving_surfaces,
+    draw_pieces,
+    draw_rest_bands,
+    draw_stops,
+    draw_surfaces,
+    legend_handles,
+    name_axes,
+)
+from contfric.plot.pieces import pieces_of, rest_bounds
+from contfric.plot.protocols import OrbitLike
+from contfric.plot.save import axes_or_new, figure_or_new
+from contfric.plot.style import BESIDE, SMALL, TEXT, parameter_label
+
+
+def plot_orbit(
+    orbit: OrbitLike,
+    ax: Axes | None = None,
+    *,
+    plane: tuple[str, str] | None = None,
+    legend: bool = True,
+) -> Axes:
+    """Draw an orbit in a plane, coloured by domain, with its stops and surfaces.
+
+    A surface whose observable is on an axis is a line. One that moves in the plane is a short tick
+    where the orbit crosses it, in its position at that moment; the band on which a stick rests is
+    drawn at the moment at which it begins.
+
+    Parameters
+    ----------
+    orbit : Orbit
+    ax : Axes, optional
+        Where to draw; new axes by default.
+    plane : (str, str), optional
+        States or observables on the two axes; the first two states by default. In the plane of the
+        observables, ``("u", "v")`` for dry friction, every surface is at rest.
+    legend : bool
+        Whether to draw the legend of the domains.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> plot_orbit(orbit).get_xlabel()
+    '$x$'
+    """
+    new = axes_or_new(ax, 6.4, 4.4)
+    pieces = pieces_of(orbit)
+    across, up = plane or (orbit.model.states[0], orbit.model.states[1])
+    draw_rest_bands(new, orbit, pieces, across, up)
+    path = [along(orbit, pieces, quantity) for quantity in (across, up)]
+    draw_pieces(new, orbit.model, pieces, *path)
+    draw_arrow(new, *path)
+    new.margins(0.08)
+    draw_surfaces(new, orbit, across, up)
+    named = [] if plane else draw_moving_surfaces(new, orbit, pieces, across, up)
+    draw_stops(new, orbit, across, up)
+    name_axes(new, parameter_label(across), parameter_label(up))
+    if legend:
+        handles = legend_handles(orbit, pieces)
+        if ax is None:
+            new.legend(handles=handles, fontsize=SMALL, frameon=False, **BESIDE)
+        else:
+            new.legend(handles=handles, fontsize=SMALL - 1.0, loc="best")
+    settle(new)
+    place_labels(new, named)
+    return new
+
+
+def plot_orbit_in_time(orbit: OrbitLike, axes: Sequence[Axes] | None = None) -> list[Axes]:
+    """Draw the observables of an orbit over one period, with the levels that are surfaces.
+
+    Parameters
+    ----------
+    orbit : Orbit
+    axes : sequence of Axes, optional
+        One for each observable of the model; new axes by default.
+
+    Returns
+    -------
+    list of Axes
+        One for each observable.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> [ax.get_ylabel() for ax in plot_orbit_in_time(orbit)]
+    ['$u$', '$v$']
+    """
+    observables = orbit.model.observables
+    if axes is None:
+        fig = figure_or_new(None, 6.4, 1.0 + 1.9 * len(observables))
+        axes = list(fig.subplots(len(observables), 1, sharex=True, squeeze=False)[:, 0])
+    if len(axes) != len(observables):
+        raise ParameterError(f"{len(observables)} axes are needed, one for each observable")
+    pieces = pieces_of(orbit)
+    start = float(orbit.cycle[0, 0])
+    times = [(p.times - start) / orbit.period for p in pieces]
+    for ax, observable in zip(axes, observables, strict=True):
+        for low, high in rest_bounds(orbit, observable.name):
+            ax.axhspan(low, high, color=BAND, zorder=0, linewidth=0.0)
+        draw_pieces(ax, orbit.model, pieces, times, along(orbit, pieces, observable.name))
+        draw_levels(ax, orbit, observable.name, vertical=False)
+        name_axes(ax, "", parameter_label(observable.name))
+        ax.set_xlim(0.0, 1.0)
+    axes[-1].set_xlabel("time / period of the orbit", fontsize=TEXT)
+    return list(axes)
+
+
+def plot_orbit_panels(orbit: OrbitLike, fig: Figure | None = None) -> list[Axes]:
+    """Draw an orbit in the phase plane, beside the load plane and its observables in time.
+
+    Parameters
+    ----------
+    orbit : Orbit
+    fig : Figure, optional
+        An empty figure to draw in; a new one by default.
+
+    Returns
+    -------
+    list of Axes
+        The phase plane; the plane of the first two observables, if the model has two; then one for
+        each observable in time.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> len(plot_orbit_panels(orbit))
+    4
+    """
+    fig = figure_or_new(fig, 9.0, 6.2)
+    names = [o.name for o in orbit.model.observables]
+    planes = 2 if len(names) > 1 else 1
+    grid = fig.add_gridspec(planes * len(names), 2)
+    left = [fig.add_subplot(grid[k * len(names) : (k + 1) * len(names), 0]) for k in range(planes)]
+    right = [fig.add_subplot(grid[k * planes : (k + 1) * planes, 1]) for k in range(len(names))]
+    plot_orbit(orbit, left[0], legend=False)
+    if planes == 2:
+        plot_orbit(orbit, left[1], plane=(names[0], names[1]), legend=False)
+    plot_orbit_in_time(orbit, right)
+    for ax in right[:-1]:
+        ax.tick_params(labelbottom=False)
+    values = ", ".join(
+        f"{parameter_label(n)} = {v:.6g}" for n, v in orbit.params.items() if v != 0.0
+    )
+    fig.suptitle(f"{orbit.name}:  {values}", fontsize=TEXT)
+    handles = legend_handles(orbit, pieces_of(orbit, points=40))
+    fig.legend(
+        handles=handles,
+        fontsize=SMALL,
+        ncols=len(handles),
+        loc="outside lower center" if fig.get_layout_engine() is not None else "lower center",
+        frameon=False,
+        handlelength=1.5,
+        columnspacing=1.3,
+    )
+    return [*left, *right]

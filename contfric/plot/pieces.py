@@ -1,0 +1,164 @@
+"""An orbit cut where it enters another domain, and the surfaces seen along it.
+
+Everything here derives from the model's observables, levels and domains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from contfric.models import Model
+from contfric.models.definition import FloatArray, Surface
+from contfric.plot.protocols import OrbitLike
+
+_NONE = np.empty(0, dtype=np.int64)
+_EMPTY = np.empty(0)
+#: Bisections of a crossing: to the resolution of any drawing.
+_BISECTIONS = 45
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Part of an orbit inside one domain: times (k,) and states (k, n), both ends included.
+
+    ``exit`` is the surface through which it leaves; ``segment`` counts the orbit's own segments.
+    """
+
+    domain: str
+    segment: int
+    times: FloatArray
+    states: FloatArray
+    exit: str
+
+
+def observe(orbit: OrbitLike, name: str, time: float, state: FloatArray) -> float:
+    """Return the value of an observable."""
+    c = [o.name for o in orbit.model.observables].index(name)
+    state = np.ascontiguousarray(state)
+    return float(orbit.model.flow.observe(c, time, state, orbit.vector, _NONE, _EMPTY))
+
+
+def observe_gradient(orbit: OrbitLike, name: str, time: float, state: FloatArray) -> FloatArray:
+    """Return the derivatives of an observable with respect to the states, shape (n,)."""
+    c = [o.name for o in orbit.model.observables].index(name)
+    gradient = np.empty(1 + len(orbit.model.states))
+    state = np.ascontiguousarray(state)
+    orbit.model.flow.observe(c, time, state, orbit.vector, _NONE, gradient)
+    return gradient[1:]
+
+
+def level(orbit: OrbitLike, surface: Surface) -> float:
+    """Return the level of the observable that makes the surface."""
+    k = orbit.model.surfaces.index(surface)
+    return float(orbit.model.flow.level(k, orbit.vector, _NONE, _EMPTY))
+
+
+def pieces_of(orbit: OrbitLike, points: int = 400) -> list[Piece]:
+    """Cut one period of an orbit at its joints and where it crosses a surface in between."""
+    found: list[Piece] = []
+    for i, ((mode, exit_), start, end) in enumerate(
+        zip(orbit.word, orbit.cycle, orbit.ends, strict=True)
+    ):
+        count = max(9, int(np.ceil(points * (end[0] - start[0]) / orbit.period)))
+        times = np.linspace(start[0], end[0], count)
+        states = np.array([start[1:], *(orbit.state(t) for t in times[1:-1]), end[1:]])
+        cuts = [*_crossings(orbit, times, states), (float(end[0]), exit_)]
+        before = float(start[0])
+        for time, surface in cuts:
+            inside = (times > before) & (times < time)
+            own = np.array([before, *times[inside], time])
+            first = start[1:] if before == start[0] else orbit.state(before)
+            last = end[1:] if time == end[0] else orbit.state(time)
+            middle = 0.5 * (before + time)
+            domain = _domain(orbit, mode, middle)
+            found.append(Piece(domain, i, own, np.array([first, *states[inside], last]), surface))
+            before = time
+    return found
+
+
+def _crossings(orbit: OrbitLike, times: FloatArray, states: FloatArray) -> list[tuple[float, str]]:
+    """Return times at which transparent surfaces are crossed inside a segment, in order."""
+    found: list[tuple[float, str]] = []
+    for surface in orbit.model.surfaces:
+        if surface.switching:
+            continue
+        limit = level(orbit, surface)
+        gap = np.array(
+            [observe(orbit, surface.observable, t, y) for t, y in zip(times, states, strict=True)]
+        )
+        gap -= limit
+        gap[np.abs(gap) < 1e-9 * (1.0 + abs(limit))] = 0.0  # a joint on the surface
+        for k in np.flatnonzero(gap[:-1] * gap[1:] < 0.0):
+            found.append(
+                (_crossing(orbit, surface.observable, limit, times[k : k + 2]), surface.name)
+            )
+    return sorted(found)
+
+
+def _crossing(orbit: OrbitLike, observable: str, limit: float, bracket: FloatArray) -> float:
+    low, high = float(bracket[0]), float(bracket[1])
+    sign = np.sign(observe(orbit, observable, low, orbit.state(low)) - limit)
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if np.sign(observe(orbit, observable, middle, orbit.state(middle)) - limit) == sign:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def _domain(orbit: OrbitLike, mode: str, time: float) -> str:
+    """Return the domain of a mode in which the orbit is at a time."""
+    state = orbit.state(time)
+    own = [d for d in orbit.model.domains if d.mode == mode]
+    side = {
+        s.name: np.sign(observe(orbit, s.observable, time, state) - level(orbit, s))
+        for s in orbit.model.surfaces
+        if not s.switching
+    }
+    fitting = [d for d in own if all(d.signs[name] == sign for name, sign in side.items())]
+    return (fitting or own)[0].name
+
+
+def is_sliding(model: Model, domain: str) -> bool:
+    """Whether motion in a domain stays on a surface, such as a stick."""
+    return model.mode_by_name[model.domain_by_name[domain].mode].sliding
+
+
+def rest_limits(orbit: OrbitLike, piece: Piece) -> tuple[float, float] | None:
+    """Return the displacements between which the piece could rest when it begins.
+
+    The two surfaces that bound a sliding domain are met along the first state by Newton's method
+    (exact at once where the observable is affine). None if the domain has not two such bounds.
+    """
+    model = orbit.model
+    found: list[float] = []
+    for surface in model.surfaces:
+        if surface.switching or model.domain_by_name[piece.domain].signs[surface.name] == 0:
+            continue
+        state = piece.states[0].copy()
+        time = float(piece.times[0])
+        for _ in range(4):
+            gap = observe(orbit, surface.observable, time, state) - level(orbit, surface)
+            slope = observe_gradient(orbit, surface.observable, time, state)[0]
+            if slope == 0.0:
+                return None
+            state[0] -= gap / slope
+        found.append(float(state[0]))
+    return (min(found), max(found)) if len(found) == 2 else None
+
+
+def rest_bounds(orbit: OrbitLike, observable: str) -> Iterator[tuple[float, float]]:
+    """Yield the intervals of an observable inside which the model can stay on a surface."""
+    model = orbit.model
+    own = [s for s in model.surfaces if s.observable == observable and not s.switching]
+    for domain in model.domains:
+        if not model.mode_by_name[domain.mode].sliding:
+            continue
+        above = [level(orbit, s) for s in own if domain.signs[s.name] < 0]
+        below = [level(orbit, s) for s in own if domain.signs[s.name] > 0]
+        if above and below:
+            yield max(below), min(above)

@@ -1,0 +1,85 @@
+"""The computing steps of a run: the first orbit, and what is done with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from contfric.atlas.diagram import Diagram, LooseEnd, Node
+from contfric.continuation.branch import Branch
+from contfric.continuation.events import EndReason
+from contfric.orbit.orbit import Orbit
+from contfric.study.read import Study
+from contfric.study.schema import ContinueTask, ExploreTask, Want
+
+Say = Callable[[str], None]
+
+#: Ends of a branch that nothing could follow.
+_FINAL = (EndReason.RANGE, EndReason.LIMIT, EndReason.CLOSED)
+
+
+def find_start(study: Study, say: Say) -> Orbit:
+    """Return the first orbit: saved, solved for, or what a simulation settles on."""
+    if study.orbit is not None:
+        return study.orbit
+    if study.signature is not None:
+        from contfric.orbit.solve import solve_orbit
+
+        say(f"orbit: solving for {study.signature.name or study.signature}")
+        return solve_orbit(study.model, study.signature, study.params)
+    from contfric.orbit.find import find_orbit
+
+    how = study.content.start.simulate
+    assert how is not None
+    say("orbit: simulating")
+    return find_orbit(
+        study.model,
+        study.params,
+        how.periods,
+        state=how.state,
+        time=how.time,
+        longest=how.longest,
+    )
+
+
+def explore_from(study: Study, orbit: Orbit, task: ExploreTask, say: Say) -> Diagram:
+    """Explore; on Ctrl-C the diagram found so far, with ``complete`` False."""
+    from contfric.atlas.explore import explore
+
+    return explore(
+        orbit,
+        task.parameter,
+        (task.range[0], task.range[1]),
+        stability=study.wants(Want.STABILITY),
+        progress=lambda text: say(f"explore: {text}"),
+        **task.options(),
+    )
+
+
+def continue_from(study: Study, orbit: Orbit, task: ContinueTask, say: Say) -> Branch:
+    """Continue one branch."""
+    from contfric.continuation.trace import continue_orbit
+
+    return continue_orbit(
+        orbit,
+        task.parameter,
+        (task.range[0], task.range[1]),
+        stability=study.wants(Want.STABILITY),
+        progress=lambda text: say(f"continue: {text}"),
+        **task.options(),
+    )
+
+
+def one_branch(branch: Branch, bounds: tuple[float, float]) -> Diagram:
+    """Return the diagram of a single branch: nothing follows its events."""
+    return Diagram(
+        model=branch.model,
+        parameter=branch.parameter,
+        range=bounds,
+        branches=(branch,),
+        nodes=tuple(Node(bifurcation, (0,)) for bifurcation in branch.bifurcations),
+        loose_ends=tuple(
+            LooseEnd(0, side, end)
+            for side, end in enumerate(branch.ends)
+            if end.reason not in _FINAL
+        ),
+    )

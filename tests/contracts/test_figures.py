@@ -1,0 +1,454 @@
+"""Figures: what is drawn where, and what a drawing leaves alone."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import combinations
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+mpl.use("Agg")
+
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
+
+import contfric as cf
+from contfric.errors import ParameterError
+from contfric.plot import (
+    ROWS,
+    new_figure,
+    plot_branches,
+    plot_diagram,
+    plot_diagram_graph,
+    plot_diagram_row,
+    plot_orbit,
+    plot_orbit_in_time,
+    plot_orbit_panels,
+    plot_transition_graph,
+    save_figure,
+)
+from contfric.plot.pieces import level, observe, pieces_of
+from contfric.plot.runs import aligned, stability_runs
+from contfric.plot.style import (
+    UNSTABLE,
+    branch_colours,
+    domain_colours,
+    event_label,
+    lighter,
+    parameter_label,
+    surface_label,
+)
+
+FIG5 = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
+
+
+@pytest.fixture(scope="module")
+def orbit() -> Any:
+    return cf.find_orbit("coulomb", FIG5)
+
+
+@pytest.fixture(scope="module")
+def branch(orbit: Any) -> Any:
+    return cf.continue_orbit(orbit, "Omega", (0.4, 0.6))
+
+
+@pytest.fixture(scope="module")
+def diagram(orbit: Any) -> Any:
+    return cf.explore(orbit, "Omega", (0.4, 0.6))
+
+
+@pytest.fixture(autouse=True)
+def no_show(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("a drawing called show()")
+
+    monkeypatch.setattr(pyplot, "show", refuse)
+    yield
+    pyplot.close("all")
+
+
+def curves(ax: Axes, gid: str) -> list[Line2D]:
+    return [line for line in ax.lines if line.get_gid() == gid and line.get_marker() == "None"]
+
+
+def markers(ax: Axes, gid: str) -> list[Line2D]:
+    return [line for line in ax.lines if line.get_gid() == gid and line.get_marker() != "None"]
+
+
+def texts(ax: Axes) -> list[str]:
+    return [t.get_text() for t in ax.texts]
+
+
+def is_dashed(line: Line2D) -> bool:
+    return line.get_linestyle() == "--"
+
+
+def entries(legend: Any) -> list[str]:
+    assert legend is not None
+    return [t.get_text() for t in legend.get_texts()]
+
+
+# ------------------------------------------------------------------------- runs of a branch
+
+
+def event(position: float, x: float, y: float, before: bool | None, after: bool | None) -> Any:
+    return SimpleNamespace(
+        kind=SimpleNamespace(value="SN", meaning="fold"),
+        params={"p": x},
+        orbit=SimpleNamespace(x_max=y, stops=np.array([y, -y])),
+        label="SN_1a",
+        position=position,
+        stable_before=before,
+        stable_after=after,
+    )
+
+
+def fold(stable: list[bool] | None, events: list[Any]) -> Any:
+    """A parabola p = 1 - s^2 with its fold at s = 0, sampled off the fold."""
+    s = np.array([-0.9, -0.5, -0.2, 0.3, 0.6, 1.0])
+    x_max = 2.0 + s
+    return SimpleNamespace(
+        parameter="p",
+        name="1a",
+        mirrored=False,
+        values=1.0 - s**2,
+        arc=s + 0.9,
+        x_max=x_max,
+        stops=np.column_stack([x_max, -x_max]),
+        stable=None if stable is None else np.array(stable),
+        turn_multipliers=None if stable is None else np.array(1.0 + s, dtype=complex)[:, None],
+        bifurcations=events,
+        ends=(SimpleNamespace(bifurcation=None), SimpleNamespace(bifurcation=None)),
+    )
+
+
+HALVES = [True, True, True, False, False, False]
+
+
+@pytest.mark.parametrize("said", [(True, False), (None, None)])
+def test_runs_meet_at_the_located_bifurcation(said: tuple[bool | None, bool | None]) -> None:
+    runs = stability_runs(fold(HALVES, [event(0.9, 1.0, 2.0, *said)]), "x_max")
+    assert [r.stable for r in runs] == [True, False]
+    assert (runs[0].x[-1], runs[0].y[-1, 0]) == (1.0, 2.0)
+    assert (runs[1].x[0], runs[1].y[0, 0]) == (1.0, 2.0)
+    assert sum(len(r.x) for r in runs) == 6 + 2
+
+
+def test_a_change_that_no_event_explains_is_interpolated() -> None:
+    first, second = stability_runs(fold(HALVES, []), "x_max")
+    # |mu| = 1 + s is linear in the arclength: s = 0 exactly
+    assert first.y[-1, 0] == second.y[0, 0] == pytest.approx(2.0)
+
+
+def test_two_changes_within_one_step() -> None:
+    events = [event(0.8, 0.99, 1.9, True, False), event(1.0, 0.99, 2.1, False, True)]
+    runs = stability_runs(fold([True] * 6, events), "x_max")
+    assert [r.stable for r in runs] == [True, False, True]
+    np.testing.assert_array_equal(runs[1].y[:, 0], [1.9, 2.1])
+
+
+def test_unknown_stability_is_one_run() -> None:
+    (run,) = stability_runs(fold(None, [event(0.9, 1.0, 2.0, None, None)]), "stops")
+    assert run.stable is None
+    assert run.y.shape == (7, 2)
+
+
+def test_stops_of_an_event_join_their_own_lines() -> None:
+    """A located orbit may list its stops from another one on than the branch."""
+    turned = event(0.9, 1.0, 2.0, None, None)
+    turned.orbit.stops = np.array([-2.0, 2.0])
+    (run,) = stability_runs(fold(None, [turned]), "stops")
+    assert np.all(run.y[:, 0] > 0.0)
+    np.testing.assert_array_equal(aligned(np.arange(3.0), np.array([1.1, 2.0, 0.0])), [1, 2, 0])
+
+
+def test_a_point_at_an_event_gives_way_to_it() -> None:
+    """Stability computed exactly at a bifurcation is rounding."""
+    bent = fold([True, True, False, True, True, True], [event(0.7, 0.96, 1.8, True, True)])
+    assert [r.stable for r in stability_runs(bent, "x_max")] == [True]
+
+
+def test_an_event_of_another_branch_at_an_end() -> None:
+    """A branch that leaves a branch point has that point of its parent as its end."""
+    start = event(77.0, 0.19, 1.1, False, True)
+    line = fold([True] * 6, [start])
+    line.ends = (SimpleNamespace(bifurcation=start), line.ends[1])
+    (run,) = stability_runs(line, "x_max")
+    assert run.x[0] == 0.19
+
+
+# ---------------------------------------------------------------------------------- diagrams
+
+
+def test_stable_is_solid_and_unstable_dashed_up_to_the_fold(branch: Any) -> None:
+    ax = plot_branches([branch], "x_max")
+    assert isinstance(ax, Axes)
+    (sn,) = (b for b in branch.bifurcations if b.kind.value == "SN")
+    corner = (sn.params["Omega"], sn.orbit.x_max)
+    solid, dashed = curves(ax, branch.name)
+    if is_dashed(solid):
+        solid, dashed = dashed, solid
+    assert is_dashed(dashed)
+    assert not is_dashed(solid)
+    for line in (solid, dashed):
+        ends = {tuple(line.get_xydata()[0]), tuple(line.get_xydata()[-1])}
+        assert corner in ends, "a gap or an overlap at the fold"
+
+
+def test_every_event_is_marked_at_its_coordinates(branch: Any) -> None:
+    for row, look in ROWS.items():
+        ax = plot_branches([branch], row)
+        for bif in branch.bifurcations:
+            points = np.vstack([m.get_xydata() for m in markers(ax, bif.label)])
+            for value in np.atleast_1d(getattr(bif.orbit, look.attribute)):
+                distance = np.abs(points - (bif.params["Omega"], value)).max(axis=1)
+                assert distance.min() < 1e-7
+
+
+def test_axes_are_labelled(branch: Any) -> None:
+    ax = plot_branches([branch], "stops")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (r"$\Omega$", "$x$ at stops")
+    assert len(curves(ax, "1a")) == 2 * branch.stops.shape[1]
+
+
+def test_stability_that_was_not_computed(orbit: Any) -> None:
+    plain = cf.continue_orbit(orbit, "Omega", (0.49, 0.51), stability=False)
+    ax = plot_branches([plain])
+    assert not any(is_dashed(line) for line in curves(ax, plain.name))
+    known = entries(ax.get_legend())
+    assert "stability not computed" in known
+    assert not {"stable", "unstable"} & set(known)
+
+
+def test_diagram_rows_share_their_parameter(diagram: Any) -> None:
+    axes = plot_diagram(diagram, rows=("x_max", "x_min", "stops", "psi"))
+    assert [ax.get_ylabel() for ax in axes] == [look.label for look in ROWS.values()]
+    assert {ax.get_xlim() for ax in axes} == {(0.4, 0.6)}
+    assert axes[-1].get_xlabel() == r"$\Omega$"
+    assert axes[0].get_title() == "$S$ = 0.32, $S_{0}$ = 0.4"
+
+
+def test_legend_says_branches_lines_and_events(diagram: Any) -> None:
+    (legend,) = plot_diagram(diagram)[0].figure.legends
+    known = entries(legend)
+    assert {b.name for b in diagram.branches} <= set(known)
+    assert {"stable", "unstable", "mirror image: lighter"} <= set(known)
+    for bif in diagram.bifurcations:
+        assert f"{bif.kind.value}: {bif.kind.meaning}" in known
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_events_of_a_diagram_are_labelled_once(diagram: Any, row: str) -> None:
+    ax = plot_diagram_row(diagram, row)
+    shown = {event_label(b.label) for b in diagram.bifurcations if b.kind.value != "T"}
+    assert shown <= set(texts(ax))
+    assert texts(ax).count(r"$\mathrm{SN}_{1a}$") == 1, "the mirror image is labelled too"
+
+
+def test_mirror_images_are_marked_and_drawn_lighter(diagram: Any) -> None:
+    ax = plot_diagram_row(diagram, "x_max")
+    (folds,) = markers(ax, "SN_1a")
+    assert len(folds.get_xdata()) == 2
+    colour = branch_colours(["1a"])["1a"]
+    assert {line.get_color() for line in curves(ax, "1a")} == {colour, lighter(colour)}
+    even = plot_diagram_row(diagram, "psi")
+    assert len({line.get_color() for line in curves(even, "1a")}) == 1
+
+
+def test_labels_do_not_overlap(diagram: Any) -> None:
+    fig = new_figure(8.4, 8.4)
+    for ax in plot_diagram(diagram, fig=fig):
+        boxes = [t.get_window_extent() for t in ax.texts if isinstance(t, Annotation)]
+        assert boxes
+        assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
+        assert all(ax.bbox.x0 < b.x0 and b.y1 < ax.bbox.y1 for b in boxes)
+
+
+def test_events_and_legend_can_be_left_out(diagram: Any) -> None:
+    ax = plot_diagram_row(diagram, events=False, legend=False)
+    assert ax.get_legend() is None
+    assert texts(ax) == []
+
+
+def test_unknown_row_has_a_remedy(diagram: Any) -> None:
+    for draw in (plot_diagram_row, lambda d, row: plot_diagram(d, rows=(row,))):
+        with pytest.raises(ParameterError, match="did you mean 'x_max'"):
+            draw(diagram, "xmax")
+
+
+def test_an_empty_diagram_is_drawn() -> None:
+    empty = SimpleNamespace(parameter="p", range=(0.0, 1.0), branches=(), nodes=(), bifurcations=())
+    assert len(plot_diagram(empty)) == 3
+    assert isinstance(plot_diagram_graph(empty), Axes)
+
+
+def test_methods_draw(orbit: Any, branch: Any, diagram: Any) -> None:
+    fig = new_figure()
+    ax = fig.add_subplot()
+    assert branch.plot(ax=ax, row="psi") is ax
+    assert diagram.plot(ax=ax) is ax
+    assert orbit.plot(ax=fig.add_subplot()) is fig.axes[-1]
+
+
+# ------------------------------------------------------------------------------------ orbits
+
+
+def test_orbit_is_cut_where_it_changes_domain(orbit: Any) -> None:
+    pieces = pieces_of(orbit)
+    names = [p.domain for p in pieces]
+    walk = list(orbit.signature.segments)
+    assert names in [walk[k:] + walk[:k] for k in range(len(walk))]
+    for piece in pieces:
+        surface = orbit.model.surface_by_name[piece.exit]
+        value = observe(orbit, surface.observable, float(piece.times[-1]), piece.states[-1])
+        assert value == pytest.approx(level(orbit, surface), abs=1e-10)
+
+
+def test_orbit_is_coloured_by_domain(orbit: Any) -> None:
+    ax = plot_orbit(orbit)
+    assert isinstance(ax, Axes)
+    colours = domain_colours(orbit.model)
+    known = entries(ax.get_legend())
+    for domain in set(orbit.signature.segments):
+        lines = curves(ax, domain)
+        assert {line.get_color() for line in lines} == {colours[domain]}
+        assert orbit.model.domain_by_name[domain].label in known
+    assert {"stop: sticks", "stop: reverses"} <= set(known)
+    assert {"$F^{+}$", "$F^{-}$", "$v$ = 0"} <= set(texts(ax))
+
+
+def test_surfaces_are_lines_in_the_plane_of_the_observables(orbit: Any) -> None:
+    ax = plot_orbit(orbit, plane=("u", "v"))
+    for name, value in (("F+", 0.4), ("F-", -0.4)):
+        (line,) = curves(ax, name)
+        assert set(line.get_xdata()) == {value}
+    with pytest.raises(ParameterError, match="no state or observable 'w'"):
+        plot_orbit(orbit, plane=("w", "v"))
+
+
+def test_observables_in_time_with_their_levels(orbit: Any) -> None:
+    load, velocity = plot_orbit_in_time(orbit)
+    assert [set(line.get_ydata()) for line in curves(load, "F-")] == [{-0.4}]
+    assert [set(line.get_ydata()) for line in curves(velocity, "v")] == [{0.0}]
+    fig = new_figure()
+    own = list(fig.subplots(2, 1))
+    assert plot_orbit_in_time(orbit, own) == own
+    with pytest.raises(ParameterError, match="2 axes"):
+        plot_orbit_in_time(orbit, own[:1])
+
+
+def test_orbit_panels(orbit: Any) -> None:
+    fig = new_figure(9, 6)
+    axes = plot_orbit_panels(orbit, fig)
+    assert [(ax.get_xlabel(), ax.get_ylabel()) for ax in axes] == [
+        ("$x$", "$v$"),
+        ("$u$", "$v$"),
+        ("", "$u$"),
+        ("time / period of the orbit", "$v$"),
+    ]
+    assert all(ax.figure is fig for ax in axes)
+
+
+# ------------------------------------------------------------------------------------ graphs
+
+
+def test_transition_graph_draws_all_transitions() -> None:
+    model = cf.load_model("coulomb")
+    ax = plot_transition_graph(model)
+    drawn = {patch.get_gid() for patch in ax.patches}
+    assert len(ax.patches) == len(drawn) == 14
+    assert drawn == {f"{source} -> {to}" for (source, _), to in model.transitions.items()}
+    assert {domain.label for domain in model.domains} <= set(texts(ax))
+    assert texts(ax).count(surface_label("F+")) == 5
+
+
+def test_transition_graph_highlights_a_walk(orbit: Any) -> None:
+    walk = orbit.signature.segments
+    ax = plot_transition_graph(orbit.model, signature=orbit.signature)
+    bold = {patch.get_gid() for patch in ax.patches if patch.get_linewidth() > 1.5}
+    assert bold == {f"{a} -> {b}" for a, b in zip(walk, (*walk[1:], walk[0]), strict=True)}
+    assert len(ax.patches) == 14
+
+
+def test_diagram_graph_has_every_branch(diagram: Any) -> None:
+    ax = plot_diagram_graph(diagram)
+    for branch in diagram.branches:
+        assert branch.name.replace(", ", ",\n") in texts(ax)
+    assert any(text.startswith(r"$\mathrm{BP}_{2s}$") for text in texts(ax))
+
+
+# ------------------------------------------------------------------------- look, axes and files
+
+
+def test_own_axes_are_used_and_nothing_else(
+    orbit: Any, diagram: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pyplot, "figure", None)
+    monkeypatch.setattr(pyplot, "subplots", None)
+    fig = new_figure()
+    one, two, three = fig.subplots(1, 3)
+    assert plot_orbit(orbit, one) is one
+    assert plot_diagram_row(diagram, "psi", two) is two
+    assert plot_transition_graph(orbit.model, three) is three
+    assert two.get_legend() is not None
+    assert len(fig.axes) == 3
+
+
+def test_subfigures_are_honoured(diagram: Any) -> None:
+    fig = new_figure(9, 4)
+    left, _ = fig.subfigures(1, 2)
+    ax = left.subplots()
+    assert plot_diagram_row(diagram, "psi", ax) is ax
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_files_are_reproducible(branch: Any, tmp_path: Path, suffix: str) -> None:
+    content = []
+    for name in "ab":
+        fig = new_figure(4, 3)
+        plot_branches([branch], "psi", fig.add_subplot())
+        path = save_figure(fig, tmp_path / f"{name}.{suffix}", dpi=60)
+        content.append(path.read_bytes())
+    assert content[0] == content[1]
+    assert not any(word in content[0] for word in (b"CreationDate", b"dc:date", b"Software"))
+
+
+def test_saving_needs_no_pyplot() -> None:
+    code = (
+        "import sys, io, contfric as cf, contfric.plot\n"
+        "assert 'matplotlib' not in sys.modules, 'contfric.plot loads matplotlib at once'\n"
+        "from contfric.plot import new_figure, plot_transition_graph\n"
+        "fig = new_figure()\n"
+        "plot_transition_graph(cf.load_model('coulomb'), fig.add_subplot())\n"
+        "fig.savefig(io.BytesIO())\n"
+        "assert 'matplotlib.pyplot' not in sys.modules\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_names_as_mathematics() -> None:
+    assert parameter_label("S0") == "$S_{0}$"
+    assert parameter_label("zeta") == r"$\zeta$"
+    assert parameter_label("sigma_0") == r"$\sigma_{0}$"
+    assert parameter_label("rate") == r"$\mathrm{rate}$"
+    assert parameter_label("v_rel") == "v_rel"
+    assert event_label("CS_s") == r"$\mathrm{CS}_{s}$"
+    assert event_label("GS_2a, 14seg") == r"$\mathrm{GS}_{2a,\,14\mathrm{seg}}$"
+
+
+def test_colours_tell_apart() -> None:
+    names = ["1a", "2s", "0s", "2a", "1a, 9seg", "2a, 14seg", "4a"]
+    assert len(set(branch_colours(names).values())) == len(names)
+    assert branch_colours(names) == branch_colours([*names, "1a"])
+    assert len(set(domain_colours(cf.load_model("coulomb")).values())) == 7
+    assert isinstance(UNSTABLE, tuple)

@@ -1,0 +1,319 @@
+"""Results on disk: what is loaded is what was saved, and a damaged file says so."""
+
+from __future__ import annotations
+
+import dataclasses
+import errno
+import json
+import struct
+import subprocess
+import sys
+import time
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.continuation.events import EndReason
+from contfric.orbit.system import build_system
+from contfric.results import files
+from contfric.signature import load_signature
+
+PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
+
+
+@pytest.fixture(scope="module")
+def orbit() -> cf.Orbit:
+    return cf.find_orbit("coulomb", PARAMS)
+
+
+@pytest.fixture(scope="module")
+def branch(orbit: cf.Orbit) -> cf.Branch:
+    return cf.continue_orbit(orbit, "Omega", (0.45, 0.56))
+
+
+@pytest.fixture(scope="module")
+def diagram(orbit: cf.Orbit) -> cf.Diagram:
+    return cf.explore(orbit, "Omega", (0.45, 0.56))
+
+
+def assert_same(a: object, b: object) -> None:
+    """Compare dataclasses to their last bit, field by field; shared systems by what they solve."""
+    assert type(a) is type(b)
+    if isinstance(a, np.ndarray):
+        assert isinstance(b, np.ndarray)
+        assert (a.dtype, a.shape) == (b.dtype, b.shape)
+        assert a.tobytes() == b.tobytes()
+    elif isinstance(a, tuple):
+        assert isinstance(b, tuple)
+        assert len(a) == len(b)
+        for x, y in zip(a, b, strict=True):
+            assert_same(x, y)
+    elif dataclasses.is_dataclass(a) and not hasattr(a, "flow_factory"):
+        for field in dataclasses.fields(a):
+            assert_same(getattr(a, field.name), getattr(b, field.name))
+    elif isinstance(a, float):
+        assert struct.pack("d", a) == struct.pack("d", b)
+    else:
+        assert a == b
+
+
+def round_trip(x, tmp_path: Path):
+    path = tmp_path / "x.npz"
+    cf.save(x, path)
+    return cf.load(path)
+
+
+# --------------------------------------------------------------------------------- round trips
+
+
+def test_orbit(orbit, tmp_path) -> None:
+    loaded = round_trip(orbit, tmp_path)
+    assert_same(orbit, loaded)
+    assert loaded.signature == orbit.signature
+    assert loaded.multipliers.tobytes() == orbit.multipliers.tobytes()
+
+
+def test_unsolved_orbit(orbit, tmp_path) -> None:
+    unsolved = dataclasses.replace(orbit, residual=np.inf, joints=orbit.joints * np.nan)
+    assert_same(unsolved, round_trip(unsolved, tmp_path))
+
+
+def test_branch(branch, tmp_path) -> None:
+    loaded = round_trip(branch, tmp_path)
+    assert_same(branch, loaded)
+    ended = [end.bifurcation for end in loaded.ends if end.bifurcation is not None]
+    assert ended
+    assert all(any(b is listed for listed in loaded.bifurcations) for b in ended)
+
+
+def test_branch_without_stability(orbit, tmp_path) -> None:
+    branch = cf.continue_orbit(orbit, "S", (0.3, 0.33), stability=False)
+    loaded = round_trip(branch, tmp_path)
+    assert loaded.stable is None
+    assert_same(branch, loaded)
+
+
+def test_diagram(diagram, tmp_path) -> None:
+    assert {b.mirrored for b in diagram.branches} == {True, False}
+    assert {b.symmetric for b in diagram.branches} == {True, False}
+    loaded = round_trip(diagram, tmp_path)
+    assert_same(diagram, loaded)
+    assert str(loaded) == str(diagram)
+    for node in loaded.nodes:
+        if not node.mirrored:
+            branches = [loaded.branches[i] for i in node.branches]
+            assert any(node.bifurcation is b for branch in branches for b in branch.bifurcations)
+    assert sorted(loaded.graph.edges()) == sorted(diagram.graph.edges())
+
+
+def test_interrupted_diagram(diagram, tmp_path) -> None:
+    partial = dataclasses.replace(diagram, complete=False, notes=(EndReason.INTERRUPTED.value,))
+    assert not round_trip(partial, tmp_path).complete
+
+
+def test_continuation_goes_on_from_a_loaded_branch(branch, tmp_path) -> None:
+    loaded = round_trip(branch, tmp_path)
+    middle = len(branch) // 2
+    again = cf.continue_orbit(loaded[middle], "Omega", (0.45, 0.56))
+    want = cf.continue_orbit(branch[middle], "Omega", (0.45, 0.56))
+    assert again.joints.tobytes() == want.joints.tobytes()
+
+
+def test_saving_replaces_the_file(orbit, branch, tmp_path) -> None:
+    path = tmp_path / "x.npz"
+    cf.save(branch, path)
+    cf.save(orbit, path)
+    assert isinstance(cf.load(path), cf.Orbit)
+    assert [p.name for p in tmp_path.iterdir()] == ["x.npz"]
+
+
+def test_million_points_take_seconds(branch, tmp_path) -> None:
+    count = 1_000_000
+    grown = {
+        name: np.resize(getattr(branch, name), (count, *getattr(branch, name).shape[1:]))
+        for name in ("values", "joints", "arc", "margins", "labels", "turn_multipliers")
+    }
+    large = dataclasses.replace(branch, **grown)
+    path = tmp_path / "large.npz"
+    start = time.perf_counter()
+    cf.save(large, path)
+    loaded = cf.load(path)
+    seconds = time.perf_counter() - start
+    path.unlink()
+    assert loaded.joints.tobytes() == large.joints.tobytes()
+    assert seconds < 20.0, "no point of a branch may be an object of its own on the way"
+
+
+def test_loading_does_not_load_the_engine(branch, tmp_path) -> None:
+    path = tmp_path / "x.npz"
+    cf.save(branch, path)
+    code = (
+        "import sys, contfric as cf; print(len(cf.load(sys.argv[1])));"
+        "assert not {'numba', 'matplotlib', 'pydantic'} & set(sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, path], capture_output=True, text=True, check=False
+    )
+    assert done.stdout.strip() == str(len(branch)), done.stderr
+
+
+# ------------------------------------------------------------------------------ what is refused
+
+
+def test_other_objects_are_refused(tmp_path) -> None:
+    with pytest.raises(
+        cf.ResultFileError, match=r"only an Orbit, a Branch or a Diagram .* got dict"
+    ):
+        cf.save({}, tmp_path / "x.npz")  # type: ignore[arg-type]
+
+
+def test_full_form_is_refused(orbit, tmp_path) -> None:
+    signature = load_signature("1a")
+    modes = [orbit.model.domain_by_name[d].mode for d in signature.segments]
+    word = tuple(zip(modes, signature.surfaces, strict=True))
+    system = build_system(orbit.model, word, 1, False, signature.segments)
+    full = dataclasses.replace(orbit, system=system, joints=np.zeros((6, 3)))
+    with pytest.raises(cf.ResultFileError, match="full form"):
+        cf.save(full, tmp_path / "x.npz")
+    assert not list(tmp_path.iterdir())
+
+
+def test_missing_file(tmp_path) -> None:
+    with pytest.raises(cf.ResultFileError, match=r"cannot read .*none\.npz: No such file"):
+        cf.load(tmp_path / "none.npz")
+    with pytest.raises(cf.ResultFileError, match="cannot read"):
+        cf.load(tmp_path)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.1, 0.5, 0.9, 0.999])
+def test_truncated_file(diagram, tmp_path, share) -> None:
+    path = tmp_path / "diagram.npz"
+    cf.save(diagram, path)
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(cf.ResultFileError, match=r"diagram\.npz is damaged or incomplete .*again"):
+        cf.load(path)
+
+
+def test_every_changed_byte_is_found_or_harmless(orbit, tmp_path) -> None:
+    path = tmp_path / "orbit.npz"
+    cf.save(orbit, path)
+    content = path.read_bytes()
+    for place in range(0, len(content), 7):
+        changed = bytearray(content)
+        changed[place] ^= 0x55
+        path.write_bytes(changed)
+        try:
+            loaded = cf.load(path)
+        except cf.ResultFileError:
+            continue
+        assert_same(orbit, loaded)  # a date or an attribute of the archive, not a number
+
+
+@pytest.mark.parametrize("content", [b"", b"PK", b"x,y\n1,2\n", b"\x93NUMPY\x01\x00"])
+def test_foreign_file(tmp_path, content) -> None:
+    path = tmp_path / "x.npz"
+    path.write_bytes(content)
+    with pytest.raises(cf.ResultFileError, match="damaged or incomplete"):
+        cf.load(path)
+
+
+def test_foreign_npz(tmp_path) -> None:
+    path = tmp_path / "x.npz"
+    np.savez(path, values=np.arange(3.0))
+    with pytest.raises(cf.ResultFileError, match="was not written by contfric"):
+        cf.load(path)
+    np.savez(path, header=np.array([{"mark": "contfric result"}], dtype=object))
+    with pytest.raises(cf.ResultFileError, match="damaged"):
+        cf.load(path)  # objects would be executed: they are not read
+
+
+def edit_header(path: Path, **changes: object) -> None:
+    with np.load(path) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    header = json.loads(bytes(arrays["header"]))
+    header |= changes
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    np.savez(path, **arrays)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"format": 2}, "is in format 2, this contfric reads format 1"),
+        ({"mark": "other"}, "was not written by contfric"),
+        ({"model": "lugre7"}, "model 'lugre7', which is not installed .*pass load"),
+        ({"parameters": ["Omega", "S"]}, r"was written for parameters \['Omega', 'S'\]"),
+        ({"content": {"kind": "orbit", "index": 5}}, "damaged"),
+        ({"content": {"kind": "cake"}}, "damaged"),
+        ({"pool": {}}, "damaged"),
+        ({"pool": []}, "damaged"),
+    ],
+)
+def test_header_is_checked(orbit, tmp_path, changes, message) -> None:
+    path = tmp_path / "x.npz"
+    cf.save(orbit, path)
+    edit_header(path, **changes)
+    with pytest.raises(cf.ResultFileError, match=message):
+        cf.load(path)
+
+
+def test_a_model_without_a_name_can_be_passed(orbit, tmp_path) -> None:
+    own = dataclasses.replace(orbit.model, name="mine")
+    system = build_system(own, orbit.system.word, orbit.periods, orbit.system.half)
+    path = tmp_path / "x.npz"
+    cf.save(dataclasses.replace(orbit, system=system), path)
+    with pytest.raises(cf.ResultFileError, match="'mine', which is not installed"):
+        cf.load(path)
+    from contfric.results import load
+
+    assert load(path, own).model is own
+    with pytest.raises(cf.ResultFileError, match="was written for model mine"):
+        load(path, orbit.model)
+
+
+# ------------------------------------------------------------------------------- whole or not
+
+
+@pytest.mark.parametrize(
+    ("code", "remedy"),
+    [
+        (errno.ENOSPC, "free some space"),
+        (errno.EROFS, "read-only: write to another"),
+        (errno.EIO, "write to another place"),
+    ],
+)
+def test_a_failed_write_leaves_the_old_file(orbit, tmp_path, monkeypatch, code, remedy) -> None:
+    path = tmp_path / "x.npz"
+    path.write_text("precious")
+
+    def refuse(*_: object) -> None:
+        raise OSError(code, "refused")
+
+    monkeypatch.setattr(files.os, "fsync", refuse)
+    with pytest.raises(cf.ResultFileError, match=rf"cannot write .*x\.npz: refused; .*{remedy}"):
+        cf.save(orbit, path)
+    assert path.read_text() == "precious"
+    assert [p.name for p in tmp_path.iterdir()] == ["x.npz"]
+
+
+def test_an_interrupted_write_leaves_the_old_file(orbit, tmp_path, monkeypatch) -> None:
+    path = tmp_path / "x.npz"
+    path.write_text("precious")
+
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(zipfile.ZipFile, "open", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        cf.save(orbit, path)
+    assert path.read_text() == "precious"
+    assert [p.name for p in tmp_path.iterdir()] == ["x.npz"]
+
+
+def test_missing_folder_is_named(orbit, tmp_path) -> None:
+    with pytest.raises(cf.ResultFileError, match=r"make the folder .*none first"):
+        cf.save(orbit, tmp_path / "none" / "x.npz")
