@@ -70,7 +70,37 @@ _HOMES = {
     "transition_graph": "contfric.signature",
 }
 
-__all__ = [*_HOMES, "__version__"]
+__all__ = [
+    "AperiodicError",
+    "Bifurcation",
+    "Branch",
+    "ContfricError",
+    "ConvergenceError",
+    "Diagram",
+    "EndReason",
+    "Kind",
+    "Model",
+    "NotationError",
+    "Orbit",
+    "ParameterError",
+    "ResultFileError",
+    "Signature",
+    "StudyError",
+    "__version__",
+    "continue_orbit",
+    "explore",
+    "find_orbit",
+    "load",
+    "load_model",
+    "load_signature",
+    "model_names",
+    "run_study",
+    "save",
+    "signature_names",
+    "simulate",
+    "solve_orbit",
+    "transition_graph",
+]
 
 
 def __getattr__(name: str) -> Any:

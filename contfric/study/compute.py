@@ -82,4 +82,5 @@ def one_branch(branch: Branch, bounds: tuple[float, float]) -> Diagram:
             for side, end in enumerate(branch.ends)
             if end.reason not in _FINAL
         ),
+        complete=all(end.reason is not EndReason.INTERRUPTED for end in branch.ends),
     )

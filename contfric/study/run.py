@@ -187,14 +187,17 @@ class _Run:
             found = self._timed(
                 StepName.EXPLORE, lambda: explore_from(study, orbit, task, self.say)
             )
-            self.diagram = found if found.branches else None
-            if not found.complete:
-                self.status = RunStatus.INTERRUPTED
+            self._keep(found)
         elif isinstance(task, ContinueTask):
             self.branch = self._timed(
                 StepName.CONTINUE, lambda: continue_from(study, orbit, task, self.say)
             )
-            self.diagram = one_branch(self.branch, (task.range[0], task.range[1]))
+            self._keep(one_branch(self.branch, (task.range[0], task.range[1])))
+
+    def _keep(self, found: Diagram) -> None:
+        self.diagram = found if found.branches else None
+        if not found.complete:
+            self.status = RunStatus.INTERRUPTED
 
     def _timed(self, name: StepName, step: Callable[[], _T]) -> _T:
         start = time.perf_counter()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.continuation.events import End, EndReason
 from contfric.orbit.counts import counts
 from contfric.study import UnwrittenError, make_plan, read_study, study_names
 from contfric.study.run import RunStatus
@@ -556,6 +558,17 @@ def test_interrupted_before_the_first_branch(tmp_path, study) -> None:
     )
     assert result.status is RunStatus.INTERRUPTED
     assert [p.name for p in result.files] == ["orbit.npz", "run.json"]
+
+
+def test_interrupted_branch_is_saved(tmp_path, study, monkeypatch) -> None:
+    whole = cf.continue_orbit(cf.find_orbit("coulomb", {}), "Omega", (0.45, 0.56))
+    partial = dataclasses.replace(whole, ends=(whole.ends[0], End(EndReason.INTERRUPTED)))
+    monkeypatch.setattr("contfric.continuation.trace.continue_orbit", lambda *_, **__: partial)
+    result = cf.run_study(study(HEAD + CONTINUE), tmp_path / "out")
+    assert result.status is RunStatus.INTERRUPTED
+    loaded = cf.load(result.out / "branch.npz")
+    assert isinstance(loaded, cf.Branch)
+    assert loaded.ends[1].reason is EndReason.INTERRUPTED
 
 
 @pytest.mark.parametrize("task", [EXPLORE, CONTINUE])
