@@ -80,6 +80,8 @@ class _Exploration:
         index = len(self.branches)
         self.branches.append(branch)
         self.say(f"branch {index + 1}: {branch.name}, {len(branch)} points")
+        if any(end.reason is EndReason.INTERRUPTED for end in branch.ends):
+            raise KeyboardInterrupt
         for bifurcation in branch.bifurcations:
             self._meet(bifurcation, index)
 

@@ -123,10 +123,12 @@ def continue_orbit(
     ParameterError
         If the parameter, the range or the step is not valid.
     ConvergenceError
-        If the orbit is not solved.
+        If the orbit is not solved, or has no unique continuation.
 
     Notes
     -----
+    Ctrl-C ends the branch where it is, with the reason INTERRUPTED.
+
     What detection cannot see: two events of the same kind within one step whose test functions do
     not betray it by a parabola through three points. A smaller ``max_step`` shows them.
 
@@ -149,15 +151,10 @@ def continue_orbit(
             orbit,
         )
     ahead = trace_side(orbit, start, settings, progress=progress)
-    if ahead.end.reason is EndReason.CLOSED:
-        return assemble(orbit, settings, ahead, replace_end(ahead.end))
+    if ahead.end.reason in (EndReason.CLOSED, EndReason.INTERRUPTED):
+        return assemble(orbit, settings, ahead, End(ahead.end.reason))
     behind = trace_side(orbit, start.reversed(), settings, progress=progress)
     return join(orbit, settings, behind, ahead)
-
-
-def replace_end(end: End) -> End:
-    """Return an end without its event, for the other side of a closed branch."""
-    return End(end.reason, end.message)
 
 
 def trace_side(
@@ -172,7 +169,11 @@ def trace_side(
     side = Side([start], End(EndReason.START))
     step = first_step * settings.largest
     while True:
-        finished, step = _advance(orbit, side, settings, step)
+        try:
+            finished, step = _advance(orbit, side, settings, step)
+        except KeyboardInterrupt:  # keep what was found
+            side.end = End(EndReason.INTERRUPTED)
+            return side
         if progress is not None:
             last = side.points[-1].value
             progress(f"{len(side.points)} points, {settings.parameter} = {last:.6g}")

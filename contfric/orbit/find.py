@@ -20,7 +20,9 @@ MOST_PERIODS = 64
 #: A return nearer than this (nondimensional) is worth a Newton solve.
 _NEAR = 1e-2
 #: A return nearer than this is periodic to the resolution of a simulation.
-_EXACT = 1e-10
+_EXACT = 1e-9
+#: A motion that returns this near and still does not settle creeps along a continuum of orbits.
+_CREEPING = 1e-5
 #: Periods to follow before the first look, and how much longer before each next one.
 _FIRST, _LONGER = 200, 4
 #: A settled orbit attracts; beyond rounding its multipliers cannot exceed 1.
@@ -67,11 +69,14 @@ def find_orbit(
             model, dict(params or {}), state=y, time=time, periods=span, events=10_000_000
         )
         _check_motion(trajectory)
-        orbit = _read_off(trajectory)
         done += span
+        orbit = _read_off(trajectory, final=done >= longest)
         if orbit is not None:
             return _wanted(orbit, periods)
         if done >= longest:
+            slow = next((r for r in recurrences(trajectory) if r[2] < _CREEPING), None)
+            if slow is not None:
+                raise ConvergenceError(_marginal(trajectory, done, *slow[1:]), trajectory)
             raise AperiodicError(_advice(trajectory, done), trajectory)
         span = min(span * _LONGER, longest - done)
         _, time, y, _ = trajectory.last
@@ -95,6 +100,16 @@ def _check_motion(trajectory: Trajectory) -> None:
         )
 
 
+def _marginal(trajectory: Trajectory, done: int, turns: int, mismatch: float) -> str:
+    where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
+    return (
+        f"the motion at {where} has not settled in {done} periods: it still changes by "
+        f"{mismatch:.1g} in {turns} period(s), more slowly than any exponential. The orbit is "
+        "marginally stable (a multiplier is 1), as orbits of a continuum are. Move a parameter a "
+        "little, or add damping"
+    )
+
+
 def _advice(trajectory: Trajectory, done: int) -> str:
     where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
     return (
@@ -104,23 +119,29 @@ def _advice(trajectory: Trajectory, done: int) -> str:
     )
 
 
-def _read_off(trajectory: Trajectory) -> Orbit | None:
-    """Return the orbit that the end of a trajectory has settled on, if it has."""
+def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:
+    """Return the orbit that the end of a trajectory has settled on, if it has.
+
+    A return that is not yet exact may belong to an orbit that repels, beside an attractor of longer
+    period; longer simulation tells. Only at the final look are multipliers asked instead.
+    """
     for lag, turns, mismatch in recurrences(trajectory):
+        if mismatch > _EXACT and not final:
+            return None
         orbit = _orbit_of_lag(trajectory, lag, turns)
         if orbit is None:
             continue
         solved = settle(orbit)
-        if solved.converged and solved.admissible and _attracts(solved, mismatch):
+        if solved.converged and solved.admissible and (mismatch <= _EXACT or _attracts(solved)):
             return solved
-        if mismatch < _EXACT and solved.status is not Status.CONVERGED:
+        if mismatch <= _EXACT and not solved.converged:
             # the simulation repeats itself but the system is singular: one orbit of a continuum
             return Orbit(orbit.system, orbit.joints, orbit.vector, mismatch, Status.CONVERGED)
     return None
 
 
-def _attracts(orbit: Orbit, mismatch: float) -> bool:
-    return mismatch < _EXACT or bool(np.all(np.abs(orbit.multipliers) <= _ATTRACTS))
+def _attracts(orbit: Orbit) -> bool:
+    return bool(np.all(np.abs(orbit.multipliers) <= _ATTRACTS))
 
 
 def recurrences(trajectory: Trajectory) -> Iterator[tuple[int, int, float]]:

@@ -177,7 +177,7 @@ def simulate(
     --------
     >>> import contfric as cf
     >>> cf.simulate("coulomb", {"Omega": 0.5}, state=[1.3, 0.0], periods=2).word[0]
-    ('slide-', 'v')
+    ('stick', 'F+')
     """
     model = load_model(model)
     vector = model.vector(params or {})

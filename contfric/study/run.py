@@ -75,8 +75,7 @@ class StudyResult:
     files: tuple[Path, ...]
 
     def __repr__(self) -> str:
-        count = len(self.files)
-        return f"<StudyResult {self.study.name}: {self.status.value}, {count} files in {self.out}>"
+        return f"<StudyResult {self.study.name}: {self.status.value}, in {self.out}>"
 
 
 class UnwrittenError(ResultFileError):
@@ -176,8 +175,6 @@ class _Run:
         self.folder.remove_stale(self.written)
         return result
 
-    # ------------------------------------------------------------------ computing
-
     def _compute(self) -> None:
         study = self.study
         self.orbit = orbit = self._timed(StepName.ORBIT, lambda: find_start(study, self.say))
@@ -218,8 +215,6 @@ class _Run:
             return
         if isinstance(error, ContfricError):
             error.args = (f"{error} (the orbit {self.orbit.name} found before is in {path})",)
-
-    # ------------------------------------------------------------------ writing
 
     def _write_all(self, orbit: Orbit) -> None:
         from contfric.study.tables import write_bifurcations, write_points
@@ -270,8 +265,8 @@ class _Run:
     def _write_record(self, orbit: Orbit) -> dict[str, Any]:
         from contfric.study.record import record_of, write_record
 
-        done = counts() - self.before
-        record = record_of(self.plan, done, self.timings, orbit, self.diagram)
+        work = counts() - self.before
+        record = record_of(self.plan, work, self.timings, orbit, self.diagram)
         record |= {
             "status": self.status.value,
             "failures": [_one_line(error) for error in self.failures],

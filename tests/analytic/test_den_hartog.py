@@ -135,7 +135,9 @@ def test_very_near_resonance(distance: float) -> None:
     compare(orbit, limit=20 * EPS * exact.sensitivity)
 
 
-@pytest.mark.parametrize("omega, S", [(0.357257025, 0.0832116755), (0.3508, 0.058), (0.3938, 0.1342)])
+@pytest.mark.parametrize(
+    "omega, S", [(0.357257025, 0.0832116755), (0.3508, 0.058), (0.3938, 0.1342)]
+)
 def test_where_it_would_stop_on_the_way_there_is_none(omega: float, S: float) -> None:
     assert S < DenHartog(omega, S).onset and not DenHartog(omega, S).moves_on()
     with pytest.raises(cf.ConvergenceError, match="interior margin at v"):
@@ -171,7 +173,9 @@ def test_onset_of_sticking(omega: float) -> None:
     assert low == pytest.approx(onset, rel=1e-12)
 
 
-@pytest.mark.parametrize("omega, kind", [(0.45, "SS"), (0.55, "CS"), (0.7, "CS"), (1.05, "CS"), (2.2, "CS")])
+@pytest.mark.parametrize(
+    "omega, kind", [(0.45, "SS"), (0.55, "CS"), (0.7, "CS"), (1.05, "CS"), (2.2, "CS")]
+)
 def test_continued_in_the_static_limit_it_ends_where_the_load_is(omega: float, kind: str) -> None:
     S = 0.5 * DenHartog(omega, 0.0).onset
     exact = DenHartog(omega, S)

@@ -266,7 +266,9 @@ def test_every_event_is_the_one_of_the_return_map(name: str) -> None:
     assert compared >= 3
 
 
-@pytest.mark.parametrize("name, kind", [("fig05", "CS"), ("small limits", "SS"), ("large limits", "CS")])
+@pytest.mark.parametrize(
+    "name, kind", [("fig05", "CS"), ("small limits", "SS"), ("large limits", "CS")]
+)
 def test_den_hartogs_orbit_begins_to_stick(name: str, kind: str) -> None:
     """Where its load ``Omega^2 X`` has fallen to S0, in closed form."""
     params = DIAGRAMS[name][0]
@@ -300,9 +302,7 @@ def test_kinds_and_ends_of_fig05() -> None:
     names = sorted(branch.name for branch in found.branches)
     assert names == ["0s", "1a", "1a", "2a", "2a", "2s"]
     assert sum(branch.mirrored for branch in found.branches) == 2
-    meeting = {
-        i for node in found.nodes if node.bifurcation.kind == "CS" for i in node.branches
-    }
+    meeting = {i for node in found.nodes if node.bifurcation.kind == "CS" for i in node.branches}
     names = sorted(found.branches[i].name for i in meeting)
     assert names == ["0s", "1a", "1a", "2s"], "CS_s joins 0s, 2s, 1a and its mirror image"
     assert {end.end.reason.name for end in found.loose_ends} == {"SS"}

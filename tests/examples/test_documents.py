@@ -1,0 +1,49 @@
+"""The code in README and the guide runs, and the guide leaves out no public name."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import pkgutil
+import re
+from pathlib import Path
+
+import matplotlib
+import pytest
+
+import contfric
+
+matplotlib.use("Agg")
+ROOT = Path(__file__).parents[2]
+
+
+def blocks(name: str) -> list[str]:
+    return re.findall(r"```python\n(.*?)```", (ROOT / name).read_text(), re.DOTALL)
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/guide.md"])
+def test_code_runs(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    found = blocks(name)
+    assert found
+    scope: dict[str, object] = {}
+    for block in found:  # one after the other, as a reader would type them
+        exec(compile(block, name, "exec"), scope)
+    assert "SN_1a" in capsys.readouterr().out
+
+
+def test_guide_mentions_every_public_name() -> None:
+    guide = (ROOT / "docs/guide.md").read_text()
+    missing = [n for n in contfric.__all__ if not re.search(rf"cf\.{n}\b|`{n}`", guide)]
+    assert not missing
+
+
+def modules() -> list[str]:
+    found = pkgutil.walk_packages(contfric.__path__, "contfric.")
+    return sorted(m.name for m in found if not m.name.endswith("__main__"))
+
+
+@pytest.mark.parametrize("name", modules())
+def test_docstring_examples(name: str) -> None:
+    module = importlib.import_module(name)
+    failed, _ = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert failed == 0
