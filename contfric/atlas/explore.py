@@ -18,7 +18,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from contfric.atlas.diagram import Diagram, LooseEnd, Node
+from contfric.atlas.collect import Event, collect
+from contfric.atlas.diagram import Diagram
 from contfric.atlas.matching import identity, on_branch, same_event, stops_distance
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation, End, EndReason, Kind
@@ -38,23 +39,11 @@ Progress = Callable[[str], None]
 
 #: Kinds that leave nothing to follow: the branch itself goes on.
 _PASSED = frozenset({Kind.SN, Kind.T, Kind.NS})
-#: Ends that the exploration goes on from.
-_FOLLOWED = frozenset({EndReason.CS, EndReason.BP, EndReason.PD})
-#: Ends that need no follower.
-_FINAL = frozenset({EndReason.RANGE, EndReason.LIMIT, EndReason.CLOSED, EndReason.UNBOUNDED})
 #: First step away from an event, in largest steps: the new word is proved close to it.
 _NEAR_EVENT = 0.01
 #: A branch that gets no farther than this (arclength) from the event it starts at has left it in the
 #: direction in which it is not admissible.
 _NOWHERE = 1e-7
-
-
-@dataclass(eq=False)
-class _Event:
-    """A bifurcation while the exploration runs, with the branches that meet there."""
-
-    bifurcation: Bifurcation
-    branches: list[int] = field(default_factory=list)
 
 
 @dataclass(eq=False)
@@ -67,8 +56,8 @@ class _Exploration:
     max_points: int
     progress: Progress | None
     branches: list[Branch] = field(default_factory=list)
-    events: list[_Event] = field(default_factory=list)
-    waiting: deque[_Event] = field(default_factory=deque)
+    events: list[Event] = field(default_factory=list)
+    waiting: deque[Event] = field(default_factory=deque)
     notes: list[str] = field(default_factory=list)
 
     def say(self, text: str) -> None:
@@ -92,7 +81,7 @@ class _Exploration:
                 if index not in event.branches:
                     event.branches.append(index)
                 return
-        event = _Event(bifurcation, [index])
+        event = Event(bifurcation, [index])
         self.events.append(event)
         if bifurcation.kind not in _PASSED:
             self.waiting.append(event)
@@ -101,7 +90,7 @@ class _Exploration:
         """Tell whether an orbit lies on a branch already traced."""
         return any(on_branch(orbit, branch) for branch in self.branches)
 
-    def ends_here(self, orbit: Orbit, event: _Event) -> bool:
+    def ends_here(self, orbit: Orbit, event: Event) -> bool:
         """Tell whether a branch of the orbit's word already ends at an event."""
         wanted = identity(orbit)
         mirror = orbit.model.symmetry is not None
@@ -140,7 +129,7 @@ class _Exploration:
 
     # ---------------------------------------------------------------- crossing-sliding
 
-    def _follow_crossing(self, event: _Event) -> None:
+    def _follow_crossing(self, event: Event) -> None:
         for orbit, reason in swapped_orbits(event.bifurcation):
             if self.ends_here(orbit, event):
                 continue
@@ -152,7 +141,7 @@ class _Exploration:
             self.notes.append(f"{at}: accepted: {reason}: {branch.name}")
             self._add_from(branch, event)
 
-    def _leave_event(self, orbit: Orbit, event: _Event) -> Branch | None:
+    def _leave_event(self, orbit: Orbit, event: Event) -> Branch | None:
         """Trace away from an event, in the direction in which the orbit is admissible."""
         settings = self.settings
         start = first_point(orbit, settings)
@@ -169,7 +158,7 @@ class _Exploration:
                 return assemble(orbit, settings, side, first)
         return None
 
-    def _add_from(self, branch: Branch, event: _Event) -> None:
+    def _add_from(self, branch: Branch, event: Event) -> None:
         index = len(self.branches)
         self.add(branch)
         if index not in event.branches:
@@ -177,7 +166,7 @@ class _Exploration:
 
     # ---------------------------------------------------------------- branch points
 
-    def _follow_branch_point(self, event: _Event) -> None:
+    def _follow_branch_point(self, event: Event) -> None:
         bifurcation = event.bifurcation
         orbit = bifurcation.orbit
         if not orbit.system.half:
@@ -191,7 +180,7 @@ class _Exploration:
         departure = leave_branch_point(whole, self.settings, "symmetry breaking")
         self._follow_departure(departure, event, EndReason.BP)
 
-    def _follow_both_ways(self, orbit: Orbit, event: _Event) -> None:
+    def _follow_both_ways(self, orbit: Orbit, event: Event) -> None:
         """Continue a branch through an event that it passes, from just beside it."""
         branch = _through(orbit, self.settings, self.max_points)
         if branch is None:
@@ -204,7 +193,7 @@ class _Exploration:
             self._add_from(branch, event)
 
     def _follow_departure(
-        self, departure: Departure | None, event: _Event, reason: EndReason
+        self, departure: Departure | None, event: Event, reason: EndReason
     ) -> None:
         at = _where(event.bifurcation, self.settings.parameter)
         if departure is None:
@@ -224,7 +213,7 @@ class _Exploration:
 
     # ---------------------------------------------------------------- period doubling
 
-    def _follow_doubling(self, event: _Event) -> None:
+    def _follow_doubling(self, event: Event) -> None:
         orbit = event.bifurcation.orbit
         at = _where(event.bifurcation, self.settings.parameter)
         if not any(self.branches[i].system.periods == orbit.periods for i in event.branches):
@@ -304,7 +293,15 @@ def explore(
     except KeyboardInterrupt:
         complete = False
         state.notes.append(EndReason.INTERRUPTED.value)
-    return _diagram(state, orbit, (float(range[0]), float(range[1])), complete)
+    return collect(
+        orbit.model,
+        settings,
+        (float(range[0]), float(range[1])),
+        state.branches,
+        state.events,
+        tuple(state.notes),
+        complete,
+    )
 
 
 def _where(bifurcation: Bifurcation, parameter: str) -> str:
@@ -344,63 +341,3 @@ def _through(orbit: Orbit, settings: Settings, max_points: int) -> Branch | None
                 max_points=max_points,
             )
     return None
-
-
-def _diagram(
-    state: _Exploration, orbit: Orbit, bounds: tuple[float, float], complete: bool
-) -> Diagram:
-    """Collect the result, with the mirror image of every asymmetric branch."""
-    branches: list[Branch] = []
-    place: dict[int, int] = {}
-    image: dict[int, int] = {}
-    for i, branch in enumerate(state.branches):
-        place[i] = len(branches)
-        branches.append(branch)
-        if not branch.symmetric and orbit.model.symmetry is not None:
-            image[i] = len(branches)
-            branches.append(branch.mirror())
-    nodes: list[Node] = []
-    for event in state.events:
-        computed = tuple(place[i] for i in event.branches)
-        symmetric = event.bifurcation.symmetric
-        mirrored = tuple(image.get(i, place[i]) for i in event.branches)
-        if symmetric:
-            nodes.append(Node(event.bifurcation, tuple(dict.fromkeys((*computed, *mirrored)))))
-        else:
-            nodes.append(Node(event.bifurcation, computed))
-            if mirrored != computed:
-                nodes.append(Node(event.bifurcation, mirrored, mirrored=True))
-    return Diagram(
-        orbit.model,
-        state.settings.parameter,
-        bounds,
-        tuple(branches),
-        tuple(nodes),
-        _loose_ends(state, place),
-        complete,
-        tuple(state.notes),
-    )
-
-
-def _loose_ends(state: _Exploration, place: dict[int, int]) -> tuple[LooseEnd, ...]:
-    """Return the ends that nothing follows; mirror images have the same and are not listed."""
-    loose: list[LooseEnd] = []
-    for i, branch in enumerate(state.branches):
-        for side, end in enumerate(branch.ends):
-            if end.reason in _FINAL or _is_followed(state, i, end):
-                continue
-            loose.append(LooseEnd(place[i], side, end))
-    return tuple(loose)
-
-
-def _is_followed(state: _Exploration, index: int, end: End) -> bool:
-    if end.reason not in _FOLLOWED:
-        return False
-    if end.bifurcation is None:
-        return True  # a branch that starts at an event of another one
-    for event in state.events:
-        if index in event.branches and same_event(
-            event.bifurcation, end.bifurcation, state.settings.parameter, state.settings.width
-        ):
-            return len(event.branches) > 1
-    return False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
@@ -15,8 +14,8 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.counts import TALLY
 from contfric.orbit.simulation import signs_at
 from contfric.orbit.system import Margin, System, Word, build_system
-from contfric.orbit.words import half_of, mirror_pairs, passed_domains, whole_of
-from contfric.signature import Signature, reduce_signature
+from contfric.orbit.words import decode, half_of, mirror_pairs, passed_domains, whole_of
+from contfric.signature import Signature
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -378,23 +377,3 @@ def whole_multipliers(mu: ComplexArray) -> ComplexArray:
     squares: ComplexArray = mu**2
     swap = squares.imag[..., :1] < 0
     return np.where(swap, squares.conj(), squares)
-
-
-def decode(code: int, surfaces: list[str]) -> list[str]:
-    """Return the surfaces crossed, in order, from the digits of a label."""
-    base = len(surfaces) + 1
-    crossed: list[str] = []
-    while code > 0:
-        code, digit = divmod(code, base)
-        crossed.append(surfaces[digit - 1])
-    return crossed[::-1]
-
-
-def orbit_from_signature(
-    signature: Signature, joints: FloatArray, params: Mapping[str, float], half: bool = False
-) -> Orbit:
-    """Return an unsolved orbit of a signature from the joints of its reduced segments."""
-    word = tuple(piece.pair for piece in reduce_signature(signature))
-    model = signature.model
-    system = build_system(model, word, signature.periods, half)
-    return Orbit(system, joints, model.vector(params), np.inf, Status.NOT_CONVERGED)

@@ -63,3 +63,13 @@ def _across(model: Model, domain: str, surface: str) -> str:
             if same:
                 return source
     return domain
+
+
+def decode(code: int, surfaces: list[str]) -> list[str]:
+    """Return the surfaces crossed, in order, from the digits of a label."""
+    base = len(surfaces) + 1
+    crossed: list[str] = []
+    while code > 0:
+        code, digit = divmod(code, base)
+        crossed.append(surfaces[digit - 1])
+    return crossed[::-1]
