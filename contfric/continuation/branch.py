@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from contfric.continuation.events import Bifurcation, End
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.orbit import Orbit, whole_multipliers
+from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System, build_system
 from contfric.orbit.words import mirror_pairs
 
@@ -111,7 +111,7 @@ class Branch:
         if self.turn_multipliers is None:
             return None
         mu = self.turn_multipliers
-        return whole_multipliers(mu) if self.system.half else mu
+        return mu**2 if self.system.half else mu
 
     @cached_property
     def stable(self) -> BoolArray | None:

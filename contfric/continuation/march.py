@@ -81,6 +81,8 @@ def march(  # type: ignore[no-untyped-def]
 ):
     """Continue from the point in row 0 (with its tangent and watched values) until something happens.
 
+    A first step of 0 asks for row 0 alone: it is solved, normal to the tangent given there.
+
     Parameters
     ----------
     options : (first step, largest step, smallest step, lower limit, upper limit, 1/width^2)
@@ -99,6 +101,25 @@ def march(  # type: ignore[no-untyped-def]
     value = np.empty(tests.shape[1])
     label = np.empty(labels.shape[1], dtype=np.int64)
     k = 0
+    if step == 0.0:
+        trial[active] = ws[0]
+        fine, tws[0], _ = settle(
+            functions,
+            layout,
+            zs[0],
+            trial,
+            which,
+            tzs[0],
+            tws[0],
+            scale,
+            stability,
+            tests[0],
+            labels[0],
+            mu[0],
+            counts,
+        )
+        ws[0] = trial[active]
+        return FULL if fine else BROKEN, 0, step
     while k + 1 < ws.shape[0]:
         if step < smallest:
             return STEP, k, step
@@ -165,31 +186,3 @@ def march(  # type: ignore[no-untyped-def]
             return UNBOUNDED, k, following
         step = following
     return FULL, k, step
-
-
-@kernel(
-    types.Tuple((types.boolean, f8))(
-        FunctionsType,
-        LayoutType,
-        matrix,
-        vector,
-        i8,
-        matrix,
-        f8,
-        f8,
-        types.boolean,
-        vector,
-        indices,
-        types.complex128[::1],
-        indices,
-    )
-)
-def begin(  # type: ignore[no-untyped-def]
-    functions, layout, z, p, active, tz, tw, scale, stability, tests, labels, mu, counts
-):
-    """Solve for the first point of a branch, normal to (tz, tw); (solved, p' of the tangent)."""
-    which = np.array([active])
-    fine, slope, _ = settle(
-        functions, layout, z, p, which, tz, tw, scale, stability, tests, labels, mu, counts
-    )
-    return fine, slope

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +96,72 @@ class Point:
         )
 
 
+@dataclass(eq=False)
+class Rows:
+    """Arrays that the compiled march writes to; row 0 holds the point to start from."""
+
+    joints: FloatArray
+    values: FloatArray
+    tangents: FloatArray
+    slopes: FloatArray
+    arc: FloatArray
+    tests: FloatArray
+    labels: IntArray
+    mu: NDArray[np.complex128]
+
+    @classmethod
+    def room_for(cls, orbit: Orbit, room: int) -> Rows:
+        """Return empty rows for the points of an orbit's branch."""
+        shape, system = orbit.joints.shape, orbit.system
+        return cls(
+            np.empty((room, *shape)),
+            np.empty(room),
+            np.empty((room, *shape)),
+            np.empty(room),
+            np.zeros(room),
+            np.zeros((room, len(system.tests) + EXTRA)),
+            np.zeros((room, len(system.layout.labels)), dtype=np.int64),
+            np.zeros((room, len(system.model.states)), dtype=np.complex128),
+        )
+
+    @classmethod
+    def after(cls, orbit: Orbit, point: Point, room: int) -> Rows:
+        """Return rows that start with a point."""
+        rows = cls.room_for(orbit, room)
+        rows.joints[0], rows.values[0] = point.joints, point.value
+        rows.tangents[0], rows.slopes[0] = point.tangent, point.slope
+        rows.arc[0], rows.tests[0] = point.arc, point.tests
+        rows.labels[0], rows.mu[0] = point.labels, point.mu
+        return rows
+
+    def arrays(self, counts: IntArray) -> Any:
+        """Return the arrays in the order in which the march takes them, the counts last."""
+        return (
+            self.joints,
+            self.values,
+            self.tangents,
+            self.slopes,
+            self.arc,
+            self.tests,
+            self.labels,
+            self.mu,
+            counts,
+        )
+
+    def point(self, k: int) -> Point:
+        """Return one row as a point."""
+        return Point(
+            self.joints[k],
+            float(self.values[k]),
+            self.tangents[k],
+            float(self.slopes[k]),
+            self.tests[k],
+            self.labels[k],
+            self.mu[k],
+            float(self.arc[k]),
+        )
+
+
 def settings_of(
     orbit: Orbit,
     parameter: str,
@@ -159,31 +226,21 @@ def first_point(
     ----------
     tangent, slope : direction to solve normal to; by default along the parameter
     """
-    from contfric.continuation.march import begin
+    from contfric.continuation.march import BROKEN, march
 
-    system = orbit.system
-    layout = system.layout
     active = orbit.model.index_of(settings.parameter)
-    joints, vector = orbit.joints.copy(), orbit.vector.copy()
-    direction = np.zeros_like(joints) if tangent is None else tangent.copy()
-    tests = np.zeros(len(system.tests) + EXTRA)
-    labels = np.zeros(len(layout.labels), dtype=np.int64)
-    mu = np.zeros(len(system.model.states), dtype=np.complex128)
-    solved, new_slope = begin(
-        system.functions(),
-        layout,
-        joints,
-        vector,
+    direction = np.zeros_like(orbit.joints) if tangent is None else tangent
+    rows = Rows.room_for(orbit, 1)
+    rows.joints[0], rows.values[0] = orbit.joints, orbit.vector[active]
+    rows.tangents[0], rows.slopes[0] = direction, slope
+    options = np.array([0.0, 0.0, 0.0, settings.low, settings.high, settings.scale])
+    why, _, _ = march(
+        orbit.system.functions(),
+        orbit.system.layout,
+        orbit.vector,
         active,
-        direction,
-        slope,
-        settings.scale,
+        options,
         settings.stability,
-        tests,
-        labels,
-        mu,
-        TALLY,
+        *rows.arrays(TALLY),
     )
-    if not solved:
-        return None
-    return Point(joints, float(vector[active]), direction, float(new_slope), tests, labels, mu)
+    return None if why == BROKEN else rows.point(0)

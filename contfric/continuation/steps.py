@@ -92,11 +92,11 @@ def settle(  # type: ignore[no-untyped-def]
     border_rows(tz, tw, scale, d, e)
     pencil = np.empty((2, m, m))
     counts[SOLVES] += 1
-    status, _, _, _ = correct(functions, layout, z, p, which, d, e, False, _ROUGH, pencil)
+    status, _, _, _ = correct(functions, layout, z, p, which, d, e, np.inf, _ROUGH, pencil)
     if status != CONVERGED:
         return False, tw, True
     new_z, new_w = np.empty((count, m)), np.empty(1)
-    fine, _ = tangent_at(functions, layout, z, p, which, d, e, new_z, new_w, pencil, True)
+    fine, _ = tangent_at(functions, layout, z, p, which, d, e, new_z, new_w, pencil, 1.0)
     if not fine:
         return False, tw, True
     norm = math.sqrt(product(new_z, new_w[0], new_z, new_w[0], scale))

@@ -21,6 +21,7 @@ from contfric.continuation.events import Bifurcation
 from contfric.continuation.points import Point, Settings, first_point
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
+from contfric.orbit.linear import assembled
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.system import build_system
 from contfric.orbit.words import half_of, mirror_pairs
@@ -50,23 +51,8 @@ def null_vector(orbit: Orbit) -> FloatArray:
 
     By the singular value decomposition of the assembled Jacobian; done once a branch point.
     """
-    from contfric.orbit.newton import linearise
-
-    system = orbit.system
     count, m = orbit.joints.shape
-    size = len(orbit.vector)
-    a, b = np.empty((count, m, m)), np.empty((count, m, m))
-    c, r = np.empty((count, m, size)), np.empty((count, m, 1))
-    close = np.empty((m, m))
-    linearise(system.functions(), system.layout, orbit.joints, orbit.vector, a, b, c, r, close)
-    full = np.zeros((count * m, count * m))
-    for i in range(count):
-        rows = slice(i * m, (i + 1) * m)
-        full[rows, i * m : (i + 1) * m] += a[i]
-        if i + 1 < count:
-            full[rows, (i + 1) * m : (i + 2) * m] += b[i]
-        else:
-            full[rows, :m] += b[i] @ close
+    full = assembled(orbit.system, orbit.joints, orbit.vector)
     vector: FloatArray = np.linalg.svd(full)[2][-1].reshape(count, m)
     return vector / float(np.sqrt(np.sum(vector**2) / count))
 

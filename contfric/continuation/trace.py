@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
@@ -17,15 +16,14 @@ from contfric.continuation.points import (
     MOST_POINTS,
     SMALLEST_STEP,
     Point,
+    Rows,
     Settings,
     first_point,
     settings_of,
 )
 from contfric.errors import ConvergenceError
-from contfric.models.definition import FloatArray
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import IntArray
 
 #: Points that one call of the compiled march may write: long enough to cost nothing, short enough
 #: for Ctrl-C to be answered at once.
@@ -44,50 +42,6 @@ class Side:
     points: list[Point]
     end: End
     bifurcations: list[Bifurcation] = field(default_factory=list)
-
-
-@dataclass(eq=False)
-class _Rows:
-    """Arrays that the compiled march writes to; row 0 holds the point to start from."""
-
-    joints: FloatArray
-    values: FloatArray
-    tangents: FloatArray
-    slopes: FloatArray
-    arc: FloatArray
-    tests: FloatArray
-    labels: IntArray
-    mu: NDArray[np.complex128]
-
-    @classmethod
-    def after(cls, point: Point, room: int) -> _Rows:
-        rows = cls(
-            np.empty((room, *point.joints.shape)),
-            np.empty(room),
-            np.empty((room, *point.joints.shape)),
-            np.empty(room),
-            np.empty(room),
-            np.empty((room, len(point.tests))),
-            np.zeros((room, len(point.labels)), dtype=np.int64),
-            np.zeros((room, len(point.mu)), dtype=np.complex128),
-        )
-        rows.joints[0], rows.values[0] = point.joints, point.value
-        rows.tangents[0], rows.slopes[0] = point.tangent, point.slope
-        rows.arc[0], rows.tests[0] = point.arc, point.tests
-        rows.labels[0], rows.mu[0] = point.labels, point.mu
-        return rows
-
-    def point(self, k: int) -> Point:
-        return Point(
-            self.joints[k],
-            float(self.values[k]),
-            self.tangents[k],
-            float(self.slopes[k]),
-            self.tests[k],
-            self.labels[k],
-            self.mu[k],
-            float(self.arc[k]),
-        )
 
 
 def continue_orbit(
@@ -190,7 +144,7 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     if room < 2:
         side.end = End(EndReason.POINTS)
         return True, step
-    rows = _Rows.after(last, room)
+    rows = Rows.after(orbit, last, room)
     options = np.array(
         [step, settings.largest, SMALLEST_STEP, settings.low, settings.high, settings.scale]
     )
@@ -201,15 +155,7 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         orbit.model.index_of(settings.parameter),
         options,
         settings.stability,
-        rows.joints,
-        rows.values,
-        rows.tangents,
-        rows.slopes,
-        rows.arc,
-        rows.tests,
-        rows.labels,
-        rows.mu,
-        TALLY,
+        *rows.arrays(TALLY),
     )
     side.points += [rows.point(k) for k in range(1, count + 1)]
     reasons = {

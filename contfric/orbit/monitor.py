@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numba import types
 
-from contfric.compiled import helper, indices, kernel, matrix, vector
+from contfric.compiled import blocks, f8, helper, indices, kernel, matrix, vector
 from contfric.orbit.cyclic import turn_map
 from contfric.orbit.newton import (
     CHECKS,
@@ -24,7 +24,6 @@ from contfric.orbit.newton import (
     FunctionsType,
     LayoutType,
     last_joint,
-    tangent_at,
 )
 
 #: Most interior stationary points of one observable in one segment; beyond it the orbit is reported
@@ -272,35 +271,15 @@ def watch(functions, layout, z, p, out, labels):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel(
-    types.boolean(
-        FunctionsType,
-        LayoutType,
-        matrix,
-        vector,
-        types.boolean,
-        vector,
-        indices,
-        types.complex128[::1],
-        vector,
-        indices,
-    )
-)
-def examine(  # type: ignore[no-untyped-def]
-    functions, layout, z, p, stability, out, labels, mu, chi, counts
-):
-    """Fill margins and labels or (``stability``) multipliers of one turn and (chi(1), chi(-1))."""
-    if not stability:
-        counts[CHECKS] += 1
-        return watch(functions, layout, z, p, out, labels)
+@kernel(types.boolean(FunctionsType, LayoutType, matrix, vector, vector, indices, indices))
+def examine(functions, layout, z, p, out, labels, counts):  # type: ignore[no-untyped-def]
+    """Fill margins and labels of a solved orbit; False if something is not finite."""
+    counts[CHECKS] += 1
+    return watch(functions, layout, z, p, out, labels)
+
+
+@kernel(types.UniTuple(f8, 2)(LayoutType, blocks, types.complex128[::1], indices))
+def stability(layout, pencil, mu, counts):  # type: ignore[no-untyped-def]
+    """Fill the multipliers of one turn from its pencil; return (chi(1), chi(-1))."""
     counts[MULTIPLIERS] += 1
-    count, m = z.shape
-    which = np.zeros(1, dtype=np.int64)
-    d = np.zeros((1, count, m))
-    e = np.ones((1, 1))
-    tz, tw = np.empty((count, m)), np.empty(1)
-    pencil = np.empty((2, m, m))
-    # where the system is singular at fixed parameters (a multiplier is 1) the pencil is still good
-    tangent_at(functions, layout, z.copy(), p.copy(), which, d, e, tz, tw, pencil, False)
-    chi[0], chi[1] = multipliers(layout, pencil, mu)
-    return True
+    return multipliers(layout, pencil, mu)

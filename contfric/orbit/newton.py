@@ -54,6 +54,9 @@ CONVERGED, NOT_CONVERGED, SINGULAR, NOT_FINITE = range(4)
 _MOST_STEPS = 25
 #: Relative size of corrections at which rounding dominates (a few hundred units in the last place).
 _FLOOR = 5e-14
+#: Relative residual that is rounding: where the system is ill-conditioned (beside a fold) corrections
+#: stop falling earlier, and no iterate can be better.
+_ROUNDING = 1e-14
 #: Error that the last correction may leave: below one unit in the last place.
 _TARGET = 1e-16
 
@@ -148,14 +151,15 @@ def constraint(z, p, which, z_ref, p_ref, d, e, s):  # type: ignore[no-untyped-d
 
 
 @helper
-def correct(functions, layout, z, p, which, d, e, damped, floor, pencil):  # type: ignore[no-untyped-def]
+def correct(functions, layout, z, p, which, d, e, trust, floor, pencil):  # type: ignore[no-untyped-def]
     """Solve for the orbit from (z, p) in place, border rows anchored at the start.
 
     Returns
     -------
     tuple
         (status, steps, size of the first correction, last residual). ``pencil`` (2, m, m) holds P
-        and Q of the last Jacobian. ``floor`` is the accuracy asked for.
+        and Q of the last Jacobian. ``floor`` is the accuracy asked for; ``trust`` the longest
+        correction, infinite for the plain method (a number, as a flag would be compiled twice).
     """
     count, m = z.shape
     q = which.shape[0]
@@ -168,6 +172,7 @@ def correct(functions, layout, z, p, which, d, e, damped, floor, pencil):  # typ
     z_ref, p_ref = z.copy(), p.copy()
     before, first = np.inf, 0.0
     share, worst_before = 1.0, np.inf
+    damped = math.isfinite(trust)
     for step in range(_MOST_STEPS):
         last_joint(functions, layout, z, p, which, last, close, close_w)
         worst = assemble(functions, layout, z, p, which, last, a, b, c, r)
@@ -186,8 +191,8 @@ def correct(functions, layout, z, p, which, d, e, damped, floor, pencil):  # typ
         if not math.isfinite(size):
             return NOT_FINITE, step, first, worst
         share = 1.0
-        if damped and size > 0.3:
-            share = 0.3 / size  # trust region: a third of the natural scale
+        if size > trust:
+            share = trust / size
         move(z, p, which, dz, dw, share)
         if step == 0:
             first = size
@@ -195,6 +200,8 @@ def correct(functions, layout, z, p, which, d, e, damped, floor, pencil):  # typ
         if size <= floor or (size < 1e-3 and left <= max(_TARGET, floor * 1e-3)):
             return CONVERGED, step + 1, first, worst
         if size < _FLOOR * 100 and size >= 0.5 * before:
+            return CONVERGED, step + 1, first, worst
+        if worst < _ROUNDING and size < 1e-6 and size >= 0.5 * before:
             return CONVERGED, step + 1, first, worst
         if not damped and step > 1 and size > 2.0 * before:
             return NOT_CONVERGED, step + 1, first, worst
@@ -213,8 +220,8 @@ def move(z, p, which, dz, dw, share):  # type: ignore[no-untyped-def]
 
 
 @helper
-def tangent_at(functions, layout, z, p, which, d, e, tz, tw, pencil, polish):  # type: ignore[no-untyped-def]
-    """Return the tangent along the border row, unnormalised, and polish (z, p) by one more step.
+def tangent_at(functions, layout, z, p, which, d, e, tz, tw, pencil, share):  # type: ignore[no-untyped-def]
+    """Return the tangent along the border row, unnormalised, and move (z, p) by a share of one step.
 
     The two right-hand sides share one elimination: the polishing correction costs nothing more.
     """
@@ -233,8 +240,7 @@ def tangent_at(functions, layout, z, p, which, d, e, tz, tw, pencil, polish):  #
         return False, worst
     if not solve_cyclic(a, b, c, r, close, close_w, d, e, s, dz, dw, pencil[0], pencil[1]):
         return False, worst
-    if polish:
-        move(z, p, which, dz, dw, 1.0)
+    move(z, p, which, dz, dw, share)
     for i in range(count):
         for j in range(m):
             tz[i, j] = dz[i, j, 1]
@@ -243,17 +249,15 @@ def tangent_at(functions, layout, z, p, which, d, e, tz, tw, pencil, polish):  #
     return True, worst
 
 
-@kernel(
-    types.UniTuple(f8, 4)(FunctionsType, LayoutType, matrix, vector, types.boolean, blocks, indices)
-)
-def solve(functions, layout, z, p, damped, pencil, counts):  # type: ignore[no-untyped-def]
+@kernel(types.UniTuple(f8, 4)(FunctionsType, LayoutType, matrix, vector, f8, blocks, indices))
+def solve(functions, layout, z, p, trust, pencil, counts):  # type: ignore[no-untyped-def]
     """Solve for the orbit at fixed parameters, in place; (status, steps, first, residual)."""
     counts[SOLVES] += 1
     count, m = z.shape
     which = np.empty(0, dtype=np.int64)
     d, e = np.empty((0, count, m)), np.empty((0, 0))
     status, steps, first, worst = correct(
-        functions, layout, z, p, which, d, e, damped, _FLOOR, pencil
+        functions, layout, z, p, which, d, e, trust, _FLOOR, pencil
     )
     a, b = np.empty((count, m, m)), np.empty((count, m, m))
     c, r = np.empty((count, m, 0)), np.empty((count, m, 1))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.counts import TALLY
+from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.simulation import signs_at
 from contfric.orbit.system import Margin, System, Word, build_system
 from contfric.orbit.words import decode, half_of, mirror_pairs, passed_domains, whole_of
@@ -177,47 +178,25 @@ class Orbit:
         layout = self.system.layout
         margins = np.empty(len(self.system.tests))
         labels = np.zeros(len(layout.labels), dtype=np.int64)
-        mu, chi = np.empty(len(self.model.states), dtype=np.complex128), np.empty(2)
-        fine = examine(
-            self.system.functions(),
-            layout,
-            self.joints,
-            self.vector,
-            False,
-            margins,
-            labels,
-            mu,
-            chi,
-            TALLY,
-        )
+        functions = self.system.functions()
+        fine = examine(functions, layout, self.joints, self.vector, margins, labels, TALLY)
         return margins, labels, bool(fine)
 
     @cached_property
     def turn_multipliers(self) -> ComplexArray:
         """Multipliers of one turn, largest first, shape (n,)."""
-        from contfric.orbit.monitor import examine
+        from contfric.orbit.monitor import stability
 
-        mu, chi = np.empty(len(self.model.states), dtype=np.complex128), np.empty(2)
-        unused = np.empty(0)
-        examine(
-            self.system.functions(),
-            self.system.layout,
-            self.joints,
-            self.vector,
-            True,
-            unused,
-            np.empty(0, dtype=np.int64),
-            mu,
-            chi,
-            TALLY,
-        )
+        mu = np.empty(len(self.model.states), dtype=np.complex128)
+        pencil = pencil_of_turn(self.system, self.joints, self.vector)
+        stability(self.system.layout, pencil, mu, TALLY)
         return mu
 
     @property
     def multipliers(self) -> ComplexArray:
         """Floquet multipliers of the whole orbit, largest first, shape (n,)."""
         mu = self.turn_multipliers
-        return whole_multipliers(mu) if self.system.half else mu
+        return mu**2 if self.system.half else mu
 
     @property
     def stable(self) -> bool:
@@ -262,8 +241,11 @@ class Orbit:
     @cached_property
     def signature(self) -> Signature:
         """The signature, with all seven domains, read off the solved segments."""
-        _, labels, _ = self._watched
         model, system = self.model, self.system
+        if system.domains:  # in full form each segment is one of them
+            plain = Signature(model, system.domains, self.periods, symmetric=self.symmetric)
+            return replace(plain, name=plain.auto_name(self.symmetric))
+        _, labels, _ = self._watched
         surfaces = [s.name for s in model.surfaces]
         ends = np.vstack([self.joints[1:], self.cycle[len(self.joints) % len(self.cycle)]])
         if not system.half:
@@ -370,10 +352,3 @@ class Orbit:
     def __repr__(self) -> str:
         values = ", ".join(f"{k}={v:.6g}" for k, v in self.params.items())
         return f"<Orbit {self.name}: {values}; {self.status.name.lower()}>"
-
-
-def whole_multipliers(mu: ComplexArray) -> ComplexArray:
-    """Return the multipliers of two equal turns; of a pair the one with positive argument first."""
-    squares: ComplexArray = mu**2
-    swap = squares.imag[..., :1] < 0
-    return np.where(swap, squares.conj(), squares)

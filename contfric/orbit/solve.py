@@ -21,6 +21,8 @@ from contfric.signature import Signature, reduced_word
 #: Starts drawn for one signature: enough for every bundled signature to be found from scratch in
 #: the tests (the rarest needs about 150), at about a tenth of a millisecond each.
 STARTS = 600
+#: Longest Newton correction from a start that may be far: a third of the natural scale of the states.
+TRUST = 0.3
 #: Candidates of the smallest mismatch that are handed to Newton.
 CANDIDATES = 40
 
@@ -42,7 +44,7 @@ def polish(orbit: Orbit, damped: bool = True) -> Orbit:
         orbit.system.layout,
         joints,
         vector,
-        damped,
+        TRUST if damped else np.inf,
         np.empty((2, m, m)),
         TALLY,
     )

@@ -81,7 +81,8 @@ Word = tuple[tuple[str, str], ...]
 class System:
     """A boundary-value problem: a reduced word with its closure, over one turn.
 
-    ``half`` says that the turn is half of the orbit and closes by the model's symmetry.
+    ``half`` says that the turn is half of the orbit and closes by the model's symmetry; ``domains``
+    are those of the segments if the problem is in full form, empty if it is reduced.
     """
 
     model: Model
@@ -90,6 +91,7 @@ class System:
     half: bool
     layout: Layout
     tests: tuple[Test, ...]
+    domains: tuple[str, ...] = ()
 
     @property
     def segments(self) -> int:
@@ -176,7 +178,7 @@ def build_system(
         turn=float(periods * symmetry.fraction) if half and symmetry else float(periods),
         rank=min(model.mode_by_name[mode].rank for mode, _ in word),
     )
-    return System(model, word, periods, half, layout, tests)
+    return System(model, word, periods, half, layout, tests, domains)
 
 
 def _mode_after(model: Model, word: Word, half: bool) -> str:

@@ -1,0 +1,58 @@
+"""The linearised equations of one orbit: the assembled Jacobian and the pencil of one turn.
+
+For single orbits; along a branch the engine has the pencil from the elimination it does anyway.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.models.definition import FloatArray
+from contfric.orbit.system import System
+
+
+def jacobian_blocks(
+    system: System, joints: FloatArray, vector: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the blocks on z_i, z_{i+1} and the parameters, and the closure.
+
+    Shapes (N, m, m), (N, m, m), (N, m, parameters) and (m, m).
+    """
+    from contfric.orbit.newton import linearise
+
+    count, m = joints.shape
+    a, b = np.empty((count, m, m)), np.empty((count, m, m))
+    c, r = np.empty((count, m, len(vector))), np.empty((count, m, 1))
+    close = np.empty((m, m))
+    linearise(system.functions(), system.layout, joints, vector, a, b, c, r, close)
+    return a, b, c, close
+
+
+def assembled(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:
+    """Return the Jacobian with respect to all joints, shape (N m, N m)."""
+    a, b, _, close = jacobian_blocks(system, joints, vector)
+    count, m = joints.shape
+    full = np.zeros((count * m, count * m))
+    for i in range(count):
+        rows = slice(i * m, (i + 1) * m)
+        full[rows, rows] += a[i]
+        if i + 1 < count:
+            full[rows, (i + 1) * m : (i + 2) * m] += b[i]
+        else:
+            full[rows, :m] += b[i] @ close
+    return full
+
+
+def pencil_of_turn(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:
+    """Return (P, Q) with ``P z_0 + Q z_N = 0`` for one turn, shape (2, m, m).
+
+    Each inner joint is taken out by an orthogonal transformation of the two blocks that it stands
+    in: the last m rows of the transposed Q of their QR factorisation annihilate it.
+    """
+    a, b, _, _ = jacobian_blocks(system, joints, vector)
+    m = joints.shape[1]
+    p, q = a[0], b[0]
+    for i in range(1, len(a)):
+        rest = np.linalg.qr(np.vstack([q, a[i]]), mode="complete")[0][:, m:].T
+        p, q = rest[:, :m] @ p, rest[:, m:] @ b[i]
+    return np.stack([p, q])
