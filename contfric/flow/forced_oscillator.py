@@ -30,48 +30,24 @@ from contfric.compiled import (
     turning_signature,
 )
 from contfric.flow.interface import CompiledFlow
-from contfric.flow.march import leaving_step, reached, safe_step, window_of
 from contfric.flow.response import divided_exponentials, forced, free, roots
-
-OMEGA, S, S0, H, ZETA = range(5)
-STICK = 2
-LOAD, SPEED = range(2)
-#: Below this fraction of the natural scale a stationary value at the start counts as being there.
-_AT_START = 1e-13
-
-
-@helper
-def excitation(p, t):  # type: ignore[no-untyped-def]
-    """Return f(t) and its first two time derivatives."""
-    w, h = p[OMEGA], p[H]
-    c, s = math.cos(w * t), math.sin(w * t)
-    f, f1, f2 = c, -w * s, -w * w * c
-    if h != 0.0:
-        c3, s3 = math.cos(3 * w * t), math.sin(3 * w * t)
-        f, f1, f2 = f + h * c3, f1 - 3 * w * h * s3, f2 - 9 * w * w * h * c3
-    return f, f1, f2
-
-
-@helper
-def direction(mode):  # type: ignore[no-untyped-def]
-    """Return the sign of the velocity in a slide."""
-    return 1.0 if mode == 0 else -1.0
-
-
-@helper
-def slide(s, p, t0, x0, v0, d):  # type: ignore[no-untyped-def]
-    """Return (x, v) after a slide of duration d in direction s."""
-    w, h = p[OMEGA], p[H]
-    g, c, r = free(p[ZETA], d)
-    load = x0 + s * p[S]
-    one = forced(p[ZETA], w, w * t0, d)
-    x = x0 + v0 * g - load * r + one[0]
-    v = v0 * c - load * g + one[1]
-    if h != 0.0:
-        three = forced(p[ZETA], 3 * w, 3 * w * t0, d)
-        x += h * three[0]
-        v += h * three[1]
-    return x, v
+from contfric.flow.roots import (
+    AT_START,
+    OMEGA,
+    S0,
+    SPEED,
+    STICK,
+    ZETA,
+    H,
+    S,
+    direction,
+    excitation,
+    natural_scale,
+    next_root,
+    phases,
+    quantity,
+    slide,
+)
 
 
 @helper
@@ -205,120 +181,14 @@ def period(p, which, grad):  # type: ignore[no-untyped-def]
     return value
 
 
-@helper
-def quantity(mode, c, order, p, t, x, v):  # type: ignore[no-untyped-def]
-    """Return (q, q', q'', E): q is observable c or (order 1) its rate; E bounds hypot(v, v')."""
-    f, f1, f2 = excitation(p, t)
-    w, h = p[OMEGA], p[H]
-    f3 = w * w * w * math.sin(w * t)
-    if h != 0.0:
-        f3 += 27.0 * h * w * w * w * math.sin(3 * w * t)
-    if mode == STICK:
-        if order == 0:
-            return x - f, -f1, -f2, 0.0
-        return -f1, -f2, -f3, 0.0
-    z = 2.0 * p[ZETA]
-    a = f - z * v - x - direction(mode) * p[S]
-    a1 = f1 - z * a - v
-    a2 = f2 - z * a1 - a
-    size = math.hypot(v, a)
-    if c == SPEED:
-        if order == 0:
-            return v, a, a1, size
-        return a, a1, a2, size
-    if order == 0:
-        return x - f, v - f1, a - f2, size
-    return v - f1, a - f2, a1 - f3, size
-
-
-@helper
-def third_bound(mode, c, order, p, size, window):  # type: ignore[no-untyped-def]
-    """Return a bound of |q'''| over a window that starts where hypot(v, v') = size.
-
-    From ``v'' + 2 zeta v' + v = f'`` follows ``d/dt hypot(v, v') <= |f'| + 2 max(0, -zeta) hypot``.
-    """
-    w, h, zeta = p[OMEGA], abs(p[H]), p[ZETA]
-    w3 = w * w * w
-    if mode == STICK:
-        return w3 * (1 + 27 * h) if order == 0 else w3 * w * (1 + 81 * h)
-    z = 2.0 * abs(zeta)
-    f1 = w * (1 + 3 * h)
-    e = size + f1 * window
-    if zeta < 0.0:
-        e *= math.exp(z * window)
-    a1 = (1 + z) * e + f1
-    a2 = z * a1 + e + w * w * (1 + 9 * h)
-    if c == SPEED:
-        return a2 if order == 0 else z * a2 + a1 + w3 * (1 + 27 * h)
-    return a1 + w3 * (1 + 27 * h) if order == 0 else a2 + w3 * w * (1 + 81 * h)
-
-
-@helper
-def state(mode, p, t0, y0, d):  # type: ignore[no-untyped-def]
-    """Return (x, v) after a duration d in one mode."""
-    if mode == STICK:
-        return y0[0], 0.0
-    return slide(direction(mode), p, t0, y0[0], y0[1], d)
-
-
-@helper
-def natural_scale(mode, p):  # type: ignore[no-untyped-def]
-    """Return the longest window worth a bound: one radian of the fastest motion."""
-    fastest = p[OMEGA] if p[H] == 0.0 else 3.0 * p[OMEGA]
-    if mode == STICK:
-        return 1.0 / fastest
-    return 1.0 / max(1.0 + 2.0 * abs(p[ZETA]), fastest)
-
-
-@helper
-def next_root(mode, c, order, target, on, sign, t0, y0, start, end, p):  # type: ignore[no-untyped-def]
-    """Return the first root of q - target in (start, end], or -1; and the sign of q before it.
-
-    ``on``: q takes the target at ``start`` itself, which does not count; ``sign`` is then the side
-    to which q leaves (0: found from the derivatives).
-    """
-    tau = start
-    natural = natural_scale(mode, p)
-    window = natural
-    leaving = on
-    while tau < end:
-        x, v = state(mode, p, t0, y0, tau)
-        q, q1, q2, size = quantity(mode, c, order, p, t0 + tau, x, v)
-        q -= target
-        if leaving:
-            leaving = False
-            if abs(q1) <= _AT_START * (1.0 + size):
-                q1 = 0.0  # the rate vanishes at the start (a release with S0 = S): rounding is no sign
-            if sign == 0.0:
-                sign = 1.0 if (q1 > 0.0 or (q1 == 0.0 and q2 > 0.0)) else -1.0
-            bound = third_bound(mode, c, order, p, size, natural)
-            step = min(leaving_step(sign * q1, sign * q2, bound), natural)
-            if step <= 0.0:
-                return tau, sign
-            tau += step
-            continue
-        if sign == 0.0:
-            sign = 1.0 if q > 0.0 or (q == 0.0 and q1 > 0.0) else -1.0
-        w = sign * q
-        if w <= 0.0:
-            return tau, sign
-        window = window_of(w, sign * q1, natural)
-        step = safe_step(
-            w, sign * q1, sign * q2, third_bound(mode, c, order, p, size, window), window
-        )
-        tau += step
-        if step < window and reached(step, tau):
-            return tau, sign
-    return -1.0, sign
-
-
 @kernel(hit_signature)
 def hit(mode, c, target, on, t0, y0, dt_max, p):  # type: ignore[no-untyped-def]
     """Return the first time at which observable c takes a value, or -1."""
     if mode == STICK and c == SPEED:
         return -1.0
     sign = direction(mode) if on and c == SPEED else 0.0  # a slide leaves v = 0 to its own side
-    tau, _ = next_root(mode, c, 0, target, on, sign, t0, y0, 0.0, dt_max, p)
+    phase = phases(p, t0)
+    tau = next_root(mode, c, 0, target, on, sign, phase, t0, y0, 0.0, dt_max, p)[0]
     return tau if tau <= dt_max else -1.0
 
 
@@ -327,23 +197,21 @@ def turning(mode, c, t0, y0, dt, p, out):  # type: ignore[no-untyped-def]
     """Write the interior stationary times of observable c to ``out`` and return their number."""
     if dt <= 0.0 or (mode == STICK and c == SPEED):
         return 0
+    phase = phases(p, t0)
     count = 0
     tau, sign = 0.0, 0.0
-    x, v = y0[0], y0[1]
-    q, q1, _, size = quantity(mode, c, 1, p, t0, x, v)
-    on = abs(q) <= _AT_START * (1.0 + size)
+    q, _, _, size = quantity(mode, c, 1, p, phase, t0, y0[0], y0[1], 0.0)
+    on = abs(q) <= AT_START * (1.0 + size)
     while True:
-        tau, sign = next_root(mode, c, 1, 0.0, on, sign, t0, y0, tau, dt, p)
+        tau, sign, slope = next_root(mode, c, 1, 0.0, on, sign, phase, t0, y0, tau, dt, p)
         if tau < 0.0 or tau >= dt * (1.0 - 1e-14):
             return count
-        if tau > dt * _AT_START:
+        if tau > dt * AT_START:
             if count == out.shape[0]:
                 return -1
             out[count] = tau
             count += 1
-        x, v = state(mode, p, t0, y0, tau)
-        q, q1, _, size = quantity(mode, c, 1, p, t0 + tau, x, v)
-        if sign * q1 < 0.0:
+        if sign * slope < 0.0:
             on, sign = True, -sign
         else:  # a double root: the rate touches zero and keeps its sign; go past its resolution
             tau += 1e-8 * natural_scale(mode, p)

@@ -32,36 +32,51 @@ _MOST_TURNINGS = 256
 
 
 @helper
-def interior_margin(functions, mode, surface, c, sign, start, duration, p, times):  # type: ignore[no-untyped-def]
+def scratch(n):  # type: ignore[no-untyped-def]
+    """Return the small arrays that watching an orbit needs: allocated once, not in each call."""
+    return (
+        np.empty(0, dtype=np.int64),
+        np.empty(0),
+        np.empty((0, 0)),
+        np.empty(n),
+        np.empty((n, 2 + n)),
+        np.empty(1 + n),
+        np.empty(_MOST_TURNINGS),
+    )
+
+
+@helper
+def observed(functions, mode, c, start, duration, p, work):  # type: ignore[no-untyped-def]
+    """Return observable c after a duration in a mode."""
+    none, empty, nothing, y = work[0], work[1], work[2], work[3]
+    functions[0](mode, start[0], start[1:], duration, p, none, y, nothing)
+    return functions[1](c, start[0] + duration, y, p, none, empty)
+
+
+@helper
+def interior_margin(functions, mode, surface, c, sign, start, duration, p, work):  # type: ignore[no-untyped-def]
     """Return the smallest signed distance to a surface at the stationary points; inf without any."""
-    none = np.empty(0, dtype=np.int64)
-    empty = np.empty(0)
     if duration <= 0.0:
         return np.inf  # the joint and exit margins watch a segment that vanishes
+    times = work[6]
     found = functions[3](mode, c, start[0], start[1:], duration, p, times)
     if found < 0:
         return np.nan
     least = np.inf
-    target = functions[2](surface, p, none, empty)
-    y = np.empty(start.shape[0] - 1)
-    nothing = np.empty((0, 0))
+    target = functions[2](surface, p, work[0], work[1])
     for k in range(found):
-        functions[0](mode, start[0], start[1:], times[k], p, none, y, nothing)
-        value = functions[1](c, start[0] + times[k], y, p, none, empty)
+        value = observed(functions, mode, c, start, times[k], p, work)
         least = min(least, sign * (value - target))
     return least
 
 
 @helper
-def exit_rate(functions, mode, c, after, p):  # type: ignore[no-untyped-def]
+def exit_rate(functions, mode, c, after, p, work):  # type: ignore[no-untyped-def]
     """Return the rate of observable c along a mode at a state."""
-    none = np.empty(0, dtype=np.int64)
-    n = after.shape[0] - 1
-    grad = np.empty(1 + n)
-    y = np.empty(n)
-    jac = np.empty((n, 2 + n))
+    none, y, jac, grad = work[0], work[3], work[4], work[5]
     functions[0](mode, after[0], after[1:], 0.0, p, none, y, jac)
     functions[1](c, after[0], after[1:], p, none, grad)
+    n = y.shape[0]
     rate = grad[0]
     for j in range(n):
         rate += grad[1 + j] * jac[j, 1 + n]
@@ -69,57 +84,51 @@ def exit_rate(functions, mode, c, after, p):  # type: ignore[no-untyped-def]
 
 
 @helper
-def margins(functions, layout, z, p, last, out):  # type: ignore[no-untyped-def]
+def margins(functions, layout, z, p, last, out, work):  # type: ignore[no-untyped-def]
     """Fill the margins in the order interior, exit, joint."""
-    none = np.empty(0, dtype=np.int64)
-    empty = np.empty(0)
-    times = np.empty(_MOST_TURNINGS)
+    none, empty = work[0], work[1]
     count = z.shape[0]
     at = 0
     for k in range(layout.interior.shape[0]):
-        i, surface, sign = layout.interior[k]
+        i, surface = layout.interior[k, 0], layout.interior[k, 1]
         after = z[i + 1] if i + 1 < count else last
         out[at] = interior_margin(
             functions,
             layout.modes[i],
             surface,
             layout.observables[surface],
-            float(sign),
+            float(layout.interior[k, 2]),
             z[i],
             after[0] - z[i, 0],
             p,
-            times,
+            work,
         )
         at += 1
     for i in range(count):
         after = z[i + 1] if i + 1 < count else last
         c = layout.observables[layout.exits[i]]
-        out[at] = layout.exit_signs[i] * exit_rate(functions, layout.modes[i], c, after, p)
+        out[at] = layout.exit_signs[i] * exit_rate(functions, layout.modes[i], c, after, p, work)
         at += 1
     for k in range(layout.joint.shape[0]):
-        i, surface, sign = layout.joint[k]
+        i, surface = layout.joint[k, 0], layout.joint[k, 1]
         after = z[i + 1] if i + 1 < count else last
         value = functions[1](layout.observables[surface], after[0], after[1:], p, none, empty)
-        out[at] = sign * (value - functions[2](surface, p, none, empty))
+        out[at] = layout.joint[k, 2] * (value - functions[2](surface, p, none, empty))
         at += 1
 
 
 @helper
-def crossings(functions, layout, k, z, p, last, times):  # type: ignore[no-untyped-def]
-    """Return the surfaces that segment of row k crosses, as digits of one integer, latest first."""
-    none = np.empty(0, dtype=np.int64)
-    empty = np.empty(0)
-    nothing = np.empty((0, 0))
-    i, c, on = layout.labels[k]
-    count = z.shape[0]
-    after = z[i + 1] if i + 1 < count else last
-    surfaces = layout.observables.shape[0]
-    if after[0] <= z[i, 0]:
+def crossings(functions, layout, k, z, p, last, work):  # type: ignore[no-untyped-def]
+    """Return the surfaces that the segment of row k crosses, as digits of one integer."""
+    none, empty, times = work[0], work[1], work[6]
+    i, c, on = layout.labels[k, 0], layout.labels[k, 1], layout.labels[k, 2]
+    after = z[i + 1] if i + 1 < z.shape[0] else last
+    duration = after[0] - z[i, 0]
+    if duration <= 0.0:
         return 0
-    found = functions[3](layout.modes[i], c, z[i, 0], z[i, 1:], after[0] - z[i, 0], p, times)
+    found = functions[3](layout.modes[i], c, z[i, 0], z[i, 1:], duration, p, times)
     if found < 0:
         return -1
-    y = np.empty(z.shape[1] - 1)
     if on >= 0:
         value = functions[2](on, p, none, empty)
     else:
@@ -127,19 +136,25 @@ def crossings(functions, layout, k, z, p, last, times):  # type: ignore[no-untyp
     code = 0
     for piece in range(found + 1):
         if piece < found:
-            functions[0](layout.modes[i], z[i, 0], z[i, 1:], times[piece], p, none, y, nothing)
-            following = functions[1](c, z[i, 0] + times[piece], y, p, none, empty)
+            following = observed(functions, layout.modes[i], c, z[i], times[piece], p, work)
         else:
             following = functions[1](c, after[0], after[1:], p, none, empty)
-        low, high = min(value, following), max(value, following)
-        first = surfaces - 1 if following > value else 0  # surfaces are listed from the top down
-        for j in range(surfaces):
-            surface = first - j if following > value else j
-            if layout.observables[surface] == c:
-                target = functions[2](surface, p, none, empty)
-                if low < target < high:
-                    code = code * (surfaces + 1) + surface + 1
+        code = crossed_between(functions, layout, c, value, following, p, work, code)
         value = following
+    return code
+
+
+@helper
+def crossed_between(functions, layout, c, value, following, p, work, code):  # type: ignore[no-untyped-def]
+    """Add the surfaces between two values of observable c to a code, in the order of the motion."""
+    surfaces = layout.observables.shape[0]
+    for j in range(surfaces):
+        # surfaces of an observable are listed from the highest level down
+        surface = surfaces - 1 - j if following > value else j
+        if layout.observables[surface] == c:
+            target = functions[2](surface, p, work[0], work[1])
+            if min(value, following) < target < max(value, following):
+                code = code * (surfaces + 1) + surface + 1
     return code
 
 
@@ -260,11 +275,11 @@ def watch(functions, layout, z, p, out, labels):  # type: ignore[no-untyped-def]
     close_w = np.empty((z.shape[1], 0))
     none = np.empty(0, dtype=np.int64)
     last = np.empty(z.shape[1])
-    times = np.empty(_MOST_TURNINGS)
+    work = scratch(z.shape[1] - 1)
     last_joint(functions, layout, z, p, none, last, close, close_w)
-    margins(functions, layout, z, p, last, out)
+    margins(functions, layout, z, p, last, out, work)
     for k in range(layout.labels.shape[0]):
-        labels[k] = crossings(functions, layout, k, z, p, last, times)
+        labels[k] = crossings(functions, layout, k, z, p, last, work)
     for k in range(layout.interior.shape[0] + z.shape[0] + layout.joint.shape[0]):
         if np.isnan(out[k]):
             return False

@@ -29,7 +29,7 @@ class Motion:
 
     def __init__(self, mode, p, t0, y0):
         self.mode, self.p, self.t0, self.y0 = mode, p, t0, y0
-        omega, S, _, h, zeta = p
+        omega, _, _, h, zeta = p
         self.s = {0: 1.0, 1: -1.0, STICK: 0.0}[mode]
         if mode == STICK:
             return
@@ -262,8 +262,11 @@ def stationary_phases(h: float) -> list[float]:
 @pytest.mark.parametrize("omega", [0.02, 1 / 3, 1.0, 5.0])
 @pytest.mark.parametrize(
     "h",
-    [0.0, 0.2, 0.5, -0.4, -0.11, -1 / 9 * (1 + 1e-6), -1 / 9 * (1 - 1e-6), -1 / 9 * (1 + 1e-10)]
-    + [1 / 3 * (1 + 1e-6), 1 / 3 * (1 - 1e-6), 1 / 3 * (1 + 1e-12), 1 / 3 * (1 - 1e-12)],
+    [
+        *(0.0, 0.2, 0.5, -0.4, -0.11),
+        *(-1 / 9 * (1 + e) for e in (1e-6, -1e-6, 1e-10)),
+        *(1 / 3 * (1 + e) for e in (1e-6, -1e-6, 1e-12, -1e-12)),
+    ],
 )
 def test_stationary_load_at_rest_in_closed_form(omega: float, h: float) -> None:
     """Also where two or three of them come together: at h = -1/9 (three, at 0 and pi) and 1/3 (two)."""

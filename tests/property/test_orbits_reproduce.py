@@ -81,7 +81,9 @@ def test_every_orbit_reproduces_itself_and_its_word(name: str) -> None:
     assert count > 50
 
 
-def domains_passed(run: cf.orbit.simulation.Trajectory, start: np.ndarray, time: float) -> list[str]:
+def domains_passed(
+    run: cf.orbit.simulation.Trajectory, start: np.ndarray, time: float
+) -> list[str]:
     """Domains in the order in which a simulation visits them, from dense samples of its segments."""
     model = run.model
     vector = model.vector(run.params)
@@ -101,7 +103,7 @@ def domains_passed(run: cf.orbit.simulation.Trajectory, start: np.ndarray, time:
             f = np.cos(vector[0] * now) + vector[3] * np.cos(3 * vector[0] * now)
             u = y[0] - f
             position = "+" if u > vector[2] else "-" if u < -vector[2] else "0"
-            domain = ("stick" if mode == 2 else f"x{position}v{'+-'[mode]}")
+            domain = "stick" if mode == 2 else f"x{position}v{'+-'[mode]}"
             if not seen or seen[-1] != domain:
                 seen.append(domain)
     return seen[:-1] if len(seen) > 1 and seen[0] == seen[-1] else seen

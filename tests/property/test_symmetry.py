@@ -131,7 +131,9 @@ def test_mirror_branches_of_a_diagram() -> None:
             assert gap(image[i], branch[i].mirror()) < 1e-13
         for i in range(1, len(image) - 1, 7):
             assert image[i].admissible
-            run = cf.simulate("coulomb", image[i].params, state=image[i].state(0.3), time=0.3, periods=1)
+            run = cf.simulate(
+                "coulomb", image[i].params, state=image[i].state(0.3), time=0.3, periods=1
+            )
             assert np.max(np.abs(run.last[2] - image[i].state(0.3))) < 1e-11
         for own, mirrored in zip(branch.bifurcations, image.bifurcations, strict=True):
             assert own.params == mirrored.params

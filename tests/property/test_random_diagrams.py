@@ -1,0 +1,154 @@
+"""Diagrams that nobody has chosen: random parameters, a simulated start, everything checked.
+
+Retraced with a fifth of the step, each gives the same branches and the same bifurcations; what a
+larger step had skipped or passed twice would show.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import cache
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.atlas.matching import identity
+from contfric.orbit.solve import polish
+
+#: Drawn once; a diagram of each takes about 0.1 s.
+SEEDS = (3, 4, 6, 9, 13, 18, 28, 29, 33, 35, 36, 37)
+#: Retracing them once found a larger step that went through a branch point unseen, or around a pair
+#: of events; the parameter varied, then its range.
+CAUGHT = {
+    "pitchfork passed, in Omega": (
+        {"Omega": 0.5781095080572807, "S": 0.38007585193945537, "S0": 0.7651990593717319},
+        "Omega",
+        (0.5474296482052726, 0.6087893679092887),
+    ),
+    "pitchfork passed, branches twice": (
+        {"Omega": 0.6869689819936484, "S": 0.44602859710110376, "S0": 0.8394746539783626},
+        "Omega",
+        (0.6135082903320511, 0.7604296736552457),
+    ),
+    "pitchfork passed by the smaller step": (
+        {"Omega": 0.5947234883504342, "S": 0.39379702087238033, "S0": 0.6769512054067516},
+        "h",
+        (-0.1097250893797525, 0.1097250893797525),
+    ),
+    "SS behind which the margin returns": (
+        {"Omega": 0.48686413344649343, "S": 0.4550178672135545, "S0": 0.6298070384581034},
+        "h",
+        (-0.11070223568189062, 0.11070223568189062),
+    ),
+}
+#: Ends that say that something went wrong, not that something happened.
+FAILURES = {"STEP", "BROKEN", "SINGULAR", "POINTS", "START"}
+each_case = pytest.mark.parametrize("case", [*SEEDS, *CAUGHT])
+
+
+@cache
+def scene(case: int | str) -> tuple[cf.Orbit, str, tuple[float, float]]:
+    """A random start that settles on a periodic orbit; aperiodic or stuck ones are drawn again."""
+    if isinstance(case, str):
+        params, parameter, bounds = CAUGHT[case]
+        return cf.find_orbit("coulomb", params), parameter, bounds
+    rng = np.random.default_rng(case)
+    while True:
+        S = rng.uniform(0.03, 0.6)
+        S0 = S * rng.uniform(1.0, 2.2)
+        h = float(rng.choice([0.0, 0.0, rng.uniform(-0.4, 0.4)]))
+        zeta = float(rng.choice([0.0, 0.0, rng.uniform(0.0, 0.2)]))
+        omega, half = rng.uniform(0.25, 0.85), rng.uniform(0.03, 0.12)
+        params = {"Omega": omega, "S": S, "S0": S0, "h": h, "zeta": zeta}
+        try:
+            orbit = cf.find_orbit("coulomb", params, longest=1000)
+        except (cf.AperiodicError, cf.ConvergenceError):
+            continue
+        return orbit, "Omega", (omega - half, omega + half)
+
+
+@cache
+def diagram(case: int | str, max_step: float | None = None) -> cf.Diagram:
+    orbit, parameter, bounds = scene(case)
+    return cf.explore(orbit, parameter, bounds, max_step=max_step)
+
+
+@each_case
+def test_every_point_is_a_solved_admissible_orbit(case: int | str) -> None:
+    found = diagram(case)
+    low, high = found.range
+    for branch in found.branches:
+        assert len(branch) > 2
+        assert np.all(branch.values >= low - 1e-12) and np.all(branch.values <= high + 1e-12)
+        for i in range(1, len(branch) - 1):
+            orbit = branch[i]
+            assert orbit.admissible, (orbit, orbit.violations())
+            away = float(np.min(np.abs(orbit.multipliers - 1.0)))
+            if away < 1e-4:
+                continue  # a fold or a branch point: at fixed parameters the problem is singular
+            solved = polish(orbit, damped=False)
+            assert solved.converged, orbit
+            # nothing is left to correct but rounding, divided by the distance from the singular
+            # case and, beside an event, from the tangential one
+            margin = min(1.0, float(np.min(np.abs(orbit.margins))))
+            limit = 1e-12 * (1.0 + orbit.period) / (min(1.0, away) * margin)
+            assert np.max(np.abs(solved.joints - orbit.joints)) < limit, orbit
+
+
+@each_case
+def test_every_end_has_its_reason(case: int | str) -> None:
+    found = diagram(case)
+    assert found.complete
+    for branch in found.branches:
+        for end in branch.ends:
+            assert end.reason.name not in FAILURES, (branch, end)
+            assert str(end)
+            if end.reason.name in {"CS", "SS", "AS", "GS"} and end.bifurcation is not None:
+                assert end.bifurcation.kind.value == end.reason.name
+                assert any(end.bifurcation.params == b.params for b in branch.bifurcations)
+    # where the motion is continuous something follows
+    for loose in found.loose_ends:
+        assert loose.end.reason.name in {"SS", "AS", "GS"}, loose
+
+
+@each_case
+def test_no_branch_is_computed_twice(case: int | str) -> None:
+    """Two computed branches of one word do not share an orbit."""
+    found = [b for b in diagram(case).branches if not b.mirrored]
+    for k, one in enumerate(found):
+        for other in found[:k]:
+            if identity(one[0]) != identity(other[0]) or one.system.half != other.system.half:
+                continue
+            middle = one[len(one) // 2]
+            stops = np.sort(np.abs(other.stops), axis=1)
+            sorted_middle = np.sort(np.abs(middle.stops))
+            if stops.shape[1] != len(sorted_middle):
+                continue
+            value = middle.params[one.parameter]
+            for i in np.flatnonzero((other.values[:-1] - value) * (other.values[1:] - value) <= 0):
+                step = other.values[i + 1] - other.values[i]
+                share = (value - other.values[i]) / step if step else 0.0
+                apart = stops[i] + share * (stops[i + 1] - stops[i]) - sorted_middle
+                assert np.max(np.abs(apart)) > 1e-5, (one, other)
+
+
+def events(found: cf.Diagram) -> list[tuple[str, float]]:
+    """Kinds and values but T, which changes labels only."""
+    return sorted(
+        (b.kind.value, b.params[found.parameter]) for b in found.bifurcations if b.kind != "T"
+    )
+
+
+@each_case
+def test_a_smaller_step_changes_nothing(case: int | str) -> None:
+    coarse, fine = diagram(case), diagram(case, 0.02 / 5)
+    a, b = events(coarse), events(fine)
+    assert [kind for kind, _ in a] == [kind for kind, _ in b]
+    for (_, one), (_, other) in zip(a, b, strict=True):
+        assert one == pytest.approx(other, rel=1e-9, abs=1e-9)
+    words = [
+        Counter((identity(b[0]), b.system.half, b.mirrored) for b in d.branches)
+        for d in (coarse, fine)
+    ]
+    assert words[0] == words[1]
