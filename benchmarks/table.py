@@ -45,9 +45,9 @@ def main() -> None:
     lines = [
         "# Benchmarks",
         "",
-        "Written by `make bench`. Warm, one process, medians of "
-        f"{ROUNDS} rounds in turns; {platform.machine()}, Python {platform.python_version()}. A point of a",
-        "branch includes Newton, tangent, multipliers, admissibility, event tests and the location of events.",
+        f"Written by `make bench`. Warm, one process, medians of {ROUNDS} rounds in turns;",
+        f"{platform.machine()}, Python {platform.python_version()}. A point of a branch includes Newton, tangent,",
+        "multipliers, admissibility, event tests and the location of events.",
         "",
         "| what | units | median total | per unit (median) | per unit (minimum) |",
         "|---|---|---|---|---|",

@@ -25,7 +25,7 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation, End, EndReason, Kind
 from contfric.continuation.points import MOST_POINTS, Settings, first_point, settings_of
 from contfric.continuation.switching import (
-    Departure,
+    NEARER,
     leave_branch_point,
     settings_value,
     swapped_orbits,
@@ -177,8 +177,7 @@ class _Exploration:
         whole = orbit.as_whole()
         if any(not self.branches[i].system.half for i in event.branches):
             return
-        departure = leave_branch_point(whole, self.settings, "symmetry breaking")
-        self._follow_departure(departure, event, EndReason.BP)
+        self._follow_departure(whole, event, EndReason.BP)
 
     def _follow_both_ways(self, orbit: Orbit, event: Event) -> None:
         """Continue a branch through an event that it passes, from just beside it."""
@@ -192,24 +191,23 @@ class _Exploration:
         if not self.known(branch[len(branch) // 2]):
             self._add_from(branch, event)
 
-    def _follow_departure(
-        self, departure: Departure | None, event: Event, reason: EndReason
-    ) -> None:
+    def _follow_departure(self, orbit: Orbit, event: Event, reason: EndReason) -> None:
+        """Trace the branch that leaves a branch point or a period doubling."""
         at = _where(event.bifurcation, self.settings.parameter)
-        if departure is None:
-            self.notes.append(f"{at}: the branch that leaves could not be started")
-            return
-        orbit = departure.orbit
         active = orbit.model.index_of(self.settings.parameter)
-        if self.known(departure.point.orbit(orbit.system, orbit.vector, active)):
-            return
-        side = trace_side(orbit, departure.point, self.settings, progress=self.progress)
-        if not _went_somewhere(side):
-            self.notes.append(f"{at}: the branch that leaves is not admissible")
-            return
-        side.points.insert(0, departure.origin)
-        first = _first_end(reason, event.bifurcation, side, self.settings)
-        self._add_from(assemble(orbit, self.settings, side, first), event)
+        for distance in NEARER:
+            departure = leave_branch_point(orbit, self.settings, reason.value, distance)
+            if departure is None:
+                continue
+            if self.known(departure.point.orbit(orbit.system, orbit.vector, active)):
+                return
+            side = trace_side(orbit, departure.point, self.settings, progress=self.progress)
+            if _went_somewhere(side):
+                side.points.insert(0, departure.origin)
+                first = _first_end(reason, event.bifurcation, side, self.settings)
+                self._add_from(assemble(orbit, self.settings, side, first), event)
+                return
+        self.notes.append(f"{at}: the branch that leaves is not admissible")
 
     # ---------------------------------------------------------------- period doubling
 
@@ -226,8 +224,7 @@ class _Exploration:
                 f"(max_periods = {self.max_periods})"
             )
             return
-        departure = leave_branch_point(orbit.doubled(), self.settings, "period doubling")
-        self._follow_departure(departure, event, EndReason.PD)
+        self._follow_departure(orbit.doubled(), event, EndReason.PD)
 
 
 def explore(

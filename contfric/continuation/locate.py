@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from contfric.continuation.events import Bifurcation, Kind, kind_of_margin
 from contfric.continuation.points import Point, Settings
-from contfric.models.definition import FloatArray
+from contfric.continuation.vertices import parabola_vertex, symmetric_part, undoubled_part
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
-from contfric.orbit.system import Margin, Test, build_system
-from contfric.orbit.words import half_of
+from contfric.orbit.system import Margin, Test
 
 #: Margins below this at a located event vanish with it: they form a group. Located margins are
 #: zero to about 1e-13; distinct events this near are beyond what a diagram can tell apart.
 _TOGETHER = 1e-9
-#: Share of a step within which a smooth test follows a sliding event: where a stop becomes tangential
-#: the branch folds and its multipliers are infinite at the same point.
-_SAME = 1e-6
-#: Distance of a fold to its mirror image (or to its own second half) below which it may be the vertex
-#: of a pitchfork (of a period doubling). There the system is singular and the state is good to about
-#: 1e-5 only, while the parameter, stationary along the branch, is good to the square of that.
-_NEARLY = 1e-2
-#: At such a vertex the symmetric (the undoubled) orbit has a multiplier -1 of its turn; chi(-1) of it
-#: is zero to the accuracy of the parameter, far below this.
-_VERTEX_CHI = 1e-4
+#: Arclength within which a smooth event belongs to a sliding event: where a stop becomes tangential
+#: the branch folds and its multipliers are infinite, and where it meets a surface labels change.
+SAME_PLACE = 1e-7
 
 
 #: Share of the period below which a stick at a tangential release has vanished: the square root of
@@ -46,12 +36,11 @@ def locate_events(
     """
     sliding = _sliding_events(orbit, before, after, settings)
     first = min((point.arc for _, point in sliding), default=np.inf)
-    step = after.arc - before.arc
     beyond = sliding[0][1] if sliding else after
     smooth = [
         (b, point)
         for b, point in _smooth_events(orbit, before, after, settings, beyond)
-        if point.arc < first - _SAME * step
+        if point.arc < first - SAME_PLACE
     ]
     return sorted([*smooth, *sliding], key=lambda pair: pair[1].arc)
 
@@ -155,6 +144,8 @@ def _sliding_events(
         return []
     # what comes first ends the branch; what vanishes with it is of its group
     first, point = min(located, key=lambda pair: pair[1].arc)
+    while hidden := _located_before(orbit, before, point, settings):
+        first, point = min(hidden, key=lambda pair: pair[1].arc)
     here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     kind = kind_of_margin(orbit.system, orbit.system.tests[first], here)
     if _is_degenerate(here, kind, orbit.system.tests[first]):
@@ -170,6 +161,17 @@ def _sliding_events(
         )
     )
     return [(_bifurcation(kind, here, before, None, point, settings, group), point)]
+
+
+def _located_before(
+    orbit: Orbit, before: Point, point: Point, settings: Settings
+) -> list[tuple[int, Point]]:
+    """Return the margins violated at a located event: they vanish before it, and come back behind."""
+    from contfric.continuation.bracket import BY_TEST
+
+    violated = map(int, np.flatnonzero(point.tests[: len(orbit.system.tests)] < -_TOGETHER))
+    found = [(k, _trial(orbit, before, point, settings, BY_TEST, k, 0.0, 1.0)) for k in violated]
+    return [(k, p) for k, p in found if p is not None and p.arc < point.arc]
 
 
 def _is_degenerate(here: Orbit, kind: Kind, test: Test) -> bool:
@@ -204,6 +206,14 @@ def _smooth_events(
         sign = float(np.sign(a))
         point = _trial(orbit, before, after, settings, BY_TEST, base + column, 0.0, sign)
         if point is None or point.lost or _is_pole(point.tests[base + column], a, b):
+            if column == FOLD:
+                # at the vertex of a pitchfork or of a period doubling the arclength system itself is
+                # singular, and Newton may be lost around it: look from between the two points
+                between = parabola_vertex(before, after, a / (a - b))
+                vertex = _fold(orbit, before, beyond, between, settings)
+                if vertex[0].kind is not Kind.SN:
+                    folded = True
+                    found.append(vertex)
             continue
         if column == FOLD:
             folded = True
@@ -218,7 +228,7 @@ def _smooth_events(
             kind = Kind.PD
         here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
         found.append((_bifurcation(kind, here, before, beyond, point, settings), point))
-    return [*found, *_tangencies(orbit, before, after, settings)]
+    return [*found, *_tangencies(orbit, before, beyond, settings)]
 
 
 def _is_pole(value: float, a: float, b: float) -> bool:
@@ -262,82 +272,14 @@ def _fold(
     """Tell a fold from the vertex of a pitchfork or of a period doubling."""
     active = orbit.model.index_of(settings.parameter)
     here = point.orbit(orbit.system, orbit.vector, active)
-    symmetric = _symmetric_part(here, active)
+    symmetric = symmetric_part(here, active)
     if symmetric is not None:
         kind, here = Kind.BP, symmetric
-    elif (undoubled := _undoubled_part(here, active)) is not None:
+    elif (undoubled := undoubled_part(here, active)) is not None:
         kind, here = Kind.PD, undoubled
     else:
         kind = Kind.SN
     return _bifurcation(kind, here, before, after, point, settings), point
-
-
-def _symmetric_part(orbit: Orbit, active: int) -> Orbit | None:
-    """Return the symmetric orbit that an orbit has come to, solved on its half; None if far."""
-    system = orbit.system
-    half = None if system.half else half_of(orbit.model, system.word, system.periods)
-    if half is None or orbit.model.symmetry is None:
-        return None
-    n = len(half)
-    image = orbit.joints[n:].copy()
-    image[:, 0] -= 0.5 * orbit.period
-    image[:, 1:] = image[:, 1:] @ orbit.model.symmetry.array()
-    if np.max(np.abs(image - orbit.joints[:n])) > _NEARLY:
-        return None
-    middle = 0.5 * (image + orbit.joints[:n])
-    part = build_system(orbit.model, half, system.periods, half=True)
-    return _vertex(replace(orbit, system=part, joints=middle), active)
-
-
-def _undoubled_part(orbit: Orbit, active: int) -> Orbit | None:
-    """Return the orbit of half the period that an orbit has come to; None if far."""
-    system = orbit.system
-    n, odd = divmod(len(system.word), 2)
-    if system.half or odd or system.periods % 2 or system.word[:n] != system.word[n:]:
-        return None
-    image: FloatArray = orbit.joints[n:].copy()
-    image[:, 0] -= 0.5 * orbit.period
-    if np.max(np.abs(image - orbit.joints[:n])) > _NEARLY:
-        return None
-    part = build_system(orbit.model, system.word[:n], system.periods // 2)
-    return _vertex(replace(orbit, system=part, joints=0.5 * (image + orbit.joints[:n])), active)
-
-
-def _vertex(orbit: Orbit, active: int) -> Orbit | None:
-    """Return the orbit solved if its turn has a multiplier -1, else None."""
-    solved = polish(orbit, damped=False)
-    if not solved.converged or abs(_chi_minus(solved)) > _VERTEX_CHI:
-        return None
-    return _refined(solved, active)
-
-
-def _chi_minus(orbit: Orbit) -> float:
-    return float(np.prod(1.0 + orbit.turn_multipliers).real)
-
-
-def _refined(orbit: Orbit, active: int) -> Orbit:
-    """Return the orbit whose turn has the multiplier -1 exactly, by secants in the parameter."""
-    value = float(orbit.vector[active])
-    offset = 1e-7 * (1.0 + abs(value))  # far above rounding, far below the branch's curvature
-    orbits = [orbit, _moved(orbit, active, value + offset)]
-    for _ in range(8):
-        a, b = orbits[-2:]
-        chi_a, chi_b = _chi_minus(a), _chi_minus(b)
-        if not b.converged or chi_a == chi_b:
-            return orbit
-        step = -chi_b * float(b.vector[active] - a.vector[active]) / (chi_b - chi_a)
-        if abs(step) > 100.0 * offset:
-            return orbit
-        orbits.append(_moved(b, active, float(b.vector[active]) + step))
-        if abs(step) < 1e-15 * (1.0 + abs(value)):
-            break
-    return orbits[-1]
-
-
-def _moved(orbit: Orbit, active: int, value: float) -> Orbit:
-    vector = orbit.vector.copy()
-    vector[active] = value
-    return polish(replace(orbit, vector=vector), damped=False)
 
 
 def _bifurcation(

@@ -30,7 +30,9 @@ from contfric.signature import is_closed_walk, swap_stops
 #: Distance from the branch point to the first point of the branch that leaves, in the scaled product:
 #: the square root of it is well above the accuracy of a state at a singular point, and the branch is
 #: still a parabola there.
-_LEAVE = 1e-3
+LEAVE = 1e-3
+#: Where the branch ends sooner than that, the start is taken nearer.
+NEARER = (LEAVE, 1e-4, 1e-5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +59,13 @@ def null_vector(orbit: Orbit) -> FloatArray:
     return vector / float(np.sqrt(np.sum(vector**2) / count))
 
 
-def leave_branch_point(orbit: Orbit, settings: Settings, reason: str) -> Departure | None:
+def leave_branch_point(
+    orbit: Orbit, settings: Settings, reason: str, distance: float = LEAVE
+) -> Departure | None:
     """Return a start on the branch that leaves a singular orbit along its null vector."""
     phi = null_vector(orbit)
     origin = first_point(orbit, settings)
-    moved = replace(orbit, joints=orbit.joints + _LEAVE * phi)
+    moved = replace(orbit, joints=orbit.joints + distance * phi)
     point = first_point(moved, settings, phi, 0.0)
     if point is None:
         return None
@@ -72,7 +76,7 @@ def leave_branch_point(orbit: Orbit, settings: Settings, reason: str) -> Departu
     if origin is None:
         origin = replace(point)
     origin.joints, origin.value = orbit.joints, settings_value(orbit, settings)
-    point.arc = _LEAVE
+    point.arc = distance
     return Departure(orbit, point, origin, reason)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
-from contfric.continuation.locate import locate_events, locate_value
+from contfric.continuation.locate import SAME_PLACE, locate_events, locate_value
 from contfric.continuation.points import (
     EXTRA,
     FIRST_STEP,
@@ -179,7 +179,7 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     for bifurcation, point in locate_events(orbit, before, after, settings):
         if limit is not None and point.arc > limit[0].arc - _AT_LIMIT * (after.arc - before.arc):
             break
-        if bifurcation.kind is Kind.T and _is_start(side, before, point, after):
+        if bifurcation.kind is Kind.T and _is_start(side, before, point):
             before.labels = after.labels  # where a stop lies on a surface its label is arbitrary
             continue
         ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, orbit)
@@ -201,10 +201,10 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     return True
 
 
-def _is_start(side: Side, before: Point, point: Point, after: Point) -> bool:
+def _is_start(side: Side, before: Point, point: Point) -> bool:
     """Tell whether a change of labels happens at the very start of a side, at an event."""
     start = before is side.points[0]
-    return start and point.arc - before.arc < _AT_LIMIT * (after.arc - before.arc)
+    return start and point.arc - before.arc < SAME_PLACE
 
 
 def _limit_crossed(

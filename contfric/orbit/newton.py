@@ -197,11 +197,7 @@ def correct(functions, layout, z, p, which, d, e, trust, floor, pencil):  # type
         if step == 0:
             first = size
         left = size if not math.isfinite(before) else size * (size / before) ** 2
-        if (
-            size <= floor
-            or size * size <= 1e-2 * floor
-            or (size < 1e-3 and left <= max(_TARGET, floor * 1e-3))
-        ):
+        if size <= floor or (size < 1e-3 and left <= max(_TARGET, floor * 1e-3)):
             return CONVERGED, step + 1, first, worst
         if size < _FLOOR * 100 and size >= 0.5 * before:
             return CONVERGED, step + 1, first, worst

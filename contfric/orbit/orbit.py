@@ -351,4 +351,5 @@ class Orbit:
 
     def __repr__(self) -> str:
         values = ", ".join(f"{k}={v:.6g}" for k, v in self.params.items())
-        return f"<Orbit {self.name}: {values}; {self.status.name.lower()}>"
+        name = self.name if self.converged else "not solved"  # an iterate may walk no signature
+        return f"<Orbit {name}: {values}; {self.status.name.lower()}>"

@@ -21,6 +21,10 @@ ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE = range(5)
 #: A sliding mode that is not left within this many periods is never left; a slide gets far more.
 _HOLD_PERIODS, _SLIDE_PERIODS = 1.001, 1e4
 
+#: A state this large grows for ever (negative damping, or resonance without any): its square is still
+#: far from overflow, and its events are still exact.
+_INFINITE = 1e100
+
 
 @helper
 def sign_code(functions, observables, surface, t, y, p):  # type: ignore[no-untyped-def]
@@ -151,7 +155,7 @@ def simulate(  # type: ignore[no-untyped-def]
         times[event] = t
         states[event] = y
         for j in range(y.shape[0]):
-            if not math.isfinite(y[j]):
+            if not abs(y[j]) < _INFINITE:
                 return INFINITE, event, mode, cycle, t
         code = sign_code(functions, observables, surface, t, y, p)
         row = (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code

@@ -35,7 +35,8 @@ def test_wheel_runs_fig05_from_an_empty_folder(installed: Path, tmp_path: Path) 
         "sys.exit(main(['run', 'fig05', '--out', 'results']))"
     )
     done = subprocess.run(
-        [sys.executable, "-P" if sys.version_info >= (3, 11) else "-B", "-c", code],
+        check=False,
+        args=[sys.executable, "-P" if sys.version_info >= (3, 11) else "-B", "-c", code],
         cwd=tmp_path,
         env=environment,
         capture_output=True,

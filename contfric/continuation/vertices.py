@@ -1,0 +1,107 @@
+"""Vertices: where the branch of an asymmetric (a doubled) orbit meets the symmetric (the undoubled) one.
+
+The parameter turns there as at a fold, and the equations of the branch that turns are singular. So the
+meeting is recognised by the distance of the orbit to its mirror image (to its own second half), and
+located on the simpler orbit, of which one multiplier of a turn is -1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contfric.continuation.points import Point
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.solve import polish
+from contfric.orbit.system import build_system
+from contfric.orbit.words import half_of
+
+#: Distance of a fold to its mirror image (or to its own second half) below which it may be the vertex
+#: of a pitchfork (of a period doubling). There the system is singular and the state is good to about
+#: 1e-5 only, while the parameter, stationary along the branch, is good to the square of that.
+_NEARLY = 1e-2
+#: At such a vertex the symmetric (the undoubled) orbit has a multiplier -1 of its turn; chi(-1) of it
+#: is zero to the accuracy of the parameter, far below this.
+_VERTEX_CHI = 1e-4
+
+
+def symmetric_part(orbit: Orbit, active: int) -> Orbit | None:
+    """Return the symmetric orbit that an orbit has come to, solved on its half; None if far."""
+    system = orbit.system
+    half = None if system.half else half_of(orbit.model, system.word, system.periods)
+    if half is None or orbit.model.symmetry is None:
+        return None
+    n = len(half)
+    image = orbit.joints[n:].copy()
+    image[:, 0] -= 0.5 * orbit.period
+    image[:, 1:] = image[:, 1:] @ orbit.model.symmetry.array()
+    if np.max(np.abs(image - orbit.joints[:n])) > _NEARLY:
+        return None
+    middle = 0.5 * (image + orbit.joints[:n])
+    part = build_system(orbit.model, half, system.periods, half=True)
+    return _vertex(replace(orbit, system=part, joints=middle), active)
+
+
+def undoubled_part(orbit: Orbit, active: int) -> Orbit | None:
+    """Return the orbit of half the period that an orbit has come to; None if far."""
+    system = orbit.system
+    n, odd = divmod(len(system.word), 2)
+    if system.half or odd or system.periods % 2 or system.word[:n] != system.word[n:]:
+        return None
+    image: FloatArray = orbit.joints[n:].copy()
+    image[:, 0] -= 0.5 * orbit.period
+    if np.max(np.abs(image - orbit.joints[:n])) > _NEARLY:
+        return None
+    part = build_system(orbit.model, system.word[:n], system.periods // 2)
+    return _vertex(replace(orbit, system=part, joints=0.5 * (image + orbit.joints[:n])), active)
+
+
+def _vertex(orbit: Orbit, active: int) -> Orbit | None:
+    """Return the orbit solved if its turn has a multiplier -1, else None."""
+    solved = polish(orbit, damped=False)
+    if not solved.converged or abs(_chi_minus(solved)) > _VERTEX_CHI:
+        return None
+    return _refined(solved, active)
+
+
+def _chi_minus(orbit: Orbit) -> float:
+    return float(np.prod(1.0 + orbit.turn_multipliers).real)
+
+
+def _refined(orbit: Orbit, active: int) -> Orbit:
+    """Return the orbit whose turn has the multiplier -1 exactly, by secants in the parameter."""
+    value = float(orbit.vector[active])
+    offset = 1e-7 * (1.0 + abs(value))  # far above rounding, far below the branch's curvature
+    orbits = [orbit, _moved(orbit, active, value + offset)]
+    for _ in range(8):
+        a, b = orbits[-2:]
+        chi_a, chi_b = _chi_minus(a), _chi_minus(b)
+        if not b.converged or chi_a == chi_b:
+            return orbit
+        step = -chi_b * float(b.vector[active] - a.vector[active]) / (chi_b - chi_a)
+        if abs(step) > 100.0 * offset:
+            return orbit
+        orbits.append(_moved(b, active, float(b.vector[active]) + step))
+        if abs(step) < 1e-15 * (1.0 + abs(value)):
+            break
+    return orbits[-1]
+
+
+def _moved(orbit: Orbit, active: int, value: float) -> Orbit:
+    vector = orbit.vector.copy()
+    vector[active] = value
+    return polish(replace(orbit, vector=vector), damped=False)
+
+
+def parabola_vertex(before: Point, after: Point, share: float) -> Point:
+    """Return the point between two at which the parameter's slope, taken as linear, vanishes."""
+    step = after.arc - before.arc
+    return replace(
+        before,
+        joints=before.joints + share * (after.joints - before.joints),
+        value=before.value + 0.5 * before.slope * share * step,
+        slope=0.0,
+        arc=before.arc + share * step,
+    )
