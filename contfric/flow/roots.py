@@ -19,6 +19,8 @@ STICK = 2
 LOAD, SPEED = range(2)
 #: Below this fraction of the natural scale a stationary value at the start counts as being there.
 AT_START = 1e-13
+#: Error of a stationary time, relative to 1 + the time, at which its search ends: its square counts.
+AT_STATIONARY = 1e-10
 
 
 @helper
@@ -185,6 +187,7 @@ def next_root(mode, c, order, target, on, sign, phase, t0, y0, start, end, p):  
     tau = start
     natural = natural_scale(mode, p)
     x0, v0 = y0[0], y0[1]
+    resolution = 0.0 if order == 0 else AT_STATIONARY  # a root goes to the resolution of time
     leaving = on
     while tau < end:
         q, q1, q2, size = quantity(mode, c, order, p, phase, t0, x0, v0, tau)
@@ -210,6 +213,10 @@ def next_root(mode, c, order, target, on, sign, phase, t0, y0, start, end, p):  
         bound = third_bound(mode, c, order, p, size, window)
         step = safe_step(w, sign * q1, sign * q2, bound, window)
         tau += step
-        if step < window and reached(step, tau):
-            return tau, sign, q1
+        if step < window:
+            # the remainder of Taylor's formula against the slope that is left at the root
+            slope = -sign * (q1 + q2 * step) - bound * step * step
+            error = bound * step * step * (window + step) / 6.0
+            if reached(step, tau) or error < slope * resolution * (1.0 + tau):
+                return tau, sign, q1
     return -1.0, sign, 0.0

@@ -66,7 +66,12 @@ def turn(orbit: cf.Orbit, time: float, state: np.ndarray) -> cf.orbit.simulation
 
 @each_diagram
 def test_every_orbit_reproduces_itself_and_its_word(name: str) -> None:
-    """Measured: 2e-14 at worst, 8e-12 |mu| beside an event at which the flow jumps (in h)."""
+    """Measured: 2e-14 at worst, 8e-12 |mu| beside an event at which the flow jumps (in h).
+
+    Where an exit is met almost tangentially, with a rate r, its time is good to rounding / r only:
+    the branch in h comes within 1e-6 of such an end (a stick that vanishes as its release becomes
+    tangential), where r is about 1e-4.
+    """
     count = 0
     for orbit in orbits(name):
         first, time = section(orbit)
@@ -74,7 +79,9 @@ def test_every_orbit_reproduces_itself_and_its_word(name: str) -> None:
         run = turn(orbit, time, state)
         gap = float(np.max(np.abs(run.last[2] - state)))
         mu = float(np.max(np.abs(orbit.multipliers)))
-        assert gap < 1e-11 * max(1.0, mu), (orbit, gap, mu)
+        exits = [t.margin.value == "exit" for t in orbit.system.tests]
+        rate = min(1.0, float(np.min(orbit.margins[exits])))
+        assert gap < max(1e-11, 1e-13 / rate) * max(1.0, mu), (orbit, gap, mu, rate)
         assert run.word == rotated(orbit.word, first), orbit
         assert orbit.admissible, orbit.violations()
         count += 1
