@@ -92,6 +92,10 @@ class FirstClass(types.WrapperAddressProtocol):  # type: ignore[misc]
         return self._signature
 
 
+#: LLVM's level: 1 gives the same run time here as 3 and compiles a third faster (measured).
+_OPTIMISATION = config._OptLevel(1)
+
+
 @cache
 def _digest(folder: Path) -> str:
     """Digest of the compiled sources that a kernel in ``folder`` may have been built from."""
@@ -127,15 +131,15 @@ def kernel(signature: Any) -> Callable[[F], F]:
 
     def decorate(function: F) -> F:
         folder = cache_folder(Path(function.__code__.co_filename))
-        before = config.CACHE_DIR
-        config.CACHE_DIR = str(folder)
+        before = config.CACHE_DIR, config.OPT
+        config.CACHE_DIR, config.OPT = str(folder), _OPTIMISATION
         try:
             folder.mkdir(parents=True, exist_ok=True)
             return numba.njit(signature, cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
         except (OSError, RuntimeError):  # no folder is writable
             return numba.njit(signature, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
         finally:
-            config.CACHE_DIR = before
+            config.CACHE_DIR, config.OPT = before
 
     return decorate
 
