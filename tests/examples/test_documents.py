@@ -47,3 +47,18 @@ def test_docstring_examples(name: str) -> None:
     module = importlib.import_module(name)
     failed, _ = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert failed == 0
+
+
+def test_glossary_has_every_kind_and_end() -> None:
+    glossary = (ROOT / "docs/glossary.md").read_text()
+    for kind in contfric.Kind:
+        assert re.search(rf"^\| {kind.value} \|", glossary, re.MULTILINE), kind
+    for reason in contfric.EndReason:
+        assert f"`{reason.name}`" in glossary, reason
+
+
+def test_engine_constants_agree() -> None:
+    """The number of extra tests stands twice, so that tracing is not compiled before it is used."""
+    from contfric.continuation import points, steps
+
+    assert points.EXTRA == steps.EXTRA
