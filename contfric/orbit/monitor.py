@@ -32,48 +32,15 @@ _MOST_TURNINGS = 256
 
 
 @helper
-def scratch(n):  # type: ignore[no-untyped-def]
-    """Return the small arrays that watching an orbit needs: allocated once, not in each call."""
-    return (
-        np.empty(0, dtype=np.int64),
-        np.empty(0),
-        np.empty((0, 0)),
-        np.empty(n),
-        np.empty((n, 2 + n)),
-        np.empty(1 + n),
-        np.empty(_MOST_TURNINGS),
-    )
-
-
-@helper
-def observed(functions, mode, c, start, duration, p, work):  # type: ignore[no-untyped-def]
+def observed(functions, mode, c, start, duration, p, none, empty, nothing, y):  # type: ignore[no-untyped-def]
     """Return observable c after a duration in a mode."""
-    none, empty, nothing, y = work[0], work[1], work[2], work[3]
     functions[0](mode, start[0], start[1:], duration, p, none, y, nothing)
     return functions[1](c, start[0] + duration, y, p, none, empty)
 
 
 @helper
-def interior_margin(functions, mode, surface, c, sign, start, duration, p, work):  # type: ignore[no-untyped-def]
-    """Return the smallest signed distance to a surface at the stationary points; inf without any."""
-    if duration <= 0.0:
-        return np.inf  # the joint and exit margins watch a segment that vanishes
-    times = work[6]
-    found = functions[3](mode, c, start[0], start[1:], duration, p, times)
-    if found < 0:
-        return np.nan
-    least = np.inf
-    target = functions[2](surface, p, work[0], work[1])
-    for k in range(found):
-        value = observed(functions, mode, c, start, times[k], p, work)
-        least = min(least, sign * (value - target))
-    return least
-
-
-@helper
-def exit_rate(functions, mode, c, after, p, work):  # type: ignore[no-untyped-def]
+def exit_rate(functions, mode, c, after, p, none, y, jac, grad):  # type: ignore[no-untyped-def]
     """Return the rate of observable c along a mode at a state."""
-    none, y, jac, grad = work[0], work[3], work[4], work[5]
     functions[0](mode, after[0], after[1:], 0.0, p, none, y, jac)
     functions[1](c, after[0], after[1:], p, none, grad)
     n = y.shape[0]
@@ -84,49 +51,59 @@ def exit_rate(functions, mode, c, after, p, work):  # type: ignore[no-untyped-de
 
 
 @helper
-def margins(functions, layout, z, p, last, out, work):  # type: ignore[no-untyped-def]
-    """Fill the margins in the order interior, exit, joint."""
-    none, empty = work[0], work[1]
+def margins(functions, layout, z, p, last, out, times):  # type: ignore[no-untyped-def]
+    """Fill the margins in the order interior, exit, joint; an interior one is inf without turnings."""
+    n = z.shape[1] - 1
+    none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
+    y, jac, grad = np.empty(n), np.empty((n, 2 + n)), np.empty(1 + n)
+    modes, exits, observables = layout.modes, layout.exits, layout.observables
+    interior, joint = layout.interior, layout.joint
     count = z.shape[0]
     at = 0
-    for k in range(layout.interior.shape[0]):
-        i, surface = layout.interior[k, 0], layout.interior[k, 1]
+    for k in range(interior.shape[0]):
+        i, surface, sign = interior[k, 0], interior[k, 1], float(interior[k, 2])
         after = z[i + 1] if i + 1 < count else last
-        out[at] = interior_margin(
-            functions,
-            layout.modes[i],
-            surface,
-            layout.observables[surface],
-            float(layout.interior[k, 2]),
-            z[i],
-            after[0] - z[i, 0],
-            p,
-            work,
-        )
+        duration = after[0] - z[i, 0]
+        c = observables[surface]
+        least = np.inf  # also of a segment that vanishes: the joint and exit margins watch it
+        if duration > 0.0:
+            found = functions[3](modes[i], c, z[i, 0], z[i, 1:], duration, p, times)
+            target = functions[2](surface, p, none, empty)
+            if found < 0:
+                least = np.nan
+            for turn in range(found):
+                value = observed(
+                    functions, modes[i], c, z[i], times[turn], p, none, empty, nothing, y
+                )
+                least = min(least, sign * (value - target))
+        out[at] = least
         at += 1
     for i in range(count):
         after = z[i + 1] if i + 1 < count else last
-        c = layout.observables[layout.exits[i]]
-        out[at] = layout.exit_signs[i] * exit_rate(functions, layout.modes[i], c, after, p, work)
+        c = observables[exits[i]]
+        rate = exit_rate(functions, modes[i], c, after, p, none, y, jac, grad)
+        out[at] = layout.exit_signs[i] * rate
         at += 1
-    for k in range(layout.joint.shape[0]):
-        i, surface = layout.joint[k, 0], layout.joint[k, 1]
+    for k in range(joint.shape[0]):
+        i, surface = joint[k, 0], joint[k, 1]
         after = z[i + 1] if i + 1 < count else last
-        value = functions[1](layout.observables[surface], after[0], after[1:], p, none, empty)
-        out[at] = layout.joint[k, 2] * (value - functions[2](surface, p, none, empty))
+        value = functions[1](observables[surface], after[0], after[1:], p, none, empty)
+        out[at] = joint[k, 2] * (value - functions[2](surface, p, none, empty))
         at += 1
 
 
 @helper
-def crossings(functions, layout, k, z, p, last, work):  # type: ignore[no-untyped-def]
+def crossings(functions, layout, k, z, p, last, times):  # type: ignore[no-untyped-def]
     """Return the surfaces that the segment of row k crosses, as digits of one integer."""
-    none, empty, times = work[0], work[1], work[6]
+    none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
+    y = np.empty(z.shape[1] - 1)
     i, c, on = layout.labels[k, 0], layout.labels[k, 1], layout.labels[k, 2]
+    mode, observables = layout.modes[i], layout.observables
     after = z[i + 1] if i + 1 < z.shape[0] else last
     duration = after[0] - z[i, 0]
     if duration <= 0.0:
         return 0
-    found = functions[3](layout.modes[i], c, z[i, 0], z[i, 1:], duration, p, times)
+    found = functions[3](mode, c, z[i, 0], z[i, 1:], duration, p, times)
     if found < 0:
         return -1
     if on >= 0:
@@ -136,23 +113,23 @@ def crossings(functions, layout, k, z, p, last, work):  # type: ignore[no-untype
     code = 0
     for piece in range(found + 1):
         if piece < found:
-            following = observed(functions, layout.modes[i], c, z[i], times[piece], p, work)
+            following = observed(functions, mode, c, z[i], times[piece], p, none, empty, nothing, y)
         else:
             following = functions[1](c, after[0], after[1:], p, none, empty)
-        code = crossed_between(functions, layout, c, value, following, p, work, code)
+        code = crossed_between(functions, observables, c, value, following, p, none, empty, code)
         value = following
     return code
 
 
 @helper
-def crossed_between(functions, layout, c, value, following, p, work, code):  # type: ignore[no-untyped-def]
+def crossed_between(functions, observables, c, value, following, p, none, empty, code):  # type: ignore[no-untyped-def]
     """Add the surfaces between two values of observable c to a code, in the order of the motion."""
-    surfaces = layout.observables.shape[0]
+    surfaces = observables.shape[0]
     for j in range(surfaces):
         # surfaces of an observable are listed from the highest level down
         surface = surfaces - 1 - j if following > value else j
-        if layout.observables[surface] == c:
-            target = functions[2](surface, p, work[0], work[1])
+        if observables[surface] == c:
+            target = functions[2](surface, p, none, empty)
             if min(value, following) < target < max(value, following):
                 code = code * (surfaces + 1) + surface + 1
     return code
@@ -275,11 +252,11 @@ def watch(functions, layout, z, p, out, labels):  # type: ignore[no-untyped-def]
     close_w = np.empty((z.shape[1], 0))
     none = np.empty(0, dtype=np.int64)
     last = np.empty(z.shape[1])
-    work = scratch(z.shape[1] - 1)
+    times = np.empty(_MOST_TURNINGS)
     last_joint(functions, layout, z, p, none, last, close, close_w)
-    margins(functions, layout, z, p, last, out, work)
+    margins(functions, layout, z, p, last, out, times)
     for k in range(layout.labels.shape[0]):
-        labels[k] = crossings(functions, layout, k, z, p, last, work)
+        labels[k] = crossings(functions, layout, k, z, p, last, times)
     for k in range(layout.interior.shape[0] + z.shape[0] + layout.joint.shape[0]):
         if np.isnan(out[k]):
             return False
