@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,7 +15,7 @@ from contfric.continuation.events import Bifurcation, End
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System, build_system
-from contfric.orbit.words import mirror_pairs
+from contfric.orbit.words import decode, encode, mirror_pairs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -72,6 +73,8 @@ class Branch:
         return len(self.values)
 
     def __getitem__(self, index: int) -> Orbit:
+        """Return one point as an orbit."""
+        index = operator.index(index)
         vector = self.vector.copy()
         vector[self.model.index_of(self.parameter)] = self.values[index]
         return Orbit(self.system, self.joints[index], vector, 0.0)
@@ -158,11 +161,13 @@ class Branch:
         system = build_system(self.model, word, self.system.periods, self.system.half)
         joints = self.joints @ _block(symmetry.array()).T
         joints[:, :, 0] += self._period_shift()[:, None]
-        images = {id(b): replace(b, orbit=b.orbit.mirror()) for b in self._all_bifurcations()}
+        images = {id(b): b.mirror() for b in self._all_bifurcations()}
         return replace(
             self,
             system=system,
             joints=joints,
+            margins=self.margins[:, _mirrored_tests(self.system, system)],
+            labels=_mirrored_labels(self.labels, self.model),
             bifurcations=tuple(images[id(b)] for b in self.bifurcations),
             ends=(_mirror_end(self.ends[0], images), _mirror_end(self.ends[1], images)),
             mirrored=not self.mirrored,
@@ -200,6 +205,24 @@ class Branch:
             f"<Branch {self.name}: {len(self)} points, {self.parameter} in [{low:.6g}, {high:.6g}], "
             f"ends {self.ends[0].reason.name} and {self.ends[1].reason.name}>"
         )
+
+
+def _mirrored_tests(system: System, image: System) -> list[int]:
+    """Return the column of the original margins for each margin of the mirror image."""
+    assert system.model.symmetry is not None
+    surfaces = system.model.symmetry.surfaces
+    place = {(t.margin, t.segment, surfaces[t.surface]): k for k, t in enumerate(system.tests)}
+    return [place[t.margin, t.segment, t.surface] for t in image.tests]
+
+
+def _mirrored_labels(labels: IntArray, model: Model) -> IntArray:
+    """Return the labels of the mirror image: the same crossings of the mirrored surfaces."""
+    assert model.symmetry is not None
+    image = model.symmetry.surfaces
+    surfaces = [s.name for s in model.surfaces]
+    codes, inverse = np.unique(labels, return_inverse=True)
+    mirrored = [encode([image[s] for s in decode(int(c), surfaces)], surfaces) for c in codes]
+    return np.array(mirrored, dtype=np.int64)[inverse].reshape(labels.shape)
 
 
 def _block(matrix: FloatArray) -> FloatArray:

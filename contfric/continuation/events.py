@@ -19,7 +19,7 @@ out of the region where it can stay.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 
@@ -138,6 +138,15 @@ class Bifurcation:
         if self.tests and self.kind is not Kind.T:
             return f"{self.kind.value}_{'s' if self.symmetric else 'a'}"
         return self.kind.value if self.kind is Kind.T else f"{self.kind.value}_{self.orbit.name}"
+
+    def mirror(self) -> Bifurcation:
+        """Return the mirror image, at the same parameters."""
+        symmetry = self.orbit.model.symmetry
+        assert symmetry is not None
+        tests = tuple(
+            replace(t, surface=symmetry.surfaces.get(t.surface, t.surface)) for t in self.tests
+        )
+        return replace(self, orbit=self.orbit.mirror(), tests=tests)
 
     def __repr__(self) -> str:
         values = ", ".join(f"{k}={v:.12g}" for k, v in self.params.items())

@@ -245,18 +245,19 @@ def _tangencies(
     found: list[tuple[Bifurcation, Point]] = []
     active = orbit.model.index_of(settings.parameter)
     for k in range(len(before.labels)):
-        start = before
-        while start.labels[k] != after.labels[k]:
-            code = float(start.labels[k])
-            point = _trial(orbit, start, after, settings, BY_LABEL, k, code, 1.0)
-            if point is None or len(found) > 64:
-                break
+        if before.labels[k] == after.labels[k]:
+            continue
+        # the first change, seen from the start, and the last one, seen from the end of the step
+        first = _trial(orbit, before, after, settings, BY_LABEL, k, float(before.labels[k]), 1.0)
+        last = _trial(orbit, after, before, settings, BY_LABEL, k, float(after.labels[k]), 1.0)
+        places = [p for p in (first, last) if p is not None]
+        if len(places) > 1 and places[1].arc - places[0].arc < SAME_PLACE:
+            places.pop()
+        for point in places:
             here = point.orbit(orbit.system, orbit.vector, active)
             test = Test(*_label_place(orbit, k))
-            found.append(
-                (_bifurcation(Kind.T, here, point, point, point, settings, (test,)), point)
-            )
-            break
+            b = _bifurcation(Kind.T, here, point, point, point, settings, (test,))
+            found.append((b, point))
     return found
 
 

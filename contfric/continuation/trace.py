@@ -32,6 +32,12 @@ _CHUNK = 512
 #: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).
 _AT_LIMIT = 1e-6
 
+#: Share of the range within which an event cannot be told from a physical limit, where conditions
+#: degenerate together (with S0 = S a release has no acceleration): the root of rounding.
+_NEAR_LIMIT = 1e-6
+#: A margin this negative (nondimensional) is violated; a located limit is good to rounding.
+_VIOLATED = 1e-9
+
 Progress = Callable[[str], None]
 
 
@@ -177,8 +183,15 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     before, after = side.points[-2], side.points[-1]
     limit = _limit_crossed(orbit, before, after, settings)
     for bifurcation, point in locate_events(orbit, before, after, settings):
-        if limit is not None and point.arc > limit[0].arc - _AT_LIMIT * (after.arc - before.arc):
+        if limit is not None and (
+            point.arc > limit[0].arc - _AT_LIMIT * (after.arc - before.arc)
+            or not settings.low <= point.value <= settings.high
+        ):
             break
+        if _is_at_limit(point.value, settings):
+            side.points[-1] = point
+            side.end = _limit_end(point.value > 0.5 * (settings.low + settings.high), settings)
+            return True
         if bifurcation.kind is Kind.T and _is_start(side, before, point):
             before.labels = after.labels  # where a stop lies on a surface its label is arbitrary
             continue
@@ -189,16 +202,31 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         side.points[-1] = point
         side.end = End(ends, bifurcation=None if point.lost else bifurcation)
         return True
-    if np.any(after.tests[:-EXTRA] < 0.0) and limit is None:
+    reached = after if limit is None else limit[0]
+    if np.any(reached.tests[:-EXTRA] < -_VIOLATED):
         side.points.pop()
         side.end = End(EndReason.SINGULAR)
         return True
     if limit is None:
         return False
-    side.points[-1], reason = limit
-    kind = EndReason.LIMIT if reason else EndReason.RANGE
-    side.end = End(kind, f"{kind.value}: {reason}" if reason else "")
+    side.points[-1] = limit[0]
+    side.end = _limit_end(after.value > settings.high, settings)
     return True
+
+
+def _limit_end(upper: bool, settings: Settings) -> End:
+    reason = settings.high_reason if upper else settings.low_reason
+    kind = EndReason.LIMIT if reason else EndReason.RANGE
+    return End(kind, f"{kind.value}: {reason}" if reason else "")
+
+
+def _is_at_limit(value: float, settings: Settings) -> bool:
+    """Tell whether an event is at a physical limit: what is located there is the limit itself."""
+    near = _NEAR_LIMIT * settings.width
+    return bool(
+        (settings.low_reason and value - settings.low < near)
+        or (settings.high_reason and settings.high - value < near)
+    )
 
 
 def _is_start(side: Side, before: Point, point: Point) -> bool:

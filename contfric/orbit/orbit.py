@@ -15,7 +15,7 @@ from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.simulation import signs_at
 from contfric.orbit.system import Margin, System, Word, build_system
-from contfric.orbit.words import decode, half_of, mirror_pairs, passed_domains, whole_of
+from contfric.orbit.words import decode, end_domain, half_of, mirror_pairs, passed_domains, whole_of
 from contfric.signature import Signature
 
 if TYPE_CHECKING:
@@ -28,6 +28,10 @@ ComplexArray = NDArray[np.complex128]
 SYMMETRY_TOLERANCE = 1e-9
 #: A multiplier this near to 1 makes the orbit one of a continuum to working precision.
 DEGENERATE = 1e-9
+
+
+#: A stick of length zero (at an event) has a duration of rounding over the rate of its release.
+_NO_TIME = 1e-10
 
 
 class Status(str, Enum):
@@ -217,7 +221,8 @@ class Orbit:
     def admissible(self) -> bool:
         """Whether the orbit obeys every inequality inside every segment."""
         margins, _, fine = self._watched
-        return self.converged and fine and bool(np.all(margins > self._slack))
+        lasting = bool(np.all(self.ends[:, 0] - self.cycle[:, 0] > -_NO_TIME))
+        return self.converged and fine and lasting and bool(np.all(margins > self._slack))
 
     @property
     def _slack(self) -> FloatArray:
@@ -247,24 +252,30 @@ class Orbit:
             return replace(plain, name=plain.auto_name(self.symmetric))
         _, labels, _ = self._watched
         surfaces = [s.name for s in model.surfaces]
-        ends = np.vstack([self.joints[1:], self.cycle[len(self.joints) % len(self.cycle)]])
-        if not system.half:
-            ends[-1, 0] += self.period
-        after = [mode for mode, _ in system.word[1:]] + [
-            self.word[len(system.word) % len(self.word)][0]
-        ]
+        ends = self._end_domains()
         domains: list[str] = []
-        for i, (mode, exit_) in enumerate(system.word):
-            signs = signs_at(model, float(ends[i, 0]), ends[i, 1:].copy(), self.vector)
+        for i in range(len(system.word)):
+            entry = self.word[i - 1][1]  # of the whole word: its last exit leads into the first
+            start = model.transitions[ends[i - 1], entry]
             crossed: list[str] = []
             for row, code in zip(system.layout.labels, labels, strict=True):
                 if row[0] == i:
                     crossed += decode(int(code), surfaces)
-            domains += passed_domains(model, mode, signs, exit_, after[i], crossed)
+            domains += passed_domains(model, start, ends[i], crossed)
         if system.half:
             domains += [model.mirror_domain[d] for d in domains]
         plain = Signature(model, tuple(domains), self.periods, symmetric=self.symmetric)
         return replace(plain, name=plain.auto_name(self.symmetric))
+
+    def _end_domains(self) -> list[str]:
+        """Domain in which each segment of the whole orbit ends."""
+        found = []
+        for i, (mode, exit_) in enumerate(self.word):
+            end = self.ends[i]
+            signs = signs_at(self.model, float(end[0]), end[1:].copy(), self.vector)
+            after = self.word[(i + 1) % len(self.word)][0]
+            found.append(end_domain(self.model, mode, exit_, after, signs))
+        return found
 
     @property
     def name(self) -> str:

@@ -1,8 +1,9 @@
-"""Words of an orbit and of its half, and the labels of its segments."""
+"""Words of an orbit and of its half, and the domains that its segments pass."""
 
 from __future__ import annotations
 
-from contfric.errors import NotationError
+from collections import deque
+
 from contfric.models.definition import Model
 from contfric.orbit.system import Word, exit_domains, mirror_mode
 
@@ -30,39 +31,53 @@ def whole_of(model: Model, word: Word, half: bool) -> Word:
     return word + mirror_pairs(model, word) if half else word
 
 
-def passed_domains(
-    model: Model, mode: str, end_signs: dict[str, int], exit_: str, after: str, crossed: list[str]
-) -> list[str]:
-    """Return the domains of one segment in order, from the surfaces that it crosses.
+def end_domain(model: Model, mode: str, exit_: str, after: str, signs: dict[str, int]) -> str:
+    """Return the domain in which a segment ends: one whose exit leads on, by the signs there.
 
-    They are found backwards from the domain in which it ends: the one whose signs agree with the
-    state there, among those from which its exit leads on.
+    Where a stop lies on a surface to rounding (at an event) the word decides, not the sign.
     """
     candidates = exit_domains(model, mode, exit_, after)
-    fitting = [d for d in candidates if _agrees(model, d, end_signs, exit_)]
-    if not fitting and not candidates:
-        raise NotationError(f"no domain of {mode} leads through {exit_} into {after}")
-    domain = (fitting or candidates)[0]
-    domains = [domain]
-    for surface in reversed(crossed):
-        domain = _across(model, domain, surface)
-        domains.append(domain)
-    return domains[::-1]
+    for domain in candidates:
+        own = model.domain_by_name[domain].signs
+        if all(own[s] * signs[s] >= 0 for s in own if s != exit_):
+            return domain
+    return candidates[0]
 
 
-def _agrees(model: Model, domain: str, signs: dict[str, int], skipped: str) -> bool:
-    own = model.domain_by_name[domain].signs
-    return all(own[s] * signs[s] >= 0 for s in own if s != skipped)
+def passed_domains(model: Model, start: str, end: str, crossed: list[str]) -> list[str]:
+    """Return the domains of one segment in order, from the surfaces that it crosses.
+
+    A crossing at a joint itself may be counted or not, by rounding: one that leads nowhere is left
+    out, and the walk is cut or completed so that it ends where the word says.
+    """
+    mode = model.domain_by_name[start].mode
+    path = [start]
+    for surface in crossed:
+        target = model.transitions.get((path[-1], surface))
+        if target is not None and model.domain_by_name[target].mode == mode:
+            path.append(target)
+    if path[-1] == end:
+        return path
+    if end in path[-2:]:
+        return path[: len(path) - path[::-1].index(end)]
+    return path[:-1] + _shortest_walk(model, path[-1], end)
 
 
-def _across(model: Model, domain: str, surface: str) -> str:
-    """Return the domain on the other side of a transparent surface."""
-    for (source, through), target in model.transitions.items():
-        if target == domain and through == surface:
-            same = model.domain_by_name[source].mode == model.domain_by_name[domain].mode
-            if same:
-                return source
-    return domain
+def _shortest_walk(model: Model, start: str, end: str) -> list[str]:
+    """Return the shortest walk between two domains of one mode; both ends if there is none."""
+    mode = model.domain_by_name[start].mode
+    waiting = deque([[start]])
+    seen = {start}
+    while waiting:
+        walk = waiting.popleft()
+        if walk[-1] == end:
+            return walk
+        for (source, _), target in model.transitions.items():
+            inside = model.domain_by_name[target].mode == mode
+            if source == walk[-1] and inside and target not in seen:
+                seen.add(target)
+                waiting.append([*walk, target])
+    return [start, end]
 
 
 def decode(code: int, surfaces: list[str]) -> list[str]:
@@ -73,3 +88,11 @@ def decode(code: int, surfaces: list[str]) -> list[str]:
         code, digit = divmod(code, base)
         crossed.append(surfaces[digit - 1])
     return crossed[::-1]
+
+
+def encode(crossed: list[str], surfaces: list[str]) -> int:
+    """Return the label of the surfaces crossed, in order."""
+    code = 0
+    for surface in crossed:
+        code = code * (len(surfaces) + 1) + surfaces.index(surface) + 1
+    return code
