@@ -50,3 +50,24 @@ def did_you_mean(word: str, valid: Iterable[str]) -> str:
     close = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
     hint = f"; did you mean '{close[0]}'?" if close else "."
     return f"{hint} Valid: {', '.join(names)}"
+
+
+def whole_number(name: str, value: object, least: int, most: int | None = None) -> int:
+    """Return a whole number that a user gave.
+
+    Raises
+    ------
+    ParameterError
+        If it is none, or outside of its limits.
+
+    Examples
+    --------
+    >>> whole_number("max_points", 100, least=2)
+    100
+    """
+    limits = f">= {least}" if most is None else f"from {least} to {most}"
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise ParameterError(f"{name} is a whole number {limits}, got {value!r}")
+    if value < least or (most is not None and value > most):
+        raise ParameterError(f"{name} is a whole number {limits}, got {value!r}")
+    return value

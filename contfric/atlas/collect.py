@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from contfric.atlas.diagram import Diagram, LooseEnd, Node
 from contfric.atlas.matching import same_event
@@ -14,7 +14,7 @@ from contfric.models.definition import Model
 #: Ends that the exploration goes on from.
 _FOLLOWED = frozenset({EndReason.CS, EndReason.BP, EndReason.PD})
 #: Ends that need no follower.
-_FINAL = frozenset({EndReason.RANGE, EndReason.LIMIT, EndReason.CLOSED, EndReason.UNBOUNDED})
+FINAL = frozenset({EndReason.RANGE, EndReason.LIMIT, EndReason.CLOSED, EndReason.UNBOUNDED})
 
 
 @dataclass(eq=False)
@@ -46,10 +46,10 @@ def collect(
             branches.append(branch.mirror())
     nodes = [node for event in events for node in _nodes(event, place, image)]
     loose = [
-        LooseEnd(place[i], side, end)
+        LooseEnd(place[i], side, _not_followed(end) if end.reason in _FOLLOWED else end)
         for i, branch in enumerate(computed)
         for side, end in enumerate(branch.ends)
-        if end.reason not in _FINAL and not _is_followed(events, settings, i, end)
+        if end.reason not in FINAL and not _is_followed(events, settings, i, end)
     ]
     return Diagram(
         model,
@@ -61,6 +61,11 @@ def collect(
         complete,
         notes,
     )
+
+
+def _not_followed(end: End) -> End:
+    """Return an end that could be followed and was not, saying so."""
+    return replace(end, message=f"{end.reason.value}; not followed (see the notes)")
 
 
 def _nodes(event: Event, place: dict[int, int], image: dict[int, int]) -> list[Node]:

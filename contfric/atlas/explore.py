@@ -31,7 +31,7 @@ from contfric.continuation.switching import (
     swapped_orbits,
 )
 from contfric.continuation.trace import Side, assemble, continue_orbit, trace_side
-from contfric.errors import ConvergenceError
+from contfric.errors import ConvergenceError, whole_number
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
 
@@ -59,6 +59,7 @@ class _Exploration:
     events: list[Event] = field(default_factory=list)
     waiting: deque[Event] = field(default_factory=deque)
     notes: list[str] = field(default_factory=list)
+    complete: bool = True
 
     def say(self, text: str) -> None:
         if self.progress is not None:
@@ -117,6 +118,7 @@ class _Exploration:
         while self.waiting:
             if len(self.branches) >= self.max_branches:
                 self.notes.append(f"stopped at max_branches = {self.max_branches}")
+                self.complete = False
                 return
             event = self.waiting.popleft()
             kind = event.bifurcation.kind
@@ -269,11 +271,12 @@ def explore(
     >>> sorted({b.name for b in cf.explore(orbit, "Omega", (0.48, 0.55)).branches})
     ['0s', '1a', '2a', '2s']
     """
+    settings = settings_of(orbit, parameter, range, max_step, stability, max_points)
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
-    settings = settings_of(orbit, parameter, range, max_step, stability, max_points)
+    whole_number("max_periods", max_periods, least=1)
+    whole_number("max_branches", max_branches, least=1)
     state = _Exploration(settings, max_periods, max_branches, max_points, progress)
-    complete = True
     try:
         state.add(
             continue_orbit(
@@ -288,7 +291,7 @@ def explore(
         )
         state.run()
     except KeyboardInterrupt:
-        complete = False
+        state.complete = False
         state.notes.append(EndReason.INTERRUPTED.value)
     return collect(
         orbit.model,
@@ -297,7 +300,7 @@ def explore(
         state.branches,
         state.events,
         tuple(state.notes),
-        complete,
+        state.complete,
     )
 
 

@@ -72,7 +72,9 @@ def _parser() -> _Parser:
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True)
 
     def add(name: str, command: commands.Command, text: str) -> argparse.ArgumentParser:
-        return _described(subparsers.add_parser(name, help=text, description=text), command)
+        return _described(
+            subparsers.add_parser(name, help=text, description=text, allow_abbrev=False), command
+        )
 
     _fill_run(add("run", commands.run, "compute what a study wants, and write the results"))
     _fill_explain(add("explain", commands.explain, "print the plan of a study; compute nothing"))
@@ -110,13 +112,19 @@ def _fill_info(parser: argparse.ArgumentParser) -> None:
 
 def _fill_signatures(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(metavar="list|show|check", required=True)
-    listing = actions.add_parser("list", help="names, periods and segments of all signatures")
+    listing = actions.add_parser(
+        "list", help="names, periods and segments of all signatures", allow_abbrev=False
+    )
     _described(listing, commands.list_signatures)
     listing.add_argument("--model", help="those of this model only")
-    showing = actions.add_parser("show", help="one signature, as a signature file")
+    showing = actions.add_parser(
+        "show", help="one signature, as a signature file", allow_abbrev=False
+    )
     _described(showing, commands.show_signature)
     showing.add_argument("name", metavar="NAME", help="a name, or the path of a file")
-    checking = actions.add_parser("check", help="read signature files and say what is wrong")
+    checking = actions.add_parser(
+        "check", help="read signature files and say what is wrong", allow_abbrev=False
+    )
     _described(checking, commands.check_signatures)
     checking.add_argument("files", metavar="FILE", nargs="+", type=Path)
 

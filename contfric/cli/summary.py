@@ -41,8 +41,9 @@ def findings(record: Record) -> Iterator[str]:
         yield from (f"  {text}" for text in record["loose_ends"])
     else:
         yield "no loose ends"
+    yield from (f"note: {text}" for text in record.get("notes", []))
     if not record["complete"]:
-        yield "incomplete: the exploration was interrupted"
+        yield "incomplete: the exploration was stopped before it was done"
 
 
 def _bifurcations(record: Record) -> Iterator[str]:
@@ -57,8 +58,7 @@ def _bifurcations(record: Record) -> Iterator[str]:
 
 
 def work(record: Record) -> Iterator[str]:
-    """Yield what was done: notes, counts, times, what was skipped, files."""
-    yield from (f"note      {text}" for text in record.get("notes", []))
+    """Yield what was done: counts, times, what was skipped, files."""
     yield ""
     counts = ", ".join(
         f"{value} {name.replace('_', ' ')}" for name, value in record["counts"].items()

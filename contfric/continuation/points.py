@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.errors import ParameterError
+from contfric.errors import ParameterError, whole_number
 from contfric.models.definition import FloatArray
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
@@ -22,6 +22,8 @@ LARGEST_STEP = 0.01
 FIRST_STEP = 0.1
 #: Smallest step: at the resolution of a branch in double precision, far below any feature of one.
 SMALLEST_STEP = 1e-10
+#: Smallest largest step: below it a branch is millions of points long.
+_LEAST_STEP = 1e-8
 #: Most points of one side of a branch by default.
 MOST_POINTS = 20_000
 #: Extra columns of the tests behind the margins; the first is the slope of the parameter. (Repeated
@@ -177,15 +179,27 @@ def settings_of(
     ParameterError
         For an unknown parameter, an empty, reversed or not finite range, or one without the orbit.
     """
+    if not isinstance(orbit, Orbit):
+        raise ParameterError(f"continuation starts from an Orbit, got {type(orbit).__name__}")
     model = orbit.model
     model.index_of(parameter)
-    low, high = float(bounds[0]), float(bounds[1])
+    try:
+        low, high = (float(value) for value in bounds)
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"the range of '{parameter}' is a pair of numbers (lower, upper), got {bounds!r}"
+        ) from None
+    whole_number("max_points", max_points, least=2)
+    if max_step is not None and not isinstance(max_step, (int, float)):
+        raise ParameterError(f"max_step is a share of the range, in (0, 1], got {max_step!r}")
     if not (math.isfinite(low) and math.isfinite(high)) or not low < high:
         raise ParameterError(
             f"the range of '{parameter}' must be two finite numbers, lower first, got ({low}, {high})"
         )
-    if max_step is not None and not 0.0 < max_step <= 1.0:
-        raise ParameterError(f"max_step is a share of the range, in (0, 1], got {max_step!r}")
+    if max_step is not None and not _LEAST_STEP <= max_step <= 1.0:
+        raise ParameterError(
+            f"max_step is a share of the range, from {_LEAST_STEP:g} to 1, got {max_step!r}"
+        )
     width = high - low
     bottom, top, why_bottom, why_top = model.limits(parameter, orbit.params)
     clipped_low, clipped_high = max(low, bottom), min(high, top)

@@ -99,9 +99,9 @@ def continue_orbit(
     >>> [end.reason.name for end in cf.continue_orbit(orbit, "Omega", (0.4, 0.6)).ends]
     ['SS', 'CS']
     """
+    settings = settings_of(orbit, parameter, range, max_step, stability, max_points)
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
-    settings = settings_of(orbit, parameter, range, max_step, stability, max_points)
     orbit = orbit.as_half()
     start = first_point(orbit, settings)
     if start is None:

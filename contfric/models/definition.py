@@ -277,7 +277,8 @@ class Model:
             if left < 0 or (constraint.strict and left == 0):
                 shown = ", ".join(f"{n} = {values[n]!r}" for n in constraint.coefficients)
                 raise ParameterError(
-                    f"model '{self.name}' needs {constraint.text}, got {shown}. {constraint.meaning}"
+                    f"model '{self.name}' needs {constraint.text}, got {shown}. "
+                    + (constraint.meaning or "Choose a value that obeys it.")
                 )
         return values
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contfric.errors import AperiodicError, ConvergenceError
+from contfric.errors import AperiodicError, ConvergenceError, whole_number
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit, Status
@@ -25,6 +25,8 @@ _EXACT = 1e-9
 _CREEPING = 1e-5
 #: Periods to follow before the first look, and how much longer before each next one.
 _FIRST, _LONGER = 200, 4
+#: Growth over the last stretch (three quarters of the whole simulation) that no settling motion has.
+_GROWTH = 2.0
 #: A settled orbit attracts; beyond rounding its multipliers cannot exceed 1.
 _ATTRACTS = 1.0 + 1e-6
 
@@ -62,6 +64,9 @@ def find_orbit(
     '1a'
     """
     model = load_model(model)
+    if periods is not None:
+        whole_number("periods", periods, least=1, most=MOST_PERIODS)
+    whole_number("longest", longest, least=1)
     span, done = _FIRST, 0
     y: ArrayLike | None = state
     while True:
@@ -77,6 +82,8 @@ def find_orbit(
             slow = next((r for r in recurrences(trajectory) if r[2] < _CREEPING), None)
             if slow is not None:
                 raise ConvergenceError(_marginal(trajectory, done, *slow[1:]), trajectory)
+            if _grows(trajectory):
+                raise ConvergenceError(_unbounded(trajectory), trajectory)
             raise AperiodicError(_advice(trajectory, done), trajectory)
         span = min(span * _LONGER, longest - done)
         _, time, y, _ = trajectory.last
@@ -107,6 +114,22 @@ def _marginal(trajectory: Trajectory, done: int, turns: int, mismatch: float) ->
         f"{mismatch:.1g} in {turns} period(s), more slowly than any exponential. The orbit is "
         "marginally stable (a multiplier is 1), as orbits of a continuum are. Move a parameter a "
         "little, or add damping"
+    )
+
+
+def _grows(trajectory: Trajectory) -> bool:
+    """Tell whether the last stretch of a simulation is far larger at its end than at its start."""
+    size = np.max(np.abs(trajectory.states), axis=1)
+    tenth = max(1, len(size) // 10)
+    return bool(np.max(size[-tenth:]) > _GROWTH * np.max(size[:tenth]))
+
+
+def _unbounded(trajectory: Trajectory) -> str:
+    where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
+    size = float(np.max(np.abs(trajectory.states[-1])))
+    return (
+        f"no periodic orbit: the motion at {where} grows without bound (to {size:.3g} so far), as at "
+        "a resonance with too little damping. Choose other parameters"
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from contfric.atlas.collect import FINAL
 from contfric.atlas.diagram import Diagram, LooseEnd, Node
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import EndReason
@@ -12,9 +13,6 @@ from contfric.study.read import Study
 from contfric.study.schema import ContinueTask, ExploreTask, Want
 
 Say = Callable[[str], None]
-
-#: Ends of a branch that nothing could follow.
-_FINAL = (EndReason.RANGE, EndReason.LIMIT, EndReason.CLOSED)
 
 
 def find_start(study: Study, say: Say) -> Orbit:
@@ -80,7 +78,13 @@ def one_branch(branch: Branch, bounds: tuple[float, float]) -> Diagram:
         loose_ends=tuple(
             LooseEnd(0, side, end)
             for side, end in enumerate(branch.ends)
-            if end.reason not in _FINAL
+            if end.reason not in FINAL
         ),
         complete=all(end.reason is not EndReason.INTERRUPTED for end in branch.ends),
     )
+
+
+def was_interrupted(diagram: Diagram) -> bool:
+    """Tell whether Ctrl-C ended a computation (a limit such as ``max_branches`` does not count)."""
+    ends = (end.reason for branch in diagram.branches for end in branch.ends)
+    return EndReason.INTERRUPTED.value in diagram.notes or EndReason.INTERRUPTED in ends

@@ -16,10 +16,11 @@ from contfric.study.plan import RECORD, RESULT_FILES
 
 @dataclass(frozen=True)
 class Folder:
-    """A folder that is ready to take results, and whether this run made it."""
+    """A folder that is ready to take results: whether this run made it, and what was in it."""
 
     path: Path
     made: bool
+    earlier: tuple[str, ...] = ()
 
     def discard_if_empty(self) -> None:
         """Remove the folder if this run made it and left nothing in it."""
@@ -30,18 +31,9 @@ class Folder:
     def remove_stale(self, written: Iterable[str]) -> None:
         """Remove result files of an earlier run that this one has not replaced."""
         kept = {*written, RECORD}
-        for name in {*RESULT_FILES, *self._earlier_files} - kept:
+        for name in {*RESULT_FILES, *self.earlier} - kept:
             with suppress(OSError):
                 (self.path / name).unlink()
-
-    @property
-    def _earlier_files(self) -> list[str]:
-        """Files that the record of an earlier run names."""
-        try:
-            names = json.loads((self.path / RECORD).read_text(encoding="utf-8"))["files"]
-            return [n for n in names if isinstance(n, str) and Path(n).name == n]
-        except (OSError, ValueError, KeyError, TypeError):
-            return []
 
     def free_name(self, stem: str, suffix: str) -> Path:
         """Return a file name that is not taken yet: ``stem.npz``, ``stem-2.npz``, ..."""
@@ -79,4 +71,13 @@ def open_folder(path: Path, files: Iterable[str], force: bool) -> Folder:
             pass
     except OSError as error:
         raise ResultFileError(unwritable(path, error)) from error
-    return Folder(path, made)
+    return Folder(path, made, _earlier_files(path))
+
+
+def _earlier_files(path: Path) -> tuple[str, ...]:
+    """Return the files that the record of an earlier run names, before this run replaces it."""
+    try:
+        names = json.loads((path / RECORD).read_text(encoding="utf-8"))["files"]
+        return tuple(n for n in names if isinstance(n, str) and Path(n).name == n)
+    except (OSError, ValueError, KeyError, TypeError):
+        return ()

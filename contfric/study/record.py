@@ -104,7 +104,10 @@ def _branch_entry(number: int, branch: Branch) -> dict[str, Any]:
         "points": len(branch),
         "from": min(values),
         "to": max(values),
-        "ends": [str(end) for end in branch.ends],
+        "ends": [
+            f"at {value:.8g}: {end}"
+            for value, end in zip(branch.values[[0, -1]], branch.ends, strict=True)
+        ],
     }
 
 

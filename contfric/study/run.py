@@ -15,7 +15,13 @@ from contfric.errors import ContfricError, ResultFileError
 from contfric.orbit.counts import Counts, counts
 from contfric.orbit.orbit import Orbit
 from contfric.results import save
-from contfric.study.compute import continue_from, explore_from, find_start, one_branch
+from contfric.study.compute import (
+    continue_from,
+    explore_from,
+    find_start,
+    one_branch,
+    was_interrupted,
+)
 from contfric.study.folder import Folder, open_folder
 from contfric.study.plan import (
     BIFURCATIONS,
@@ -193,7 +199,7 @@ class _Run:
 
     def _keep(self, found: Diagram) -> None:
         self.diagram = found if found.branches else None
-        if not found.complete:
+        if was_interrupted(found):
             self.status = RunStatus.INTERRUPTED
 
     def _timed(self, name: StepName, step: Callable[[], _T]) -> _T:

@@ -413,3 +413,16 @@ def test_environment_is_left_alone() -> None:
     before = dict(os.environ)
     main(["graph"])
     assert dict(os.environ) == before
+
+
+def test_an_abbreviated_force_is_refused(tmp_path: Path) -> None:
+    """``--forc`` must not overwrite results."""
+    done = subprocess.run(
+        [sys.executable, "-m", "contfric", "run", "fig05", "--out", str(tmp_path), "--forc"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "--forc" in done.stderr
+    assert not list(tmp_path.iterdir())

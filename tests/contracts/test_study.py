@@ -639,3 +639,16 @@ def test_a_read_only_disk(tmp_path, study, monkeypatch) -> None:
     monkeypatch.setattr(Path, "mkdir", refuse)
     with pytest.raises(cf.ResultFileError, match="Read-only file system; the folder is read-only"):
         cf.run_study(study(HEAD), tmp_path / "out")
+
+
+def test_force_removes_the_figures_of_another_study(tmp_path: Path) -> None:
+    """What lies in the folder afterwards is of this run, not of the one that it replaces."""
+    text = "title: {0}\nmodel: coulomb\nparams: {{Omega: 0.5, S: 0.32, S0: 0.4}}\nstart: simulate\n"
+    drawn, plain = tmp_path / "drawn.yaml", tmp_path / "plain.yaml"
+    drawn.write_text(text.format("drawn") + "figures: [{kind: orbit, file: own.png}]\n")
+    plain.write_text(text.format("plain"))
+    out = tmp_path / "out"
+    cf.run_study(drawn, out)
+    assert (out / "own.png").is_file()
+    cf.run_study(plain, out, force=True)
+    assert not (out / "own.png").exists()
