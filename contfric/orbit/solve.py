@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.simulation import Trajectory, run, start_of
-from contfric.orbit.system import System, Word, build_system
+from contfric.orbit.system import System, build_system
 from contfric.orbit.words import half_of
 from contfric.signature import Signature, reduced_word
 
@@ -173,7 +172,7 @@ def stretches(
     points = np.column_stack([clock, trajectory.states])
     closure, turn = system.layout.closure, system.layout.turn * period
     for i in range(1, len(word) - count + 1):
-        if not _same(word[i : i + count], system.word):
+        if word[i : i + count] != system.word:
             continue
         joints = points[i - 1 : i - 1 + count].copy()
         gap = points[i - 1 + count, 1:] - joints[0, 1:] @ closure.T
@@ -182,14 +181,10 @@ def stretches(
         yield float(np.max(np.abs(gap)) + abs(slip)), joints
 
 
-def _same(stretch: Word, word: Word) -> bool:
-    return stretch == word
-
-
 def settle(orbit: Orbit) -> Orbit:
     """Solve an orbit, on its half if it turns out symmetric."""
     solved = polish(orbit)
     if not solved.converged:
         return solved
     half = solved.as_half()
-    return solved if half is solved else replace(polish(half))
+    return solved if half is solved else polish(half)

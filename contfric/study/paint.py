@@ -19,8 +19,8 @@ _SIZES = {
 }
 
 
-def paint(path: Path, drawing: Drawing, orbit: Orbit, diagram: Diagram | None) -> None:
-    """Draw a figure and write it."""
+def paint(path: Path, drawing: Drawing, orbit: Orbit, diagram: Diagram | None, title: str) -> None:
+    """Draw a figure and write it; a diagram carries the study's title."""
     from contfric.plot.diagram import plot_diagram
     from contfric.plot.graph import plot_transition_graph
     from contfric.plot.orbit import plot_orbit_panels
@@ -32,6 +32,7 @@ def paint(path: Path, drawing: Drawing, orbit: Orbit, diagram: Diagram | None) -
         if diagram is None:
             raise StudyError(f"{drawing.file}: there is no diagram to draw")
         plot_diagram(diagram, rows=[row.value for row in drawing.rows], fig=figure)
+        figure.suptitle(title)
     elif drawing.kind is FigureKind.ORBIT:
         plot_orbit_panels(orbit, fig=figure)
     else:

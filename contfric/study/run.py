@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -252,7 +253,13 @@ class _Run:
         for drawing in self.study.drawings:
             self._write(
                 drawing.file,
-                lambda path, drawing=drawing: paint(path, drawing, orbit, self.diagram),  # type: ignore[misc]
+                partial(
+                    paint,
+                    drawing=drawing,
+                    orbit=orbit,
+                    diagram=self.diagram,
+                    title=self.study.title,
+                ),
             )
 
     def _write(self, name: str, write: Callable[[Path], None]) -> None:

@@ -1,7 +1,7 @@
 """Diagrams that nobody has chosen: random parameters, a simulated start, everything checked.
 
-Retraced with a fifth of the step, each gives the same branches and the same bifurcations; what a
-larger step had skipped or passed twice would show.
+Retraced with the largest step 0.004 instead of 0.01, each gives the same branches
+and the same bifurcations; what a larger step had skipped or passed twice would show.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import contfric as cf
 from contfric.atlas.matching import identity
 from contfric.orbit.solve import polish
 
-#: Drawn once; a diagram of each takes about 0.1 s.
-SEEDS = (3, 4, 6, 9, 13, 18, 28, 29, 33, 35, 36, 37)
+#: The first ones, none left out. (Of the first 120 one, 67, ends where Omega = 1/2 is a continuum, as
+#: test_event_orbits has it, and would need an exception here.)
+SEEDS = range(20)
 #: Retracing them once found a larger step that went through a branch point unseen, or around a pair
 #: of events; the parameter varied, then its range.
 CAUGHT = {
@@ -142,7 +143,7 @@ def events(found: cf.Diagram) -> list[tuple[str, float]]:
 
 @each_case
 def test_a_smaller_step_changes_nothing(case: int | str) -> None:
-    coarse, fine = diagram(case), diagram(case, 0.02 / 5)
+    coarse, fine = diagram(case), diagram(case, 0.004)
     a, b = events(coarse), events(fine)
     assert [kind for kind, _ in a] == [kind for kind, _ in b]
     for (_, one), (_, other) in zip(a, b, strict=True):
