@@ -62,6 +62,7 @@ bench: $(STAMP)
 	@echo "== bench"
 	@$(BIN)/python -m pytest benchmarks -o python_files='bench_*.py' --benchmark-only
 	@$(BIN)/python benchmarks/table.py
+	@$(BIN)/python benchmarks/error.py
 
 gallery: $(STAMP)
 	@echo "== gallery"
