@@ -18,11 +18,10 @@ import math
 import numpy as np
 from numba import types
 
-from contfric.compiled import blocks, f8, i8, indices, kernel, matrix, table, vector
+from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, table, vector
 from contfric.continuation.steps import (
     apart,
     changed,
-    copy_to,
     dips,
     largest_state,
     product,
@@ -41,6 +40,33 @@ _WANTED_ANGLE, _MOST_ANGLE = 0.12, 0.35
 _MOST_MISS = 0.3
 #: A state this large (nondimensional) is on its way to infinity: resonance without damping.
 _UNBOUNDED = 1e6
+
+
+@helper
+def predict(zs, ws, tzs, tws, k, step, guess):  # type: ignore[no-untyped-def]
+    """Write the predicted point and the last tangent to row k + 1; return the predicted parameter."""
+    for i in range(zs.shape[1]):
+        for j in range(zs.shape[2]):
+            guess[i, j] = zs[k, i, j] + step * tzs[k, i, j]
+            zs[k + 1, i, j] = guess[i, j]
+            tzs[k + 1, i, j] = tzs[k, i, j]
+    return ws[k] + step * tws[k]
+
+
+@helper
+def arrival(zs, ws, tzs, tws, tests, labels, k, step, low, high, scale):  # type: ignore[no-untyped-def]
+    """Return why the march stops at row k, or FULL if it goes on."""
+    if changed(tests[k - 1], tests[k], labels[k - 1], labels[k]):
+        return EVENT
+    if ws[k] < low or ws[k] > high:
+        return OUTSIDE
+    if k > 3 and returned(
+        zs[k], ws[k], zs[0], ws[0], tzs[0], tws[0], zs[k - 1], ws[k - 1], scale, step
+    ):
+        return CLOSED
+    if largest_state(zs[k]) > _UNBOUNDED:
+        return UNBOUNDED
+    return FULL
 
 
 @kernel(
@@ -95,94 +121,60 @@ def march(  # type: ignore[no-untyped-def]
     """
     step, largest, smallest, low, high, scale = options
     which = np.array([active])
-    count, m = zs.shape[1], zs.shape[2]
-    z, tz, guess = np.empty((count, m)), np.empty((count, m)), np.empty((count, m))
+    guess = np.empty(zs.shape[1:])
     trial = p.copy()
-    value = np.empty(tests.shape[1])
-    label = np.empty(labels.shape[1], dtype=np.int64)
-    k = 0
-    if step == 0.0:
-        trial[active] = ws[0]
-        fine, tws[0], _ = settle(
-            functions,
-            layout,
-            zs[0],
-            trial,
-            which,
-            tzs[0],
-            tws[0],
-            scale,
-            stability,
-            tests[0],
-            labels[0],
-            mu[0],
-            counts,
-        )
-        ws[0] = trial[active]
-        return FULL if fine else BROKEN, 0, step
+    solving_first = step == 0.0
+    k = -1 if solving_first else 0
     while k + 1 < ws.shape[0]:
-        if step < smallest:
+        if solving_first:
+            trial[active], slope = ws[0], tws[0]
+        elif step < smallest:
             return STEP, k, step
-        for i in range(count):
-            for j in range(m):
-                z[i, j] = zs[k, i, j] + step * tzs[k, i, j]
-                guess[i, j] = z[i, j]
-                tz[i, j] = tzs[k, i, j]
-        trial[active] = ws[k] + step * tws[k]
+        else:
+            trial[active], slope = predict(zs, ws, tzs, tws, k, step, guess), tws[k]
         guess_w = trial[active]
+        row = k + 1
         fine, slope, finite = settle(
             functions,
             layout,
-            z,
+            zs[row],
             trial,
             which,
-            tz,
-            tws[k],
+            tzs[row],
+            slope,
             scale,
             stability,
-            value,
-            label,
-            mu[k + 1],
+            tests[row],
+            labels[row],
+            mu[row],
             counts,
         )
+        ws[row], tws[row] = trial[active], slope
+        if solving_first:
+            return FULL if fine else BROKEN, 0, step
         if not fine:
             step *= 0.5
             continue
         if not finite:
-            if step > 64.0 * smallest:
-                step *= 0.25
-                continue
-            return BROKEN, k, step
-        miss = apart(z, trial[active], guess, guess_w, scale)
-        cosine = product(tz, slope, tzs[k], tws[k], scale)
+            if step <= 64.0 * smallest:
+                return BROKEN, k, step
+            step *= 0.25
+            continue
+        miss = apart(zs[row], ws[row], guess, guess_w, scale)
+        cosine = product(tzs[row], slope, tzs[k], tws[k], scale)
         angle = math.acos(min(1.0, max(-1.0, cosine)))
         if (angle > _MOST_ANGLE or miss > _MOST_MISS * step) and step > 4.0 * smallest:
             step *= 0.5
             continue
-        if k > 0 and step > 1e-4 * largest and dips(tests, k, arc, value, step):
+        if k > 0 and step > 1e-4 * largest and dips(tests, k, arc, tests[row], step):
             step *= 0.25
             continue
-        k += 1
-        copy_to(zs[k], z)
-        copy_to(tzs[k], tz)
-        ws[k], tws[k] = trial[active], slope
+        k = row
         arc[k] = arc[k - 1] + step
-        for j in range(value.shape[0]):
-            tests[k, j] = value[j]
-        for j in range(label.shape[0]):
-            labels[k, j] = label[j]
         factor = min(1.6, max(0.4, _WANTED_ANGLE / max(angle, 1e-6)))
-        size = largest_state(z)
-        following = min(largest * (1.0 + size), step * factor)
-        if changed(tests[k - 1], value, labels[k - 1], label):
-            return EVENT, k, following
-        if ws[k] < low or ws[k] > high:
-            return OUTSIDE, k, following
-        if k > 3 and returned(
-            z, ws[k], zs[0], ws[0], tzs[0], tws[0], zs[k - 1], ws[k - 1], scale, step
-        ):
-            return CLOSED, k, following
-        if size > _UNBOUNDED:
-            return UNBOUNDED, k, following
+        following = min(largest * (1.0 + largest_state(zs[k])), step * factor)
+        why = arrival(zs, ws, tzs, tws, tests, labels, k, step, low, high, scale)
+        if why != FULL:
+            return why, k, following
         step = following
     return FULL, k, step
