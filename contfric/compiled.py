@@ -94,7 +94,7 @@ class FirstClass(types.WrapperAddressProtocol):  # type: ignore[misc]
 
 #: LLVM's level, and vectorised loops or not: loops are over 3 to 10 numbers here, so that more of
 #: either does not run faster (measured: within 2 percent) and takes up to a quarter longer to compile.
-_OPTIMISATION, _VECTORISE = config._OptLevel(1), 0
+_OPTIMISATION, _VECTORISE = type(config.OPT)(1), 0
 
 
 @cache
