@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 from contfric.continuation.branch import Branch
@@ -91,17 +92,16 @@ class Diagram:
 
     @cached_property
     def graph(self) -> nx.MultiGraph[int]:
-        """Branches as nodes, joined by the bifurcations at which they meet (networkx)."""
+        """Branches as nodes; an edge for each pair that meets at a bifurcation (networkx)."""
         import networkx as nx
 
         graph: nx.MultiGraph[int] = nx.MultiGraph()
         for i, branch in enumerate(self.branches):
             graph.add_node(i, name=branch.name, branch=branch)
         for node in self.nodes:
-            first, *others = node.branches
-            for other in others:
+            for one, other in combinations(node.branches, 2):
                 graph.add_edge(
-                    first, other, kind=node.bifurcation.kind.value, bifurcation=node.bifurcation
+                    one, other, kind=node.bifurcation.kind.value, bifurcation=node.bifurcation
                 )
         return graph
 
