@@ -84,7 +84,10 @@ class _Exploration:
                 return
         event = Event(bifurcation, [index])
         self.events.append(event)
-        if bifurcation.kind not in _PASSED:
+        if not bifurcation.located:
+            at = _where(bifurcation, settings.parameter)
+            self.notes.append(f"{at}: not located (Newton fails behind this point); not followed")
+        elif bifurcation.kind not in _PASSED:
             self.waiting.append(event)
 
     def known(self, orbit: Orbit) -> bool:

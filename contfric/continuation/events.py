@@ -107,6 +107,9 @@ class Bifurcation:
         Arclength on the branch.
     stable_before, stable_after : bool or None
         Stability on the two sides in the order of the branch; None if not computed or no side.
+    located : bool
+        False if a test changed sign but Newton failed on the way to the place: the parameters are
+        those of the last solved point before it.
     """
 
     kind: Kind
@@ -116,6 +119,7 @@ class Bifurcation:
     position: float = 0.0
     stable_before: bool | None = None
     stable_after: bool | None = None
+    located: bool = True
 
     @property
     def group(self) -> int:
@@ -150,7 +154,7 @@ class Bifurcation:
 
     def __repr__(self) -> str:
         values = ", ".join(f"{k}={v:.12g}" for k, v in self.params.items())
-        return f"<{self.label}: {values}>"
+        return f"<{self.label}: {values}{'' if self.located else ' (not located)'}>"
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from contfric.continuation.events import Bifurcation, Kind, kind_of_margin
@@ -211,9 +213,16 @@ def _smooth_events(
                 # singular, and Newton may be lost around it: look from between the two points
                 between = parabola_vertex(before, after, a / (a - b))
                 vertex = _fold(orbit, before, beyond, between, settings)
-                if vertex[0].kind is not Kind.SN:
-                    folded = True
+                folded = True
+                if vertex[0].kind is Kind.SN:
+                    found.append(_not_located(orbit, Kind.SN, before, beyond, settings))
+                else:
                     found.append(vertex)
+            elif point is None or point.lost:
+                # a pole is no event: multipliers are infinite where an exit becomes tangential
+                half = orbit.system.half or column == CHI_ONE
+                kind = Kind.NS if column == CHI_PAIR else Kind.BP if half else Kind.PD
+                found.append(_not_located(orbit, kind, before, beyond, settings))
             continue
         if column == FOLD:
             folded = True
@@ -229,6 +238,15 @@ def _smooth_events(
         here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
         found.append((_bifurcation(kind, here, before, beyond, point, settings), point))
     return [*found, *_tangencies(orbit, before, beyond, settings)]
+
+
+def _not_located(
+    orbit: Orbit, kind: Kind, before: Point, beyond: Point, settings: Settings
+) -> tuple[Bifurcation, Point]:
+    """Return an event that is known to lie behind a point, and no better: it is not kept silent."""
+    here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    bifurcation = _bifurcation(kind, here, before, beyond, before, settings)
+    return replace(bifurcation, located=False), before
 
 
 def _is_pole(value: float, a: float, b: float) -> bool:

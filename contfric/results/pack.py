@@ -158,6 +158,7 @@ class Packer:
             "tests": [[t.margin.value, t.segment, t.surface] for t in bifurcation.tests],
             "stable_before": bifurcation.stable_before,
             "stable_after": bifurcation.stable_after,
+            "located": bifurcation.located,
         }
 
 

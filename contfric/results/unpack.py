@@ -72,6 +72,7 @@ class Unpacker:
                 position,
                 entry["stable_before"],
                 entry["stable_after"],
+                entry.get("located", True),
             )
             for entry, position in zip(self.header["bifurcations"], positions, strict=True)
         ]

@@ -85,6 +85,7 @@ def _diagram_entries(diagram: Diagram) -> dict[str, Any]:
                 "group": node.bifurcation.group,
                 "stable_before": node.bifurcation.stable_before,
                 "stable_after": node.bifurcation.stable_after,
+                "located": node.bifurcation.located,
             }
             for node in listed_nodes(diagram)
         ],

@@ -103,3 +103,27 @@ def test_negative_damping_gives_a_torus_bifurcation() -> None:
     assert np.allclose(np.abs(mu), 1.0, atol=1e-10)
     assert torus[0].params["zeta"] < 0.0
     assert (torus[0].stable_before, torus[0].stable_after) in {(True, False), (False, True)}
+
+
+@pytest.mark.parametrize(("column", "kind"), [(0, "SN"), (2, "BP")])
+def test_an_event_that_cannot_be_located_is_said(
+    column: int, kind: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The sign change is known, the place is not: reported at the point before, and not followed."""
+    from contfric.continuation import locate
+
+    trial = locate._trial
+
+    def failing(orbit, before, after, settings, by, index, *rest):  # type: ignore[no-untyped-def]
+        if by == 0 and index == len(orbit.system.tests) + column:
+            return None
+        return trial(orbit, before, after, settings, by, index, *rest)
+
+    monkeypatch.setattr(locate, "_trial", failing)
+    found = cf.explore(cf.find_orbit("coulomb", PARAMS), "Omega", (0.4, 0.6))
+    (event,) = [b for b in found.bifurcations if not b.located]
+    assert event.kind == kind
+    assert "not located" in repr(event)
+    assert any("not located" in note for note in found.notes)
+    cf.save(found, tmp_path / "diagram.npz")
+    assert [b.located for b in cf.load(tmp_path / "diagram.npz").bifurcations].count(False) == 1
