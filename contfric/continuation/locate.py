@@ -271,6 +271,8 @@ def _tangencies(
         places = [p for p in (first, last) if p is not None]
         if len(places) > 1 and places[1].arc - places[0].arc < SAME_PLACE:
             places.pop()
+        if not places:
+            found.append(_not_located(orbit, Kind.T, before, after, settings))
         for point in places:
             here = point.orbit(orbit.system, orbit.vector, active)
             test = Test(*_label_place(orbit, k))
