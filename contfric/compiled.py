@@ -54,9 +54,9 @@ flow_signature = types.void(i8, f8, vector, f8, vector, indices, vector, matrix)
 observe_signature = f8(i8, f8, vector, vector, indices, vector)
 #: level(k, p, which, grad): level of surface k; ``grad`` (len(which)), not filled if empty.
 level_signature = f8(i8, vector, indices, vector)
-#: turning(mode, c, t0, y0, dt, p, out): number of interior stationary times of observable c, written
-#: to ``out`` in ascending order; -1 if they do not fit.
-turning_signature = i8(i8, i8, f8, vector, f8, vector, vector)
+#: turning(mode, c, t0, y0, dt, p, times, values): number of interior stationary points of observable
+#: c; their times after the start, ascending, and its values there are written; -1 if they do not fit.
+turning_signature = i8(i8, i8, f8, vector, f8, vector, vector, vector)
 #: hit(mode, c, level, on, t0, y0, dt_max, p): the first time after the start at which observable c
 #: takes the level (``on``: it starts there); negative if it does not within ``dt_max``.
 hit_signature = f8(i8, i8, f8, types.boolean, f8, vector, f8, vector)
@@ -71,25 +71,42 @@ HitType = types.FunctionType(hit_signature)
 PeriodType = types.FunctionType(period_signature)
 
 
+class Kernel:
+    """A compiled entry point: called from Python without numba's look at the types of its arguments.
+
+    The look costs about 60 microseconds a call with the engine's arguments, and there is one
+    signature only. What is handed over must have exactly the types of the signature.
+    """
+
+    def __init__(self, dispatcher: Any, signature: Any) -> None:
+        self.dispatcher, self.signature = dispatcher, signature
+        self.__wrapped__ = dispatcher.py_func
+        self.__doc__ = dispatcher.py_func.__doc__
+        (result,) = dispatcher.overloads.values()
+        self._entry = result.entry_point
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._entry(*arguments)
+
+
 class FirstClass(types.WrapperAddressProtocol):  # type: ignore[misc]
     """A kernel as a first-class function: its address is looked up once, not at every call.
 
     Handing numba the kernel itself costs about 16 microseconds an argument and call.
     """
 
-    def __init__(self, kernel: Any, signature: Any) -> None:
+    def __init__(self, kernel: Kernel) -> None:
         from numba.experimental.function_type import _get_wrapper_address
 
         self._kernel = kernel  # keeps the compiled code alive
-        self._signature = signature
-        self._address = _get_wrapper_address(kernel, signature)
+        self._address = _get_wrapper_address(kernel.dispatcher, kernel.signature)
 
     def __wrapper_address__(self) -> int:
         return int(self._address)
 
     def signature(self) -> Any:
         """Return the signature of the function."""
-        return self._signature
+        return self._kernel.signature
 
 
 #: LLVM's level, and vectorised loops or not: loops are over 3 to 10 numbers here, so that more of
@@ -127,24 +144,34 @@ def _user_cache() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache")))
 
 
-def kernel(signature: Any) -> Callable[[F], F]:
+def kernel(signature: Any) -> Callable[[Callable[..., Any]], Kernel]:
     """Compile a function for one explicit signature, with a cache on disk where possible."""
 
-    def decorate(function: F) -> F:
+    def decorate(function: Callable[..., Any]) -> Kernel:
         folder = cache_folder(Path(function.__code__.co_filename))
         before = config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE
         config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = str(folder), _OPTIMISATION, _VECTORISE
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            return numba.njit(signature, cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+            compiled = numba.njit(signature, cache=True, nogil=True, error_model="numpy")(function)
         except (OSError, RuntimeError):  # no folder is writable
-            return numba.njit(signature, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+            compiled = numba.njit(signature, nogil=True, error_model="numpy")(function)
         finally:
             config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = before
+        return Kernel(compiled, signature)
 
     return decorate
 
 
 def helper(function: F) -> F:
-    """Compile a small function into the kernels that call it."""
+    """Compile a small function into the kernels that call it; it must not allocate.
+
+    Without numba's counts of references, which cost two atomic operations for each array that is
+    looked up in a tuple: half of the engine's time.
+    """
+    return numba.njit(error_model="numpy", nogil=True, _nrt=False)(function)  # type: ignore[no-any-return]
+
+
+def allocating_helper(function: F) -> F:
+    """Compile a function that allocates into the kernels that call it."""
     return numba.njit(error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]

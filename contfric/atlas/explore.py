@@ -23,14 +23,15 @@ from contfric.atlas.diagram import Diagram
 from contfric.atlas.matching import identity, on_branch, same_event, stops_distance
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation, End, EndReason, Kind
-from contfric.continuation.points import MOST_POINTS, Settings, first_point, settings_of
+from contfric.continuation.points import MOST_POINTS, Settings, settings_of
+from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import (
     NEARER,
     leave_branch_point,
     settings_value,
     swapped_orbits,
 )
-from contfric.continuation.trace import Side, assemble, continue_orbit, trace_side
+from contfric.continuation.trace import assemble, continue_orbit, trace_side
 from contfric.errors import ConvergenceError, whole_number
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
@@ -208,7 +209,7 @@ class _Exploration:
                 return
             side = trace_side(orbit, departure.point, self.settings, progress=self.progress)
             if _went_somewhere(side):
-                side.points.insert(0, departure.origin)
+                side.start_at(departure.origin)
                 first = _first_end(reason, event.bifurcation, side, self.settings)
                 self._add_from(assemble(orbit, self.settings, side, first), event)
                 return
@@ -313,14 +314,14 @@ def _where(bifurcation: Bifurcation, parameter: str) -> str:
 
 def _first_end(reason: EndReason, b: Bifurcation, side: Side, settings: Settings) -> End:
     """Return the end of a branch at the event that it starts from."""
-    mu = side.points[min(1, len(side.points) - 1)].mu
+    mu = side.second_multipliers
     stable = bool(np.all(np.abs(mu) < 1.0)) if settings.stability else None
     here = replace(b, position=0.0, stable_before=None, stable_after=stable)
     return End(reason, f"{EndReason.START.value}: {_where(b, settings.parameter)}", here)
 
 
 def _went_somewhere(side: Side) -> bool:
-    return side.points[-1].arc - side.points[0].arc > _NOWHERE
+    return side.length > _NOWHERE
 
 
 def _through(orbit: Orbit, settings: Settings, max_points: int) -> Branch | None:

@@ -1,8 +1,10 @@
 """Location of an event on a branch, compiled: a bracket, each trial a solved point of the branch.
 
-By Chandrupatla's method (Adv. Eng. Software 28 (1997) 145-149): inverse quadratic interpolation where
-the values are monotone enough for it, bisection elsewhere; the bracket shrinks to the resolution of
-the arithmetic.
+A trial is predicted by the cubic through both ends of the step and their tangents, and corrected
+normal to the tangent between them. Places are chosen by Chandrupatla's method (Adv. Eng. Software 28
+(1997) 145-149): inverse quadratic interpolation where the values are monotone enough for it, bisection
+elsewhere; the bracket shrinks to the resolution of the arithmetic. Only the value that is sought is
+evaluated on the way.
 """
 
 from __future__ import annotations
@@ -13,8 +15,19 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
-from contfric.continuation.steps import copy_to, settle
-from contfric.orbit.newton import FunctionsType, LayoutType
+from contfric.continuation.steps import (
+    AT_EVENT,
+    CHI_ONE,
+    FOLD,
+    copy_to,
+    observe_point,
+    settle,
+    step_room,
+)
+from contfric.orbit.equations import FunctionsType, LayoutType, close_chain
+from contfric.orbit.monitor import crossings, find_turnings, interior_margin, joint_margin
+from contfric.orbit.newton import CHECKS, MULTIPLIERS
+from contfric.orbit.spectrum import multipliers
 
 #: What locate() follows: a column of the tests, a label, or the parameter itself.
 BY_TEST, BY_LABEL, BY_PARAMETER = range(3)
@@ -41,17 +54,58 @@ def next_trial(low, high, f_low, f_high, x_old, f_old, x):  # type: ignore[no-un
 
 
 @helper
-def sign_value(kind, index, target, sign, tests, labels, w):  # type: ignore[no-untyped-def]
-    """Return the function whose change of sign is sought, positive before it."""
-    if kind == BY_TEST:
-        value = sign * tests[index]
-    elif kind == BY_LABEL:
-        value = 1.0 if labels[index] == int(target) else -1.0
-    else:
-        value = sign * (w - target)
-    if math.isnan(value):
-        return -1.0
-    return min(value, 1e3)  # a margin without stationary points is infinite
+def margin_value(functions, layout, index, z, p, room):  # type: ignore[no-untyped-def]
+    """Return one margin of a settled point."""
+    first, count = layout.interior.shape[0], z.shape[0]
+    if index < first:
+        i, c = layout.interior[index, 0], layout.observables[layout.interior[index, 1]]
+        equations, turnings = room.equations, room.turnings
+        found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
+        return interior_margin(functions, layout, index, found, p, equations, turnings)
+    if index < first + count:
+        return layout.exit_signs[index - first] * room.equations.rates[index - first]
+    return joint_margin(functions, layout, index - first - count, z, p, room.equations)
+
+
+@helper
+def watched_value(functions, layout, kind, index, target, z, p, w, slope, mu, counts, room):  # type: ignore[no-untyped-def]
+    """Return the function whose change of sign is sought, at a settled point."""
+    margins = layout.interior.shape[0] + z.shape[0] + layout.joint.shape[0]
+    if kind == BY_PARAMETER:
+        return w - target
+    if kind == BY_LABEL:
+        code, nearest = crossings(functions, layout, index, z, p, room.equations, room.turnings)
+        # the distance of the nearest stationary point to a surface vanishes where the label changes
+        return nearest if code == int(target) else -nearest
+    if index < margins:
+        counts[CHECKS] += 1
+        return margin_value(functions, layout, index, z, p, room)
+    if index == margins + FOLD:
+        return slope
+    counts[MULTIPLIERS] += 1
+    one, minus = multipliers(layout.rank, room.pencil, room.equations.close, mu, room.spectral)
+    if index == margins + CHI_ONE:
+        return one
+    return minus if index == margins + CHI_ONE + 1 else 1.0 - abs(mu[0]) * abs(mu[1])
+
+
+@helper
+def limited(value):  # type: ignore[no-untyped-def]
+    """Return a value fit for interpolation: a margin without stationary points is infinite."""
+    return -1.0 if math.isnan(value) else min(value, 1e3)
+
+
+@helper
+def between(za, zb, ta, tb, wa, wb, sa, sb, length, x, z, t):  # type: ignore[no-untyped-def]
+    """Write the predicted point and tangent at a share x of a step; return parameter and slope."""
+    y = 1.0 - x
+    ha, hb = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x)
+    ga, gb = x * y * y * length, -x * x * y * length
+    for i in range(za.shape[0]):
+        for j in range(za.shape[1]):
+            z[i, j] = ha * za[i, j] + hb * zb[i, j] + ga * ta[i, j] + gb * tb[i, j]
+            t[i, j] = y * ta[i, j] + x * tb[i, j]
+    return ha * wa + hb * wb + ga * sa + gb * sb, y * sa + x * sb
 
 
 @kernel(
@@ -65,12 +119,12 @@ def sign_value(kind, index, target, sign, tests, labels, w):  # type: ignore[no-
         i8,
         i8,
         f8,
-        f8,
+        vector,
+        vector,
         matrix,
         matrix,
         matrix,
-        f8,
-        f8,
+        matrix,
         vector,
         vector,
         indices,
@@ -88,12 +142,12 @@ def locate(  # type: ignore[no-untyped-def]
     kind,
     index,
     target,
-    sign,
+    ends,
+    values,
     za,
     zb,
-    tz,
-    wb,
-    tw,
+    ta,
+    tb,
     tests,
     slope_out,
     labels,
@@ -102,8 +156,13 @@ def locate(  # type: ignore[no-untyped-def]
 ):
     """Find where a watched value changes sign between two points of a branch.
 
-    On entry ``za``, ``p`` and the tangent ``(tz, tw)`` are the first point, ``(zb, wb)`` the second.
-    On return ``za``, ``p``, ``tz`` hold the located point with its tangent (``slope_out[0]`` its
+    Parameters
+    ----------
+    ends : (parameter, slope, parameter, slope, arclength between) of the first and the second point
+    values : the watched value at both
+    za, zb, ta, tb : joints and tangents of both, shape (N, m)
+
+    On return ``za``, ``p``, ``ta`` hold the located point with its tangent (``slope_out[0]`` its
     p'), and ``tests``, ``labels``, ``mu`` what is watched there.
 
     Returns
@@ -114,75 +173,77 @@ def locate(  # type: ignore[no-untyped-def]
     """
     which = np.array([active])
     count, m = za.shape
-    wa = p[active]
+    wa, sa, wb, sb, length = ends
+    room = step_room(count, m, p.shape[0])
     z, t = np.empty((count, m)), np.empty((count, m))
-    best_z, best_t = za.copy(), tz.copy()
-    low, high = 0.0, 1.0
-    f_low, f_high, f_old, x_old = np.nan, np.nan, np.nan, 0.0
-    x, stage = 0.0, 0
-    best_x, best_w, best_slope = 0.0, wa, tw
+    best_z, best_t = za.copy(), ta.copy()
+    best_x, best_w, best_slope = 0.0, wa, sa
+    f_low, f_high = values[0], values[1]
+    if kind == BY_LABEL:
+        for side in range(2):
+            here = za if side == 0 else zb
+            p[active] = wa if side == 0 else wb
+            close_chain(functions, layout, here, p, room.equations.none, room.equations)
+            f = watched_value(
+                functions, layout, kind, index, target, here, p, 0.0, 0.0, mu, counts, room
+            )
+            if side == 0:
+                f_low = f
+            else:
+                f_high = f
+    sign = -1.0 if f_low < 0.0 and kind != BY_LABEL else 1.0
+    f_low, f_high = limited(sign * f_low), limited(sign * f_high)
+    low, high, x = 0.0, 1.0, 0.5
+    x_old, f_old = low, f_low
     lost = False
+    if f_low > 0.0 and f_high < 0.0:
+        x = min(0.99, max(0.01, f_low / (f_low - f_high)))
     for _ in range(120):
-        for i in range(count):
-            for j in range(m):
-                z[i, j] = za[i, j] + x * (zb[i, j] - za[i, j])
-        p[active] = wa + x * (wb - wa)
-        copy_to(t, tz)
+        if f_low <= 0.0 or f_high > 0.0:
+            best_x = 0.0 if f_low <= 0.0 else 1.0
+            break
+        p[active], slope = between(za, zb, ta, tb, wa, wb, sa, sb, length, x, z, t)
         fine, slope, _ = settle(
-            functions, layout, z, p, which, t, tw, scale, stability, tests, labels, mu, counts
+            functions, layout, z, p, which, t, slope, scale, AT_EVENT, counts, room
         )
-        if not fine:
-            if stage < 2:
-                return -1.0
-            f = -1.0
-        else:
-            f = sign_value(kind, index, target, sign, tests, labels, p[active])
-            if f >= 0.0 or stage == 1:
-                best_x, best_w, best_slope = x, p[active], slope
+        f = -1.0
+        if fine:
+            w = p[active]
+            f = limited(
+                sign
+                * watched_value(
+                    functions, layout, kind, index, target, z, p, w, slope, mu, counts, room
+                )
+            )
+            if f >= 0.0:
+                best_x, best_w, best_slope = x, w, slope
                 copy_to(best_z, z)
                 copy_to(best_t, t)
-        if stage == 0:
-            f_low, stage, x = f, 1, 1.0
-            if f <= 0.0:
-                break
-            continue
-        if stage == 1:
-            f_high, stage = f, 2
-            if f > 0.0:
-                break
-            x_old, f_old = low, f_low
-            x = 0.5
-            continue
         if f > 0.0:
-            x_old, f_old = (low, f_low)
+            x_old, f_old = low, f_low
             low, f_low = x, f
         else:
-            x_old, f_old = (high, f_high)
+            x_old, f_old = high, f_high
             high, f_high = x, f
             lost = not fine
-        width = high - low
-        if f == 0.0 or width <= 4e-16:
+        if f == 0.0 or high - low <= 4e-16:
             break
         x = next_trial(low, high, f_low, f_high, x_old, f_old, x)
-    copy_to(za, best_z)
-    copy_to(tz, best_t)
+    if best_x == 1.0:
+        copy_to(best_z, zb)
+        copy_to(best_t, tb)
+        best_w, best_slope = wb, sb
     p[active] = best_w
-    copy_to(t, tz)
-    _, slope, _ = settle(
-        functions,
-        layout,
-        best_z,
-        p,
-        which,
-        t,
-        best_slope,
-        scale,
-        stability,
-        tests,
-        labels,
-        mu,
-        counts,
+    fine, best_slope, _ = settle(
+        functions, layout, best_z, p, which, best_t, best_slope, scale, AT_EVENT, counts, room
     )
-    p[active] = best_w
+    if fine:
+        observe_point(
+            functions, layout, best_z, p, best_slope, stability, tests, labels, mu, counts, room
+        )
+    copy_to(za, best_z)
+    copy_to(ta, best_t)
     slope_out[0] = best_slope
+    if not fine:
+        return -1.0
     return -2.0 - best_x if lost else best_x

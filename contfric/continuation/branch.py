@@ -42,8 +42,6 @@ class Branch:
         Joints of one turn at each point.
     arc : ndarray, shape (k,)
         Arclength, in units in which the parameter's range counts 1.
-    margins : ndarray, shape (k, margins)
-        Margins of the inequalities at each point.
     labels : ndarray, shape (k, labels)
         Codes of the transparent surfaces crossed; they change at T.
     turn_multipliers : ndarray or None, shape (k, n)
@@ -62,7 +60,6 @@ class Branch:
     values: FloatArray
     joints: FloatArray
     arc: FloatArray
-    margins: FloatArray
     labels: IntArray
     turn_multipliers: NDArray[np.complex128] | None
     bifurcations: tuple[Bifurcation, ...]
@@ -124,6 +121,11 @@ class Branch:
         return np.asarray(np.all(np.abs(self.turn_multipliers) < 1.0, axis=1))
 
     @cached_property
+    def margins(self) -> FloatArray:
+        """Margins of the inequalities at each point, shape (k, margins); evaluated when asked for."""
+        return np.array([orbit.margins for orbit in self])
+
+    @cached_property
     def stops(self) -> FloatArray:
         """Displacements at the stops, shape (k, stops)."""
         surface = self.model.stop_surface
@@ -166,7 +168,6 @@ class Branch:
             self,
             system=system,
             joints=joints,
-            margins=self.margins[:, _mirrored_tests(self.system, system)],
             labels=_mirrored_labels(self.labels, self.model),
             bifurcations=tuple(images[id(b)] for b in self.bifurcations),
             ends=(_mirror_end(self.ends[0], images), _mirror_end(self.ends[1], images)),
@@ -205,14 +206,6 @@ class Branch:
             f"<Branch {self.name}: {len(self)} points, {self.parameter} in [{low:.6g}, {high:.6g}], "
             f"ends {self.ends[0].reason.name} and {self.ends[1].reason.name}>"
         )
-
-
-def _mirrored_tests(system: System, image: System) -> list[int]:
-    """Return the column of the original margins for each margin of the mirror image."""
-    assert system.model.symmetry is not None
-    surfaces = system.model.symmetry.surfaces
-    place = {(t.margin, t.segment, surfaces[t.surface]): k for k, t in enumerate(system.tests)}
-    return [place[t.margin, t.segment, t.surface] for t in image.tests]
 
 
 def _mirrored_labels(labels: IntArray, model: Model) -> IntArray:

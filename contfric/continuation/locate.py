@@ -54,8 +54,7 @@ def _trial(
     settings: Settings,
     kind: int,
     index: int,
-    target: float,
-    sign: float,
+    target: float = 0.0,
 ) -> Point | None:
     """Locate one change of sign; None if no point could be solved on the way."""
     from contfric.continuation.bracket import BY_TEST, locate
@@ -63,10 +62,15 @@ def _trial(
     system = orbit.system
     active = orbit.model.index_of(settings.parameter)
     vector = orbit.vector.copy()
-    vector[active] = before.value
     joints, tangent = before.joints.copy(), before.tangent.copy()
     tests, labels, mu = before.tests.copy(), before.labels.copy(), before.mu.copy()
     slope = np.empty(1)
+    length = after.arc - before.arc
+    ends = np.array([before.value, before.slope, after.value, after.slope, length])
+    if kind == BY_TEST:
+        values = np.array([before.tests[index], after.tests[index]])
+    else:
+        values = np.array([before.value - target, after.value - target])
     at = locate(
         system.functions(),
         system.layout,
@@ -77,12 +81,12 @@ def _trial(
         kind,
         index,
         target,
-        sign,
+        ends,
+        values,
         joints,
-        np.ascontiguousarray(after.joints),
+        after.joints,
         tangent,
-        after.value,
-        before.slope,
+        after.tangent,
         tests,
         slope,
         labels,
@@ -115,10 +119,9 @@ def locate_value(
     """Return the point at which the parameter takes a value."""
     from contfric.continuation.bracket import BY_PARAMETER
 
-    sign = 1.0 if before.value > target else -1.0
     if before.value == target:
         return before
-    found = _trial(orbit, before, after, settings, BY_PARAMETER, 0, target, sign)
+    found = _trial(orbit, before, after, settings, BY_PARAMETER, 0, target)
     if found is None:
         return before
     # the bracket ends within rounding of the value: solve at the value itself
@@ -139,7 +142,7 @@ def _sliding_events(
     located: list[tuple[int, Point]] = []
     for k in range(margins):
         if after.tests[k] < 0.0:
-            point = _trial(orbit, before, after, settings, BY_TEST, k, 0.0, 1.0)
+            point = _trial(orbit, before, after, settings, BY_TEST, k)
             if point is not None:
                 located.append((k, point))
     if not located:
@@ -172,7 +175,7 @@ def _located_before(
     from contfric.continuation.bracket import BY_TEST
 
     violated = map(int, np.flatnonzero(point.tests[: len(orbit.system.tests)] < -_TOGETHER))
-    found = [(k, _trial(orbit, before, point, settings, BY_TEST, k, 0.0, 1.0)) for k in violated]
+    found = [(k, _trial(orbit, before, point, settings, BY_TEST, k)) for k in violated]
     return [(k, p) for k, p in found if p is not None and p.arc < point.arc]
 
 
@@ -205,8 +208,7 @@ def _smooth_events(
         a, b = before.tests[base + column], after.tests[base + column]
         if not a * b < 0.0 or (column == CHI_ONE and folded):
             continue  # chi(1) of a fold vanishes with it
-        sign = float(np.sign(a))
-        point = _trial(orbit, before, after, settings, BY_TEST, base + column, 0.0, sign)
+        point = _trial(orbit, before, after, settings, BY_TEST, base + column)
         if point is None or point.lost or _is_pole(point.tests[base + column], a, b):
             if column == FOLD:
                 # at the vertex of a pitchfork or of a period doubling the arclength system itself is
@@ -266,8 +268,8 @@ def _tangencies(
         if before.labels[k] == after.labels[k]:
             continue
         # the first change, seen from the start, and the last one, seen from the end of the step
-        first = _trial(orbit, before, after, settings, BY_LABEL, k, float(before.labels[k]), 1.0)
-        last = _trial(orbit, after, before, settings, BY_LABEL, k, float(after.labels[k]), 1.0)
+        first = _trial(orbit, before, after, settings, BY_LABEL, k, float(before.labels[k]))
+        last = _trial(orbit, after, before, settings, BY_LABEL, k, float(after.labels[k]))
         places = [p for p in (first, last) if p is not None]
         if len(places) > 1 and places[1].arc - places[0].arc < SAME_PLACE:
             places.pop()

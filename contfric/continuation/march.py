@@ -1,8 +1,10 @@
 """Pseudo-arclength continuation, compiled.
 
-A branch is a curve ``(z(s), p(s))`` of the chain of segments. From a point with unit tangent the next
-one is predicted along the tangent and corrected in the plane normal to it (H. B. Keller, 1977). The
-step follows the curvature: the angle between consecutive tangents is kept near a target.
+A branch is a curve ``(z(s), p(s))`` of the chain of segments. From two points with unit tangents the
+next one is predicted by the cubic through both (Hermite), and corrected in the plane normal to the
+last tangent (H. B. Keller, 1977). The step follows the curvature: the angle between consecutive
+tangents is kept near a target. Arclength between points is the chord c with the correction for its
+arc, ``c (1 + angle^2 / 24)``.
 
 Every accepted point is watched: margins, slope p', ``chi(1)``, ``chi(-1)``, the largest pair of
 multipliers, and the labels of its segments. The march stops at the first step over which any of them
@@ -20,15 +22,18 @@ from numba import types
 
 from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, table, vector
 from contfric.continuation.steps import (
+    ALONG,
     apart,
     changed,
     dips,
     largest_state,
+    observe_point,
     product,
     returned,
     settle,
+    step_room,
 )
-from contfric.orbit.newton import FunctionsType, LayoutType
+from contfric.orbit.equations import FunctionsType, LayoutType
 
 #: Why a march stopped.
 FULL, EVENT, OUTSIDE, STEP, CLOSED, BROKEN, UNBOUNDED = range(7)
@@ -36,6 +41,8 @@ FULL, EVENT, OUTSIDE, STEP, CLOSED, BROKEN, UNBOUNDED = range(7)
 #: Angle between consecutive tangents (rad): wanted, and the most that is accepted. At the wanted
 #: angle a branch is smooth to the eye; beyond the other one, the step may change branches.
 _WANTED_ANGLE, _MOST_ANGLE = 0.12, 0.35
+#: Most that a step grows by: the first steps are short, and the cubic holds this far beyond its base.
+_GROWTH = 2.5
 #: Distance from predictor to orbit in units of the step: beyond it the step may change branches.
 _MOST_MISS = 0.3
 #: A state this large (nondimensional) is on its way to infinity: resonance without damping.
@@ -43,30 +50,62 @@ _UNBOUNDED = 1e6
 
 
 @helper
-def predict(zs, ws, tzs, tws, k, step, guess):  # type: ignore[no-untyped-def]
-    """Write the predicted point and the last tangent to row k + 1; return the predicted parameter."""
+def predict(zs, ws, tzs, tws, arc, k, step):  # type: ignore[no-untyped-def]
+    """Write the predicted point and the last tangent to row k + 1; return the predicted parameter.
+
+    The cubic through the last two points and their tangents, ``z_k + t_k x + A x^2 + B x^3`` with
+    ``A = (2 t_k + t_{k-1} - 3 D) / h`` and ``B = (t_k + t_{k-1} - 2 D) / h^2``, D the chord over h.
+    """
+    back = arc[k] - arc[k - 1] if k > 0 else 0.0
+    square, cube = 0.0, 0.0
+    if back > 0.0:
+        square, cube = step * step / back, step**3 / (back * back)
     for i in range(zs.shape[1]):
         for j in range(zs.shape[2]):
-            guess[i, j] = zs[k, i, j] + step * tzs[k, i, j]
-            zs[k + 1, i, j] = guess[i, j]
-            tzs[k + 1, i, j] = tzs[k, i, j]
-    return ws[k] + step * tws[k]
+            t = tzs[k, i, j]
+            value = zs[k, i, j] + step * t
+            if back > 0.0:
+                chord = (zs[k, i, j] - zs[k - 1, i, j]) / back
+                before = tzs[k - 1, i, j]
+                value += square * (2.0 * t + before - 3.0 * chord)
+                value += cube * (t + before - 2.0 * chord)
+            zs[k + 1, i, j] = value
+            tzs[k + 1, i, j] = t
+    value = ws[k] + step * tws[k]
+    if back > 0.0:
+        chord = (ws[k] - ws[k - 1]) / back
+        value += square * (2.0 * tws[k] + tws[k - 1] - 3.0 * chord)
+        value += cube * (tws[k] + tws[k - 1] - 2.0 * chord)
+    return value
 
 
 @helper
-def arrival(zs, ws, tzs, tws, tests, labels, k, step, low, high, scale):  # type: ignore[no-untyped-def]
+def arrival(zs, ws, tzs, tws, tests, labels, k, start, taken, step, low, high, scale):  # type: ignore[no-untyped-def]
     """Return why the march stops at row k, or FULL if it goes on."""
     if changed(tests[k - 1], tests[k], labels[k - 1], labels[k]):
         return EVENT
     if ws[k] < low or ws[k] > high:
         return OUTSIDE
-    if k > 3 and returned(
-        zs[k], ws[k], zs[0], ws[0], tzs[0], tws[0], zs[k - 1], ws[k - 1], scale, step
+    if taken > 3 and returned(
+        zs[k],
+        ws[k],
+        start[0],
+        start[1][0, 0],
+        start[2],
+        start[3][0, 0],
+        zs[k - 1],
+        ws[k - 1],
+        scale,
+        step,
     ):
         return CLOSED
     if largest_state(zs[k]) > _UNBOUNDED:
         return UNBOUNDED
     return FULL
+
+
+#: Start of a branch as the march knows it: joints, parameter (1, 1), tangent, slope (1, 1).
+StartType = types.UniTuple(matrix, 4)
 
 
 @kernel(
@@ -76,7 +115,10 @@ def arrival(zs, ws, tzs, tws, tests, labels, k, step, low, high, scale):  # type
         vector,
         i8,
         vector,
+        i8,
         types.boolean,
+        StartType,
+        i8,
         blocks,
         vector,
         blocks,
@@ -94,7 +136,10 @@ def march(  # type: ignore[no-untyped-def]
     p,
     active,
     options,
+    k,
     stability,
+    start,
+    taken,
     zs,
     ws,
     tzs,
@@ -105,14 +150,16 @@ def march(  # type: ignore[no-untyped-def]
     mu,
     counts,
 ):
-    """Continue from the point in row 0 (with its tangent and watched values) until something happens.
+    """Continue from the point in row k (with its tangent and watched values) until something happens.
 
-    A first step of 0 asks for row 0 alone: it is solved, normal to the tangent given there.
+    With k = -1, row 0 alone is solved, normal to the tangent given there.
 
     Parameters
     ----------
     options : (first step, largest step, smallest step, lower limit, upper limit, 1/width^2)
-    zs, ws, tzs, tws, arc, tests, labels, mu : points of the branch, one a row; filled from row 1
+    k : last row that is given; an earlier one serves the prediction
+    start, taken : where the branch began, and points since then
+    zs, ws, tzs, tws, arc, tests, labels, mu : points of the branch, one a row; filled from row k + 1
 
     Returns
     -------
@@ -121,34 +168,44 @@ def march(  # type: ignore[no-untyped-def]
     """
     step, largest, smallest, low, high, scale = options
     which = np.array([active])
-    guess = np.empty(zs.shape[1:])
+    guess, angle = np.empty(zs.shape[1:]), 0.0
     trial = p.copy()
-    solving_first = step == 0.0
-    k = -1 if solving_first else 0
+    room = step_room(zs.shape[1], zs.shape[2], p.shape[0])
+    solving_first = k < 0
     while k + 1 < ws.shape[0]:
+        row = k + 1
         if solving_first:
             trial[active], slope = ws[0], tws[0]
         elif step < smallest:
             return STEP, k, step
         else:
-            trial[active], slope = predict(zs, ws, tzs, tws, k, step, guess), tws[k]
+            trial[active], slope = predict(zs, ws, tzs, tws, arc, k, step), tws[k]
+            guess[:, :] = zs[row]
         guess_w = trial[active]
-        row = k + 1
         fine, slope, finite = settle(
-            functions,
-            layout,
-            zs[row],
-            trial,
-            which,
-            tzs[row],
-            slope,
-            scale,
-            stability,
-            tests[row],
-            labels[row],
-            mu[row],
-            counts,
+            functions, layout, zs[row], trial, which, tzs[row], slope, scale, ALONG, counts, room
         )
+        if fine and not solving_first:
+            miss = apart(zs[row], trial[active], guess, guess_w, scale)
+            cosine = product(tzs[row], slope, tzs[k], tws[k], scale)
+            angle = math.acos(min(1.0, max(-1.0, cosine)))
+            if (angle > _MOST_ANGLE or miss > _MOST_MISS * step) and step > 4.0 * smallest:
+                step *= 0.5
+                continue
+        if fine:
+            finite = observe_point(
+                functions,
+                layout,
+                zs[row],
+                trial,
+                slope,
+                stability,
+                tests[row],
+                labels[row],
+                mu[row],
+                counts,
+                room,
+            )
         ws[row], tws[row] = trial[active], slope
         if solving_first:
             return FULL if fine else BROKEN, 0, step
@@ -160,20 +217,15 @@ def march(  # type: ignore[no-untyped-def]
                 return BROKEN, k, step
             step *= 0.25
             continue
-        miss = apart(zs[row], ws[row], guess, guess_w, scale)
-        cosine = product(tzs[row], slope, tzs[k], tws[k], scale)
-        angle = math.acos(min(1.0, max(-1.0, cosine)))
-        if (angle > _MOST_ANGLE or miss > _MOST_MISS * step) and step > 4.0 * smallest:
-            step *= 0.5
-            continue
         if k > 0 and step > 1e-4 * largest and dips(tests, k, arc, tests[row], step):
             step *= 0.25
             continue
-        k = row
-        arc[k] = arc[k - 1] + step
-        factor = min(1.6, max(0.4, _WANTED_ANGLE / max(angle, 1e-6)))
+        k, taken = row, taken + 1
+        chord = apart(zs[k], ws[k], zs[k - 1], ws[k - 1], scale)
+        arc[k] = arc[k - 1] + chord * (1.0 + angle * angle / 24.0)
+        factor = min(_GROWTH, max(0.4, _WANTED_ANGLE / max(angle, 1e-6)))
         following = min(largest * (1.0 + largest_state(zs[k])), step * factor)
-        why = arrival(zs, ws, tzs, tws, tests, labels, k, step, low, high, scale)
+        why = arrival(zs, ws, tzs, tws, tests, labels, k, start, taken, step, low, high, scale)
         if why != FULL:
             return why, k, following
         step = following

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contfric.errors import ParameterError, whole_number
 from contfric.models.definition import FloatArray
-from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System
 
@@ -82,6 +80,10 @@ class Point:
         full[active] = self.value
         return Orbit(system, self.joints.copy(), full, 0.0)
 
+    def as_start(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return joints, parameter, tangent and slope as the march takes them, each a matrix."""
+        return self.joints, np.array([[self.value]]), self.tangent, np.array([[self.slope]])
+
     def reversed(self) -> Point:
         """Return the same point with the opposite tangent."""
         tests = self.tests.copy()
@@ -95,72 +97,6 @@ class Point:
             self.labels,
             self.mu,
             self.arc,
-        )
-
-
-@dataclass(eq=False)
-class Rows:
-    """Arrays that the compiled march writes to; row 0 holds the point to start from."""
-
-    joints: FloatArray
-    values: FloatArray
-    tangents: FloatArray
-    slopes: FloatArray
-    arc: FloatArray
-    tests: FloatArray
-    labels: IntArray
-    mu: NDArray[np.complex128]
-
-    @classmethod
-    def room_for(cls, orbit: Orbit, room: int) -> Rows:
-        """Return empty rows for the points of an orbit's branch."""
-        shape, system = orbit.joints.shape, orbit.system
-        return cls(
-            np.empty((room, *shape)),
-            np.empty(room),
-            np.empty((room, *shape)),
-            np.empty(room),
-            np.zeros(room),
-            np.zeros((room, len(system.tests) + EXTRA)),
-            np.zeros((room, len(system.layout.labels)), dtype=np.int64),
-            np.zeros((room, len(system.model.states)), dtype=np.complex128),
-        )
-
-    @classmethod
-    def after(cls, orbit: Orbit, point: Point, room: int) -> Rows:
-        """Return rows that start with a point."""
-        rows = cls.room_for(orbit, room)
-        rows.joints[0], rows.values[0] = point.joints, point.value
-        rows.tangents[0], rows.slopes[0] = point.tangent, point.slope
-        rows.arc[0], rows.tests[0] = point.arc, point.tests
-        rows.labels[0], rows.mu[0] = point.labels, point.mu
-        return rows
-
-    def arrays(self, counts: IntArray) -> Any:
-        """Return the arrays in the order in which the march takes them, the counts last."""
-        return (
-            self.joints,
-            self.values,
-            self.tangents,
-            self.slopes,
-            self.arc,
-            self.tests,
-            self.labels,
-            self.mu,
-            counts,
-        )
-
-    def point(self, k: int) -> Point:
-        """Return one row as a point."""
-        return Point(
-            self.joints[k],
-            float(self.values[k]),
-            self.tangents[k],
-            float(self.slopes[k]),
-            self.tests[k],
-            self.labels[k],
-            self.mu[k],
-            float(self.arc[k]),
         )
 
 
@@ -226,35 +162,3 @@ def settings_of(
         stability,
         max_points,
     )
-
-
-def first_point(
-    orbit: Orbit,
-    settings: Settings,
-    tangent: FloatArray | None = None,
-    slope: float = 1.0,
-) -> Point | None:
-    """Solve for the first point of a branch; None if it has no unique tangent there.
-
-    Parameters
-    ----------
-    tangent, slope : direction to solve normal to; by default along the parameter
-    """
-    from contfric.continuation.march import BROKEN, march
-
-    active = orbit.model.index_of(settings.parameter)
-    direction = np.zeros_like(orbit.joints) if tangent is None else tangent
-    rows = Rows.room_for(orbit, 1)
-    rows.joints[0], rows.values[0] = orbit.joints, orbit.vector[active]
-    rows.tangents[0], rows.slopes[0] = direction, slope
-    options = np.array([0.0, 0.0, 0.0, settings.low, settings.high, settings.scale])
-    why, _, _ = march(
-        orbit.system.functions(),
-        orbit.system.layout,
-        orbit.vector,
-        active,
-        options,
-        settings.stability,
-        *rows.arrays(TALLY),
-    )
-    return None if why == BROKEN else rows.point(0)

@@ -7,26 +7,59 @@ the number of segments nor the unit of the parameter matters.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from contfric.compiled import helper
-from contfric.orbit.monitor import multipliers, watch
-from contfric.orbit.newton import (
-    CHECKS,
-    CONVERGED,
-    MULTIPLIERS,
-    SOLVES,
-    correct,
-    tangent_at,
-)
+from contfric.compiled import allocating_helper, helper
+from contfric.models.definition import FloatArray
+from contfric.orbit.cyclic import Elimination, room_for
+from contfric.orbit.equations import Room, close_chain, equation_room
+from contfric.orbit.monitor import Turnings, turning_room, watch
+from contfric.orbit.newton import CHECKS, CONVERGED, MULTIPLIERS, SOLVES, correct
+from contfric.orbit.spectrum import SpectralRoom, multipliers, spectral_room
 
 #: Extra columns of the tests behind the margins: slope of the parameter, products of 1 - mu and of
 #: 1 + mu, and 1 - |mu_1 mu_2| of the two largest multipliers.
 FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR = range(4)
 EXTRA = 4
-#: Accuracy asked of the corrector: the tangent's solve takes one more Newton step behind it.
-_ROUGH = 1e-9
+#: Correction from which the next one is far below rounding: along a branch the last Jacobian, which
+#: gives tangent and multipliers, is this near to the orbit.
+ALONG = 3e-13
+#: The same where an event is located, and its test function counts to its last digits.
+AT_EVENT = 5e-14
+
+
+class StepRoom(NamedTuple):
+    """Room for the steps of one branch: all that a corrector and the watch need, allocated once."""
+
+    equations: Room
+    elimination: Elimination
+    spectral: SpectralRoom
+    turnings: Turnings
+    pencil: FloatArray
+    d: FloatArray
+    e: FloatArray
+    s: FloatArray
+    z_ref: FloatArray
+    p_ref: FloatArray
+
+
+@allocating_helper
+def step_room(count, m, parameters):  # type: ignore[no-untyped-def]
+    """Return the room for the branch of a chain."""
+    return StepRoom(
+        equation_room(count, m, 1),
+        room_for(count, m, 1, 2),
+        spectral_room(m),
+        turning_room(),
+        np.zeros((2, m, m)),
+        np.zeros((1, count, m)),
+        np.zeros((1, 1)),
+        np.zeros((1, 2)),
+        np.zeros((count, m)),
+        np.zeros(parameters),
+    )
 
 
 @helper
@@ -68,46 +101,70 @@ def largest_state(z):  # type: ignore[no-untyped-def]
 
 
 @helper
-def border_rows(tz, tw, scale, d, e):  # type: ignore[no-untyped-def]
-    """Write a tangent as a border row."""
-    for i in range(tz.shape[0]):
+def anchor(room, z, p, tz, tw, scale):  # type: ignore[no-untyped-def]
+    """Set the border row: normal to a tangent through the point (z, p)."""
+    count = tz.shape[0]
+    for i in range(count):
         for j in range(tz.shape[1]):
-            d[0, i, j] = tz[i, j] / tz.shape[0]
-    e[0, 0] = tw * scale
+            room.d[0, i, j] = tz[i, j] / count
+            room.z_ref[i, j] = z[i, j]
+    room.e[0, 0] = tw * scale
+    for k in range(p.shape[0]):
+        room.p_ref[k] = p[k]
 
 
 @helper
-def settle(  # type: ignore[no-untyped-def]
-    functions, layout, z, p, which, tz, tw, scale, stability, tests, labels, mu, counts
-):
-    """Correct (z, p) normal to the tangent (tz, tw); replace the tangent; watch the point.
+def settle(functions, layout, z, p, which, tz, tw, scale, accuracy, counts, room):  # type: ignore[no-untyped-def]
+    """Correct (z, p) normal to the tangent (tz, tw), and replace the tangent.
 
     Returns
     -------
     tuple
         (converged, new p', everything finite).
     """
-    count, m = z.shape
-    d, e = np.empty((1, count, m)), np.empty((1, 1))
-    border_rows(tz, tw, scale, d, e)
-    pencil = np.empty((2, m, m))
+    anchor(room, z, p, tz, tw, scale)
     counts[SOLVES] += 1
-    status, _, _, _ = correct(functions, layout, z, p, which, d, e, np.inf, _ROUGH, pencil)
+    work = room.elimination
+    status, _, _, _ = correct(
+        functions,
+        layout,
+        z,
+        p,
+        which,
+        room.z_ref,
+        room.p_ref,
+        room.d,
+        room.e,
+        room.s,
+        np.inf,
+        accuracy,
+        room.equations,
+        work,
+        room.pencil,
+    )
     if status != CONVERGED:
         return False, tw, True
-    new_z, new_w = np.empty((count, m)), np.empty(1)
-    fine, _ = tangent_at(functions, layout, z, p, which, d, e, new_z, new_w, pencil, 1.0)
-    if not fine:
-        return False, tw, True
-    norm = math.sqrt(product(new_z, new_w[0], new_z, new_w[0], scale))
+    count, m = z.shape
+    total = 0.0
+    for i in range(count):
+        for j in range(m):
+            total += work.z[i, j, 1] ** 2
+    slope = work.w[0, 1]
+    norm = math.sqrt(total / count + slope * slope * scale)
     if not math.isfinite(norm) or norm == 0.0:
         return False, tw, False
     for i in range(count):
         for j in range(m):
-            tz[i, j] = new_z[i, j] / norm
-    slope = new_w[0] / norm
+            tz[i, j] = work.z[i, j, 1] / norm
+    close_chain(functions, layout, z, p, room.equations.none, room.equations)
+    return True, slope / norm, True
+
+
+@helper
+def observe_point(functions, layout, z, p, slope, stability, tests, labels, mu, counts, room):  # type: ignore[no-untyped-def]
+    """Fill everything that is watched on a settled point; False if something is not finite."""
     counts[CHECKS] += 1
-    finite = watch(functions, layout, z, p, tests, labels)
+    finite = watch(functions, layout, z, p, room.equations, room.turnings, tests, labels)
     at = tests.shape[0] - EXTRA
     tests[at + FOLD] = slope
     tests[at + CHI_ONE] = 1.0
@@ -115,10 +172,12 @@ def settle(  # type: ignore[no-untyped-def]
     tests[at + CHI_PAIR] = 1.0
     if stability:
         counts[MULTIPLIERS] += 1
-        tests[at + CHI_ONE], tests[at + CHI_MINUS] = multipliers(layout, pencil, mu)
+        tests[at + CHI_ONE], tests[at + CHI_MINUS] = multipliers(
+            layout.rank, room.pencil, room.equations.close, mu, room.spectral
+        )
         if layout.rank > 1:
             tests[at + CHI_PAIR] = 1.0 - abs(mu[0]) * abs(mu[1])
-    return True, slope, finite
+    return finite
 
 
 @helper

@@ -18,7 +18,8 @@ from itertools import combinations
 import numpy as np
 
 from contfric.continuation.events import Bifurcation
-from contfric.continuation.points import Point, Settings, first_point
+from contfric.continuation.points import Point, Settings
+from contfric.continuation.side import first_point
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import assembled

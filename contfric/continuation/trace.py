@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
@@ -14,20 +16,13 @@ from contfric.continuation.points import (
     EXTRA,
     FIRST_STEP,
     MOST_POINTS,
-    SMALLEST_STEP,
     Point,
-    Rows,
     Settings,
-    first_point,
     settings_of,
 )
+from contfric.continuation.side import KEPT, Side, first_point
 from contfric.errors import ConvergenceError
-from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
-
-#: Points that one call of the compiled march may write: long enough to cost nothing, short enough
-#: for Ctrl-C to be answered at once.
-_CHUNK = 512
 
 #: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).
 _AT_LIMIT = 1e-6
@@ -39,15 +34,6 @@ _NEAR_LIMIT = 1e-6
 _VIOLATED = 1e-9
 
 Progress = Callable[[str], None]
-
-
-@dataclass(eq=False)
-class Side:
-    """One side of a branch while it grows, from its first point outward."""
-
-    points: list[Point]
-    end: End
-    bifurcations: list[Bifurcation] = field(default_factory=list)
 
 
 def continue_orbit(
@@ -126,7 +112,7 @@ def trace_side(
     progress: Progress | None = None,
 ) -> Side:
     """Follow a branch from a point along its tangent until it ends."""
-    side = Side([start], End(EndReason.START))
+    side = Side.starting(start, orbit.system, End(EndReason.START))
     step = first_step * settings.largest
     while True:
         try:
@@ -135,8 +121,7 @@ def trace_side(
             side.end = End(EndReason.INTERRUPTED)
             return side
         if progress is not None:
-            last = side.points[-1].value
-            progress(f"{len(side.points)} points, {settings.parameter} = {last:.6g}")
+            progress(f"{side.count} points, {settings.parameter} = {side.tip.value:.6g}")
         if finished:
             return side
 
@@ -145,25 +130,10 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     """March once and deal with what stopped it; (whether the side is finished, next step)."""
     from contfric.continuation import march as kernels
 
-    last = side.points[-1]
-    room = min(_CHUNK, settings.most_points - len(side.points)) + 1
-    if room < 2:
+    if side.count >= settings.most_points:
         side.end = End(EndReason.POINTS)
         return True, step
-    rows = Rows.after(orbit, last, room)
-    options = np.array(
-        [step, settings.largest, SMALLEST_STEP, settings.low, settings.high, settings.scale]
-    )
-    why, count, step = kernels.march(
-        orbit.system.functions(),
-        orbit.system.layout,
-        orbit.vector,
-        orbit.model.index_of(settings.parameter),
-        options,
-        settings.stability,
-        *rows.arrays(TALLY),
-    )
-    side.points += [rows.point(k) for k in range(1, count + 1)]
+    why, step = side.march(orbit, settings, step)
     reasons = {
         kernels.STEP: EndReason.STEP,
         kernels.BROKEN: EndReason.BROKEN,
@@ -180,7 +150,7 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
 
 def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     """Locate what happened over the last step; True if the side ends there."""
-    before, after = side.points[-2], side.points[-1]
+    before, after = side.before_tip, side.tip
     limit = _limit_crossed(orbit, before, after, settings)
     for bifurcation, point in locate_events(orbit, before, after, settings):
         if limit is not None and (
@@ -189,27 +159,29 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         ):
             break
         if _is_at_limit(point.value, settings):
-            side.points[-1] = point
+            side.put_tip(point)
             side.end = _limit_end(point.value > 0.5 * (settings.low + settings.high), settings)
             return True
         if bifurcation.kind is Kind.T and _is_start(side, before, point):
-            before.labels = after.labels  # where a stop lies on a surface its label is arbitrary
+            side.relabel_first(
+                after.labels
+            )  # where a stop lies on a surface its label is arbitrary
             continue
         ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, orbit)
         if ends is None:
             side.bifurcations.append(bifurcation)
             continue
-        side.points[-1] = point
+        side.put_tip(point)
         side.end = End(ends, bifurcation=None if point.lost else bifurcation)
         return True
     reached = after if limit is None else limit[0]
     if np.any(reached.tests[:-EXTRA] < -_VIOLATED):
-        side.points.pop()
+        side.drop_tip()
         side.end = End(EndReason.SINGULAR)
         return True
     if limit is None:
         return False
-    side.points[-1] = limit[0]
+    side.put_tip(limit[0])
     side.end = _limit_end(after.value > settings.high, settings)
     return True
 
@@ -231,8 +203,7 @@ def _is_at_limit(value: float, settings: Settings) -> bool:
 
 def _is_start(side: Side, before: Point, point: Point) -> bool:
     """Tell whether a change of labels happens at the very start of a side, at an event."""
-    start = before is side.points[0]
-    return start and point.arc - before.arc < SAME_PLACE
+    return side.count == 2 and point.arc - before.arc < SAME_PLACE
 
 
 def _limit_crossed(
@@ -259,11 +230,7 @@ def _ends_branch(bifurcation: Bifurcation, orbit: Orbit) -> EndReason | None:
 
 def join(orbit: Orbit, settings: Settings, behind: Side, ahead: Side) -> Branch:
     """Return one branch from the two sides of its start."""
-    points = [*reversed(behind.points[1:]), *ahead.points]
-    shift = behind.points[-1].arc
-    arc = [shift - p.arc for p in reversed(behind.points[1:])] + [
-        shift + p.arc for p in ahead.points
-    ]
+    shift = behind.tip.arc
     back = [
         replace(
             b,
@@ -289,20 +256,19 @@ def join(orbit: Orbit, settings: Settings, behind: Side, ahead: Side) -> Branch:
     if last.bifurcation is not None:
         moved = replace(last.bifurcation, position=shift + last.bifurcation.position)
         last = replace(last, bifurcation=moved)
-    return _branch(orbit, settings, points, arc, (*back, *front), (first, last))
+    return _branch(orbit, settings, behind, ahead, (*back, *front), (first, last))
 
 
 def assemble(orbit: Orbit, settings: Settings, side: Side, first: End) -> Branch:
     """Return a branch of one side, with the end at which it starts."""
-    arc = [p.arc for p in side.points]
-    return _branch(orbit, settings, side.points, arc, tuple(side.bifurcations), (first, side.end))
+    return _branch(orbit, settings, None, side, tuple(side.bifurcations), (first, side.end))
 
 
 def _branch(
     orbit: Orbit,
     settings: Settings,
-    points: list[Point],
-    arc: list[float],
+    behind: Side | None,
+    ahead: Side,
     bifurcations: tuple[Bifurcation, ...],
     ends: tuple[End, End],
 ) -> Branch:
@@ -312,16 +278,38 @@ def _branch(
         *bifurcations,
         *([events[1]] if events[1] is not None else []),
     )
+    columns = _joined(behind, ahead)
     return Branch(
         orbit.system,
         settings.parameter,
         orbit.vector,
-        np.array([p.value for p in points]),
-        np.array([p.joints for p in points]),
-        np.array(arc),
-        np.array([p.tests[:-EXTRA] for p in points]),
-        np.array([p.labels for p in points]),
-        np.array([p.mu for p in points]) if settings.stability else None,
+        columns["values"],
+        columns["joints"],
+        columns["arc"],
+        columns["labels"],
+        columns["mu"] if settings.stability else None,
         listed,
         ends,
     )
+
+
+def _joined(behind: Side | None, ahead: Side) -> dict[str, NDArray[Any]]:
+    """Return the columns of both sides as one; the first point of ``behind`` is that of ``ahead``.
+
+    One column after the other, and each is let go as it is joined: the peak of memory is the branch
+    and its largest column.
+    """
+    back = behind.columns() if behind is not None else []
+    front = ahead.columns()
+    if back:
+        back[0] = {name: array[1:] for name, array in back[0].items()}
+    joined = {}
+    for name in KEPT:
+        pieces = [chunk.pop(name)[::-1] for chunk in reversed(back)]
+        following = [chunk.pop(name) for chunk in front]
+        if name == "arc" and behind is not None:
+            shift = behind.tip.arc
+            pieces = [shift - piece for piece in pieces]
+            following = [shift + piece for piece in following]
+        joined[name] = np.concatenate([*pieces, *following])
+    return joined

@@ -20,6 +20,7 @@ import math
 import numpy as np
 
 from contfric.compiled import (
+    allocating_helper,
     flow_signature,
     helper,
     hit_signature,
@@ -32,7 +33,6 @@ from contfric.compiled import (
 from contfric.flow.interface import CompiledFlow
 from contfric.flow.response import divided_exponentials, forced, free, roots
 from contfric.flow.roots import (
-    AT_START,
     OMEGA,
     S0,
     SPEED,
@@ -42,15 +42,13 @@ from contfric.flow.roots import (
     S,
     direction,
     excitation,
-    natural_scale,
-    next_root,
     phases,
-    quantity,
+    roots_along,
     slide,
 )
 
 
-@helper
+@allocating_helper
 def damping_slope(s, p, t0, x0, v0, d):  # type: ignore[no-untyped-def]
     """Return d(x, v)/dzeta: the response ``-2 G * v`` to the velocity (the equation differentiated)."""
     w, h = p[OMEGA], p[H]
@@ -76,7 +74,7 @@ def damping_slope(s, p, t0, x0, v0, d):  # type: ignore[no-untyped-def]
     return -2.0 * x.real, -2.0 * v.real
 
 
-@helper
+@allocating_helper
 def parameter_slope(index, s, p, t0, x0, v0, d):  # type: ignore[no-untyped-def]
     """Return d(x, v) with respect to one parameter after a slide."""
     w, h, zeta = p[OMEGA], p[H], p[ZETA]
@@ -188,34 +186,17 @@ def hit(mode, c, target, on, t0, y0, dt_max, p):  # type: ignore[no-untyped-def]
         return -1.0
     sign = direction(mode) if on and c == SPEED else 0.0  # a slide leaves v = 0 to its own side
     phase = phases(p, t0)
-    tau = next_root(mode, c, 0, target, on, sign, phase, t0, y0, 0.0, dt_max, p)[0]
+    tau = roots_along(mode, c, 0, target, on, sign, True, phase, t0, y0, dt_max, p, y0, y0)[1]
     return tau if tau <= dt_max else -1.0
 
 
 @kernel(turning_signature)
-def turning(mode, c, t0, y0, dt, p, out):  # type: ignore[no-untyped-def]
-    """Write the interior stationary times of observable c to ``out`` and return their number."""
+def turning(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
+    """Write the interior stationary points of observable c and return their number."""
     if dt <= 0.0 or (mode == STICK and c == SPEED):
         return 0
     phase = phases(p, t0)
-    count = 0
-    tau, sign = 0.0, 0.0
-    q, _, _, size = quantity(mode, c, 1, p, phase, t0, y0[0], y0[1], 0.0)
-    on = abs(q) <= AT_START * (1.0 + size)
-    while True:
-        tau, sign, slope = next_root(mode, c, 1, 0.0, on, sign, phase, t0, y0, tau, dt, p)
-        if tau < 0.0 or tau >= dt * (1.0 - 1e-14):
-            return count
-        if tau > dt * AT_START:
-            if count == out.shape[0]:
-                return -1
-            out[count] = tau
-            count += 1
-        if sign * slope < 0.0:
-            on, sign = True, -sign
-        else:  # a double root: the rate touches zero and keeps its sign; go past its resolution
-            tau += 1e-8 * natural_scale(mode, p)
-            on, sign = False, 0.0
+    return roots_along(mode, c, 1, 0.0, False, 0.0, False, phase, t0, y0, dt, p, times, values)[0]
 
 
 def compiled_flow() -> CompiledFlow:

@@ -39,13 +39,7 @@ class CompiledFlow:
 
     @cached_property
     def _first_class(self) -> tuple[Any, ...]:
-        from contfric import compiled as c
+        from contfric.compiled import FirstClass
 
-        return (
-            c.FirstClass(self.flow, c.flow_signature),
-            c.FirstClass(self.observe, c.observe_signature),
-            c.FirstClass(self.level, c.level_signature),
-            c.FirstClass(self.turning, c.turning_signature),
-            c.FirstClass(self.hit, c.hit_signature),
-            c.FirstClass(self.period, c.period_signature),
-        )
+        kernels = (self.flow, self.observe, self.level, self.turning, self.hit, self.period)
+        return tuple(FirstClass(kernel) for kernel in kernels)

@@ -28,7 +28,7 @@ import math
 
 import numpy as np
 
-from contfric.compiled import helper
+from contfric.compiled import allocating_helper, helper
 
 
 @helper
@@ -174,7 +174,7 @@ def forced(zeta, w, theta, d):  # type: ignore[no-untyped-def]
     return x.real, v.real, -x.imag, -v.imag, xw.real, vw.real
 
 
-@helper
+@allocating_helper
 def divided_exponentials(nodes, d):  # type: ignore[no-untyped-def]
     """Return exp_d over the leading nodes: entry j is exp_d[nodes[0..j]], for nodes that may repeat.
 
@@ -201,7 +201,7 @@ def divided_exponentials(nodes, d):  # type: ignore[no-untyped-def]
     return total[0].copy()
 
 
-@helper
+@allocating_helper
 def upper_product(left, right):  # type: ignore[no-untyped-def]
     """Return the product of two upper triangular matrices."""
     n = left.shape[0]

@@ -12,6 +12,7 @@ import math
 
 from contfric.compiled import helper
 from contfric.flow.march import leaving_step, reached, safe_step, window_of
+from contfric.flow.pieces import ISOLATED, UNSURE, coefficients, root_of, scan
 from contfric.flow.response import forced, free
 
 OMEGA, S, S0, H, ZETA = range(5)
@@ -20,7 +21,16 @@ LOAD, SPEED = range(2)
 #: Below this fraction of the natural scale a stationary value at the start counts as being there.
 AT_START = 1e-13
 #: Error of a stationary time, relative to 1 + the time, at which its search ends: its square counts.
-AT_STATIONARY = 1e-10
+AT_STATIONARY = 2e-9
+#: A stationary time behind this share of a segment is at its end, to rounding.
+BEFORE_END = 1.0 - 1e-14
+#: Shortest piece, in natural scales: below it Taylor's march alone goes on.
+SHORTEST = 0.02
+#: Step past a double root, in natural scales: the square root of rounding.
+PAST = 1e-8
+#: Length of a piece in natural scales: the interpolation error is about 1e-3 of the size there.
+PIECE = 2.2
+EPS = 2.220446049250313e-16
 
 
 @helper
@@ -93,7 +103,10 @@ def harmonic(w, s, c, d):  # type: ignore[no-untyped-def]
 def point(mode, p, phase, t0, x0, v0, d):  # type: ignore[no-untyped-def]
     """Return x, v, and the excitation with three derivatives after a duration d in one mode."""
     w, h = p[OMEGA], p[H]
-    if mode == STICK or p[ZETA] != 0.0:
+    if d == 0.0:
+        x, v = x0, (0.0 if mode == STICK else v0)
+        sin1, cos1, sin3, cos3 = phase
+    elif mode == STICK or p[ZETA] != 0.0:
         x, v = x0, 0.0
         if mode != STICK:
             x, v = slide(direction(mode), p, t0, x0, v0, d)
@@ -126,12 +139,13 @@ def point(mode, p, phase, t0, x0, v0, d):  # type: ignore[no-untyped-def]
 
 @helper
 def quantity(mode, c, order, p, phase, t0, x0, v0, d):  # type: ignore[no-untyped-def]
-    """Return (q, q', q'', E): q is observable c or (order 1) its rate; E bounds hypot(v, v')."""
+    """Return (q, q', q'', E, observable): q is observable c or (order 1) its rate; E >= hypot(v, v')."""
     x, v, f, f1, f2, f3 = point(mode, p, phase, t0, x0, v0, d)
+    u = x - f
     if mode == STICK:
         if order == 0:
-            return x - f, -f1, -f2, 0.0
-        return -f1, -f2, -f3, 0.0
+            return u, -f1, -f2, 0.0, u
+        return -f1, -f2, -f3, 0.0, u
     z = 2.0 * p[ZETA]
     a = f - z * v - x - direction(mode) * p[S]
     a1 = f1 - z * a - v
@@ -139,11 +153,11 @@ def quantity(mode, c, order, p, phase, t0, x0, v0, d):  # type: ignore[no-untype
     size = math.sqrt(v * v + a * a)
     if c == SPEED:
         if order == 0:
-            return v, a, a1, size
-        return a, a1, a2, size
+            return v, a, a1, size, v
+        return a, a1, a2, size, v
     if order == 0:
-        return x - f, v - f1, a - f2, size
-    return v - f1, a - f2, a1 - f3, size
+        return u, v - f1, a - f2, size, u
+    return v - f1, a - f2, a1 - f3, size, u
 
 
 @helper
@@ -178,45 +192,195 @@ def natural_scale(mode, p):  # type: ignore[no-untyped-def]
 
 
 @helper
-def next_root(mode, c, order, target, on, sign, phase, t0, y0, start, end, p):  # type: ignore[no-untyped-def]
-    """Return the first root of q - target in (start, end], the sign of q before it, and q' there.
+def sixth_bound(mode, c, order, p, size, window):  # type: ignore[no-untyped-def]
+    """Return a bound of |q^(6)| over a window that starts where hypot(v, v') = size.
 
-    The root is -1 if there is none. ``on``: q takes the target at ``start`` itself, which does not
-    count; ``sign`` is then the side to which q leaves (0: found from the derivatives).
+    By ``v^(k) = f^(k-1) - 2 zeta v^(k-1) - v^(k-2)``, from the bound of hypot(v, v') as above.
     """
-    tau = start
+    w, h, zeta = p[OMEGA], abs(p[H]), p[ZETA]
+    w2 = w * w
+    w6 = w2 * w2 * w2
+    if mode == STICK:
+        return w6 * (1 + 729 * h) if order == 0 else w6 * w * (1 + 2187 * h)
+    z = 2.0 * abs(zeta)
+    f1 = w * (1 + 3 * h)
+    e = size + f1 * window
+    if zeta < 0.0:
+        e *= math.exp(z * window)
+    a2 = (1 + z) * e + f1
+    a3 = z * a2 + e + w2 * (1 + 9 * h)
+    a4 = z * a3 + a2 + w2 * w * (1 + 27 * h)
+    a5 = z * a4 + a3 + w2 * w2 * (1 + 81 * h)
+    if c == LOAD and order == 0:
+        return a5 + w6 * (1 + 729 * h)
+    a6 = z * a5 + a4 + w2 * w2 * w * (1 + 243 * h)
+    if c == SPEED and order == 0:
+        return a6
+    if c == LOAD:
+        return a6 + w6 * w * (1 + 2187 * h)
+    return z * a6 + a5 + w6 * (1 + 729 * h)
+
+
+@helper
+def leaving_side(q1, q2):  # type: ignore[no-untyped-def]
+    """Return the sign that a function takes behind a root."""
+    return 1.0 if (q1 > 0.0 or (q1 == 0.0 and q2 > 0.0)) else -1.0
+
+
+@helper
+def roots_along(mode, c, order, target, on, sign, single, phase, t0, y0, end, p, times, values):  # type: ignore[no-untyped-def]
+    """Find the roots of q - target in (0, end], q being an observable or (order 1) its rate.
+
+    Parameters
+    ----------
+    on, sign : whether q takes the target at the start itself, which does not count, and the side to
+        which it leaves (0: found from the derivatives)
+    single : whether the first root is enough; else all interior ones are written to ``times``, and
+        the observable there to ``values``
+
+    Returns
+    -------
+    tuple
+        (number of roots, -1 if they do not fit; the last one found, -1 if none).
+    """
     natural = natural_scale(mode, p)
+    longest = PIECE * natural
+    if not single:
+        longest = end / math.ceil(end / longest)
     x0, v0 = y0[0], y0[1]
-    resolution = 0.0 if order == 0 else AT_STATIONARY  # a root goes to the resolution of time
-    leaving = on
+    tau, leaving, length, count = 0.0, on, longest, 0
+    q, q1, q2, size, value = quantity(mode, c, order, p, phase, t0, x0, v0, 0.0)
+    q -= target
+    if not single:
+        leaving = abs(q) <= AT_START * (1.0 + size)
     while tau < end:
-        q, q1, q2, size = quantity(mode, c, order, p, phase, t0, x0, v0, tau)
-        q -= target
-        if leaving:
-            leaving = False
-            if abs(q1) <= AT_START * (1.0 + size):
-                q1 = 0.0  # the rate vanishes at the start (a release with S0 = S): rounding is no sign
-            if sign == 0.0:
-                sign = 1.0 if (q1 > 0.0 or (q1 == 0.0 and q2 > 0.0)) else -1.0
-            bound = third_bound(mode, c, order, p, size, natural)
-            step = min(leaving_step(sign * q1, sign * q2, bound), natural)
-            if step <= 0.0:
-                return tau, sign, q1
-            tau += step
-            continue
+        if leaving and abs(q1) <= AT_START * (1.0 + size):
+            q1 = 0.0  # the rate vanishes at the start (a release with S0 = S): rounding is no sign
         if sign == 0.0:
-            sign = 1.0 if q > 0.0 or (q == 0.0 and q1 > 0.0) else -1.0
-        w = sign * q
-        if w <= 0.0:
-            return tau, sign, q1
-        window = window_of(w, sign * q1, natural)
-        bound = third_bound(mode, c, order, p, size, window)
-        step = safe_step(w, sign * q1, sign * q2, bound, window)
-        tau += step
-        if step < window:
-            # the remainder of Taylor's formula against the slope that is left at the root
-            slope = -sign * (q1 + q2 * step) - bound * step * step
-            error = bound * step * step * (window + step) / 6.0
-            if reached(step, tau) or error < slope * resolution * (1.0 + tau):
-                return tau, sign, q1
-    return -1.0, sign, 0.0
+            sign = leaving_side(q1, q2) if leaving or q == 0.0 else math.copysign(1.0, q)
+        root, slope, found = tau, q1, not leaving and sign * q <= 0.0
+        if not found:
+            after = min(end, tau + length)
+            step = after - tau
+            r, r1, r2, size_r, value_r = quantity(mode, c, order, p, phase, t0, x0, v0, after)
+            r -= target
+            s2 = step * step
+            error = sixth_bound(mode, c, order, p, size, step) * s2 * s2 * s2
+            before = 0.0 if leaving else sign * q
+            ends = coefficients(before, sign * q1, sign * q2, sign * r, sign * r1, sign * r2, step)
+            outcome, low, high, here = scan(ends, error, leaving)
+            if outcome == ISOLATED:
+                root, slope, at_root = refined(
+                    mode,
+                    c,
+                    order,
+                    target,
+                    sign,
+                    phase,
+                    t0,
+                    x0,
+                    v0,
+                    p,
+                    tau + low * step,
+                    (high - low) * step,
+                    root_of(here),
+                )
+                if single:
+                    return 1, root
+                if AT_START * end < root < end * BEFORE_END:
+                    if count == times.shape[0]:
+                        return -1, root
+                    times[count], values[count] = root, at_root
+                    count += 1
+                sign = -sign  # and behind the root, up to the end of the part, it falls further
+                if high < 1.0:
+                    after = tau + high * step
+                    r, r1, r2, size_r, value_r = quantity(
+                        mode, c, order, p, phase, t0, x0, v0, after
+                    )
+                    r -= target
+            if outcome != UNSURE:
+                tau, leaving, length = after, False, min(longest, 2.0 * length)
+                q, q1, q2, size, value = r, r1, r2, size_r, value_r
+                continue
+            length = max(0.5 * step, SHORTEST * natural)
+            if low > 0.0:
+                step = low * step
+            elif leaving:
+                bound = third_bound(mode, c, order, p, size, natural)
+                step = min(leaving_step(sign * q1, sign * q2, bound), natural)
+                found = step <= 0.0
+            else:
+                step, found = taylor_step(mode, c, order, sign, p, q, q1, q2, size, natural, tau)
+                root = tau + step
+                value += step * (q + 0.5 * step * q1)
+            tau += step
+        if found:
+            if single:
+                return 1, root
+            if root >= end * BEFORE_END:
+                return count, root
+            if root > AT_START * end:
+                if count == times.shape[0]:
+                    return -1, root
+                times[count], values[count] = root, value
+                count += 1
+            leaving = sign * slope < 0.0
+            sign = -sign if leaving else 0.0
+            if not leaving:  # a double root: the rate touches zero; go past its resolution
+                tau += PAST * natural
+        else:
+            leaving = False
+        q, q1, q2, size, value = quantity(mode, c, order, p, phase, t0, x0, v0, tau)
+        q -= target
+    return count, -1.0
+
+
+@helper
+def taylor_step(mode, c, order, sign, p, q, q1, q2, size, natural, tau):  # type: ignore[no-untyped-def]
+    """Return a step that passes no root, and whether it has come to one."""
+    w = sign * q
+    window = window_of(w, sign * q1, natural)
+    bound = third_bound(mode, c, order, p, size, window)
+    step = safe_step(w, sign * q1, sign * q2, bound, window)
+    if step >= window:
+        return step, False
+    # the remainder of Taylor's formula against the slope that is left at the root
+    resolution = 0.0 if order == 0 else AT_STATIONARY  # a root goes to the resolution of time
+    slope = -sign * (q1 + q2 * step) - bound * step * step
+    error = bound * step * step * (window + step) / 6.0
+    return step, reached(step, tau + step) or error < slope * resolution * (1.0 + tau + step)
+
+
+@helper
+def refined(mode, c, order, target, sign, phase, t0, x0, v0, p, start, width, share):  # type: ignore[no-untyped-def]
+    """Return the only root of a falling function in a bracket, q' and the observable there (Halley)."""
+    low, high = start, start + width
+    tau = start + share * width
+    resolution = 0.0 if order == 0 else AT_STATIONARY
+    q1, value = 0.0, 0.0
+    for _ in range(100):  # bisection alone needs 60
+        q, q1, q2, size, value = quantity(mode, c, order, p, phase, t0, x0, v0, tau)
+        q -= target
+        if sign * q > 0.0:
+            low = tau
+        else:
+            high = tau
+        shift = -q * q1 / (q1 * q1 - 0.5 * q * q2) if q != 0.0 else 0.0
+        following = tau + shift
+        if not low <= following <= high:
+            if high - low <= 4.0 * EPS * high:
+                return tau, q1, value
+            tau = 0.5 * (low + high)
+            continue
+        if order == 1:
+            value += shift * (q + shift * (0.5 * q1 + shift * q2 / 6.0))
+        bend = q2 / q1
+        third = third_bound(mode, c, order, p, size, abs(shift)) / abs(6.0 * q1)
+        left = (0.25 * bend * bend + third) * abs(shift) ** 3
+        if left <= EPS * following or left <= resolution * (1.0 + following):
+            return following, q1 + q2 * shift, value
+        if abs(shift) <= 4.0 * EPS * following:
+            return following, q1, value
+        tau = following
+    return tau, q1, value

@@ -10,13 +10,58 @@ link ``z_i`` and ``z_{i+1}``, and Gaussian elimination with row exchanges over a
 ``z_i`` out of m of them (S. J. Wright, SIAM J. Sci. Stat. Comput. 13 (1992) 742-764). The border rows
 are carried along. What is left is one small system for ``z_0`` and w, and the pencil (P, Q) of the
 orbit: ``P z_0 + Q z_N = 0`` is the linear map of one turn, whose eigenvalues are the multipliers.
+
+Nothing is stored but what the back substitution needs: the rows of a segment are written where they
+are eliminated. The columns are ``[z_0 | z_i | z_{i+1} | w | right-hand sides]``.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from contfric.compiled import helper
+from contfric.compiled import allocating_helper, helper
+from contfric.models.definition import FloatArray
+
+
+class Elimination(NamedTuple):
+    """Room for the elimination of one chain; allocated once, used for every solve.
+
+    Attributes
+    ----------
+    rows : the 2m rows at work, shape (2m, width)
+    kept : what the back substitution needs, shape (N, m, width)
+    border : border rows, shape (q, width)
+    small, rhs : the system that is left, shapes (m + q, m + q) and (m + q, right)
+    after : shape (m, right)
+    z, w : solution, shapes (N, m, right) and (q, right)
+    """
+
+    rows: FloatArray
+    kept: FloatArray
+    border: FloatArray
+    small: FloatArray
+    rhs: FloatArray
+    after: FloatArray
+    z: FloatArray
+    w: FloatArray
+
+
+@allocating_helper
+def room_for(count, m, free, right):  # type: ignore[no-untyped-def]
+    """Return the room for a chain of ``count`` segments with ``free`` parameters."""
+    width = 3 * m + free + right
+    return Elimination(
+        np.zeros((2 * m, width)),
+        np.zeros((count, m, width)),
+        np.zeros((free, width)),
+        np.zeros((m + free, m + free)),
+        np.zeros((m + free, right)),
+        np.zeros((m, right)),
+        np.zeros((count, m, right)),
+        np.zeros((free, right)),
+    )
 
 
 @helper
@@ -58,93 +103,49 @@ def swap_rows(a, i, j):  # type: ignore[no-untyped-def]
 
 
 @helper
+def subtract(target, row, source, j, factor, m, col):  # type: ignore[no-untyped-def]
+    """Subtract a multiple of a row; the columns m .. col of both are eliminated already."""
+    for k in range(m):
+        target[row, k] -= factor * source[j, k]
+    for k in range(col + 1, source.shape[1]):
+        target[row, k] -= factor * source[j, k]
+
+
+@helper
 def eliminate_joint(rows, border, m):  # type: ignore[no-untyped-def]
     """Take the columns m .. 2m out of the last m rows and of the border; False if singular."""
-    width = rows.shape[1]
     for j in range(m):
         col = m + j
-        best = j
+        best, largest = j, abs(rows[j, col])
         for row in range(j + 1, 2 * m):
-            if abs(rows[row, col]) > abs(rows[best, col]):
-                best = row
-        pivot = rows[best, col]
-        if pivot == 0.0 or not np.isfinite(pivot):
+            size = abs(rows[row, col])
+            if size > largest:
+                best, largest = row, size
+        if not 0.0 < largest < np.inf:
             return False
         if best != j:
             swap_rows(rows, j, best)
+        scale = 1.0 / rows[j, col]
         for row in range(j + 1, 2 * m):
-            factor = rows[row, col] / pivot
+            factor = rows[row, col] * scale
             if factor != 0.0:
-                for k in range(width):
-                    rows[row, k] -= factor * rows[j, k]
+                subtract(rows, row, rows, j, factor, m, col)
         for row in range(border.shape[0]):
-            factor = border[row, col] / pivot
+            factor = border[row, col] * scale
             if factor != 0.0:
-                for k in range(width):
-                    border[row, k] -= factor * rows[j, k]
+                subtract(border, row, rows, j, factor, m, col)
     return True
 
 
 @helper
-def solve_cyclic(a, b, c, r, close, close_w, d, e, s, z, w, p, q):  # type: ignore[no-untyped-def]
-    """Solve the chain for several right-hand sides.
-
-    Parameters
-    ----------
-    a, b : blocks on z_i and z_{i+1}, shape (N, m, m)
-    c : blocks on the parameters, shape (N, m, q)
-    r : right-hand sides, shape (N, m, right)
-    close, close_w : closure K (m, m) and k (m, q)
-    d, e, s : border rows on the joints (q, N, m), on the parameters (q, q), right (q, right)
-    z, w : solution, shapes (N, m, right) and (q, right)
-    p, q : pencil of one turn, shape (m, m) each
-
-    Returns
-    -------
-    bool
-        False if the system is singular to working precision or not finite.
-    """
-    count, m = a.shape[0], a.shape[1]
-    free, right = c.shape[2], r.shape[2]
-    width = 3 * m + free + right
-    rows = np.zeros((2 * m, width))
-    kept = np.zeros((count, m, width))
-    border = np.zeros((free, width))
-    first_border(border, d, e, s, m)
-    for i in range(count):
-        if i > 0:
-            shift_rows(rows, border, m)
-        fill_rows(rows, a, b, c, r, i, 0 if i == 0 else m)
-        if i == 0:
-            continue
-        if i + 1 < count:
-            for k in range(free):
-                for j in range(m):
-                    border[k, 2 * m + j] = d[k, i + 1, j]
-        if not eliminate_joint(rows, border, m):
-            return False
-        for j in range(m):
-            for k in range(width):
-                kept[i, j, k] = rows[j, k]
-    for i in range(m):
-        for j in range(m):
-            p[i, j] = rows[m + i, j]
-            q[i, j] = rows[m + i, 2 * m + j]
-    if not solve_ends(rows, border, close, close_w, m, free, z, w):
-        return False
-    back_substitute(kept, close, close_w, z, w, m, free)
-    return True
-
-
-@helper
-def first_border(border, d, e, s, m):  # type: ignore[no-untyped-def]
+def start_border(border, d, e, s, m):  # type: ignore[no-untyped-def]
     """Start the border rows: their parts on z_0, z_1, the parameters and the right-hand sides."""
     free, right = e.shape[0], s.shape[1]
     for k in range(free):
         for j in range(m):
             border[k, j] = d[k, 0, j]
-            if d.shape[1] > 1:
-                border[k, 2 * m + j] = d[k, 1, j]
+            border[k, m + j] = 0.0
+            border[k, 2 * m + j] = d[k, 1, j] if d.shape[1] > 1 else 0.0
         for j in range(free):
             border[k, 3 * m + j] = e[k, j]
         for j in range(right):
@@ -152,57 +153,68 @@ def first_border(border, d, e, s, m):  # type: ignore[no-untyped-def]
 
 
 @helper
-def fill_rows(rows, a, b, c, r, i, at):  # type: ignore[no-untyped-def]
-    """Write the equations of segment i to the last m rows, with z_i in the columns from ``at``."""
-    m, free, right = a.shape[1], c.shape[2], r.shape[2]
+def next_rows(rows, border, d, i, m):  # type: ignore[no-untyped-def]
+    """Make the rows that remain (last m) the first ones of segment i, z_i in its place."""
+    width = rows.shape[1]
     for row in range(m):
-        for j in range(3 * m):
-            rows[m + row, j] = 0.0
-        for j in range(m):
-            rows[m + row, at + j] = a[i, row, j]
-            rows[m + row, 2 * m + j] = b[i, row, j]
-        for j in range(free):
-            rows[m + row, 3 * m + j] = c[i, row, j]
-        for j in range(right):
-            rows[m + row, 3 * m + free + j] = r[i, row, j]
-
-
-@helper
-def shift_rows(rows, border, m):  # type: ignore[no-untyped-def]
-    """Make the rows that remain (last m) the first, with z_{i+1} in the place of z_i."""
-    for row in range(m):
-        for k in range(rows.shape[1]):
+        for k in range(m):
             rows[row, k] = rows[m + row, k]
-        for j in range(m):
-            rows[row, m + j] = rows[m + row, 2 * m + j]
-            rows[row, 2 * m + j] = 0.0
+            rows[row, m + k] = rows[m + row, 2 * m + k]
+            rows[row, 2 * m + k] = 0.0
+        for k in range(3 * m, width):
+            rows[row, k] = rows[m + row, k]
+    count = d.shape[1]
     for row in range(border.shape[0]):
-        for j in range(m):
-            border[row, m + j] = border[row, 2 * m + j]
-            border[row, 2 * m + j] = 0.0
+        for k in range(m):
+            border[row, m + k] = border[row, 2 * m + k]
+            border[row, 2 * m + k] = d[row, i + 1, k] if i + 1 < count else 0.0
 
 
 @helper
-def solve_ends(rows, border, close, close_w, m, free, z, w):  # type: ignore[no-untyped-def]
+def take_out(room, i, m):  # type: ignore[no-untyped-def]
+    """Eliminate joint i and keep its rows; False if singular."""
+    rows, kept = room.rows, room.kept
+    if not eliminate_joint(rows, room.border, m):
+        return False
+    for j in range(m):
+        for k in range(rows.shape[1]):
+            kept[i, j, k] = rows[j, k]
+    return True
+
+
+@helper
+def finish(room, close, close_w, p, q):  # type: ignore[no-untyped-def]
+    """Solve for all unknowns when every joint but the first is out, and fill the pencil (p, q)."""
+    rows, m = room.rows, close.shape[0]
+    for i in range(m):
+        for j in range(m):
+            p[i, j] = rows[m + i, j]
+            q[i, j] = rows[m + i, 2 * m + j]
+    if not solve_ends(rows, room.border, close, close_w, room.small, room.rhs, room.z, room.w):
+        return False
+    back_substitute(room.kept, close, close_w, room.z, room.w, room.after)
+    return True
+
+
+@helper
+def solve_ends(rows, border, close, close_w, small, rhs, z, w):  # type: ignore[no-untyped-def]
     """Solve the small system for z_0 and w that is left when all other joints are eliminated."""
-    size = m + free
-    right = z.shape[2]
-    small = np.zeros((size, size))
-    rhs = np.zeros((size, right))
-    for i in range(size):
+    m, free, right = z.shape[1], w.shape[0], z.shape[2]
+    for i in range(m + free):
+        source, row = (rows, m + i) if i < m else (border, i - m)
         for j in range(m):
-            last = rows[m + i, 2 * m + j] if i < m else border[i - m, 2 * m + j]
-            for k in range(m):
-                small[i, k] += last * close[j, k]
-            for k in range(free):
-                small[i, m + k] += last * close_w[j, k]
-        for j in range(m):
-            small[i, j] += rows[m + i, j] if i < m else border[i - m, j]
+            small[i, j] = source[row, j]
         for k in range(free):
-            small[i, m + k] += rows[m + i, 3 * m + k] if i < m else border[i - m, 3 * m + k]
+            small[i, m + k] = source[row, 3 * m + k]
         for k in range(right):
-            at = 3 * m + free + k
-            rhs[i, k] = rows[m + i, at] if i < m else border[i - m, at]
+            rhs[i, k] = source[row, 3 * m + free + k]
+        for j in range(m):
+            last = source[row, 2 * m + j]
+            if last != 0.0:
+                for k in range(m):
+                    small[i, k] += last * close[j, k]
+                for k in range(free):
+                    small[i, m + k] += last * close_w[j, k]
     if not dense_solve(small, rhs):
         return False
     for k in range(right):
@@ -214,16 +226,18 @@ def solve_ends(rows, border, close, close_w, m, free, z, w):  # type: ignore[no-
 
 
 @helper
-def back_substitute(kept, close, close_w, z, w, m, free):  # type: ignore[no-untyped-def]
+def back_substitute(kept, close, close_w, z, w, after):  # type: ignore[no-untyped-def]
     """Fill z_{N-1} .. z_1 from the kept rows."""
-    count, right = z.shape[0], z.shape[2]
-    after = np.zeros((m, right))
+    count, m, right = z.shape
+    free = w.shape[0]
     for i in range(m):
         for k in range(right):
+            value = 0.0
             for j in range(m):
-                after[i, k] += close[i, j] * z[0, j, k]
+                value += close[i, j] * z[0, j, k]
             for j in range(free):
-                after[i, k] += close_w[i, j] * w[j, k]
+                value += close_w[i, j] * w[j, k]
+            after[i, k] = value
     for i in range(count - 1, 0, -1):
         for j in range(m - 1, -1, -1):
             for k in range(right):
@@ -241,13 +255,14 @@ def back_substitute(kept, close, close_w, z, w, m, free):  # type: ignore[no-unt
 
 
 @helper
-def turn_map(p, q, close, out):  # type: ignore[no-untyped-def]
+def turn_map(p, q, close, left, out):  # type: ignore[no-untyped-def]
     """Return the linear map of one turn on z_0: ``(Q K) M = -P``; False where it is infinite."""
     m = p.shape[0]
-    left = np.zeros((m, m))
     for i in range(m):
         for j in range(m):
             out[i, j] = -p[i, j]
+            value = 0.0
             for k in range(m):
-                left[i, j] += q[i, k] * close[k, j]
+                value += q[i, k] * close[k, j]
+            left[i, j] = value
     return dense_solve(left, out)

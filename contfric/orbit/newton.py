@@ -1,14 +1,12 @@
 """Newton's method on the chain of segments, compiled.
 
-Equations of segment i, from the joint ``z_i = (t_i, y_i)`` to the next one (``z_N`` is the closure
-of ``z_0``)::
+The equations and their exact Jacobian are those of :mod:`contfric.orbit.equations`; border rows tie
+down as many parameters as are free. Each step solves for the correction and, with the same
+elimination, for the tangent along the first border row.
 
-    phi(mode_i; t_i, y_i, t_{i+1} - t_i; p) - y_{i+1} = 0        (n rows)
-    observable(z_{i+1}; p) - level(p) = 0                        (1 row)
-
-The Jacobian is exact. The iteration ends on an estimate of its own error: with quadratic convergence
-the error after a correction of size d_k, following one of size d_{k-1}, is about
-``d_k^3 / d_{k-1}^2``; at the floor of rounding the corrections stop falling.
+The iteration ends on an estimate of its own error: with quadratic convergence the error after a
+correction of size d_k, following one of size d_{k-1}, is about ``d_k^3 / d_{k-1}^2``; at the floor of
+rounding the corrections stop falling.
 """
 
 from __future__ import annotations
@@ -18,30 +16,15 @@ import math
 import numpy as np
 from numba import types
 
-from contfric.compiled import (
-    FlowType,
-    HitType,
-    LevelType,
-    ObserveType,
-    PeriodType,
-    TurningType,
-    blocks,
-    f8,
-    helper,
-    i8,
-    indices,
-    kernel,
-    matrix,
-    table,
-    vector,
-)
-from contfric.orbit.cyclic import solve_cyclic
-from contfric.orbit.system import Layout
-
-#: Type of the model's functions and of a layout, as kernels take them.
-FunctionsType = types.Tuple((FlowType, ObserveType, LevelType, TurningType, HitType, PeriodType))
-LayoutType = types.NamedTuple(
-    [indices, indices, indices, vector, table, table, table, matrix, f8, i8], Layout
+from contfric.compiled import blocks, f8, helper, indices, kernel, matrix, vector
+from contfric.orbit.cyclic import finish, next_rows, room_for, start_border, take_out
+from contfric.orbit.equations import (
+    FunctionsType,
+    LayoutType,
+    close_chain,
+    equation_room,
+    mismatch,
+    segment_rows,
 )
 
 #: Places in the array of counts that kernels add to.
@@ -53,7 +36,7 @@ CONVERGED, NOT_CONVERGED, SINGULAR, NOT_FINITE = range(4)
 #: need more. Beyond this number the start is hopeless or the system singular.
 _MOST_STEPS = 25
 #: Relative size of corrections at which rounding dominates (a few hundred units in the last place).
-_FLOOR = 5e-14
+FLOOR = 5e-14
 #: Relative residual that is rounding: where the system is ill-conditioned (beside a fold) corrections
 #: stop falling earlier, and no iterate can be better.
 _ROUNDING = 1e-14
@@ -62,67 +45,28 @@ _TARGET = 1e-16
 
 
 @helper
-def last_joint(functions, layout, z, p, which, out, close, close_w):  # type: ignore[no-untyped-def]
-    """Write the closure of z_0 to ``out``, with its matrices on z_0 and on the parameters."""
-    n = layout.closure.shape[0]
-    grad = np.zeros(which.shape[0])
-    period = functions[5](p, which, grad)
-    out[0] = z[0, 0] + layout.turn * period
-    for i in range(n + 1):
-        for j in range(n + 1):
-            close[i, j] = 0.0
-        for k in range(which.shape[0]):
-            close_w[i, k] = layout.turn * grad[k] if i == 0 else 0.0
-    close[0, 0] = 1.0
-    for i in range(n):
-        value = 0.0
-        for j in range(n):
-            value += layout.closure[i, j] * z[0, 1 + j]
-            close[1 + i, 1 + j] = layout.closure[i, j]
-        out[1 + i] = value
+def newton_step(functions, layout, z, p, which, d, e, s, room, work, pencil):  # type: ignore[no-untyped-def]
+    """Solve the linearised equations at (z, p); return (solved, largest residual).
 
-
-@helper
-def assemble(functions, layout, z, p, which, last, a, b, c, r):  # type: ignore[no-untyped-def]
-    """Fill the blocks and the negative residual; return the largest residual against scale."""
+    The solution is left in ``work.z`` and ``work.w``, the pencil of one turn in ``pencil``.
+    """
     count, m = z.shape
-    n = m - 1
-    q = which.shape[0]
-    y1 = np.empty(n)
-    jac = np.empty((n, 2 + n + q))
-    grad = np.zeros(1 + n + q)
-    level_grad = np.zeros(q)
+    rows = work.rows
+    close_chain(functions, layout, z, p, which, room)
+    start_border(work.border, d, e, s, m)
     worst = 0.0
     for i in range(count):
-        for j in range(m):
-            for k in range(m):
-                a[i, j, k] = 0.0
-                b[i, j, k] = 0.0
-        after = z[i + 1] if i + 1 < count else last
-        functions[0](layout.modes[i], z[i, 0], z[i, 1:], after[0] - z[i, 0], p, which, y1, jac)
-        for j in range(n):
-            residual = y1[j] - after[1 + j]
-            worst = max(worst, abs(residual) / (1.0 + abs(after[1 + j])))
-            r[i, j, 0] = -residual
-            a[i, j, 0] = jac[j, 0] - jac[j, 1 + n]
-            b[i, j, 0] = jac[j, 1 + n]
-            b[i, j, 1 + j] = -1.0
-            for k in range(n):
-                a[i, j, 1 + k] = jac[j, 1 + k]
-            for k in range(q):
-                c[i, j, k] = jac[j, 2 + n + k]
-        surface = layout.exits[i]
-        value = functions[1](layout.observables[surface], after[0], after[1:], p, which, grad)
-        residual = value - functions[2](surface, p, which, level_grad)
-        worst = max(worst, abs(residual) / (1.0 + abs(value)))
-        r[i, n, 0] = -residual
-        for k in range(m):
-            b[i, n, k] = grad[k]
-        for k in range(q):
-            c[i, n, k] = grad[m + k] - level_grad[k]
-    if not math.isfinite(worst):
-        return np.inf
-    return worst
+        if i > 0:
+            next_rows(rows, work.border, d, i, m)
+        after = z[i + 1] if i + 1 < count else room.last
+        at = 0 if i == 0 else m
+        here = segment_rows(functions, layout, i, at, z[i], after, p, which, room, rows)
+        if here == np.inf:
+            return False, here
+        worst = max(worst, here)
+        if i > 0 and not take_out(work, i, m):
+            return False, worst
+    return finish(work, room.close, room.close_w, pencil[0], pencil[1]), worst
 
 
 @helper
@@ -131,15 +75,24 @@ def correction_size(dz, dw, z, p, which):  # type: ignore[no-untyped-def]
     size = 0.0
     for i in range(z.shape[0]):
         for j in range(z.shape[1]):
-            size = max(size, abs(dz[i, j, 0]) / (1.0 + abs(z[i, j])))
+            here = abs(dz[i, j, 0]) / (1.0 + abs(z[i, j]))
+            if not here <= size:
+                size = here
+                if not math.isfinite(size):
+                    return np.inf
     for k in range(which.shape[0]):
-        size = max(size, abs(dw[k, 0]) / (1.0 + abs(p[which[k]])))
-    return size
+        here = abs(dw[k, 0]) / (1.0 + abs(p[which[k]]))
+        if not here <= size:
+            size = here
+    return size if math.isfinite(size) else np.inf
 
 
 @helper
 def constraint(z, p, which, z_ref, p_ref, d, e, s):  # type: ignore[no-untyped-def]
-    """Fill the right-hand sides of the border rows ``D (z - z_ref) + E (p - p_ref) = 0``."""
+    """Fill the right-hand sides of the border rows ``D (z - z_ref) + E (p - p_ref) = 0``.
+
+    That of the tangent asks for 1 along the first row.
+    """
     for k in range(which.shape[0]):
         value = 0.0
         for i in range(z.shape[0]):
@@ -148,65 +101,7 @@ def constraint(z, p, which, z_ref, p_ref, d, e, s):  # type: ignore[no-untyped-d
         for j in range(which.shape[0]):
             value += e[k, j] * (p[which[j]] - p_ref[which[j]])
         s[k, 0] = -value
-
-
-@helper
-def correct(functions, layout, z, p, which, d, e, trust, floor, pencil):  # type: ignore[no-untyped-def]
-    """Solve for the orbit from (z, p) in place, border rows anchored at the start.
-
-    Returns
-    -------
-    tuple
-        (status, steps, size of the first correction, last residual). ``pencil`` (2, m, m) holds P
-        and Q of the last Jacobian. ``floor`` is the accuracy asked for; ``trust`` the longest
-        correction, infinite for the plain method (a number, as a flag would be compiled twice).
-    """
-    count, m = z.shape
-    q = which.shape[0]
-    a, b = np.empty((count, m, m)), np.empty((count, m, m))
-    c, r = np.empty((count, m, q)), np.empty((count, m, 1))
-    dz, dw = np.empty((count, m, 1)), np.empty((q, 1))
-    close, close_w = np.empty((m, m)), np.empty((m, q))
-    last = np.empty(m)
-    s = np.zeros((q, 1))
-    z_ref, p_ref = z.copy(), p.copy()
-    before, first = np.inf, 0.0
-    share, worst_before = 1.0, np.inf
-    damped = math.isfinite(trust)
-    for step in range(_MOST_STEPS):
-        last_joint(functions, layout, z, p, which, last, close, close_w)
-        worst = assemble(functions, layout, z, p, which, last, a, b, c, r)
-        if not math.isfinite(worst):
-            return NOT_FINITE, step, first, worst
-        if damped and worst > 2.0 * worst_before and share > 1e-3:
-            # the last correction went too far: take back half of it
-            share *= 0.5
-            move(z, p, which, dz, dw, -share)
-            continue
-        worst_before = worst
-        constraint(z, p, which, z_ref, p_ref, d, e, s)
-        if not solve_cyclic(a, b, c, r, close, close_w, d, e, s, dz, dw, pencil[0], pencil[1]):
-            return SINGULAR, step, first, worst
-        size = correction_size(dz, dw, z, p, which)
-        if not math.isfinite(size):
-            return NOT_FINITE, step, first, worst
-        share = 1.0
-        if size > trust:
-            share = trust / size
-        move(z, p, which, dz, dw, share)
-        if step == 0:
-            first = size
-        left = size if not math.isfinite(before) else size * (size / before) ** 2
-        if size <= floor or (size < 1e-3 and left <= max(_TARGET, floor * 1e-3)):
-            return CONVERGED, step + 1, first, worst
-        if size < _FLOOR * 100 and size >= 0.5 * before:
-            return CONVERGED, step + 1, first, worst
-        if worst < _ROUNDING and size < 1e-6 and size >= 0.5 * before:
-            return CONVERGED, step + 1, first, worst
-        if not damped and step > 1 and size > 2.0 * before:
-            return NOT_CONVERGED, step + 1, first, worst
-        before = size
-    return NOT_CONVERGED, _MOST_STEPS, first, worst_before
+        s[k, 1] = 1.0 if k == 0 else 0.0
 
 
 @helper
@@ -220,33 +115,59 @@ def move(z, p, which, dz, dw, share):  # type: ignore[no-untyped-def]
 
 
 @helper
-def tangent_at(functions, layout, z, p, which, d, e, tz, tw, pencil, share):  # type: ignore[no-untyped-def]
-    """Return the tangent along the border row, unnormalised, and move (z, p) by a share of one step.
+def has_settled(size, before, worst, floor):  # type: ignore[no-untyped-def]
+    """Tell whether the last correction ends the iteration."""
+    left = size if not math.isfinite(before) else size * (size / before) ** 2
+    if size <= floor or (floor <= FLOOR and size < 1e-3 and left <= _TARGET):
+        return True
+    if size < 0.5 * before:
+        return False
+    return size < FLOOR * 100 or (worst < _ROUNDING and size < 1e-6)
 
-    The two right-hand sides share one elimination: the polishing correction costs nothing more.
+
+@helper
+def correct(
+    functions, layout, z, p, which, z_ref, p_ref, d, e, s, trust, floor, room, work, pencil
+):  # type: ignore[no-untyped-def]
+    """Solve for the orbit from (z, p) in place, border rows anchored at (z_ref, p_ref).
+
+    Returns
+    -------
+    tuple
+        (status, steps, size of the first correction, last residual). ``work`` holds the last solution
+        and with it the tangent, ``pencil`` (2, m, m) P and Q, ``room.rates`` the rates: all of the
+        last Jacobian, at a distance below ``floor`` from the orbit. ``trust`` is the longest
+        correction, infinite for the plain method (a number, as a flag would be compiled twice).
     """
-    count, m = z.shape
-    q = which.shape[0]
-    a, b = np.empty((count, m, m)), np.empty((count, m, m))
-    c, r = np.empty((count, m, q)), np.zeros((count, m, 2))
-    dz, dw = np.empty((count, m, 2)), np.empty((q, 2))
-    close, close_w = np.empty((m, m)), np.empty((m, q))
-    last = np.empty(m)
-    s = np.zeros((q, 2))
-    s[0, 1] = 1.0
-    last_joint(functions, layout, z, p, which, last, close, close_w)
-    worst = assemble(functions, layout, z, p, which, last, a, b, c, r)
-    if not math.isfinite(worst):
-        return False, worst
-    if not solve_cyclic(a, b, c, r, close, close_w, d, e, s, dz, dw, pencil[0], pencil[1]):
-        return False, worst
-    move(z, p, which, dz, dw, share)
-    for i in range(count):
-        for j in range(m):
-            tz[i, j] = dz[i, j, 1]
-    for k in range(q):
-        tw[k] = dw[k, 1]
-    return True, worst
+    before, first, worst = np.inf, 0.0, 0.0
+    share, worst_before = 1.0, np.inf
+    damped = math.isfinite(trust)
+    for step in range(_MOST_STEPS):
+        if damped:
+            worst = mismatch(functions, layout, z, p, room)
+            if worst > 2.0 * worst_before and share > 1e-3:
+                # the last correction went too far: take back half of it
+                share *= 0.5
+                move(z, p, which, work.z, work.w, -share)
+                continue
+            worst_before = worst
+        constraint(z, p, which, z_ref, p_ref, d, e, s)
+        solved, worst = newton_step(functions, layout, z, p, which, d, e, s, room, work, pencil)
+        if not solved:
+            return (SINGULAR if math.isfinite(worst) else NOT_FINITE), step, first, worst
+        size = correction_size(work.z, work.w, z, p, which)
+        if size == np.inf:
+            return NOT_FINITE, step, first, worst
+        share = trust / size if size > trust else 1.0
+        move(z, p, which, work.z, work.w, share)
+        if step == 0:
+            first = size
+        if has_settled(size, before, worst, floor):
+            return CONVERGED, step + 1, first, worst
+        if not damped and step > 1 and size > 2.0 * before:
+            return NOT_CONVERGED, step + 1, first, worst
+        before = size
+    return NOT_CONVERGED, _MOST_STEPS, first, worst
 
 
 @kernel(types.UniTuple(f8, 4)(FunctionsType, LayoutType, matrix, vector, f8, blocks, indices))
@@ -254,17 +175,12 @@ def solve(functions, layout, z, p, trust, pencil, counts):  # type: ignore[no-un
     """Solve for the orbit at fixed parameters, in place; (status, steps, first, residual)."""
     counts[SOLVES] += 1
     count, m = z.shape
-    which = np.empty(0, dtype=np.int64)
-    d, e = np.empty((0, count, m)), np.empty((0, 0))
-    status, steps, first, worst = correct(
-        functions, layout, z, p, which, d, e, trust, _FLOOR, pencil
+    room, work = equation_room(count, m, 0), room_for(count, m, 0, 1)
+    d, e, s = np.empty((0, count, m)), np.empty((0, 0)), np.empty((0, 1))
+    status, steps, first, _ = correct(
+        functions, layout, z, p, room.none, z, p, d, e, s, trust, FLOOR, room, work, pencil
     )
-    a, b = np.empty((count, m, m)), np.empty((count, m, m))
-    c, r = np.empty((count, m, 0)), np.empty((count, m, 1))
-    close, close_w, last = np.empty((m, m)), np.empty((m, 0)), np.empty(m)
-    last_joint(functions, layout, z, p, which, last, close, close_w)
-    worst = assemble(functions, layout, z, p, which, last, a, b, c, r)
-    return float(status), float(steps), first, worst
+    return float(status), float(steps), first, mismatch(functions, layout, z, p, room)
 
 
 @kernel(
@@ -274,13 +190,22 @@ def linearise(functions, layout, z, p, a, b, c, r, close):  # type: ignore[no-un
     """Fill the blocks of the full Jacobian (all parameters) for use outside of the engine."""
     count, m = z.shape
     which = np.arange(p.shape[0])
-    close_w = np.empty((m, p.shape[0]))
-    last = np.empty(m)
-    last_joint(functions, layout, z, p, which, last, close, close_w)
-    worst = assemble(functions, layout, z, p, which, last, a, b, c, r)
+    free = which.shape[0]
+    room, rows = equation_room(count, m, free), np.empty((2 * m, 3 * m + free + 1))
+    close_chain(functions, layout, z, p, which, room)
+    close[:, :] = room.close
+    fine = True
+    for i in range(count):
+        after = z[i + 1] if i + 1 < count else room.last
+        worst = segment_rows(functions, layout, i, m, z[i], after, p, which, room, rows)
+        fine = fine and math.isfinite(worst)
+        a[i] = rows[m:, m : 2 * m]
+        b[i] = rows[m:, 2 * m : 3 * m]
+        c[i] = rows[m:, 3 * m : 3 * m + free]
+        r[i, :, 0] = rows[m:, 3 * m + free]
     # the closure's dependence on the parameters is added to the last segment's columns
     for i in range(m):
-        for k in range(p.shape[0]):
+        for k in range(free):
             for j in range(m):
-                c[count - 1, i, k] += b[count - 1, i, j] * close_w[j, k]
-    return math.isfinite(worst)
+                c[count - 1, i, k] += b[count - 1, i, j] * room.close_w[j, k]
+    return fine

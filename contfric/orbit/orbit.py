@@ -189,7 +189,7 @@ class Orbit:
     @cached_property
     def turn_multipliers(self) -> ComplexArray:
         """Multipliers of one turn, largest first, shape (n,)."""
-        from contfric.orbit.monitor import stability
+        from contfric.orbit.spectrum import stability
 
         mu = np.empty(len(self.model.states), dtype=np.complex128)
         pencil = pencil_of_turn(self.system, self.joints, self.vector)

@@ -27,25 +27,30 @@ _INFINITE = 1e100
 
 
 @helper
-def sign_code(functions, observables, surface, t, y, p):  # type: ignore[no-untyped-def]
+def copy_state(source, target):  # type: ignore[no-untyped-def]
+    """Copy a state."""
+    for j in range(source.shape[0]):
+        target[j] = source[j]
+
+
+@helper
+def sign_code(functions, observables, surface, t, y, p, none, empty):  # type: ignore[no-untyped-def]
     """Return the sides of all surfaces but one, as bits."""
-    none = np.empty(0, dtype=np.int64)
-    empty = np.empty(0)
-    code = 0
+    code, observed, value = 0, -1, 0.0
     for k in range(observables.shape[0]):
         if k == surface:
             continue
-        value = functions[1](observables[k], t, y, p, none, empty)
+        if observables[k] != observed:  # surfaces of one observable stand together
+            observed = observables[k]
+            value = functions[1](observed, t, y, p, none, empty)
         if value > functions[2](k, p, none, empty):
             code |= 1 << k
     return code
 
 
 @helper
-def first_hit(functions, observables, bounds, mode, on, t, y, p, longest):  # type: ignore[no-untyped-def]
+def first_hit(functions, observables, bounds, mode, on, t, y, p, longest, none, empty):  # type: ignore[no-untyped-def]
     """Return (time, surface) of the first bounding surface that is met; (-1, -1) if none."""
-    none = np.empty(0, dtype=np.int64)
-    empty = np.empty(0)
     best, which = longest, -1
     for k in range(observables.shape[0]):
         if bounds[mode, k] == 0:
@@ -56,6 +61,80 @@ def first_hit(functions, observables, bounds, mode, on, t, y, p, longest):  # ty
         if tau >= 0.0 and (which < 0 or tau < best):
             best, which = tau, k
     return (best, which) if which >= 0 else (-1.0, -1)
+
+
+@helper
+def follow(  # type: ignore[no-untyped-def]
+    functions,
+    observables,
+    bounds,
+    following,
+    sliding,
+    lies_on,
+    mode,
+    on,
+    t,
+    y,
+    p,
+    periods,
+    joints,
+    cycles,
+    times,
+    states,
+    none,
+    empty,
+    nothing,
+    after,
+):
+    """Follow a trajectory; see :func:`simulate`."""
+    period = functions[5](p, none, empty)
+    unit = period if period > 0.0 else 1.0
+    cycle = 0
+    if period > 0.0:
+        cycle = int(math.floor(t / period))
+        t -= cycle * period
+    first_cycle, first_time = cycle, t
+    for event in range(joints.shape[0]):
+        left = (periods - (cycle - first_cycle)) * unit - (t - first_time)
+        if period <= 0.0:
+            left = periods - (t - first_time)
+        allowance = (_HOLD_PERIODS if sliding[mode] else _SLIDE_PERIODS) * unit
+        tau, surface = first_hit(
+            functions, observables, bounds, mode, on, t, y, p, min(left, allowance), none, empty
+        )
+        if surface < 0:
+            if left > allowance:
+                return HELD, event, mode, cycle, t
+            functions[0](mode, t, y, left, p, none, after, nothing)
+            copy_state(after, y)
+            t += left
+            if period > 0.0:
+                turns = int(math.floor(t / period))
+                cycle += turns
+                t -= turns * period
+            return ALL_TIME, event, mode, cycle, t
+        functions[0](mode, t, y, tau, p, none, after, nothing)
+        copy_state(after, y)
+        t += tau
+        while period > 0.0 and t >= period:
+            t -= period
+            cycle += 1
+        joints[event, 0] = mode
+        joints[event, 1] = surface
+        cycles[event] = cycle
+        times[event] = t
+        copy_state(y, states[event])
+        for j in range(y.shape[0]):
+            if not abs(y[j]) < _INFINITE:
+                return INFINITE, event, mode, cycle, t
+        code = sign_code(functions, observables, surface, t, y, p, none, empty)
+        row = (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code
+        before = mode
+        mode = following[row]
+        if mode < 0:
+            return IMPOSSIBLE, event + 1, mode, cycle, t
+        on = (1 << surface) | lies_on[before]
+    return ALL_EVENTS, joints.shape[0], mode, cycle, t
 
 
 @kernel(
@@ -113,55 +192,26 @@ def simulate(  # type: ignore[no-untyped-def]
     tuple
         (how it ended, events written, mode, periods completed, phase).
     """
-    none = np.empty(0, dtype=np.int64)
-    empty = np.empty(0)
-    nothing = np.empty((0, 0))
-    period = functions[5](p, none, empty)
-    unit = period if period > 0.0 else 1.0
-    cycle = 0
-    if period > 0.0:
-        cycle = int(math.floor(t / period))
-        t -= cycle * period
-    first_cycle, first_time = cycle, t
-    after = np.empty(y.shape[0])
-    for event in range(joints.shape[0]):
-        left = (periods - (cycle - first_cycle)) * unit - (t - first_time)
-        if period <= 0.0:
-            left = periods - (t - first_time)
-        allowance = (_HOLD_PERIODS if sliding[mode] else _SLIDE_PERIODS) * unit
-        tau, surface = first_hit(
-            functions, observables, bounds, mode, on, t, y, p, min(left, allowance)
-        )
-        if surface < 0:
-            if left > allowance:
-                return HELD, event, mode, cycle, t
-            functions[0](mode, t, y, left, p, none, after, nothing)
-            y[:] = after
-            t += left
-            if period > 0.0:
-                turns = int(math.floor(t / period))
-                cycle += turns
-                t -= turns * period
-            return ALL_TIME, event, mode, cycle, t
-        functions[0](mode, t, y, tau, p, none, after, nothing)
-        y[:] = after
-        t += tau
-        while period > 0.0 and t >= period:
-            t -= period
-            cycle += 1
-        joints[event, 0] = mode
-        joints[event, 1] = surface
-        cycles[event] = cycle
-        times[event] = t
-        states[event] = y
-        for j in range(y.shape[0]):
-            if not abs(y[j]) < _INFINITE:
-                return INFINITE, event, mode, cycle, t
-        code = sign_code(functions, observables, surface, t, y, p)
-        row = (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code
-        before = mode
-        mode = following[row]
-        if mode < 0:
-            return IMPOSSIBLE, event + 1, mode, cycle, t
-        on = (1 << surface) | lies_on[before]
-    return ALL_EVENTS, joints.shape[0], mode, cycle, t
+    none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
+    return follow(
+        functions,
+        observables,
+        bounds,
+        following,
+        sliding,
+        lies_on,
+        mode,
+        on,
+        t,
+        y,
+        p,
+        periods,
+        joints,
+        cycles,
+        times,
+        states,
+        none,
+        empty,
+        nothing,
+        np.empty(y.shape[0]),
+    )

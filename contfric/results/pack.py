@@ -24,7 +24,7 @@ Header = dict[str, Any]
 Arrays = dict[str, NDArray[Any]]
 
 #: Arrays of a branch, each stored as ``branch<i>_<name>``.
-BRANCH_ARRAYS = ("vector", "values", "joints", "arc", "margins", "labels")
+BRANCH_ARRAYS = ("vector", "values", "joints", "arc", "labels")
 
 
 @dataclass

@@ -100,7 +100,7 @@ class Unpacker:
         shape = (len(found["values"]), system.segments, 1 + len(self.model.states))
         self._expect(found["joints"].shape == shape)
         self._expect(found["vector"].shape == (len(self.model.parameters),))
-        self._expect(len(found["arc"]) == len(found["margins"]) == len(found["labels"]) == shape[0])
+        self._expect(len(found["arc"]) == len(found["labels"]) == shape[0])
         stability = entry["stability"]
         first, last = (self.ends[i] for i in entry["ends"])
         return Branch(

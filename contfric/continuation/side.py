@@ -1,0 +1,241 @@
+"""One side of a branch while it grows: rows that the compiled march fills, and what is kept of them.
+
+The march needs tangents and tests of the last points only. What a branch keeps of a point (joints,
+parameter, arclength, labels, multipliers) is copied out of the rows when they are full.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.continuation.events import Bifurcation, End
+from contfric.continuation.points import EXTRA, SMALLEST_STEP, Point, Settings
+from contfric.models.definition import FloatArray
+from contfric.orbit.counts import TALLY
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import IntArray, System
+
+#: Points that one call of the compiled march may write: long enough to cost nothing, short enough
+#: for Ctrl-C to be answered at once.
+CHUNK = 512
+
+#: What a branch keeps of its points.
+KEPT = ("joints", "values", "arc", "labels", "mu")
+
+
+@dataclass(eq=False)
+class Rows:
+    """Arrays that the compiled march writes to, a point in each row."""
+
+    joints: FloatArray
+    values: FloatArray
+    tangents: FloatArray
+    slopes: FloatArray
+    arc: FloatArray
+    tests: FloatArray
+    labels: IntArray
+    mu: NDArray[np.complex128]
+
+    @classmethod
+    def room_for(cls, system: System, room: int) -> Rows:
+        """Return empty rows for points of a system."""
+        shape = (system.segments, 1 + len(system.model.states))
+        return cls(
+            np.empty((room, *shape)),
+            np.empty(room),
+            np.empty((room, *shape)),
+            np.empty(room),
+            np.zeros(room),
+            np.zeros((room, len(system.tests) + EXTRA)),
+            np.zeros((room, len(system.layout.labels)), dtype=np.int64),
+            np.zeros((room, len(system.model.states)), dtype=np.complex128),
+        )
+
+    def arrays(self, stop: int) -> tuple[Any, ...]:
+        """Return the arrays up to a row, in the order in which the march takes them."""
+        return tuple(a[:stop] for a in vars(self).values())
+
+    def point(self, k: int) -> Point:
+        """Return one row as a point of its own."""
+        return Point(
+            self.joints[k].copy(),
+            float(self.values[k]),
+            self.tangents[k].copy(),
+            float(self.slopes[k]),
+            self.tests[k].copy(),
+            self.labels[k].copy(),
+            self.mu[k].copy(),
+            float(self.arc[k]),
+        )
+
+    def put(self, k: int, point: Point) -> None:
+        """Write a point to one row."""
+        self.joints[k], self.values[k] = point.joints, point.value
+        self.tangents[k], self.slopes[k] = point.tangent, point.slope
+        self.tests[k], self.labels[k] = point.tests, point.labels
+        self.mu[k], self.arc[k] = point.mu, point.arc
+
+
+@dataclass(eq=False)
+class Side:
+    """One side of a branch, from its first point outward.
+
+    Attributes
+    ----------
+    first : the point it starts from
+    end : why it ended
+    bifurcations : what it has met
+    rows, last : the points at work, and the row of the last one
+    count : points so far
+    """
+
+    first: Point
+    end: End
+    rows: Rows
+    last: int = 0
+    count: int = 1
+    bifurcations: list[Bifurcation] = field(default_factory=list)
+    _kept: list[dict[str, NDArray[Any]]] = field(default_factory=list)
+    _fresh: int = 0
+
+    @classmethod
+    def starting(cls, point: Point, system: System, end: End) -> Side:
+        """Return a side that consists of its first point."""
+        side = cls(point, end, Rows.room_for(system, CHUNK))
+        side.rows.put(0, point)
+        return side
+
+    @property
+    def tip(self) -> Point:
+        """The last point."""
+        return self.rows.point(self.last)
+
+    @property
+    def before_tip(self) -> Point:
+        """The last point but one."""
+        return self.rows.point(self.last - 1)
+
+    @property
+    def length(self) -> float:
+        """Arclength from the first point to the last."""
+        return float(self.rows.arc[self.last] - self.first.arc)
+
+    @property
+    def second_multipliers(self) -> NDArray[np.complex128]:
+        """Multipliers of one turn at the second point (at the first, if it is the only one)."""
+        chunk = self._kept[0]["mu"] if self._kept else self.rows.mu[: self.last + 1]
+        return np.asarray(chunk[min(1, len(chunk) - 1)])
+
+    def put_tip(self, point: Point) -> None:
+        """Replace the last point."""
+        self.rows.put(self.last, point)
+
+    def drop_tip(self) -> None:
+        """Take the last point away."""
+        self.last -= 1
+        self.count -= 1
+
+    def relabel_first(self, labels: IntArray) -> None:
+        """Give the first of two points the labels of the second."""
+        self.rows.labels[self.last - 1] = labels
+
+    def start_at(self, origin: Point) -> None:
+        """Put a point before the first one."""
+        self.first = origin
+        kept = {name: np.array([getattr(origin, _FIELD[name])]) for name in KEPT}
+        self._kept.insert(0, kept)
+        self.count += 1
+
+    def march(self, orbit: Orbit, settings: Settings, step: float) -> tuple[int, float]:
+        """March on; return (why it stopped, next step)."""
+        from contfric.continuation.march import march
+
+        if self.last + 1 >= CHUNK:
+            self._keep_full_rows()
+        stop = min(CHUNK, self.last + 1 + settings.most_points - self.count)
+        why, last, step = march(
+            orbit.system.functions(),
+            orbit.system.layout,
+            orbit.vector,
+            orbit.model.index_of(settings.parameter),
+            march_options(settings, step),
+            self.last,
+            settings.stability,
+            self.first.as_start(),
+            self.count - 1,
+            *self.rows.arrays(stop),
+            TALLY,
+        )
+        self.count += last - self.last
+        self.last = last
+        return why, step
+
+    def _keep_full_rows(self) -> None:
+        """Keep all rows, and go on with the last two as the first."""
+        self._keep(self.last + 1)
+        for array in vars(self.rows).values():
+            array[:2] = array[self.last - 1 : self.last + 1]
+        # the last one may still be replaced
+        for array in self._kept[-1].values():
+            array.resize((len(array) - 1, *array.shape[1:]), refcheck=False)
+        self.last, self._fresh = 1, 1
+
+    def _keep(self, stop: int) -> None:
+        rows = slice(self._fresh, stop)
+        self._kept.append({name: getattr(self.rows, name)[rows].copy() for name in KEPT})
+
+    def columns(self) -> list[dict[str, NDArray[Any]]]:
+        """Return everything that is kept, in chunks; the side is finished."""
+        self._keep(self.last + 1)
+        self._fresh = self.last + 1
+        return self._kept
+
+
+#: The attribute of a point that each column is made of.
+_FIELD = {"joints": "joints", "values": "value", "arc": "arc", "labels": "labels", "mu": "mu"}
+
+
+def march_options(settings: Settings, step: float) -> FloatArray:
+    """Return the numbers that steer the march."""
+    return np.array(
+        [step, settings.largest, SMALLEST_STEP, settings.low, settings.high, settings.scale]
+    )
+
+
+def first_point(
+    orbit: Orbit,
+    settings: Settings,
+    tangent: FloatArray | None = None,
+    slope: float = 1.0,
+) -> Point | None:
+    """Solve for the first point of a branch; None if it has no unique tangent there.
+
+    Parameters
+    ----------
+    tangent, slope : direction to solve normal to; by default along the parameter
+    """
+    from contfric.continuation.march import BROKEN, march
+
+    active = orbit.model.index_of(settings.parameter)
+    direction = np.zeros_like(orbit.joints) if tangent is None else tangent
+    rows = Rows.room_for(orbit.system, 1)
+    rows.joints[0], rows.values[0] = orbit.joints, orbit.vector[active]
+    rows.tangents[0], rows.slopes[0] = direction, slope
+    why, _, _ = march(
+        orbit.system.functions(),
+        orbit.system.layout,
+        orbit.vector,
+        active,
+        march_options(settings, 0.0),
+        -1,
+        settings.stability,
+        rows.point(0).as_start(),
+        0,
+        *rows.arrays(1),
+        TALLY,
+    )
+    return None if why == BROKEN else rows.point(0)

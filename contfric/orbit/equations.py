@@ -1,0 +1,175 @@
+"""The equations of the chain, a segment at a time: residuals, exact Jacobian, rates at the exits.
+
+Equations of segment i, from the joint ``z_i = (t_i, y_i)`` to the next one (``z_N`` is the closure
+of ``z_0``)::
+
+    phi(mode_i; t_i, y_i, t_{i+1} - t_i; p) - y_{i+1} = 0        (n rows)
+    observable(z_{i+1}; p) - level(p) = 0                        (1 row)
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+
+from contfric.compiled import (
+    allocating_helper,
+    FlowType,
+    HitType,
+    LevelType,
+    ObserveType,
+    PeriodType,
+    TurningType,
+    f8,
+    helper,
+    i8,
+    indices,
+    matrix,
+    table,
+    vector,
+)
+from contfric.models.definition import FloatArray
+from contfric.orbit.system import Layout
+
+#: Type of the model's functions and of a layout, as kernels take them.
+FunctionsType = types.Tuple((FlowType, ObserveType, LevelType, TurningType, HitType, PeriodType))
+LayoutType = types.NamedTuple(
+    [indices, indices, indices, vector, table, table, table, matrix, f8, i8], Layout
+)
+
+
+class Room(NamedTuple):
+    """Room for the equations of one segment and for the closure; allocated once.
+
+    Attributes
+    ----------
+    state, jac : end of a segment with its derivatives, shapes (n,) and (n, 2 + n + q)
+    grad, level_grad : gradients of an observable and of a level, shapes (1 + n + q,) and (q,)
+    rates : rate of the exit's observable at the end of each segment, shape (N,)
+    last, close, close_w : closure of z_0 with its matrices, shapes (m,), (m, m) and (m, q)
+    none, empty, nothing : what is handed over where nothing is wanted, shapes (0,), (0,), (0, 0)
+    """
+
+    state: FloatArray
+    jac: FloatArray
+    grad: FloatArray
+    level_grad: FloatArray
+    rates: FloatArray
+    last: FloatArray
+    close: FloatArray
+    close_w: FloatArray
+    none: FloatArray
+    empty: FloatArray
+    nothing: FloatArray
+
+
+@allocating_helper
+def equation_room(count, m, free):  # type: ignore[no-untyped-def]
+    """Return the room for a chain of ``count`` segments with ``free`` parameters."""
+    n = m - 1
+    return Room(
+        np.zeros(n),
+        np.zeros((n, 2 + n + free)),
+        np.zeros(1 + n + free),
+        np.zeros(free),
+        np.zeros(count),
+        np.zeros(m),
+        np.zeros((m, m)),
+        np.zeros((m, free)),
+        np.empty(0, dtype=np.int64),
+        np.empty(0),
+        np.empty((0, 0)),
+    )
+
+
+@helper
+def close_chain(functions, layout, z, p, which, room):  # type: ignore[no-untyped-def]
+    """Write the closure of z_0, and its matrices on z_0 and on the parameters."""
+    last, close, close_w, grad = room.last, room.close, room.close_w, room.level_grad
+    n, free = layout.closure.shape[0], which.shape[0]
+    period = functions[5](p, which, grad)
+    last[0] = z[0, 0] + layout.turn * period
+    for k in range(free):
+        close_w[0, k] = layout.turn * grad[k]
+        for i in range(n):
+            close_w[1 + i, k] = 0.0
+    close[0, 0] = 1.0
+    for i in range(n):
+        close[0, 1 + i] = 0.0
+        close[1 + i, 0] = 0.0
+        value = 0.0
+        for j in range(n):
+            value += layout.closure[i, j] * z[0, 1 + j]
+            close[1 + i, 1 + j] = layout.closure[i, j]
+        last[1 + i] = value
+
+
+@helper
+def segment_rows(functions, layout, i, at, start, after, p, which, room, rows):  # type: ignore[no-untyped-def]
+    """Write the rows of segment i to the last m of ``rows``; return its residual against scale.
+
+    The columns are ``[z_0 | z_i | z_{i+1} | parameters | right-hand sides]``, z_i from ``at``; the
+    first right-hand side is minus the residual, the others are zero.
+    """
+    state, jac, grad, level_grad = room.state, room.jac, room.grad, room.level_grad
+    n, free, width = state.shape[0], which.shape[0], rows.shape[1]
+    m = n + 1
+    functions[0](layout.modes[i], start[0], start[1:], after[0] - start[0], p, which, state, jac)
+    worst = 0.0
+    for j in range(n):
+        row = m + j
+        for k in range(width):
+            rows[row, k] = 0.0
+        residual = state[j] - after[1 + j]
+        worst += abs(residual) / (1.0 + abs(after[1 + j]))
+        rows[row, at] = jac[j, 0] - jac[j, 1 + n]
+        for k in range(n):
+            rows[row, at + 1 + k] = jac[j, 1 + k]
+        rows[row, 2 * m] = jac[j, 1 + n]
+        rows[row, 2 * m + 1 + j] = -1.0
+        for k in range(free):
+            rows[row, 3 * m + k] = jac[j, 2 + n + k]
+        rows[row, 3 * m + free] = -residual
+    surface, row = layout.exits[i], m + n
+    value = functions[1](layout.observables[surface], after[0], after[1:], p, which, grad)
+    residual = value - functions[2](surface, p, which, level_grad)
+    worst += abs(residual) / (1.0 + abs(value))
+    rate = grad[0]
+    for k in range(n):
+        rate += grad[1 + k] * jac[k, 1 + n]
+    room.rates[i] = rate
+    for k in range(2 * m):
+        rows[row, k] = 0.0
+    for k in range(m):
+        rows[row, 2 * m + k] = grad[k]
+    for k in range(free):
+        rows[row, 3 * m + k] = grad[m + k] - level_grad[k]
+    rows[row, 3 * m + free] = -residual
+    for k in range(3 * m + free + 1, width):
+        rows[row, k] = 0.0
+    return worst if math.isfinite(worst) else np.inf
+
+
+@helper
+def mismatch(functions, layout, z, p, room):  # type: ignore[no-untyped-def]
+    """Return the largest residual of a segment against scale; nothing is differentiated."""
+    none, empty, state = room.none, room.empty, room.state
+    count, m = z.shape
+    close_chain(functions, layout, z, p, none, room)
+    worst = 0.0
+    for i in range(count):
+        after = z[i + 1] if i + 1 < count else room.last
+        duration = after[0] - z[i, 0]
+        functions[0](layout.modes[i], z[i, 0], z[i, 1:], duration, p, none, state, room.nothing)
+        surface = layout.exits[i]
+        value = functions[1](layout.observables[surface], after[0], after[1:], p, none, empty)
+        here = abs(value - functions[2](surface, p, none, empty)) / (1.0 + abs(value))
+        for j in range(m - 1):
+            here += abs(state[j] - after[1 + j]) / (1.0 + abs(after[1 + j]))
+        if not math.isfinite(here):
+            return np.inf
+        worst = max(worst, here)
+    return worst
