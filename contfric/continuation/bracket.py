@@ -75,8 +75,9 @@ def watched_value(functions, layout, kind, index, target, z, p, w, slope, mu, co
         return w - target
     if kind == BY_LABEL:
         code, nearest = crossings(functions, layout, index, z, p, room.equations, room.turnings)
-        # the distance of the nearest stationary point to a surface vanishes where the label changes
-        return nearest if code == int(target) else -nearest
+        # the distance of the nearest stationary point to a surface vanishes where the label changes;
+        # elsewhere a joint may lie on a surface
+        return nearest if code == int(target) else -max(nearest, 1e-300)
     if index < margins:
         counts[CHECKS] += 1
         return margin_value(functions, layout, index, z, p, room)
@@ -191,7 +192,10 @@ def locate(  # type: ignore[no-untyped-def]
                 f_low = f
             else:
                 f_high = f
-    sign = -1.0 if f_low < 0.0 and kind != BY_LABEL else 1.0
+    margins = layout.interior.shape[0] + count + layout.joint.shape[0]
+    # margins and distances are positive before the event, the others have the sign that they have
+    two_sided = kind == BY_PARAMETER or (kind == BY_TEST and index >= margins)
+    sign = -1.0 if two_sided and f_low < 0.0 else 1.0
     f_low, f_high = limited(sign * f_low), limited(sign * f_high)
     low, high, x = 0.0, 1.0, 0.5
     x_old, f_old = low, f_low
@@ -233,17 +237,17 @@ def locate(  # type: ignore[no-untyped-def]
         copy_to(best_z, zb)
         copy_to(best_t, tb)
         best_w, best_slope = wb, sb
-    p[active] = best_w
-    fine, best_slope, _ = settle(
-        functions, layout, best_z, p, which, best_t, best_slope, scale, AT_EVENT, counts, room
-    )
-    if fine:
-        observe_point(
-            functions, layout, best_z, p, best_slope, stability, tests, labels, mu, counts, room
-        )
     copy_to(za, best_z)
     copy_to(ta, best_t)
     slope_out[0] = best_slope
+    # the last Jacobian at the located point, for its rates and multipliers; the point itself stays
+    p[active] = best_w
+    fine, _, _ = settle(
+        functions, layout, best_z, p, which, best_t, best_slope, scale, AT_EVENT, counts, room
+    )
+    p[active] = best_w
     if not fine:
         return -1.0
+    close_chain(functions, layout, za, p, room.equations.none, room.equations)
+    observe_point(functions, layout, za, p, best_slope, stability, tests, labels, mu, counts, room)
     return -2.0 - best_x if lost else best_x

@@ -22,6 +22,8 @@ LOAD, SPEED = range(2)
 AT_START = 1e-13
 #: Error of a stationary time, relative to 1 + the time, at which its search ends: its square counts.
 AT_STATIONARY = 2e-9
+#: A second rate this small leaves less than the third does on the way to the end of a shortest piece.
+FLAT = 1e-7
 #: A stationary time behind this share of a segment is at its end, to rounding.
 BEFORE_END = 1.0 - 1e-14
 #: Shortest piece, in natural scales: below it Taylor's march alone goes on.
@@ -306,6 +308,13 @@ def roots_along(mode, c, order, target, on, sign, single, phase, t0, y0, end, p,
             length = max(0.5 * step, SHORTEST * natural)
             if low > 0.0:
                 step = low * step
+            elif leaving and q1 == 0.0 and abs(q2) <= FLAT * (1.0 + size):
+                # a third-order start, such as a release at the largest force: what the first two rates
+                # leave is rounding, and the third decides on which side of the root the function is
+                step = SHORTEST * natural
+                beyond = quantity(mode, c, order, p, phase, t0, x0, v0, tau + step)[0] - target
+                found = sign * beyond <= 0.0
+                step = 0.0 if found else step
             elif leaving:
                 bound = third_bound(mode, c, order, p, size, natural)
                 step = min(leaving_step(sign * q1, sign * q2, bound), natural)
@@ -313,7 +322,7 @@ def roots_along(mode, c, order, target, on, sign, single, phase, t0, y0, end, p,
             else:
                 step, found = taylor_step(mode, c, order, sign, p, q, q1, q2, size, natural, tau)
                 root = tau + step
-                value += step * (q + 0.5 * step * q1)
+                value += step * (q + step * (0.5 * q1 + step * q2 / 6.0))
             tau += step
         if found:
             if single:
@@ -375,10 +384,12 @@ def refined(mode, c, order, target, sign, phase, t0, x0, v0, p, start, width, sh
             continue
         if order == 1:
             value += shift * (q + shift * (0.5 * q1 + shift * q2 / 6.0))
-        bend = q2 / q1
-        third = third_bound(mode, c, order, p, size, abs(shift)) / abs(6.0 * q1)
-        left = (0.25 * bend * bend + third) * abs(shift) ** 3
-        if left <= EPS * following or left <= resolution * (1.0 + following):
+        bend, cube = q2 / q1, abs(shift) ** 3
+        third = third_bound(mode, c, order, p, size, abs(shift)) / 6.0
+        left = (0.25 * bend * bend + third / abs(q1)) * cube
+        # what Taylor's formula leaves of the time, and of the observable at a stationary point
+        accurate = third * cube * abs(shift) <= 4.0 * EPS * (1.0 + size)
+        if left <= EPS * following or (accurate and left <= resolution * (1.0 + following)):
             return following, q1 + q2 * shift, value
         if abs(shift) <= 4.0 * EPS * following:
             return following, q1, value

@@ -134,7 +134,7 @@ def test_million_points_take_seconds(branch, tmp_path) -> None:
     count = 1_000_000
     grown = {
         name: np.resize(getattr(branch, name), (count, *getattr(branch, name).shape[1:]))
-        for name in ("values", "joints", "arc", "margins", "labels", "turn_multipliers")
+        for name in ("values", "joints", "arc", "labels", "turn_multipliers")
     }
     large = dataclasses.replace(branch, **grown)
     path = tmp_path / "large.npz"

@@ -16,7 +16,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq, minimize_scalar
 
-from contfric.flow.forced_oscillator import flow, hit, turning
+from contfric.flow.forced_oscillator import flow, hit, observe, turning
 
 LOAD, SPEED = range(2)
 STICK = 2
@@ -110,10 +110,16 @@ def first_hit(mode, c, target, on, t0, y0, longest, p):
 
 
 def stationary(mode, c, t0, y0, dt, p):
-    out = np.empty(256)
-    count = turning(mode, c, t0, np.array(y0, float), dt, np.array(p, float), out)
+    times, values = np.empty(256), np.empty(256)
+    vector = np.array(p, float)
+    count = turning(mode, c, t0, np.array(y0, float), dt, vector, times, values)
     assert count >= 0
-    return out[:count]
+    none, empty, after = np.empty(0, dtype=np.int64), np.empty(0), np.empty(2)
+    for tau, value in zip(times[:count], values[:count], strict=True):
+        flow(mode, t0, np.array(y0, float), tau, vector, none, after, np.empty((0, 0)))
+        there = observe(c, t0 + tau, after, vector, none, empty)
+        assert value == pytest.approx(there, abs=1e-13 * (1 + np.max(np.abs(after))))
+    return times[:count]
 
 
 @st.composite
