@@ -1,0 +1,66 @@
+"""Write docs/stress.md from the JSON reports of the stress runs.
+
+``python benchmarks/stress/page.py *.json --out docs/stress.md``
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+from pathlib import Path
+
+from report import Report
+
+import contfric as cf
+
+INTRODUCTION = """# Stress runs
+
+What random cases, far more than `make test` has time for, have found: each is drawn from a seed and its
+index, compared with a reference that shares nothing with the library but the equation of motion, and
+counted. An error is compared with what rounding of the arguments alone explains at the condition of the
+problem (a ratio of 1 is the most that is allowed; below 1 the result is as exact as doubles permit).
+
+Each run can be repeated: `python benchmarks/stress/<name>.py --count N --seed K --out <name>.json`, then
+`python benchmarks/stress/page.py *.json --out docs/stress.md`.
+"""
+#: Order of the sections; others follow by name.
+ORDER = ("sequences", "segments", "orbits", "events", "continuation")
+
+
+def page(reports: list[Report]) -> str:
+    """Return the page: a summary, then each report."""
+    reports = sorted(reports, key=lambda report: (_place(report.name), report.seed))
+    lines = [INTRODUCTION, f"contfric {cf.__version__}, Python {platform.python_version()}.", ""]
+    lines += ["| run | cases | checks | failed | run time |", "|---|---:|---:|---:|---:|"]
+    for report in reports:
+        tried, failed = sum(report.tried.values()), len(report.failed)
+        lines.append(
+            f"| [{report.name}](#{report.name}) | {report.count} | {tried} | {failed} "
+            f"| {report.seconds:.0f} s |"
+        )
+    named = set()
+    for report in reports:
+        lines.append("")
+        if report.name not in named:
+            lines += [f"## {report.name}", ""]
+            named.add(report.name)
+        lines += report.lines()
+    return "\n".join(lines) + "\n"
+
+
+def _place(name: str) -> tuple[int, str]:
+    return (ORDER.index(name) if name in ORDER else len(ORDER)), name
+
+
+def main() -> None:
+    """Read the reports that are named and write the page."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("reports", nargs="+", type=Path)
+    parser.add_argument("--out", type=Path, default=Path("docs/stress.md"))
+    args = parser.parse_args()
+    text = page([Report.read(path) for path in args.reports])
+    args.out.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

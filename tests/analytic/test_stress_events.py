@@ -1,0 +1,68 @@
+"""Events of random explorations against 50 digits: the first cases of ``benchmarks/stress/events.py``.
+
+The whole run is there; here are as many as take seconds, and that an event that is off is told.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+from mpmath import mp
+
+import contfric as cf
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "stress"))
+
+import bordered
+import chain
+import events
+from report import Tally
+
+DIAGRAMS = {
+    "S": ({"Omega": 0.5, "S": 0.3, "S0": 0.4}, (0.03, 0.39)),
+    "S0": ({"Omega": 0.6, "S": 0.3, "S0": 0.35}, (0.3, 0.8)),
+    "h": ({"Omega": 0.5, "S": 0.3, "S0": 0.4}, (-0.3, 0.3)),
+    "zeta": ({"Omega": 1.6, "S": 0.1, "S0": 0.1, "zeta": 0.05}, (-0.2, 0.1)),
+}
+
+
+@cache
+def found(parameter: str) -> tuple[cf.Bifurcation, ...]:
+    params, bounds = DIAGRAMS[parameter]
+    return cf.explore(cf.find_orbit("coulomb", params), parameter, bounds).bifurcations
+
+
+def test_random_events() -> None:
+    report = events.run(count=22, seed=12)
+    assert not report.failed, report.failed
+    kinds = [kind for kind in cf.Kind if report.passed.get(f"{kind.value}: its parameter")]
+    assert len(kinds) >= 7
+
+
+@pytest.mark.parametrize("parameter", DIAGRAMS)
+def test_an_event_that_is_off_is_told(parameter: str) -> None:
+    """By ten times what rounding explains, or twice 1e-12 of the parameter if that is more."""
+    told = 0
+    for event in found(parameter):
+        value = event.params[parameter]
+        with mp.workdps(chain.DIGITS):
+            exact = bordered.locate(event, parameter)
+            off = max(10.0 * exact.allowed, 2e-12 * abs(value))
+            assert off < 1e-9
+            vector = event.orbit.vector.copy()
+            vector[event.orbit.model.index_of(parameter)] += off
+            wrong = replace(
+                event,
+                params=event.params | {parameter: value + off},
+                orbit=replace(event.orbit, vector=vector),
+            )
+            tally = Tally()
+            events.events_of(tally, event, parameter, "")
+            assert not tally.failed, tally.failed
+            events.events_of(tally, wrong, parameter, "")
+            told += len(tally.failed)
+    assert told == len(found(parameter)) > 0
