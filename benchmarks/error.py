@@ -1,7 +1,7 @@
 """Write docs/benchmarks-error.md and its pictures docs/images/error_*.png: run time against error.
 
 All settings of a question run in one process and take turns. What is asked stands in ``tasks.py``, the
-methods in ``peers/``, the 40-digit reference in ``reference.py``. Packages that are not installed
+methods in ``peers/``, the 40-digit reference in ``many_digits.py``. Packages that are not installed
 are left out, and the page says so (``pip install '.[bench]'`` installs them).
 """
 
@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 import scipy
 import tasks
+from many_digits import DIGITS
 from measuring import SHORTEST, Row, measure
 from mpmath import mp
 from page import draw, duration, summary, table, verdict
-from reference import DIGITS
 from settings import NEAR_FOLD, NODES, OMEGA, OPTIONAL, S0, S, integrators, versions
 
 #: Rounds of each question: fewer where one round takes 10 s.

@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from many_digits import DIGITS, Reference, farthest
 from measuring import Case
 from mpmath import mp, mpf
 from peers import arclength, shooting, simulation
@@ -14,7 +15,6 @@ from peers.collocation_branch import BranchByCollocation
 from peers.collocation_fold import FoldByCollocation
 from peers.interpreted import orbit_in_closed_form
 from peers.oscillator import Failure
-from reference import DIGITS, Reference, farthest
 from settings import (
     NEAR_FOLD,
     NODES,

@@ -2,7 +2,7 @@
 
 A run tries cases that are drawn from ``(seed, index)``, so that a failure names all it takes to see it
 again. Every module of this folder offers ``run(count, seed) -> Report``; the other modules here and
-``page.py`` know nothing else of it.
+``write_page.py`` know nothing else of it.
 """
 
 from __future__ import annotations

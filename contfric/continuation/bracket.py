@@ -17,6 +17,7 @@ from numba import types
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
 from contfric.continuation.steps import (
     AT_EVENT,
+    CHI_MINUS,
     CHI_ONE,
     FOLD,
     copy_to,
@@ -81,13 +82,14 @@ def watched_value(functions, layout, kind, index, target, z, p, w, slope, mu, co
     if index < margins:
         counts[CHECKS] += 1
         return margin_value(functions, layout, index, z, p, room)
-    if index == margins + FOLD:
+    column = index - margins - layout.labels.shape[0]
+    if column == FOLD:
         return slope
     counts[MULTIPLIERS] += 1
     one, minus = multipliers(layout.rank, room.pencil, room.equations.close, mu, room.spectral)
-    if index == margins + CHI_ONE:
+    if column == CHI_ONE:
         return one
-    return minus if index == margins + CHI_ONE + 1 else 1.0 - abs(mu[0]) * abs(mu[1])
+    return minus if column == CHI_MINUS else 1.0 - abs(mu[0]) * abs(mu[1])
 
 
 @helper

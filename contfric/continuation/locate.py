@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.events import Bifurcation, Kind, kind_of_margin
-from contfric.continuation.points import Point, Settings
+from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.vertices import parabola_vertex, symmetric_part, undoubled_part
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
@@ -20,6 +20,9 @@ _TOGETHER = 1e-9
 #: Arclength within which a smooth event belongs to a sliding event: where a stop becomes tangential
 #: the branch folds and its multipliers are infinite, and where it meets a surface labels change.
 SAME_PLACE = 1e-7
+#: The same for a tangency: beside a tangential release (AS) the load overshoots its limit by the square
+#: of the release's rate, which is rounding up to this distance.
+_SAME_TANGENCY = 2e-6
 
 
 #: Share of the period below which a stick at a tangential release has vanished: the square root of
@@ -42,7 +45,7 @@ def locate_events(
     smooth = [
         (b, point)
         for b, point in _smooth_events(orbit, before, after, settings, beyond)
-        if point.arc < first - SAME_PLACE
+        if point.arc < first - (_SAME_TANGENCY if b.kind is Kind.T else SAME_PLACE)
     ]
     return sorted([*smooth, *sliding], key=lambda pair: pair[1].arc)
 
@@ -201,7 +204,7 @@ def _smooth_events(
     from contfric.continuation.bracket import BY_TEST
     from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
 
-    base = len(orbit.system.tests)
+    base = len(before.tests) - EXTRA
     found: list[tuple[Bifurcation, Point]] = []
     folded = False
     for column in (FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR):
@@ -237,9 +240,17 @@ def _smooth_events(
             kind = Kind.NS
         elif column == CHI_MINUS and not orbit.system.half:
             kind = Kind.PD
-        here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+        active = orbit.model.index_of(settings.parameter)
+        here = point.orbit(orbit.system, orbit.vector, active)
+        if kind is Kind.BP and not orbit.system.half and _is_vertex(here, active):
+            continue  # the fold there says what it is; beside it chi(1) is rounding
         found.append((_bifurcation(kind, here, before, beyond, point, settings), point))
     return [*found, *_tangencies(orbit, before, beyond, settings)]
+
+
+def _is_vertex(here: Orbit, active: int) -> bool:
+    """Tell whether an orbit is at the vertex of a pitchfork or of a period doubling."""
+    return (symmetric_part(here, active) or undoubled_part(here, active)) is not None
 
 
 def _not_located(

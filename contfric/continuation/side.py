@@ -50,7 +50,7 @@ class Rows:
             np.empty((room, *shape)),
             np.empty(room),
             np.zeros(room),
-            np.zeros((room, len(system.tests) + EXTRA)),
+            np.zeros((room, len(system.tests) + len(system.layout.labels) + EXTRA)),
             np.zeros((room, len(system.layout.labels)), dtype=np.int64),
             np.zeros((room, len(system.model.states)), dtype=np.complex128),
         )

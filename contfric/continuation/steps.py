@@ -19,7 +19,7 @@ from contfric.orbit.monitor import Turnings, turning_room, watch
 from contfric.orbit.newton import CHECKS, CONVERGED, MULTIPLIERS, SOLVES, correct
 from contfric.orbit.spectrum import SpectralRoom, multipliers, spectral_room
 
-#: Extra columns of the tests behind the margins: slope of the parameter, products of 1 - mu and of
+#: Extra columns of the tests behind the margins and the distances of the labels: slope of the parameter, products of 1 - mu and of
 #: 1 + mu, and 1 - |mu_1 mu_2| of the two largest multipliers.
 FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR = range(4)
 EXTRA = 4
@@ -28,6 +28,8 @@ EXTRA = 4
 ALONG = 3e-13
 #: The same where an event is located, and its test function counts to its last digits.
 AT_EVENT = 5e-14
+#: Share of the smaller end value above which a parabola's minimum is believed to stay positive.
+_SURE = 0.2
 
 
 class StepRoom(NamedTuple):
@@ -198,7 +200,9 @@ def dips(tests, k, arc, value, step):  # type: ignore[no-untyped-def]
         if bend * f1 <= 0.0 or slope * f1 >= 0.0:
             continue
         at = -slope / (2.0 * bend)
-        if at < step and (f1 + 0.5 * slope * at) * f1 < 0.0:
+        if at < step and abs(f1) + 0.5 * slope * at * math.copysign(1.0, f1) < _SURE * min(
+            abs(f1), abs(f2)
+        ):
             return True
     return False
 

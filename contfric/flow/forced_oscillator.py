@@ -22,7 +22,6 @@ import numpy as np
 from contfric.compiled import (
     allocating_helper,
     flow_signature,
-    helper,
     hit_signature,
     kernel,
     level_signature,

@@ -24,8 +24,6 @@ AT_START = 1e-13
 AT_STATIONARY = 2e-9
 #: A second rate this small leaves less than the third does on the way to the end of a shortest piece.
 FLAT = 1e-7
-#: A stationary time behind this share of a segment is at its end, to rounding.
-BEFORE_END = 1.0 - 1e-14
 #: Shortest piece, in natural scales: below it Taylor's march alone goes on.
 SHORTEST = 0.02
 #: Step past a double root, in natural scales: the square root of rounding.
@@ -249,6 +247,9 @@ def roots_along(mode, c, order, target, on, sign, single, phase, t0, y0, end, p,
     longest = PIECE * natural
     if not single:
         longest = end / math.ceil(end / longest)
+    # a stationary point within its own error of a joint is at the joint
+    near = 2.0 * AT_STATIONARY * (1.0 + end)
+    first, last = min(near, 0.5 * end), max(end - near, 0.5 * end)
     x0, v0 = y0[0], y0[1]
     tau, leaving, length, count = 0.0, on, longest, 0
     q, q1, q2, size, value = quantity(mode, c, order, p, phase, t0, x0, v0, 0.0)
@@ -289,7 +290,7 @@ def roots_along(mode, c, order, target, on, sign, single, phase, t0, y0, end, p,
                 )
                 if single:
                     return 1, root
-                if AT_START * end < root < end * BEFORE_END:
+                if first < root < last:
                     if count == times.shape[0]:
                         return -1, root
                     times[count], values[count] = root, at_root
@@ -327,9 +328,9 @@ def roots_along(mode, c, order, target, on, sign, single, phase, t0, y0, end, p,
         if found:
             if single:
                 return 1, root
-            if root >= end * BEFORE_END:
+            if root >= last:
                 return count, root
-            if root > AT_START * end:
+            if root > first:
                 if count == times.shape[0]:
                     return -1, root
                 times[count], values[count] = root, value

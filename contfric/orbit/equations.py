@@ -16,13 +16,13 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import (
-    allocating_helper,
     FlowType,
     HitType,
     LevelType,
     ObserveType,
     PeriodType,
     TurningType,
+    allocating_helper,
     f8,
     helper,
     i8,

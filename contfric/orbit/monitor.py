@@ -27,6 +27,10 @@ from contfric.orbit.newton import CHECKS
 #: as not finite. A stick of 30 excitation periods has 180 of them with a third harmonic.
 _MOST_TURNINGS = 256
 
+#: An observable this near to a level, relative to 1 + the level, touches it to rounding (ten units in
+#: the last place): it is not labelled as a crossing.
+_TOUCH = 2e-15
+
 
 class Turnings(NamedTuple):
     """Stationary points of one observable along one segment: times after its start, and values."""
@@ -116,6 +120,13 @@ def ends_of(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
 
 
 @helper
+def side_of(value, target):  # type: ignore[no-untyped-def]
+    """Return 2 above a level, 1 below it, 0 where rounding cannot tell."""
+    slack = _TOUCH * (1.0 + abs(target))
+    return 2 if value > target + slack else (1 if value < target - slack else 0)
+
+
+@helper
 def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-untyped-def]
     """Return the surfaces that the segment of row k crosses, as digits of one integer.
 
@@ -126,20 +137,26 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
     if found < 0:
         return -1, np.inf
     value, final = ends_of(functions, layout, k, z, p, room)
-    code, nearest = 0, np.inf
     surfaces = layout.observables.shape[0]
-    for piece in range(found + 1):
-        following = turnings.values[piece] if piece < found else final
+    code, nearest, sides = 0, np.inf, 0  # two bits of ``sides`` a surface
+    for piece in range(-1, found + 1):
+        following = value
+        if piece >= 0:
+            following = turnings.values[piece] if piece < found else final
         for j in range(surfaces):
             # surfaces of an observable are listed from the highest level down
             surface = surfaces - 1 - j if following > value else j
             if layout.observables[surface] != c:
                 continue
             target = functions[2](surface, p, room.none, room.empty)
-            nearest = min(nearest, abs(following - target))
-            if piece == 0 and surface != on:
-                nearest = min(nearest, abs(value - target))
-            if min(value, following) < target < max(value, following):
+            if piece >= 0 or surface != on:
+                nearest = min(nearest, abs(following - target))
+            side = side_of(following, target)
+            before = (sides >> (2 * surface)) & 3
+            if side == 0 or side == before:
+                continue
+            sides ^= (side ^ before) << (2 * surface)
+            if before != 0:
                 code = code * (surfaces + 1) + surface + 1
         value = following
     return code, nearest
@@ -147,11 +164,15 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
 
 @helper
 def watch(functions, layout, z, p, room, turnings, out, labels):  # type: ignore[no-untyped-def]
-    """Fill margins and labels of an orbit; False if something is not finite."""
+    """Fill margins and labels of an orbit, and behind the margins the distances of the labels.
+
+    False if something is not finite.
+    """
     margins(functions, layout, z, p, room, turnings, out)
+    count = layout.interior.shape[0] + z.shape[0] + layout.joint.shape[0]
     for k in range(layout.labels.shape[0]):
-        labels[k] = crossings(functions, layout, k, z, p, room, turnings)[0]
-    for k in range(layout.interior.shape[0] + z.shape[0] + layout.joint.shape[0]):
+        labels[k], out[count + k] = crossings(functions, layout, k, z, p, room, turnings)
+    for k in range(count):
         if np.isnan(out[k]):
             return False
     return True

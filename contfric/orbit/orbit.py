@@ -180,11 +180,12 @@ class Orbit:
         from contfric.orbit.monitor import examine
 
         layout = self.system.layout
-        margins = np.empty(len(self.system.tests))
+        count = len(self.system.tests)
+        watched = np.empty(count + len(layout.labels))
         labels = np.zeros(len(layout.labels), dtype=np.int64)
         functions = self.system.functions()
-        fine = examine(functions, layout, self.joints, self.vector, margins, labels, TALLY)
-        return margins, labels, bool(fine)
+        fine = examine(functions, layout, self.joints, self.vector, watched, labels, TALLY)
+        return watched[:count], labels, bool(fine)
 
     @cached_property
     def turn_multipliers(self) -> ComplexArray:

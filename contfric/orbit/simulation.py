@@ -22,7 +22,7 @@ class SimulationEnd(str, Enum):
     EVENTS = "the number of events asked for was reached"
     TIME = "the time asked for was reached"
     HELD = "the mass stays at rest for ever: nothing releases it"
-    IMPOSSIBLE = "the model has no transition for an event that was met"
+    IMPOSSIBLE = "events follow each other at once, and time does not go on"
     INFINITE = "the motion grew beyond all numbers"
 
 

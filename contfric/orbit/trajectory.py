@@ -21,6 +21,9 @@ ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE = range(5)
 #: A sliding mode that is not left within this many periods is never left; a slide gets far more.
 _HOLD_PERIODS, _SLIDE_PERIODS = 1.001, 1e4
 
+#: Events within this share of a period follow each other at once; more of them in a row than this do
+#: not come to an end (a stop, a release and a reversal may fall together, twice).
+_NO_TIME, _MOST_AT_ONCE = 1e-12, 16
 #: A state this large grows for ever (negative damping, or resonance without any): its square is still
 #: far from overflow, and its events are still exact.
 _INFINITE = 1e100
@@ -94,7 +97,8 @@ def follow(  # type: ignore[no-untyped-def]
         cycle = int(math.floor(t / period))
         t -= cycle * period
     first_cycle, first_time = cycle, t
-    for event in range(joints.shape[0]):
+    event, at_once = 0, 0
+    while event < joints.shape[0]:
         left = (periods - (cycle - first_cycle)) * unit - (t - first_time)
         if period <= 0.0:
             left = periods - (t - first_time)
@@ -119,21 +123,27 @@ def follow(  # type: ignore[no-untyped-def]
         while period > 0.0 and t >= period:
             t -= period
             cycle += 1
+        for j in range(y.shape[0]):
+            if not abs(y[j]) < _INFINITE:
+                return INFINITE, event, mode, cycle, t
+        code = sign_code(functions, observables, surface, t, y, p, none, empty)
+        target = following[
+            (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code
+        ]
+        at_once = at_once + 1 if tau <= _NO_TIME * unit else 0
+        if at_once > _MOST_AT_ONCE:
+            return IMPOSSIBLE, event, mode, cycle, t
+        on = 1 << surface
+        if target < 0:
+            continue  # nothing leads there: the surface is touched and left to the same side
         joints[event, 0] = mode
         joints[event, 1] = surface
         cycles[event] = cycle
         times[event] = t
         copy_state(y, states[event])
-        for j in range(y.shape[0]):
-            if not abs(y[j]) < _INFINITE:
-                return INFINITE, event, mode, cycle, t
-        code = sign_code(functions, observables, surface, t, y, p, none, empty)
-        row = (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code
-        before = mode
-        mode = following[row]
-        if mode < 0:
-            return IMPOSSIBLE, event + 1, mode, cycle, t
-        on = (1 << surface) | lies_on[before]
+        on |= lies_on[mode]
+        mode = target
+        event += 1
     return ALL_EVENTS, joints.shape[0], mode, cycle, t
 
 

@@ -109,9 +109,6 @@ def test_a_wrong_simulation_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
         assert len(tally.failed) == fails
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a velocity that starts as t^3 is taken for one that does not leave zero"
-)
 @pytest.mark.parametrize("excess", [0.0, 2.0**-44])
 def test_a_release_at_the_largest_force(excess: float) -> None:
     """S = S0, u = S0 (+ 6e-14) where f' = 0: v = -Omega^2 t^3 / 6 leaves zero, and comes back at 2 pi."""

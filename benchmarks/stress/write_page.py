@@ -1,6 +1,6 @@
 """Write docs/stress.md from the JSON reports of the stress runs.
 
-``python benchmarks/stress/page.py *.json --out docs/stress.md``
+``python benchmarks/stress/write_page.py *.json --out docs/stress.md``
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ counted. An error is compared with what rounding of the arguments alone explains
 problem (a ratio of 1 is the most that is allowed; below 1 the result is as exact as doubles permit).
 
 Each run can be repeated: `python benchmarks/stress/<name>.py --count N --seed K --out <name>.json`, then
-`python benchmarks/stress/page.py *.json --out docs/stress.md`.
+`python benchmarks/stress/write_page.py *.json --out docs/stress.md`.
 """
 #: Order of the sections; others follow by name.
 ORDER = ("sequences", "segments", "orbits", "events", "continuation")
