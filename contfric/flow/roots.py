@@ -21,7 +21,7 @@ LOAD, SPEED = range(2)
 #: Below this fraction of the natural scale a stationary value at the start counts as being there.
 AT_START = 1e-13
 #: Error of a stationary time, relative to 1 + the time, at which its search ends: its square counts.
-AT_STATIONARY = 2e-9
+AT_STATIONARY = 2e-10
 #: A second rate this small leaves less than the third does on the way to the end of a shortest piece.
 FLAT = 1e-7
 #: Shortest piece, in natural scales: below it Taylor's march alone goes on.
