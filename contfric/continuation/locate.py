@@ -205,6 +205,8 @@ def _smooth_events(
     from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
 
     base = len(before.tests) - EXTRA
+    # an event behind a sliding one is none; but where a stop becomes tangential multipliers are infinite
+    after = beyond if np.all(np.isfinite(beyond.tests[base:])) else after
     found: list[tuple[Bifurcation, Point]] = []
     folded = False
     for column in (FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR):

@@ -159,7 +159,10 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         ):
             break
         if _is_at_limit(point.value, settings):
-            side.put_tip(point)
+            if settings.low <= point.value <= settings.high:
+                side.put_tip(point)
+            else:  # conditions degenerate together there: the last good point is as near as one gets
+                side.drop_tip()
             side.end = _limit_end(point.value > 0.5 * (settings.low + settings.high), settings)
             return True
         if bifurcation.kind is Kind.T and _is_start(side, before, point):
