@@ -22,10 +22,11 @@ from __future__ import annotations
 
 import hashlib
 import os
+import subprocess
 import sys
 import warnings
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Callable, Sequence
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -72,21 +73,75 @@ PeriodType = types.FunctionType(period_signature)
 
 
 class Kernel:
-    """A compiled entry point: called from Python without numba's look at the types of its arguments.
+    """A compiled entry point: compiled, or loaded from the cache, when it is first needed.
 
-    The look costs about 60 microseconds a call with the engine's arguments, and there is one
-    signature only. What is handed over must have exactly the types of the signature.
+    It is called from Python without numba's look at the types of its arguments: the look costs about
+    60 microseconds a call with the engine's arguments, and there is one signature only. What is
+    handed over must have exactly the types of the signature.
     """
 
-    def __init__(self, dispatcher: Any, signature: Any) -> None:
-        self.dispatcher, self.signature = dispatcher, signature
-        self.__wrapped__ = dispatcher.py_func
-        self.__doc__ = dispatcher.py_func.__doc__
-        (result,) = dispatcher.overloads.values()
-        self._entry = result.entry_point
+    def __init__(self, function: Callable[..., Any], signature: Any) -> None:
+        self.__wrapped__ = function
+        self.__doc__ = function.__doc__
+        self.signature = signature
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """The function as numba knows it."""
+        function = self.__wrapped__
+        aside = _ASIDE.get(f"{function.__module__}:{function.__name__}")
+        if aside is not None:
+            aside.wait()  # another process is compiling it into the cache
+        folder = cache_folder(Path(function.__code__.co_filename))
+        before = config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE
+        config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = str(folder), _OPTIMISATION, _VECTORISE
+        options = {"nogil": True, "error_model": "numpy"}
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            return numba.njit(self.signature, cache=True, **options)(function)
+        except (OSError, RuntimeError):  # no folder is writable
+            return numba.njit(self.signature, **options)(function)
+        finally:
+            config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = before
+
+    @cached_property
+    def _entry(self) -> Callable[..., Any]:
+        (result,) = self.dispatcher.overloads.values()
+        return result.entry_point  # type: ignore[no-any-return]
 
     def __call__(self, *arguments: Any) -> Any:
+        """Call the compiled code."""
         return self._entry(*arguments)
+
+
+#: Processes that compile a kernel into the cache, by its name "module:kernel".
+_ASIDE: dict[str, subprocess.Popen[bytes]] = {}
+
+
+def compile_aside(kernels: Sequence[str]) -> None:
+    """Compile kernels in a second process, if nothing is cached yet; who needs one waits for it.
+
+    Parameters
+    ----------
+    kernels : names "module:kernel"
+    """
+    cold = not cache_folder(Path(__file__)).exists()
+    if not cold or (os.cpu_count() or 1) < 2 or not sys.executable:
+        return
+    code = "".join(
+        f"from {module} import {name}; {name}.dispatcher\n"
+        for module, name in (kernel.split(":") for kernel in kernels)
+    )
+    silent = {
+        "stdin": subprocess.DEVNULL,
+        "stdout": subprocess.DEVNULL,
+        "stderr": subprocess.DEVNULL,
+    }
+    try:
+        process = subprocess.Popen([sys.executable, "-c", code], **silent)  # type: ignore[call-overload]
+    except OSError:  # no process to be had: they are compiled here, one after the other
+        return
+    _ASIDE.update(dict.fromkeys(kernels, process))
 
 
 class FirstClass(types.WrapperAddressProtocol):  # type: ignore[misc]
@@ -146,32 +201,22 @@ def _user_cache() -> Path:
 
 def kernel(signature: Any) -> Callable[[Callable[..., Any]], Kernel]:
     """Compile a function for one explicit signature, with a cache on disk where possible."""
+    return lambda function: Kernel(function, signature)
 
-    def decorate(function: Callable[..., Any]) -> Kernel:
-        folder = cache_folder(Path(function.__code__.co_filename))
-        before = config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE
-        config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = str(folder), _OPTIMISATION, _VECTORISE
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            compiled = numba.njit(signature, cache=True, nogil=True, error_model="numpy")(function)
-        except (OSError, RuntimeError):  # no folder is writable
-            compiled = numba.njit(signature, nogil=True, error_model="numpy")(function)
-        finally:
-            config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = before
-        return Kernel(compiled, signature)
 
-    return decorate
+#: A helper is never called from Python or C: its wrappers would take a quarter of the time to compile.
+_INSIDE = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def helper(function: F) -> F:
     """Compile a small function into the kernels that call it; it must not allocate.
 
     Without numba's counts of references, which cost two atomic operations for each array that is
-    looked up in a tuple: half of the engine's time.
+    looked up in a tuple: half of the engine's time. It cannot be called from Python.
     """
-    return numba.njit(error_model="numpy", nogil=True, _nrt=False)(function)  # type: ignore[no-any-return]
+    return numba.njit(error_model="numpy", nogil=True, _nrt=False, **_INSIDE)(function)  # type: ignore[no-any-return]
 
 
 def allocating_helper(function: F) -> F:
     """Compile a function that allocates into the kernels that call it."""
-    return numba.njit(error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+    return numba.njit(error_model="numpy", nogil=True, **_INSIDE)(function)  # type: ignore[no-any-return]

@@ -174,12 +174,15 @@ def locate(  # type: ignore[no-untyped-def]
         Position in the step, from 0 to 1; -1 if no trial point could be solved; -2 minus the
         position of the last good point if it is Newton that fails behind it.
     """
-    which = np.array([active])
+    which = np.empty(1, dtype=np.int64)
+    which[0] = active
     count, m = za.shape
     wa, sa, wb, sb, length = ends
     room = step_room(count, m, p.shape[0])
     z, t = np.empty((count, m)), np.empty((count, m))
-    best_z, best_t = za.copy(), ta.copy()
+    best_z, best_t = np.empty((count, m)), np.empty((count, m))
+    copy_to(best_z, za)
+    copy_to(best_t, ta)
     best_x, best_w, best_slope = 0.0, wa, sa
     f_low, f_high = values[0], values[1]
     if kind == BY_LABEL:

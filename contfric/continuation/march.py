@@ -25,6 +25,7 @@ from contfric.continuation.steps import (
     ALONG,
     apart,
     changed,
+    copy_to,
     dips,
     largest_state,
     observe_point,
@@ -167,9 +168,11 @@ def march(  # type: ignore[no-untyped-def]
         (why it stopped, index of the last row written, next step).
     """
     step, largest, smallest, low, high, scale = options
-    which = np.array([active])
-    guess, angle = np.empty(zs.shape[1:]), 0.0
-    trial = p.copy()
+    which, trial = np.empty(1, dtype=np.int64), np.empty(p.shape[0])
+    which[0] = active
+    for j in range(p.shape[0]):
+        trial[j] = p[j]
+    guess, angle = np.empty((zs.shape[1], zs.shape[2])), 0.0
     room = step_room(zs.shape[1], zs.shape[2], p.shape[0])
     solving_first = k < 0
     while k + 1 < ws.shape[0]:
@@ -180,7 +183,7 @@ def march(  # type: ignore[no-untyped-def]
             return STEP, k, step
         else:
             trial[active], slope = predict(zs, ws, tzs, tws, arc, k, step), tws[k]
-            guess[:, :] = zs[row]
+            copy_to(guess, zs[row])
         guess_w = trial[active]
         fine, slope, finite = settle(
             functions, layout, zs[row], trial, which, tzs[row], slope, scale, ALONG, counts, room

@@ -24,7 +24,8 @@ SMALLEST_STEP = 1e-10
 _LEAST_STEP = 1e-8
 #: Most points of one side of a branch by default.
 MOST_POINTS = 20_000
-#: Extra columns of the tests behind the margins and the distances of the labels; the first is the slope of the parameter. (Repeated
+#: Extra columns of the tests behind the margins and the distances of the labels; the first is the slope
+#: of the parameter. (Repeated
 #: from the compiled steps, which are not imported before something is traced; a test compares them.)
 EXTRA = 4
 

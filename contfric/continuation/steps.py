@@ -19,7 +19,8 @@ from contfric.orbit.monitor import Turnings, turning_room, watch
 from contfric.orbit.newton import CHECKS, CONVERGED, MULTIPLIERS, SOLVES, correct
 from contfric.orbit.spectrum import SpectralRoom, multipliers, spectral_room
 
-#: Extra columns of the tests behind the margins and the distances of the labels: slope of the parameter, products of 1 - mu and of
+#: Extra columns of the tests behind the margins and the distances of the labels: slope of the
+#: parameter, products of 1 - mu and of
 #: 1 + mu, and 1 - |mu_1 mu_2| of the two largest multipliers.
 FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR = range(4)
 EXTRA = 4
@@ -50,17 +51,18 @@ class StepRoom(NamedTuple):
 @allocating_helper
 def step_room(count, m, parameters):  # type: ignore[no-untyped-def]
     """Return the room for the branch of a chain."""
+    free = max(1 - count, 1)  # one parameter, but no literal
     return StepRoom(
-        equation_room(count, m, 1),
-        room_for(count, m, 1, 2),
+        equation_room(count, m, free),
+        room_for(count, m, free, free + free),
         spectral_room(m),
         turning_room(),
-        np.zeros((2, m, m)),
-        np.zeros((1, count, m)),
-        np.zeros((1, 1)),
-        np.zeros((1, 2)),
-        np.zeros((count, m)),
-        np.zeros(parameters),
+        np.empty((2, m, m)),
+        np.empty((1, count, m)),
+        np.empty((1, 1)),
+        np.empty((1, 2)),
+        np.empty((count, m)),
+        np.empty(parameters),
     )
 
 

@@ -42,8 +42,8 @@ from contfric.flow.roots import (
     direction,
     excitation,
     phases,
+    point,
     roots_along,
-    slide,
 )
 
 
@@ -53,7 +53,9 @@ def damping_slope(s, p, t0, x0, v0, d):  # type: ignore[no-untyped-def]
     w, h = p[OMEGA], p[H]
     a, b = roots(p[ZETA])
     # G*G, its slope G*C, and C*C' by exp_d over the repeated roots
-    e = divided_exponentials(np.array([a, b, a, b]), d)
+    nodes = np.empty(5, dtype=np.complex128)
+    nodes[0], nodes[1], nodes[2], nodes[3] = a, b, a, b
+    e = divided_exponentials(nodes[:4], d)
     g2 = e[3]
     g2_1 = b * e[3] + e[2]
     g2_2 = b * g2_1 + a * e[2] + e[1]
@@ -64,7 +66,8 @@ def damping_slope(s, p, t0, x0, v0, d):  # type: ignore[no-untyped-def]
         size = 1.0 if k == 1 else h
         if size != 0.0:
             node = complex(0.0, k * w)
-            q = divided_exponentials(np.array([a, b, a, b, node]), d)[4]
+            nodes[4] = node
+            q = divided_exponentials(nodes, d)[4]
             q1 = node * q + g2
             q2 = node * q1 + g2_1
             turn = size * complex(math.cos(k * w * t0), math.sin(k * w * t0))
@@ -110,7 +113,8 @@ def flow(mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
     s = direction(mode)
     x0, v0 = y0[0], y0[1]
     if jac.shape[0] == 0:
-        y1[0], y1[1] = slide(s, p, t0, x0, v0, dt)
+        moved = point(mode, p, phases(p, t0), t0, x0, v0, dt)
+        y1[0], y1[1] = moved[0], moved[1]
         return
     w, h, zeta = p[OMEGA], p[H], p[ZETA]
     g, c, r = free(zeta, dt)
@@ -146,6 +150,11 @@ def observe(c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
         if grad.shape[0] > 0:
             grad[2] = 1.0
         return y[1]
+    if grad.shape[0] == 0:
+        f = math.cos(p[OMEGA] * t)
+        if p[H] != 0.0:
+            f += p[H] * math.cos(3 * p[OMEGA] * t)
+        return y[0] - f
     f, f1, _ = excitation(p, t)
     if grad.shape[0] > 0:
         grad[0] = -f1
@@ -185,7 +194,8 @@ def hit(mode, c, target, on, t0, y0, dt_max, p):  # type: ignore[no-untyped-def]
         return -1.0
     sign = direction(mode) if on and c == SPEED else 0.0  # a slide leaves v = 0 to its own side
     phase = phases(p, t0)
-    tau = roots_along(mode, c, 0, target, on, sign, True, phase, t0, y0, dt_max, p, y0, y0)[1]
+    order = min(mode, 0)  # 0, but no literal: the search would be compiled once for each
+    tau = roots_along(mode, c, order, target, on, sign, phase, t0, y0, dt_max, p, y0, y0)[1]
     return tau if tau <= dt_max else -1.0
 
 
@@ -195,7 +205,8 @@ def turning(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-d
     if dt <= 0.0 or (mode == STICK and c == SPEED):
         return 0
     phase = phases(p, t0)
-    return roots_along(mode, c, 1, 0.0, False, 0.0, False, phase, t0, y0, dt, p, times, values)[0]
+    order, on = max(1 - mode, 1), dt < 0.0  # 1 and False, but no literals
+    return roots_along(mode, c, order, 0.0, on, 0.0, phase, t0, y0, dt, p, times, values)[0]
 
 
 def compiled_flow() -> CompiledFlow:

@@ -188,26 +188,31 @@ def divided_exponentials(nodes, d):  # type: ignore[no-untyped-def]
     norm += abs(d)
     squarings = max(0, math.ceil(math.log2(max(norm, 1e-300))) + 1)  # scaled norm at most 1/2
     step = d / 2.0**squarings
-    bidiagonal = np.zeros((n, n), dtype=np.complex128)
+    bidiagonal = np.empty((n, n), dtype=np.complex128)
+    total = np.empty((n, n), dtype=np.complex128)
+    product = np.empty((n, n), dtype=np.complex128)
     for i in range(n):
-        bidiagonal[i, i] = nodes[i] * step
-        if i + 1 < n:
-            bidiagonal[i, i + 1] = step
-    total = np.eye(n, dtype=np.complex128)
+        for j in range(n):
+            bidiagonal[i, j] = nodes[i] * step if i == j else (step if j == i + 1 else 0.0)
+            total[i, j] = 1.0 if i == j else 0.0
     for k in range(16, 0, -1):  # Horner; 0.5^17 / 17! is below 1e-19
-        total = np.eye(n, dtype=np.complex128) + upper_product(bidiagonal, total) / k
+        upper_product(bidiagonal, total, product)
+        for i in range(n):
+            for j in range(n):
+                total[i, j] = product[i, j] / k + (1.0 if i == j else 0.0)
     for _ in range(squarings):
-        total = upper_product(total, total)
-    return total[0].copy()
+        upper_product(total, total, product)
+        total, product = product, total
+    return total[0]
 
 
-@allocating_helper
-def upper_product(left, right):  # type: ignore[no-untyped-def]
-    """Return the product of two upper triangular matrices."""
+@helper
+def upper_product(left, right, out):  # type: ignore[no-untyped-def]
+    """Write the product of two upper triangular matrices."""
     n = left.shape[0]
-    out = np.zeros((n, n), dtype=np.complex128)
     for i in range(n):
-        for j in range(i, n):
+        for j in range(n):
+            value = complex(0.0, 0.0)
             for k in range(i, j + 1):
-                out[i, j] += left[i, k] * right[k, j]
-    return out
+                value += left[i, k] * right[k, j]
+            out[i, j] = value

@@ -139,13 +139,16 @@ def point(mode, p, phase, t0, x0, v0, d):  # type: ignore[no-untyped-def]
 
 @helper
 def quantity(mode, c, order, p, phase, t0, x0, v0, d):  # type: ignore[no-untyped-def]
-    """Return (q, q', q'', E, observable): q is observable c or (order 1) its rate; E >= hypot(v, v')."""
+    """Return q with three derivatives, E and the observable; q is observable c or (order 1) its rate.
+
+    E bounds hypot(v, v'); the third derivative is that of an observable only (0 for a rate).
+    """
     x, v, f, f1, f2, f3 = point(mode, p, phase, t0, x0, v0, d)
     u = x - f
     if mode == STICK:
         if order == 0:
-            return u, -f1, -f2, 0.0, u
-        return -f1, -f2, -f3, 0.0, u
+            return u, -f1, -f2, -f3, 0.0, u
+        return -f1, -f2, -f3, 0.0, 0.0, u
     z = 2.0 * p[ZETA]
     a = f - z * v - x - direction(mode) * p[S]
     a1 = f1 - z * a - v
@@ -153,11 +156,11 @@ def quantity(mode, c, order, p, phase, t0, x0, v0, d):  # type: ignore[no-untype
     size = math.sqrt(v * v + a * a)
     if c == SPEED:
         if order == 0:
-            return v, a, a1, size, v
-        return a, a1, a2, size, v
+            return v, a, a1, a2, size, v
+        return a, a1, a2, 0.0, size, v
     if order == 0:
-        return u, v - f1, a - f2, size, u
-    return v - f1, a - f2, a1 - f3, size, u
+        return u, v - f1, a - f2, a1 - f3, size, u
+    return v - f1, a - f2, a1 - f3, 0.0, size, u
 
 
 @helper
@@ -228,21 +231,21 @@ def leaving_side(q1, q2):  # type: ignore[no-untyped-def]
 
 
 @helper
-def roots_along(mode, c, order, target, on, sign, single, phase, t0, y0, end, p, times, values):  # type: ignore[no-untyped-def]
-    """Find the roots of q - target in (0, end], q being an observable or (order 1) its rate.
+def roots_along(mode, c, order, target, on, sign, phase, t0, y0, end, p, times, values):  # type: ignore[no-untyped-def]
+    """Find the first root of an observable less a target, or (order 1) all roots of its rate.
 
     Parameters
     ----------
     on, sign : whether q takes the target at the start itself, which does not count, and the side to
         which it leaves (0: found from the derivatives)
-    single : whether the first root is enough; else all interior ones are written to ``times``, and
-        the observable there to ``values``
+    times, values : places for the interior roots of a rate, and for the observable there
 
     Returns
     -------
     tuple
         (number of roots, -1 if they do not fit; the last one found, -1 if none).
     """
+    single = order == 0
     natural = natural_scale(mode, p)
     longest = PIECE * natural
     if not single:
@@ -252,7 +255,7 @@ def roots_along(mode, c, order, target, on, sign, single, phase, t0, y0, end, p,
     first, last = min(near, 0.5 * end), max(end - near, 0.5 * end)
     x0, v0 = y0[0], y0[1]
     tau, leaving, length, count = 0.0, on, longest, 0
-    q, q1, q2, size, value = quantity(mode, c, order, p, phase, t0, x0, v0, 0.0)
+    q, q1, q2, _, size, value = quantity(mode, c, order, p, phase, t0, x0, v0, 0.0)
     q -= target
     if not single:
         leaving = abs(q) <= AT_START * (1.0 + size)
@@ -265,7 +268,7 @@ def roots_along(mode, c, order, target, on, sign, single, phase, t0, y0, end, p,
         if not found:
             after = min(end, tau + length)
             step = after - tau
-            r, r1, r2, size_r, value_r = quantity(mode, c, order, p, phase, t0, x0, v0, after)
+            r, r1, r2, _, size_r, value_r = quantity(mode, c, order, p, phase, t0, x0, v0, after)
             r -= target
             s2 = step * step
             error = sixth_bound(mode, c, order, p, size, step) * s2 * s2 * s2
@@ -298,7 +301,7 @@ def roots_along(mode, c, order, target, on, sign, single, phase, t0, y0, end, p,
                 sign = -sign  # and behind the root, up to the end of the part, it falls further
                 if high < 1.0:
                     after = tau + high * step
-                    r, r1, r2, size_r, value_r = quantity(
+                    r, r1, r2, _, size_r, value_r = quantity(
                         mode, c, order, p, phase, t0, x0, v0, after
                     )
                     r -= target
@@ -341,7 +344,7 @@ def roots_along(mode, c, order, target, on, sign, single, phase, t0, y0, end, p,
                 tau += PAST * natural
         else:
             leaving = False
-        q, q1, q2, size, value = quantity(mode, c, order, p, phase, t0, x0, v0, tau)
+        q, q1, q2, _, size, value = quantity(mode, c, order, p, phase, t0, x0, v0, tau)
         q -= target
     return count, -1.0
 
@@ -364,34 +367,48 @@ def taylor_step(mode, c, order, sign, p, q, q1, q2, size, natural, tau):  # type
 
 @helper
 def refined(mode, c, order, target, sign, phase, t0, x0, v0, p, start, width, share):  # type: ignore[no-untyped-def]
-    """Return the only root of a falling function in a bracket, q' and the observable there (Halley)."""
+    """Return the only root of a falling function in a bracket, its rate and the observable there.
+
+    By the inverse of Taylor's polynomial (of third order for an observable, of second for a rate)::
+
+        t = -r - A r^2 - (2 A^2 - B) r^3,   r = q / q', A = q" / 2 q', B = q^(3) / 6 q',
+
+    whose error is ``(5 A^3 - 5 A B + C) r^4``, C = q^(4) / 24 q', or ``(2 A^2 - B) r^3``.
+    """
     low, high = start, start + width
     tau = start + share * width
-    resolution = 0.0 if order == 0 else AT_STATIONARY
     q1, value = 0.0, 0.0
     for _ in range(100):  # bisection alone needs 60
-        q, q1, q2, size, value = quantity(mode, c, order, p, phase, t0, x0, v0, tau)
+        q, q1, q2, q3, size, value = quantity(mode, c, order, p, phase, t0, x0, v0, tau)
         q -= target
         if sign * q > 0.0:
             low = tau
         else:
             high = tau
-        shift = -q * q1 / (q1 * q1 - 0.5 * q * q2) if q != 0.0 else 0.0
+        ratio, bend, third = q / q1, 0.5 * q2 / q1, q3 / (6.0 * q1)
+        shift = -ratio * (1.0 + ratio * bend)
+        if order == 0:
+            shift -= ratio**3 * (2.0 * bend * bend - third)
         following = tau + shift
         if not low <= following <= high:
             if high - low <= 4.0 * EPS * high:
                 return tau, q1, value
             tau = 0.5 * (low + high)
             continue
-        if order == 1:
+        # a rate's third derivative is the fourth one of its observable
+        next_bound = third_bound(mode, c, 1, p, size, abs(shift))
+        cube = abs(ratio) ** 3
+        if order == 0:
+            fourth = 5.0 * abs(bend) * (bend * bend + abs(third)) + next_bound / abs(24.0 * q1)
+            if fourth * cube * abs(ratio) <= 0.5 * EPS * following:
+                return following, q1 + q2 * shift, value
+        else:
             value += shift * (q + shift * (0.5 * q1 + shift * q2 / 6.0))
-        bend, cube = q2 / q1, abs(shift) ** 3
-        third = third_bound(mode, c, order, p, size, abs(shift)) / 6.0
-        left = (0.25 * bend * bend + third / abs(q1)) * cube
-        # what Taylor's formula leaves of the time, and of the observable at a stationary point
-        accurate = third * cube * abs(shift) <= 4.0 * EPS * (1.0 + size)
-        if left <= EPS * following or (accurate and left <= resolution * (1.0 + following)):
-            return following, q1 + q2 * shift, value
+            left = (2.0 * bend * bend + next_bound / abs(6.0 * q1)) * cube
+            # what Taylor's formula leaves of the value must be rounding, too
+            accurate = next_bound * cube * abs(shift) / 24.0 <= EPS * (1.0 + size)
+            if accurate and left <= AT_STATIONARY * (1.0 + following):
+                return following, q1 + q2 * shift, value
         if abs(shift) <= 4.0 * EPS * following:
             return following, q1, value
         tau = following

@@ -53,14 +53,14 @@ def room_for(count, m, free, right):  # type: ignore[no-untyped-def]
     """Return the room for a chain of ``count`` segments with ``free`` parameters."""
     width = 3 * m + free + right
     return Elimination(
-        np.zeros((2 * m, width)),
-        np.zeros((count, m, width)),
-        np.zeros((free, width)),
-        np.zeros((m + free, m + free)),
-        np.zeros((m + free, right)),
-        np.zeros((m, right)),
-        np.zeros((count, m, right)),
-        np.zeros((free, right)),
+        np.empty((2 * m, width)),
+        np.empty((count, m, width)),
+        np.empty((free, width)),
+        np.empty((m + free, m + free)),
+        np.empty((m + free, right)),
+        np.empty((m, right)),
+        np.empty((count, m, right)),
+        np.empty((free, right)),
     )
 
 
@@ -74,7 +74,7 @@ def dense_solve(a, b):  # type: ignore[no-untyped-def]
             if abs(a[row, col]) > abs(a[best, col]):
                 best = row
         pivot = a[best, col]
-        if pivot == 0.0 or not np.isfinite(pivot):
+        if not 0.0 < abs(pivot) < np.inf:
             return False
         if best != col:
             swap_rows(a, col, best)

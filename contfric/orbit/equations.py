@@ -71,14 +71,14 @@ def equation_room(count, m, free):  # type: ignore[no-untyped-def]
     """Return the room for a chain of ``count`` segments with ``free`` parameters."""
     n = m - 1
     return Room(
-        np.zeros(n),
-        np.zeros((n, 2 + n + free)),
-        np.zeros(1 + n + free),
-        np.zeros(free),
-        np.zeros(count),
-        np.zeros(m),
-        np.zeros((m, m)),
-        np.zeros((m, free)),
+        np.empty(n),
+        np.empty((n, 2 + n + free)),
+        np.empty(1 + n + free),
+        np.empty(free),
+        np.empty(count),
+        np.empty(m),
+        np.empty((m, m)),
+        np.empty((m, free)),
         np.empty(0, dtype=np.int64),
         np.empty(0),
         np.empty((0, 0)),

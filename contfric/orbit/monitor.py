@@ -7,6 +7,7 @@ the joints, which the exit and joint margins watch). The flow delivers *all* sta
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -173,7 +174,7 @@ def watch(functions, layout, z, p, room, turnings, out, labels):  # type: ignore
     for k in range(layout.labels.shape[0]):
         labels[k], out[count + k] = crossings(functions, layout, k, z, p, room, turnings)
     for k in range(count):
-        if np.isnan(out[k]):
+        if math.isnan(out[k]):
             return False
     return True
 
@@ -183,7 +184,8 @@ def examine(functions, layout, z, p, out, labels, counts):  # type: ignore[no-un
     """Fill margins and labels of a solved orbit; False if something is not finite."""
     counts[CHECKS] += 1
     count, m = z.shape
-    room, rows = equation_room(count, m, 0), np.empty((2 * m, 3 * m + 1))
+    free = min(count, 0)  # no parameter, and no literal: the room would be compiled once for each
+    room, rows = equation_room(count, m, free), np.empty((2 * m, 3 * m + 1))
     close_chain(functions, layout, z, p, room.none, room)
     for i in range(count):  # for the rates at the exits
         after = z[i + 1] if i + 1 < count else room.last

@@ -175,7 +175,8 @@ def solve(functions, layout, z, p, trust, pencil, counts):  # type: ignore[no-un
     """Solve for the orbit at fixed parameters, in place; (status, steps, first, residual)."""
     counts[SOLVES] += 1
     count, m = z.shape
-    room, work = equation_room(count, m, 0), room_for(count, m, 0, 1)
+    free, right = min(count, 0), max(1 - count, 1)  # 0 and 1, but no literals
+    room, work = equation_room(count, m, free), room_for(count, m, free, right)
     d, e, s = np.empty((0, count, m)), np.empty((0, 0)), np.empty((0, 1))
     status, steps, first, _ = correct(
         functions, layout, z, p, room.none, z, p, d, e, s, trust, FLOOR, room, work, pencil
@@ -189,20 +190,27 @@ def solve(functions, layout, z, p, trust, pencil, counts):  # type: ignore[no-un
 def linearise(functions, layout, z, p, a, b, c, r, close):  # type: ignore[no-untyped-def]
     """Fill the blocks of the full Jacobian (all parameters) for use outside of the engine."""
     count, m = z.shape
-    which = np.arange(p.shape[0])
-    free = which.shape[0]
+    free = p.shape[0]
+    which = np.empty(free, dtype=np.int64)
+    for k in range(free):
+        which[k] = k
     room, rows = equation_room(count, m, free), np.empty((2 * m, 3 * m + free + 1))
     close_chain(functions, layout, z, p, which, room)
-    close[:, :] = room.close
+    for i in range(m):
+        for j in range(m):
+            close[i, j] = room.close[i, j]
     fine = True
     for i in range(count):
         after = z[i + 1] if i + 1 < count else room.last
         worst = segment_rows(functions, layout, i, m, z[i], after, p, which, room, rows)
         fine = fine and math.isfinite(worst)
-        a[i] = rows[m:, m : 2 * m]
-        b[i] = rows[m:, 2 * m : 3 * m]
-        c[i] = rows[m:, 3 * m : 3 * m + free]
-        r[i, :, 0] = rows[m:, 3 * m + free]
+        for j in range(m):
+            for k in range(m):
+                a[i, j, k] = rows[m + j, m + k]
+                b[i, j, k] = rows[m + j, 2 * m + k]
+            for k in range(free):
+                c[i, j, k] = rows[m + j, 3 * m + k]
+            r[i, j, 0] = rows[m + j, 3 * m + free]
     # the closure's dependence on the parameters is added to the last segment's columns
     for i in range(m):
         for k in range(free):

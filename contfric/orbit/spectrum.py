@@ -123,7 +123,7 @@ class SpectralRoom(NamedTuple):
 @allocating_helper
 def spectral_room(m):  # type: ignore[no-untyped-def]
     """Return the room for matrices of one turn, shape (m, m)."""
-    return SpectralRoom(np.empty((m, m)), np.empty((m, m)), np.empty((m, m)), np.zeros(m + 1))
+    return SpectralRoom(np.empty((m, m)), np.empty((m, m)), np.empty((m, m)), np.empty(m + 1))
 
 
 @helper
@@ -142,9 +142,9 @@ def stability(layout, pencil, mu, counts):  # type: ignore[no-untyped-def]
     """Fill the multipliers of one turn from its pencil; return (chi(1), chi(-1))."""
     counts[MULTIPLIERS] += 1
     m = pencil.shape[1]
-    close = np.zeros((m, m))
-    close[0, 0] = 1.0
-    for i in range(m - 1):
-        for j in range(m - 1):
-            close[1 + i, 1 + j] = layout.closure[i, j]
+    close = np.empty((m, m))
+    for i in range(m):
+        for j in range(m):
+            inner = i > 0 and j > 0
+            close[i, j] = layout.closure[i - 1, j - 1] if inner else (1.0 if i == j else 0.0)
     return multipliers(layout.rank, pencil, close, mu, spectral_room(m))

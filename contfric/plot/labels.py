@@ -69,8 +69,9 @@ def near(ax: Axes, anchor: Anchor, others: Sequence[Anchor]) -> bool:
 def settle(ax: Axes) -> None:
     """Let the layout of the figure decide where its axes are; labels are placed in pixels."""
     root = _root(ax)
-    if root is not None:
-        root.draw_without_rendering()
+    engine = root.get_layout_engine() if root is not None else None
+    if root is not None and engine is not None:
+        engine.execute(root)
 
 
 def _point_size(ax: Axes) -> float:

@@ -15,6 +15,17 @@ from contfric.study.schema import ContinueTask, ExploreTask, Want
 Say = Callable[[str], None]
 
 
+#: Kernels of the continuation; those that find an orbit are compiled meanwhile.
+_CONTINUATION = ("contfric.continuation.march:march", "contfric.continuation.bracket:locate")
+
+
+def compile_continuation() -> None:
+    """Let a second process compile what a first continuation needs; nothing where it is cached."""
+    from contfric.compiled import compile_aside
+
+    compile_aside(_CONTINUATION)
+
+
 def find_start(study: Study, say: Say) -> Orbit:
     """Return the first orbit: saved, solved for, or what a simulation settles on."""
     if study.orbit is not None:

@@ -31,12 +31,13 @@ def paint(path: Path, drawing: Drawing, orbit: Orbit, diagram: Diagram | None, t
     if drawing.kind is FigureKind.DIAGRAM:
         if diagram is None:
             raise StudyError(f"{drawing.file}: there is no diagram to draw")
-        plot_diagram(diagram, rows=[row.value for row in drawing.rows], fig=figure)
         figure.suptitle(title)
+        plot_diagram(diagram, rows=[row.value for row in drawing.rows], fig=figure)
     elif drawing.kind is FigureKind.ORBIT:
         plot_orbit_panels(orbit, fig=figure)
     else:
         axes = figure.add_subplot()
         plot_transition_graph(orbit.model, ax=axes, signature=orbit.signature)
+    figure.set_layout_engine("none")  # it has settled, for the labels; a second time costs 0.1 s
     with replacing(path) as temporary:
         save_figure(figure, temporary)

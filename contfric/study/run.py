@@ -17,6 +17,7 @@ from contfric.orbit.counts import Counts, counts
 from contfric.orbit.orbit import Orbit
 from contfric.results import save
 from contfric.study.compute import (
+    compile_continuation,
     continue_from,
     explore_from,
     find_start,
@@ -184,6 +185,8 @@ class _Run:
 
     def _compute(self) -> None:
         study = self.study
+        if study.task is not None:
+            compile_continuation()
         self.orbit = orbit = self._timed(StepName.ORBIT, lambda: find_start(study, self.say))
         self.say(f"orbit: {orbit.name} over {orbit.periods} period(s)")
         task = study.task
