@@ -15,7 +15,7 @@ MAKEFLAGS += --no-print-directory
 help:
 	@echo "make demo     the bifurcation diagram of Fig. 5, from one simulated orbit, in $(DEMO)/"
 	@echo "make test     lint, types, import contracts, tests"
-	@echo "make bench    run times, and run time against error beside other packages"
+	@echo "make bench    run times, cost at scale and of scenes, run time against error beside others"
 	@echo "make gallery  the figures of docs/gallery"
 	@echo "make setup    a virtual environment in $(VENV)/ (the others do this by themselves)"
 	@echo "make clean    removes what make and the tests wrote, and keeps $(VENV)/"
@@ -71,6 +71,8 @@ bench: $(BENCH_STAMP)
 	@$(BIN)/python -m pytest benchmarks -o python_files='bench_*.py' --benchmark-only
 	@$(BIN)/python benchmarks/table.py
 	@$(BIN)/python benchmarks/error.py
+	@$(BIN)/python benchmarks/scale.py
+	@$(BIN)/python benchmarks/scenes.py
 
 gallery: $(STAMP)
 	@echo "== gallery"

@@ -11,6 +11,12 @@ from pathlib import Path
 from bench_engine import CASES, branch_of, diagram_of_fig05, simulation
 
 ROUNDS = 15
+#: The other pages.
+FURTHER = (
+    "Further: [cost at scale](benchmarks-scale.md) (segments, a million points, each monitor on and off),",
+    "[cost of a scene](benchmarks-scenes.md) (what it does and skips, cold and warm),",
+    "[run time against error](benchmarks-error.md) (beside other packages).",
+)
 
 
 def count(result: object) -> int:
@@ -57,6 +63,7 @@ def main() -> None:
             f"| {name} | {units} | {median * 1e3:.2f} ms | {median / units * 1e6:.2f} us "
             f"| {least / units * 1e6:.2f} us |"
         )
+    lines += ["", *FURTHER]
     page = Path(__file__).parents[1] / "docs" / "benchmarks.md"
     page.write_text("\n".join(lines) + "\n", encoding="utf-8")
     print(page.read_text(encoding="utf-8"))
