@@ -1,8 +1,6 @@
 """``python -m contfric``: the command line."""
 
-import sys
-
-from contfric.cli import main
+from contfric.cli import console
 
 if __name__ == "__main__":
-    sys.exit(main())
+    console()

@@ -20,6 +20,7 @@ never broken.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
 import subprocess
@@ -125,7 +126,7 @@ def compile_aside(kernels: Sequence[str]) -> None:
     ----------
     kernels : names "module:kernel"
     """
-    cold = not cache_folder(Path(__file__)).exists()
+    cold = not _ASIDE and not cache_folder(Path(__file__)).exists()
     if not cold or (os.cpu_count() or 1) < 2 or not sys.executable:
         return
     code = "".join(
@@ -142,6 +143,14 @@ def compile_aside(kernels: Sequence[str]) -> None:
     except OSError:  # no process to be had: they are compiled here, one after the other
         return
     _ASIDE.update(dict.fromkeys(kernels, process))
+    atexit.register(_end, process)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Do not leave a process behind that nobody waits for any more."""
+    if process.poll() is None:
+        process.terminate()
+    process.wait()
 
 
 class FirstClass(types.WrapperAddressProtocol):  # type: ignore[misc]

@@ -209,9 +209,9 @@ class _Exploration:
                 return
             side = trace_side(orbit, departure.point, self.settings, progress=self.progress)
             if _went_somewhere(side):
-                side.start_at(departure.origin)
                 first = _first_end(reason, event.bifurcation, side, self.settings)
-                self._add_from(assemble(orbit, self.settings, side, first), event)
+                branch = assemble(orbit, self.settings, side, first, departure.origin)
+                self._add_from(branch, event)
                 return
         self.notes.append(f"{at}: the branch that leaves is not admissible")
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
 from contfric.cli.exits import Exit
 from contfric.errors import ContfricError
@@ -48,6 +49,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"contfric: error: {_message(error)}", file=sys.stderr)
         return _code(error)
     return code
+
+
+def console() -> NoReturn:
+    """Run the command line as a process, and leave at once.
+
+    Everything is written and closed by then; taking Python and the compiler apart in order would
+    take a quarter of a second.
+    """
+    code = main()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def _message(error: Exception) -> str:

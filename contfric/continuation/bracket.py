@@ -33,6 +33,10 @@ from contfric.orbit.spectrum import multipliers
 #: What locate() follows: a column of the tests, a label, or the parameter itself.
 BY_TEST, BY_LABEL, BY_PARAMETER = range(3)
 
+#: A value of order 1 that is this small is rounding (ten units in the last place, of an orbit of several
+#: segments): a narrower bracket would follow noise.
+_NOISE = 2e-15
+
 
 @helper
 def next_trial(low, high, f_low, f_high, x_old, f_old, x):  # type: ignore[no-untyped-def]
@@ -235,7 +239,7 @@ def locate(  # type: ignore[no-untyped-def]
             x_old, f_old = high, f_high
             high, f_high = x, f
             lost = not fine
-        if f == 0.0 or high - low <= 4e-16:
+        if f == 0.0 or high - low <= 4e-16 or (f_low <= _NOISE and f_high >= -_NOISE):
             break
         x = next_trial(low, high, f_low, f_high, x_old, f_old, x)
     if best_x == 1.0:

@@ -23,8 +23,52 @@ from contfric.orbit.system import IntArray, System
 #: for Ctrl-C to be answered at once.
 CHUNK = 512
 
+#: A column that is full grows by one part in this many; the last rest is given back.
+_GROWTH = 8
+#: Rows that are moved at once: few enough to need no memory to speak of.
+_BLOCK = 1 << 14
+
 #: What a branch keeps of its points.
 KEPT = ("joints", "values", "arc", "labels", "mu")
+
+
+@dataclass(eq=False)
+class Columns:
+    """What is kept of many points: one array a column, which grows in place.
+
+    (Pieces that are joined at the end would take the memory twice.)
+    """
+
+    arrays: dict[str, NDArray[Any]]
+    count: int = 0
+
+    def append(self, rows: dict[str, NDArray[Any]]) -> None:
+        """Copy rows behind those that are there."""
+        stop = self.count + len(rows["values"])
+        for name, new in rows.items():
+            array = self.arrays.setdefault(name, np.empty((0, *new.shape[1:]), new.dtype))
+            if stop > len(array):
+                room = stop if not self.count else max(stop, self.count + self.count // _GROWTH)
+                array.resize((room, *new.shape[1:]), refcheck=False)
+            array[self.count : stop] = new
+        self.count = stop
+
+    def take(self, name: str) -> NDArray[Any]:
+        """Return one column, and let it go."""
+        array = self.arrays.pop(name)
+        array.resize((self.count, *array.shape[1:]), refcheck=False)
+        return array
+
+    def take_behind(self, name: str, back: Columns) -> NDArray[Any]:
+        """Return one column behind the reversed one of another side, without their common first row."""
+        before = back.take(name)[:0:-1]
+        array, shift = self.take(name), len(before)
+        array.resize((self.count + shift, *array.shape[1:]), refcheck=False)
+        for stop in range(self.count, 0, -_BLOCK):  # from the end, for the two places overlap
+            start = max(0, stop - _BLOCK)
+            array[start + shift : stop + shift] = array[start:stop]
+        array[:shift] = before
+        return array
 
 
 @dataclass(eq=False)
@@ -99,7 +143,7 @@ class Side:
     last: int = 0
     count: int = 1
     bifurcations: list[Bifurcation] = field(default_factory=list)
-    _kept: list[dict[str, NDArray[Any]]] = field(default_factory=list)
+    kept: Columns = field(default_factory=lambda: Columns({}))
     _fresh: int = 0
 
     @classmethod
@@ -127,8 +171,8 @@ class Side:
     @property
     def second_multipliers(self) -> NDArray[np.complex128]:
         """Multipliers of one turn at the second point (at the first, if it is the only one)."""
-        chunk = self._kept[0]["mu"] if self._kept else self.rows.mu[: self.last + 1]
-        return np.asarray(chunk[min(1, len(chunk) - 1)])
+        mu = self.kept.arrays["mu"] if self.kept.count else self.rows.mu[: self.last + 1]
+        return np.array(mu[min(1, self.count - 1)])
 
     def put_tip(self, point: Point) -> None:
         """Replace the last point."""
@@ -142,13 +186,6 @@ class Side:
     def relabel_first(self, labels: IntArray) -> None:
         """Give the first of two points the labels of the second."""
         self.rows.labels[self.last - 1] = labels
-
-    def start_at(self, origin: Point) -> None:
-        """Put a point before the first one."""
-        self.first = origin
-        kept = {name: np.array([getattr(origin, _FIELD[name])]) for name in KEPT}
-        self._kept.insert(0, kept)
-        self.count += 1
 
     def march(self, orbit: Orbit, settings: Settings, step: float) -> tuple[int, float]:
         """March on; return (why it stopped, next step)."""
@@ -175,28 +212,21 @@ class Side:
         return why, step
 
     def _keep_full_rows(self) -> None:
-        """Keep all rows, and go on with the last two as the first."""
-        self._keep(self.last + 1)
+        """Keep all rows but the last, and go on with the last two as the first."""
+        self._keep(self.last)
         for array in vars(self.rows).values():
             array[:2] = array[self.last - 1 : self.last + 1]
-        # the last one may still be replaced
-        for array in self._kept[-1].values():
-            array.resize((len(array) - 1, *array.shape[1:]), refcheck=False)
         self.last, self._fresh = 1, 1
 
     def _keep(self, stop: int) -> None:
         rows = slice(self._fresh, stop)
-        self._kept.append({name: getattr(self.rows, name)[rows].copy() for name in KEPT})
+        self.kept.append({name: getattr(self.rows, name)[rows] for name in KEPT})
+        self._fresh = stop
 
-    def columns(self) -> list[dict[str, NDArray[Any]]]:
-        """Return everything that is kept, in chunks; the side is finished."""
+    def columns(self) -> Columns:
+        """Return everything that is kept of the points; the side is finished."""
         self._keep(self.last + 1)
-        self._fresh = self.last + 1
-        return self._kept
-
-
-#: The attribute of a point that each column is made of.
-_FIELD = {"joints": "joints", "values": "value", "arc": "arc", "labels": "labels", "mu": "mu"}
+        return self.kept
 
 
 def march_options(settings: Settings, step: float) -> FloatArray:

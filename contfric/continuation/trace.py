@@ -262,9 +262,12 @@ def join(orbit: Orbit, settings: Settings, behind: Side, ahead: Side) -> Branch:
     return _branch(orbit, settings, behind, ahead, (*back, *front), (first, last))
 
 
-def assemble(orbit: Orbit, settings: Settings, side: Side, first: End) -> Branch:
-    """Return a branch of one side, with the end at which it starts."""
-    return _branch(orbit, settings, None, side, tuple(side.bifurcations), (first, side.end))
+def assemble(
+    orbit: Orbit, settings: Settings, side: Side, first: End, origin: Point | None = None
+) -> Branch:
+    """Return a branch of one side, with the end at which it starts and, if known, the point there."""
+    ends = first, side.end
+    return _branch(orbit, settings, None, side, tuple(side.bifurcations), ends, origin)
 
 
 def _branch(
@@ -274,6 +277,7 @@ def _branch(
     ahead: Side,
     bifurcations: tuple[Bifurcation, ...],
     ends: tuple[End, End],
+    origin: Point | None = None,
 ) -> Branch:
     events = [end.bifurcation for end in ends]
     listed = (
@@ -281,7 +285,7 @@ def _branch(
         *bifurcations,
         *([events[1]] if events[1] is not None else []),
     )
-    columns = _joined(behind, ahead)
+    columns = _joined(behind, ahead, origin)
     return Branch(
         orbit.system,
         settings.parameter,
@@ -296,23 +300,21 @@ def _branch(
     )
 
 
-def _joined(behind: Side | None, ahead: Side) -> dict[str, NDArray[Any]]:
+def _joined(behind: Side | None, ahead: Side, origin: Point | None) -> dict[str, NDArray[Any]]:
     """Return the columns of both sides as one; the first point of ``behind`` is that of ``ahead``.
 
-    One column after the other, and each is let go as it is joined: the peak of memory is the branch
-    and its largest column.
+    ``origin`` is a point before the first one.
     """
-    back = behind.columns() if behind is not None else []
     front = ahead.columns()
-    if back:
-        back[0] = {name: array[1:] for name, array in back[0].items()}
-    joined = {}
-    for name in KEPT:
-        pieces = [chunk.pop(name)[::-1] for chunk in reversed(back)]
-        following = [chunk.pop(name) for chunk in front]
-        if name == "arc" and behind is not None:
-            shift = behind.tip.arc
-            pieces = [shift - piece for piece in pieces]
-            following = [shift + piece for piece in following]
-        joined[name] = np.concatenate([*pieces, *following])
+    if behind is None:
+        joined = {name: front.take(name) for name in KEPT}
+    else:
+        back, shift = behind.columns(), behind.tip.arc
+        back.arrays["arc"] *= -1.0
+        joined = {name: front.take_behind(name, back) for name in KEPT}
+        joined["arc"] += shift
+    if origin is not None:
+        first = {"values": origin.value, "joints": origin.joints, "arc": origin.arc}
+        first |= {"labels": origin.labels, "mu": origin.mu}
+        joined = {name: np.concatenate([np.array([first[name]]), joined[name]]) for name in KEPT}
     return joined

@@ -126,9 +126,9 @@ def has_settled(size, before, worst, floor):  # type: ignore[no-untyped-def]
 
 
 @helper
-def correct(
+def correct(  # type: ignore[no-untyped-def]
     functions, layout, z, p, which, z_ref, p_ref, d, e, s, trust, floor, room, work, pencil
-):  # type: ignore[no-untyped-def]
+):
     """Solve for the orbit from (z, p) in place, border rows anchored at (z_ref, p_ref).
 
     Returns

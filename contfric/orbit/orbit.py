@@ -253,16 +253,15 @@ class Orbit:
             return replace(plain, name=plain.auto_name(self.symmetric))
         _, labels, _ = self._watched
         surfaces = [s.name for s in model.surfaces]
-        ends = self._end_domains()
+        ends, word = self._end_domains(), self.word
+        crossed: list[list[str]] = [[] for _ in system.word]
+        for row, code in zip(system.layout.labels, labels, strict=True):
+            crossed[row[0]] += decode(int(code), surfaces)
         domains: list[str] = []
-        for i in range(len(system.word)):
-            entry = self.word[i - 1][1]  # of the whole word: its last exit leads into the first
+        for i, passed in enumerate(crossed):
+            entry = word[i - 1][1]  # of the whole word: its last exit leads into the first
             start = model.transitions[ends[i - 1], entry]
-            crossed: list[str] = []
-            for row, code in zip(system.layout.labels, labels, strict=True):
-                if row[0] == i:
-                    crossed += decode(int(code), surfaces)
-            domains += passed_domains(model, start, ends[i], crossed)
+            domains += passed_domains(model, start, ends[i], passed)
         if system.half:
             domains += [model.mirror_domain[d] for d in domains]
         plain = Signature(model, tuple(domains), self.periods, symmetric=self.symmetric)
@@ -270,11 +269,11 @@ class Orbit:
 
     def _end_domains(self) -> list[str]:
         """Domain in which each segment of the whole orbit ends."""
-        found = []
-        for i, (mode, exit_) in enumerate(self.word):
+        found, word = [], self.word
+        for i, (mode, exit_) in enumerate(word):
             end = self.ends[i]
             signs = signs_at(self.model, float(end[0]), end[1:].copy(), self.vector)
-            after = self.word[(i + 1) % len(self.word)][0]
+            after = word[(i + 1) % len(word)][0]
             found.append(end_domain(self.model, mode, exit_, after, signs))
         return found
 

@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, vector
-from contfric.orbit.newton import FunctionsType
+from contfric.orbit.equations import FunctionsType
 
 #: How a simulation ended.
 ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE = range(5)

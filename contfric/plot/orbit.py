@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from contfric.errors import ParameterError
-from contfric.plot.labels import place_labels, settle
+from contfric.plot.labels import Anchor, place_labels, settle
 from contfric.plot.orbit_artists import (
     BAND,
     along,
@@ -60,6 +60,20 @@ def plot_orbit(
     '$x$'
     """
     new = axes_or_new(ax, 6.4, 4.4)
+    named = _draw_plane(new, orbit, plane)
+    if legend:
+        handles = legend_handles(orbit, pieces_of(orbit))
+        if ax is None:
+            new.legend(handles=handles, fontsize=SMALL, frameon=False, **BESIDE)
+        else:
+            new.legend(handles=handles, fontsize=SMALL - 1.0, loc="best")
+    settle(new)
+    place_labels(new, named)
+    return new
+
+
+def _draw_plane(new: Axes, orbit: OrbitLike, plane: tuple[str, str] | None) -> list[Anchor]:
+    """Draw an orbit in a plane and return the labels that are to be placed when all is drawn."""
     pieces = pieces_of(orbit)
     across, up = plane or (orbit.model.states[0], orbit.model.states[1])
     draw_rest_bands(new, orbit, pieces, across, up)
@@ -71,15 +85,7 @@ def plot_orbit(
     named = [] if plane else draw_moving_surfaces(new, orbit, pieces, across, up)
     draw_stops(new, orbit, across, up)
     name_axes(new, parameter_label(across), parameter_label(up))
-    if legend:
-        handles = legend_handles(orbit, pieces)
-        if ax is None:
-            new.legend(handles=handles, fontsize=SMALL, frameon=False, **BESIDE)
-        else:
-            new.legend(handles=handles, fontsize=SMALL - 1.0, loc="best")
-    settle(new)
-    place_labels(new, named)
-    return new
+    return named
 
 
 def plot_orbit_in_time(orbit: OrbitLike, axes: Sequence[Axes] | None = None) -> list[Axes]:
@@ -151,9 +157,8 @@ def plot_orbit_panels(orbit: OrbitLike, fig: Figure | None = None) -> list[Axes]
     grid = fig.add_gridspec(planes * len(names), 2)
     left = [fig.add_subplot(grid[k * len(names) : (k + 1) * len(names), 0]) for k in range(planes)]
     right = [fig.add_subplot(grid[k * planes : (k + 1) * planes, 1]) for k in range(len(names))]
-    plot_orbit(orbit, left[0], legend=False)
-    if planes == 2:
-        plot_orbit(orbit, left[1], plane=(names[0], names[1]), legend=False)
+    shown = [None, (names[0], names[1])] if planes == 2 else [None]
+    named = [_draw_plane(ax, orbit, plane) for ax, plane in zip(left, shown, strict=True)]
     plot_orbit_in_time(orbit, right)
     for ax in right[:-1]:
         ax.tick_params(labelbottom=False)
@@ -171,4 +176,7 @@ def plot_orbit_panels(orbit: OrbitLike, fig: Figure | None = None) -> list[Axes]
         handlelength=1.5,
         columnspacing=1.3,
     )
+    settle(left[0])
+    for ax, labels in zip(left, named, strict=True):
+        place_labels(ax, labels)
     return [*left, *right]
