@@ -93,7 +93,8 @@ def check_hit(case: Case, tally: Tally) -> None:
     quantity = quantity_of(case, law, name, case.level)
     rate = quantity_of(case, law, RATE[name], 0.0)
     y0 = np.array([case.x0, case.v0])
-    found = hit(case.mode, case.c, case.level, case.on, case.t0, y0, case.d, case.vector())
+    there = np.empty(2)
+    found = hit(case.mode, case.c, case.level, case.on, case.t0, y0, case.d, case.vector(), there)
     kind = f"first root of {name}" + (f", {case.kind}" if case.kind else "")
     q, q1 = value(quantity, 0.0)
     # a start that rounding places is on neither side

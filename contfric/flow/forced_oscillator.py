@@ -30,8 +30,7 @@ from contfric.compiled import (
     turning_signature,
 )
 from contfric.flow.interface import CompiledFlow
-from contfric.flow.response import divided_exponentials, forced, free, roots
-from contfric.flow.roots import (
+from contfric.flow.motion import (
     OMEGA,
     S0,
     SPEED,
@@ -43,8 +42,13 @@ from contfric.flow.roots import (
     excitation,
     phases,
     point,
-    roots_along,
 )
+from contfric.flow.response import divided_exponentials, forced, free, roots
+from contfric.flow.rest import rest_hit, rest_turnings
+from contfric.flow.roots import interior_of, roots_along
+
+#: A load this far from a level is not there by rounding: its next hit is one of the closed form's.
+AWAY = 1e-6
 
 
 @allocating_helper
@@ -188,15 +192,26 @@ def period(p, which, grad):  # type: ignore[no-untyped-def]
 
 
 @kernel(hit_signature)
-def hit(mode, c, target, on, t0, y0, dt_max, p):  # type: ignore[no-untyped-def]
-    """Return the first time at which observable c takes a value, or -1."""
+def hit(mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-untyped-def]
+    """Return the first time at which observable c takes a value, with the state there, or -1."""
     if mode == STICK and c == SPEED:
         return -1.0
     sign = direction(mode) if on and c == SPEED else 0.0  # a slide leaves v = 0 to its own side
     phase = phases(p, t0)
+    if mode == STICK and p[H] == 0.0 and abs(y0[0] - phase[1] - target) > AWAY:
+        tau = rest_hit(y0[0], target, p[OMEGA], phase)
+        y1[0], y1[1] = y0[0], 0.0
+        return tau if tau <= dt_max else -1.0
     order = min(mode, 0)  # 0, but no literal: the search would be compiled once for each
-    tau = roots_along(mode, c, order, target, on, sign, phase, t0, y0, dt_max, p, y0, y0)[1]
-    return tau if tau <= dt_max else -1.0
+    _, tau, x = roots_along(mode, c, order, target, on, sign, phase, t0, y0, dt_max, p, y0, y0)
+    if tau < 0.0 or tau > dt_max:
+        return -1.0
+    if c == SPEED and not math.isnan(x):
+        y1[0], y1[1] = x, target
+    else:
+        moved = point(mode, p, phase, t0, y0[0], y0[1], tau)
+        y1[0], y1[1] = moved[0], moved[1]
+    return tau
 
 
 @kernel(turning_signature)
@@ -205,6 +220,9 @@ def turning(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-d
     if dt <= 0.0 or (mode == STICK and c == SPEED):
         return 0
     phase = phases(p, t0)
+    if mode == STICK and p[H] == 0.0:
+        first, last = interior_of(dt)
+        return rest_turnings(y0[0], p[OMEGA], phase, first, last, times, values)
     order, on = max(1 - mode, 1), dt < 0.0  # 1 and False, but no literals
     return roots_along(mode, c, order, 0.0, on, 0.0, phase, t0, y0, dt, p, times, values)[0]
 

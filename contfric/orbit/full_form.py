@@ -71,7 +71,6 @@ def _crossing_point(
     target = flow.level(k, orbit.vector, none, empty)
     start, state = float(place[0]), np.ascontiguousarray(place[1:])
     on = entry == surface
-    tau = flow.hit(number, c, target, on, start, state, orbit.period, orbit.vector)
     after = np.empty(len(model.states))
-    flow.flow(number, start, state, tau, orbit.vector, none, after, np.empty((0, 0)))
+    tau = flow.hit(number, c, target, on, start, state, orbit.period, orbit.vector, after)
     return np.array([start + tau, *after])

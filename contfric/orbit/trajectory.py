@@ -52,17 +52,23 @@ def sign_code(functions, observables, surface, t, y, p, none, empty):  # type: i
 
 
 @helper
-def first_hit(functions, observables, bounds, mode, on, t, y, p, longest, none, empty):  # type: ignore[no-untyped-def]
-    """Return (time, surface) of the first bounding surface that is met; (-1, -1) if none."""
+def first_hit(
+    functions, observables, bounds, mode, on, t, y, p, longest, none, empty, after, trial
+):  # type: ignore[no-untyped-def]
+    """Return (time, surface) of the first bounding surface that is met; (-1, -1) if none.
+
+    The state there is written to ``after``.
+    """
     best, which = longest, -1
     for k in range(observables.shape[0]):
         if bounds[mode, k] == 0:
             continue
-        tau = functions[4](
-            mode, observables[k], functions[2](k, p, none, empty), (on >> k) & 1 == 1, t, y, best, p
-        )
+        target = functions[2](k, p, none, empty)
+        started = (on >> k) & 1 == 1
+        tau = functions[4](mode, observables[k], target, started, t, y, best, p, trial)
         if tau >= 0.0 and (which < 0 or tau < best):
             best, which = tau, k
+            copy_state(trial, after)
     return (best, which) if which >= 0 else (-1.0, -1)
 
 
@@ -88,6 +94,7 @@ def follow(  # type: ignore[no-untyped-def]
     empty,
     nothing,
     after,
+    trial,
 ):
     """Follow a trajectory; see :func:`simulate`."""
     period = functions[5](p, none, empty)
@@ -104,7 +111,19 @@ def follow(  # type: ignore[no-untyped-def]
             left = periods - (t - first_time)
         allowance = (_HOLD_PERIODS if sliding[mode] else _SLIDE_PERIODS) * unit
         tau, surface = first_hit(
-            functions, observables, bounds, mode, on, t, y, p, min(left, allowance), none, empty
+            functions,
+            observables,
+            bounds,
+            mode,
+            on,
+            t,
+            y,
+            p,
+            min(left, allowance),
+            none,
+            empty,
+            after,
+            trial,
         )
         if surface < 0:
             if left > allowance:
@@ -117,7 +136,6 @@ def follow(  # type: ignore[no-untyped-def]
                 cycle += turns
                 t -= turns * period
             return ALL_TIME, event, mode, cycle, t
-        functions[0](mode, t, y, tau, p, none, after, nothing)
         copy_state(after, y)
         t += tau
         while period > 0.0 and t >= period:
@@ -223,5 +241,6 @@ def simulate(  # type: ignore[no-untyped-def]
         none,
         empty,
         nothing,
+        np.empty(y.shape[0]),
         np.empty(y.shape[0]),
     )

@@ -106,7 +106,13 @@ def sure_roots(function, low, high, samples=3001):
 
 
 def first_hit(mode, c, target, on, t0, y0, longest, p):
-    return hit(mode, c, target, on, t0, np.array(y0, float), longest, np.array(p, float))
+    state, vector, there, after = np.array(y0, float), np.array(p, float), np.empty(2), np.empty(2)
+    tau = hit(mode, c, target, on, t0, state, longest, vector, there)
+    if tau >= 0.0:
+        none = np.empty(0, dtype=np.int64)
+        flow(mode, t0, state, tau, vector, none, after, np.empty((0, 0)))
+        assert np.max(np.abs(there - after)) < 1e-13 * (1 + np.max(np.abs(after)) + tau)
+    return tau
 
 
 def stationary(mode, c, t0, y0, dt, p):

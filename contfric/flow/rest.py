@@ -1,0 +1,51 @@
+"""At rest under one harmonic: where the load takes a value or is stationary, in closed form.
+
+The load is ``u = x - cos(theta)``, ``theta = Omega t``. It takes the value L where
+``theta = +-arccos(x - L)``, and is stationary at the multiples of pi, where it is ``x -+ 1``.
+"""
+
+from __future__ import annotations
+
+import math
+
+from contfric.compiled import helper
+
+_TURN = 2.0 * math.pi
+
+
+@helper
+def rest_hit(x, target, w, phase):  # type: ignore[no-untyped-def]
+    """Return the time until the load takes a value that it is not near to at first; -1 if never.
+
+    ``phase`` holds sine and cosine of theta at the start.
+    """
+    cosine = x - target
+    if abs(cosine) > 1.0:
+        return -1.0
+    angle, start = math.acos(cosine), math.atan2(phase[0], phase[1])
+    first = angle - start
+    second = -angle - start
+    if first <= 0.0:
+        first += _TURN
+    if second <= 0.0:
+        second += _TURN
+    return min(first, second if second > 0.0 else second + _TURN) / w
+
+
+@helper
+def rest_turnings(x, w, phase, first, last, times, values):  # type: ignore[no-untyped-def]
+    """Write the stationary points of the load between two times; return their number, -1 if too many."""
+    start = math.atan2(phase[0], phase[1])
+    count = 0
+    turn = math.ceil(start / math.pi)
+    while True:
+        time = (turn * math.pi - start) / w
+        if time >= last:
+            return count
+        if time > first:
+            if count == times.shape[0]:
+                return -1
+            times[count] = time
+            values[count] = x - 1.0 if turn % 2 == 0 else x + 1.0
+            count += 1
+        turn += 1
