@@ -1,4 +1,4 @@
-# make setup | demo | test | bench | gallery | clean
+# make setup | demo | test | bench | stress | gallery | clean
 PYTHON ?= python3
 WORKERS ?= 2
 
@@ -7,15 +7,17 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 BENCH_STAMP := $(VENV)/.bench-installed
 DEMO := demo
+STRESS := .stress
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint types contracts unit bench gallery clean
+.PHONY: help setup demo test lint types contracts unit bench stress gallery clean
 MAKEFLAGS += --no-print-directory
 
 help:
 	@echo "make demo     the bifurcation diagram of Fig. 5, from one simulated orbit, in $(DEMO)/"
 	@echo "make test     lint, types, import contracts, tests"
 	@echo "make bench    run times, cost at scale and of scenes, run time against error beside others"
+	@echo "make stress   random cases against 50 digits, to docs/stress.md (an hour or more)"
 	@echo "make gallery  the figures of docs/gallery"
 	@echo "make setup    a virtual environment in $(VENV)/ (the others do this by themselves)"
 	@echo "make clean    removes what make and the tests wrote, and keeps $(VENV)/"
@@ -73,6 +75,17 @@ bench: $(BENCH_STAMP)
 	@$(BIN)/python benchmarks/error.py
 	@$(BIN)/python benchmarks/scale.py
 	@$(BIN)/python benchmarks/scenes.py
+
+# An hour or more; sequences go on where they were interrupted.
+stress: $(STAMP)
+	@echo "== stress"
+	@mkdir -p $(STRESS)
+	@$(BIN)/python benchmarks/stress/sequences.py --count 100000 --seed 1 --workers $(WORKERS) --out $(STRESS)/sequences.json
+	@$(BIN)/python benchmarks/stress/segments.py --count 10000 --seed 5 --out $(STRESS)/segments.json
+	@$(BIN)/python benchmarks/stress/orbits.py --count 400 --seed 3 --out $(STRESS)/orbits.json
+	@$(BIN)/python benchmarks/stress/events.py --count 400 --seed 2 --out $(STRESS)/events.json
+	@$(BIN)/python benchmarks/stress/continuation.py --count 300 --seed 2 --out $(STRESS)/continuation.json
+	@$(BIN)/python benchmarks/stress/write_page.py $(STRESS)/*.json --out docs/stress.md
 
 gallery: $(STAMP)
 	@echo "== gallery"

@@ -126,8 +126,15 @@ def compile_aside(kernels: Sequence[str]) -> None:
     ----------
     kernels : names "module:kernel"
     """
-    cold = not _ASIDE and not cache_folder(Path(__file__)).exists()
+    folder = cache_folder(Path(__file__))
+    cold = not _ASIDE and not folder.exists()
     if not cold or (os.cpu_count() or 1) < 2 or not sys.executable:
+        return
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    except OSError:  # nothing can be cached: what another process compiles would be lost
+        return
+    if not os.access(folder.parent, os.W_OK):
         return
     code = "".join(
         f"from {module} import {name}; {name}.dispatcher\n"
