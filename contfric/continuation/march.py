@@ -174,13 +174,13 @@ def march(  # type: ignore[no-untyped-def]
         trial[j] = p[j]
     guess, angle = np.empty((zs.shape[1], zs.shape[2])), 0.0
     room = step_room(zs.shape[1], zs.shape[2], p.shape[0])
-    solving_first = k < 0
+    solving_first, finite = k < 0, True
     while k + 1 < ws.shape[0]:
         row = k + 1
         if solving_first:
             trial[active], slope = ws[0], tws[0]
         elif step < smallest:
-            return STEP, k, step
+            return (STEP if finite else BROKEN), k, step
         else:
             trial[active], slope = predict(zs, ws, tzs, tws, arc, k, step), tws[k]
             copy_to(guess, zs[row])

@@ -183,6 +183,11 @@ class Side:
         self.last -= 1
         self.count -= 1
 
+    def drop_crowd(self, arc: float) -> None:
+        """Take away the points behind a place, but for the last one."""
+        while self.last > 1 and self.rows.arc[self.last - 1] > arc:
+            self.drop_tip()
+
     def relabel_first(self, labels: IntArray) -> None:
         """Give the first of two points the labels of the second."""
         self.rows.labels[self.last - 1] = labels

@@ -16,7 +16,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import Elimination, room_for
 from contfric.orbit.equations import Room, close_chain, equation_room
 from contfric.orbit.monitor import Turnings, turning_room, watch
-from contfric.orbit.newton import CHECKS, CONVERGED, MULTIPLIERS, SOLVES, correct
+from contfric.orbit.newton import CHECKS, CONVERGED, MULTIPLIERS, NOT_FINITE, SOLVES, correct
 from contfric.orbit.spectrum import SpectralRoom, multipliers, spectral_room
 
 #: Extra columns of the tests behind the margins and the distances of the labels: slope of the
@@ -147,7 +147,7 @@ def settle(functions, layout, z, p, which, tz, tw, scale, accuracy, counts, room
         room.pencil,
     )
     if status != CONVERGED:
-        return False, tw, True
+        return False, tw, status != NOT_FINITE
     count, m = z.shape
     total = 0.0
     for i in range(count):

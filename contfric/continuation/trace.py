@@ -21,6 +21,7 @@ from contfric.continuation.points import (
     settings_of,
 )
 from contfric.continuation.side import KEPT, Side, first_point
+from contfric.continuation.vertices import at_vertex
 from contfric.errors import ConvergenceError
 from contfric.orbit.orbit import Orbit
 
@@ -32,6 +33,9 @@ _AT_LIMIT = 1e-6
 _NEAR_LIMIT = 1e-6
 #: A margin this negative (nondimensional) is violated; a located limit is good to rounding.
 _VIOLATED = 1e-9
+#: Points this near to a vertex (arclength) are left out: the system is singular there, and they are good
+#: to about 1e-4 only. The branch that leaves starts at twice the distance.
+_CROWD = 5e-4
 
 Progress = Callable[[str], None]
 
@@ -174,7 +178,12 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         if ends is None:
             side.bifurcations.append(bifurcation)
             continue
-        side.put_tip(point)
+        if ends in (EndReason.BP, EndReason.PD):
+            active = orbit.model.index_of(settings.parameter)
+            side.drop_crowd(point.arc - _CROWD)
+            side.put_tip(at_vertex(point, bifurcation.orbit, active))
+        else:
+            side.put_tip(point)
         side.end = End(ends, bifurcation=None if point.lost else bifurcation)
         return True
     reached = after if limit is None else limit[0]

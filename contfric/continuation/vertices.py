@@ -58,6 +58,16 @@ def undoubled_part(orbit: Orbit, active: int) -> Orbit | None:
     return _vertex(replace(orbit, system=part, joints=0.5 * (image + orbit.joints[:n])), active)
 
 
+def at_vertex(point: Point, simple: Orbit, active: int) -> Point:
+    """Return the end point of a branch at a vertex, from the simpler orbit that is located there."""
+    whole = simple.as_whole()
+    there = whole if whole.joints.shape == point.joints.shape else simple.doubled()
+    same = there.joints.shape == point.joints.shape
+    if not same or np.max(np.abs(there.joints - point.joints)) > _NEARLY:
+        return point
+    return replace(point, joints=there.joints, value=float(there.vector[active]))
+
+
 def _vertex(orbit: Orbit, active: int) -> Orbit | None:
     """Return the orbit solved if its turn has a multiplier -1, else None."""
     solved = polish(orbit, damped=False)

@@ -52,9 +52,9 @@ def sign_code(functions, observables, surface, t, y, p, none, empty):  # type: i
 
 
 @helper
-def first_hit(
+def first_hit(  # type: ignore[no-untyped-def]
     functions, observables, bounds, mode, on, t, y, p, longest, none, empty, after, trial
-):  # type: ignore[no-untyped-def]
+):
     """Return (time, surface) of the first bounding surface that is met; (-1, -1) if none.
 
     The state there is written to ``after``.
