@@ -10,6 +10,7 @@ import json
 import sys
 import time
 from collections.abc import Callable
+from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -49,21 +50,19 @@ def registries() -> None:
 
 
 def watch_kernels(seconds: dict[str, float]) -> None:
-    """Time each kernel; its helpers count for the first kernel that calls them."""
-    from contfric import compiled
+    """Time each kernel that is compiled or loaded; its helpers count for the first that calls them."""
+    from contfric.compiled import Kernel
 
-    original = compiled.kernel
+    load = Kernel.dispatcher.func
 
-    def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:
-        decorate = original(signature)
+    def named(self: Any) -> Any:
+        function = self.__wrapped__
+        name = f"{function.__module__.rsplit('.', 1)[1]}.{function.__name__}"
+        return timed(seconds, name, lambda: load(self))
 
-        def named(function: Callable[..., Any]) -> Any:
-            name = f"{function.__module__.rsplit('.', 1)[1]}.{function.__name__}"
-            return timed(seconds, name, lambda: decorate(function))
-
-        return named
-
-    compiled.kernel = kernel
+    watched = cached_property(named)
+    watched.__set_name__(Kernel, "dispatcher")
+    Kernel.dispatcher = watched  # type: ignore[method-assign, assignment]
 
 
 def watch_calls(calls: dict[str, int]) -> None:

@@ -204,6 +204,7 @@ def locate(  # type: ignore[no-untyped-def]
     margins = layout.interior.shape[0] + count + layout.joint.shape[0]
     # margins and distances are positive before the event, the others have the sign that they have
     two_sided = kind == BY_PARAMETER or (kind == BY_TEST and index >= margins)
+    noise = 0.1 * _NOISE if two_sided else _NOISE  # slopes and products of multipliers have less
     sign = -1.0 if two_sided and f_low < 0.0 else 1.0
     f_low, f_high = limited(sign * f_low), limited(sign * f_high)
     low, high, x = 0.0, 1.0, 0.5
@@ -239,7 +240,7 @@ def locate(  # type: ignore[no-untyped-def]
             x_old, f_old = high, f_high
             high, f_high = x, f
             lost = not fine
-        if f == 0.0 or high - low <= 4e-16 or (f_low <= _NOISE and f_high >= -_NOISE):
+        if f == 0.0 or high - low <= 4e-16 or (f_low <= noise and f_high >= -noise):
             break
         x = next_trial(low, high, f_low, f_high, x_old, f_old, x)
     if best_x == 1.0:
