@@ -28,7 +28,7 @@ EXTRA = 4
 #: gives tangent and multipliers, is this near to the orbit.
 ALONG = 3e-13
 #: The same where an event is located, and its test function counts to its last digits.
-AT_EVENT = 5e-14
+AT_EVENT = 3e-15
 #: Share of the smaller end value above which a parabola's minimum is believed to stay positive.
 _SURE = 0.2
 
