@@ -29,15 +29,22 @@ def branch_of(name: str, stability: bool = True) -> Callable[[], cf.Branch]:
     )
 
 
+def branch_in_default_steps() -> Callable[[], cf.Branch]:
+    """Return a call that continues 1a of Fig. 5 from end to end as a user would."""
+    orbit = cf.solve_orbit("coulomb", "1a", CASES["1a"][0])
+    return lambda: cf.continue_orbit(orbit, "Omega", (0.4, 0.6))
+
+
 def diagram_of_fig05() -> Callable[[], cf.Diagram]:
     """Return a call that explores Fig. 5 from a solved orbit."""
     orbit = cf.find_orbit("coulomb", CASES["1a"][0])
     return lambda: cf.explore(orbit, "Omega", (0.4, 0.6))
 
 
-def simulation(periods: int = 20_000) -> Callable[[], int]:
-    """Return a call that simulates and counts the events."""
-    params = {"Omega": 0.5, "S": 0.05, "S0": 0.4}  # aperiodic: reversals and sticks
+def simulation(periods: int = 20_000, sticks: bool = True) -> Callable[[], int]:
+    """Return a call that simulates and counts the events: two slides and a stick a period, or slides."""
+    with_sticks = {"Omega": 0.5, "S": 0.05, "S0": 0.4}
+    params = with_sticks if sticks else {"Omega": 0.7, "S": 0.1, "S0": 0.1}
     return lambda: len(cf.simulate("coulomb", params, state=[1.3, 0.0], periods=periods))
 
 

@@ -141,9 +141,9 @@ branch and that. `fig05` is the bundled study, `fig04` explores in S from 0.02 t
 {scenes}
 
 A study leaves out what it does not name; its `run.json` says so. The last column is what was loaded
-although no step used it: numba imports scipy's linear algebra before its first kernel (no kernel of contfric
-uses it), and matplotlib its three-dimensional axes. Kernels are compiled, or loaded, when they are first called;
-the process leaves without taking Python and the compiler apart, which took 0.3 s.
+although no step used it: numba imports scipy's linear algebra before its first kernel (no kernel of
+contfric uses it), and matplotlib its three-dimensional axes. Kernels are compiled, or loaded, when they are
+first called; the process leaves without taking Python and the compiler apart, which took 0.3 s.
 
 {skipped}
 

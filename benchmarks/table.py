@@ -8,7 +8,13 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from bench_engine import CASES, branch_of, diagram_of_fig05, simulation
+from bench_engine import (
+    CASES,
+    branch_in_default_steps,
+    branch_of,
+    diagram_of_fig05,
+    simulation,
+)
 
 ROUNDS = 15
 #: The other pages.
@@ -47,7 +53,9 @@ def main() -> None:
         calls[f"branch {name}, everything on"] = branch_of(name)
         calls[f"branch {name}, without multipliers"] = branch_of(name, stability=False)
     calls["diagram of Fig. 5, all branches"] = diagram_of_fig05()
-    calls["simulation, an event"] = simulation()
+    calls["branch 1a of Fig. 5 in default steps"] = branch_in_default_steps()
+    calls["simulation, an event (two slides and a stick a period)"] = simulation()
+    calls["simulation without sticks, a slide"] = simulation(sticks=False)
     lines = [
         "# Benchmarks",
         "",
