@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,15 +27,38 @@ class SimulationEnd(str, Enum):
     INFINITE = "the motion grew beyond all numbers"
 
 
-@dataclass(frozen=True)
-class Tables:
-    """The model's transitions in the form that the compiled simulation takes."""
+class Tables(NamedTuple):
+    """The model's transitions in the form that the compiled simulation takes.
+
+    Attributes
+    ----------
+    observables : observable of each surface
+    bounds : whether a surface bounds a mode, shape (modes, surfaces)
+    following : mode after (mode, surface, signs of the other surfaces as bits); -1 if there is none
+    sliding : whether a mode slides on a surface
+    lies_on : surfaces that a mode moves on, as bits
+    """
 
     observables: IntArray
     bounds: IntArray
     following: IntArray
     sliding: IntArray
     lies_on: IntArray
+
+
+class EventRows(NamedTuple):
+    """Room for the events of a trajectory.
+
+    Attributes
+    ----------
+    joints : mode that ends and surface it exits by, shape (events, 2)
+    cycles, times, states : periods completed, phase and state, shapes (events,), (events,), (events, n)
+    """
+
+    joints: IntArray
+    cycles: IntArray
+    times: FloatArray
+    states: FloatArray
 
 
 @dataclass(frozen=True)
@@ -205,40 +229,36 @@ def run(
     model_tables = tables(model)
     y = y.copy()
     period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0))) or 1.0
-    pieces: list[tuple[IntArray, IntArray, FloatArray, FloatArray]] = []
+    pieces: list[EventRows] = []
     done, base, left = 0, 0, float(periods)
     room = int(min(events, max(64.0, 8.0 * periods)))
     while True:
         rows = min(room, events - done)
-        joints = np.empty((rows, 2), dtype=np.int64)
-        cycles = np.empty(rows, dtype=np.int64)
-        times, states = np.empty(rows), np.empty((rows, y.shape[0]))
+        written = EventRows(
+            np.empty((rows, 2), dtype=np.int64),
+            np.empty(rows, dtype=np.int64),
+            np.empty(rows),
+            np.empty((rows, y.shape[0])),
+        )
         end, count, mode, cycle, phase = kernel(
-            model.flow.functions(),
-            model_tables.observables,
-            model_tables.bounds,
-            model_tables.following,
-            model_tables.sliding,
-            model_tables.lies_on,
-            mode,
-            on,
-            time,
-            y,
-            vector,
-            left,
-            joints,
-            cycles,
-            times,
-            states,
+            model.flow.functions(), model_tables, mode, on, time, y, vector, left, written
         )
         TALLY[3] += count
-        pieces.append((joints[:count], cycles[:count] + base, times[:count], states[:count]))
+        pieces.append(
+            EventRows(
+                written.joints[:count],
+                written.cycles[:count] + base,
+                written.times[:count],
+                written.states[:count],
+            )
+        )
         done += count
         if end != ALL_EVENTS or done >= events:
             break
         left -= cycle + (phase - time) / period
         base, time = base + cycle, phase
-        on = (1 << int(joints[-1, 1])) | int(model_tables.lies_on[joints[-1, 0]])
+        last, surface = written.joints[-1]
+        on = (1 << int(surface)) | int(model_tables.lies_on[last])
     all_joints, all_cycles, all_times, all_states = (
         np.concatenate([piece[k] for piece in pieces]) for k in range(4)
     )

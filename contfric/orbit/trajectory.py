@@ -9,12 +9,31 @@ any number of periods.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, vector
+from contfric.models.definition import FloatArray
 from contfric.orbit.equations import FunctionsType
+from contfric.orbit.simulation import EventRows, Tables
+from contfric.orbit.system import IntArray
+
+#: Types of the model's tables and of the rows of events, as kernels take them.
+TablesType = types.NamedTuple([indices, table, indices, indices, indices], Tables)
+RowsType = types.NamedTuple([table, indices, vector, matrix], EventRows)
+
+
+class StateRoom(NamedTuple):
+    """Room for a state at a hit and on trial, and what is handed over where nothing is wanted."""
+
+    none: IntArray
+    empty: FloatArray
+    nothing: FloatArray
+    after: FloatArray
+    trial: FloatArray
+
 
 #: How a simulation ended.
 ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE = range(5)
@@ -52,51 +71,30 @@ def sign_code(functions, observables, surface, t, y, p, none, empty):  # type: i
 
 
 @helper
-def first_hit(  # type: ignore[no-untyped-def]
-    functions, observables, bounds, mode, on, t, y, p, longest, none, empty, after, trial
-):
+def first_hit(functions, tables, mode, on, t, y, p, longest, room):  # type: ignore[no-untyped-def]
     """Return (time, surface) of the first bounding surface that is met; (-1, -1) if none.
 
-    The state there is written to ``after``.
+    The state there is written to ``room.after``.
     """
+    observables, bounds, none, empty = tables.observables, tables.bounds, room.none, room.empty
     best, which = longest, -1
     for k in range(observables.shape[0]):
         if bounds[mode, k] == 0:
             continue
         target = functions[2](k, p, none, empty)
         started = (on >> k) & 1 == 1
-        tau = functions[4](mode, observables[k], target, started, t, y, best, p, trial)
+        tau = functions[4](mode, observables[k], target, started, t, y, best, p, room.trial)
         if tau >= 0.0 and (which < 0 or tau < best):
             best, which = tau, k
-            copy_state(trial, after)
+            copy_state(room.trial, room.after)
     return (best, which) if which >= 0 else (-1.0, -1)
 
 
 @helper
-def follow(  # type: ignore[no-untyped-def]
-    functions,
-    observables,
-    bounds,
-    following,
-    sliding,
-    lies_on,
-    mode,
-    on,
-    t,
-    y,
-    p,
-    periods,
-    joints,
-    cycles,
-    times,
-    states,
-    none,
-    empty,
-    nothing,
-    after,
-    trial,
-):
+def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: ignore[no-untyped-def]
     """Follow a trajectory; see :func:`simulate`."""
+    observables, following = tables.observables, tables.following
+    joints, none, empty, after = rows.joints, room.none, room.empty, room.after
     period = functions[5](p, none, empty)
     unit = period if period > 0.0 else 1.0
     cycle = 0
@@ -109,26 +107,12 @@ def follow(  # type: ignore[no-untyped-def]
         left = (periods - (cycle - first_cycle)) * unit - (t - first_time)
         if period <= 0.0:
             left = periods - (t - first_time)
-        allowance = (_HOLD_PERIODS if sliding[mode] else _SLIDE_PERIODS) * unit
-        tau, surface = first_hit(
-            functions,
-            observables,
-            bounds,
-            mode,
-            on,
-            t,
-            y,
-            p,
-            min(left, allowance),
-            none,
-            empty,
-            after,
-            trial,
-        )
+        allowance = (_HOLD_PERIODS if tables.sliding[mode] else _SLIDE_PERIODS) * unit
+        tau, surface = first_hit(functions, tables, mode, on, t, y, p, min(left, allowance), room)
         if surface < 0:
             if left > allowance:
                 return HELD, event, mode, cycle, t
-            functions[0](mode, t, y, left, p, none, after, nothing)
+            functions[0](mode, t, y, left, p, none, after, room.nothing)
             copy_state(after, y)
             t += left
             if period > 0.0:
@@ -156,10 +140,10 @@ def follow(  # type: ignore[no-untyped-def]
             continue  # nothing leads there: the surface is touched and left to the same side
         joints[event, 0] = mode
         joints[event, 1] = surface
-        cycles[event] = cycle
-        times[event] = t
-        copy_state(y, states[event])
-        on |= lies_on[mode]
+        rows.cycles[event] = cycle
+        rows.times[event] = t
+        copy_state(y, rows.states[event])
+        on |= tables.lies_on[mode]
         mode = target
         event += 1
     return ALL_EVENTS, joints.shape[0], mode, cycle, t
@@ -167,51 +151,16 @@ def follow(  # type: ignore[no-untyped-def]
 
 @kernel(
     types.Tuple((i8, i8, i8, i8, f8))(
-        FunctionsType,
-        indices,
-        table,
-        indices,
-        indices,
-        indices,
-        i8,
-        i8,
-        f8,
-        vector,
-        vector,
-        f8,
-        table,
-        indices,
-        vector,
-        matrix,
+        FunctionsType, TablesType, i8, i8, f8, vector, vector, f8, RowsType
     )
 )
-def simulate(  # type: ignore[no-untyped-def]
-    functions,
-    observables,
-    bounds,
-    following,
-    sliding,
-    lies_on,
-    mode,
-    on,
-    t,
-    y,
-    p,
-    periods,
-    joints,
-    cycles,
-    times,
-    states,
-):
+def simulate(functions, tables, mode, on, t, y, p, periods, rows):  # type: ignore[no-untyped-def]
     """Follow a trajectory from ``(t, y)`` in a mode until all rows are full or time is over.
 
     Parameters
     ----------
-    observables, bounds, following, sliding, lies_on : the model's tables
     on : surfaces that the start lies on and leaves, as bits
     periods : time allowed, in periods of the excitation (in units of time if it has none)
-    joints : rows (mode that ends, surface it exits by) of the events, shape (events, 2)
-    cycles, times, states : periods completed, phase and state at the events
 
     ``y`` is advanced in place to the state after the last event, or at the end of the time.
 
@@ -220,27 +169,7 @@ def simulate(  # type: ignore[no-untyped-def]
     tuple
         (how it ended, events written, mode, periods completed, phase).
     """
+    count = y.shape[0]
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
-    return follow(
-        functions,
-        observables,
-        bounds,
-        following,
-        sliding,
-        lies_on,
-        mode,
-        on,
-        t,
-        y,
-        p,
-        periods,
-        joints,
-        cycles,
-        times,
-        states,
-        none,
-        empty,
-        nothing,
-        np.empty(y.shape[0]),
-        np.empty(y.shape[0]),
-    )
+    room = StateRoom(none, empty, nothing, np.empty(count), np.empty(count))
+    return follow(functions, tables, mode, on, t, y, p, periods, rows, room)
