@@ -60,6 +60,24 @@ class EventRows(NamedTuple):
     times: FloatArray
     states: FloatArray
 
+    def first(self, count: int) -> EventRows:
+        """Return the first rows, as views."""
+        return EventRows(
+            self.joints[:count], self.cycles[:count], self.times[:count], self.states[:count]
+        )
+
+
+def joined(pieces: list[EventRows]) -> EventRows:
+    """Return rows of events one after the other; a single piece, as almost always, is not copied."""
+    if len(pieces) == 1:
+        return pieces[0]
+    return EventRows(
+        np.concatenate([piece.joints for piece in pieces]),
+        np.concatenate([piece.cycles for piece in pieces]),
+        np.concatenate([piece.times for piece in pieces]),
+        np.concatenate([piece.states for piece in pieces]),
+    )
+
 
 @dataclass(frozen=True)
 class Trajectory:
@@ -244,14 +262,8 @@ def run(
             model.flow.functions(), model_tables, mode, on, time, y, vector, left, written
         )
         TALLY[3] += count
-        pieces.append(
-            EventRows(
-                written.joints[:count],
-                written.cycles[:count] + base,
-                written.times[:count],
-                written.states[:count],
-            )
-        )
+        written.cycles[:count] += base
+        pieces.append(written.first(count))
         done += count
         if end != ALL_EVENTS or done >= events:
             break
@@ -259,18 +271,16 @@ def run(
         base, time = base + cycle, phase
         last, surface = written.joints[-1]
         on = (1 << int(surface)) | int(model_tables.lies_on[last])
-    all_joints, all_cycles, all_times, all_states = (
-        np.concatenate([piece[k] for piece in pieces]) for k in range(4)
-    )
+    found = joined(pieces)
     last_mode = model.modes[mode].name if mode >= 0 else ""
     return Trajectory(
         model,
         model.mapping(vector),
-        all_joints[:, 0],
-        all_joints[:, 1],
-        all_cycles,
-        all_times,
-        all_states,
+        found.joints[:, 0],
+        found.joints[:, 1],
+        found.cycles,
+        found.times,
+        found.states,
         list(SimulationEnd)[end],
         (base + cycle, float(phase), y, last_mode),
     )
