@@ -136,7 +136,8 @@ def compile_aside(kernels: Sequence[str]) -> None:
         return
     if not os.access(folder.parent, os.W_OK):
         return
-    code = "".join(
+    # the same path as here: what lies in the working folder is not imported by accident
+    code = f"import sys; sys.path[:] = {sys.path!r}\n" + "".join(
         f"from {module} import {name}; {name}.dispatcher\n"
         for module, name in (kernel.split(":") for kernel in kernels)
     )

@@ -314,8 +314,9 @@ def _where(bifurcation: Bifurcation, parameter: str) -> str:
 
 def _first_end(reason: EndReason, b: Bifurcation, side: Side, settings: Settings) -> End:
     """Return the end of a branch at the event that it starts from."""
-    mu = side.second_multipliers
-    stable = bool(np.all(np.abs(mu) < 1.0)) if settings.stability else None
+    stable = None
+    if settings.stability:
+        stable = bool(np.all(np.abs(side.second_multipliers) < 1.0))
     here = replace(b, position=0.0, stable_before=None, stable_after=stable)
     return End(reason, f"{EndReason.START.value}: {_where(b, settings.parameter)}", here)
 

@@ -28,8 +28,13 @@ _GROWTH = 8
 #: Rows that are moved at once: few enough to need no memory to speak of.
 _BLOCK = 1 << 14
 
-#: What a branch keeps of its points.
-KEPT = ("joints", "values", "arc", "labels", "mu")
+#: What a branch keeps of its points, and with multipliers.
+_KEPT = ("joints", "values", "arc", "labels")
+
+
+def kept(stability: bool) -> tuple[str, ...]:
+    """Return the columns that a branch keeps of its points."""
+    return (*_KEPT, "mu") if stability else _KEPT
 
 
 @dataclass(eq=False)
@@ -133,23 +138,25 @@ class Side:
     first : the point it starts from
     end : why it ended
     bifurcations : what it has met
+    names : the columns that are kept of its points
     rows, last : the points at work, and the row of the last one
     count : points so far
     """
 
     first: Point
     end: End
+    names: tuple[str, ...]
     rows: Rows
     last: int = 0
     count: int = 1
     bifurcations: list[Bifurcation] = field(default_factory=list)
-    kept: Columns = field(default_factory=lambda: Columns({}))
+    _kept: Columns = field(default_factory=lambda: Columns({}))
     _fresh: int = 0
 
     @classmethod
-    def starting(cls, point: Point, system: System, end: End) -> Side:
+    def starting(cls, point: Point, system: System, end: End, stability: bool) -> Side:
         """Return a side that consists of its first point."""
-        side = cls(point, end, Rows.room_for(system, CHUNK))
+        side = cls(point, end, kept(stability), Rows.room_for(system, CHUNK))
         side.rows.put(0, point)
         return side
 
@@ -171,7 +178,7 @@ class Side:
     @property
     def second_multipliers(self) -> NDArray[np.complex128]:
         """Multipliers of one turn at the second point (at the first, if it is the only one)."""
-        mu = self.kept.arrays["mu"] if self.kept.count else self.rows.mu[: self.last + 1]
+        mu = self._kept.arrays["mu"] if self._kept.count else self.rows.mu[: self.last + 1]
         return np.array(mu[min(1, self.count - 1)])
 
     def put_tip(self, point: Point) -> None:
@@ -225,13 +232,13 @@ class Side:
 
     def _keep(self, stop: int) -> None:
         rows = slice(self._fresh, stop)
-        self.kept.append({name: getattr(self.rows, name)[rows] for name in KEPT})
+        self._kept.append({name: getattr(self.rows, name)[rows] for name in self.names})
         self._fresh = stop
 
     def columns(self) -> Columns:
         """Return everything that is kept of the points; the side is finished."""
         self._keep(self.last + 1)
-        return self.kept
+        return self._kept
 
 
 def march_options(settings: Settings, step: float) -> FloatArray:

@@ -20,7 +20,7 @@ from contfric.continuation.points import (
     Settings,
     settings_of,
 )
-from contfric.continuation.side import KEPT, Side, first_point
+from contfric.continuation.side import Side, first_point
 from contfric.continuation.vertices import at_vertex
 from contfric.errors import ConvergenceError
 from contfric.orbit.orbit import Orbit
@@ -116,7 +116,7 @@ def trace_side(
     progress: Progress | None = None,
 ) -> Side:
     """Follow a branch from a point along its tangent until it ends."""
-    side = Side.starting(start, orbit.system, End(EndReason.START))
+    side = Side.starting(start, orbit.system, End(EndReason.START), settings.stability)
     step = first_step * settings.largest
     while True:
         try:
@@ -316,14 +316,14 @@ def _joined(behind: Side | None, ahead: Side, origin: Point | None) -> dict[str,
     """
     front = ahead.columns()
     if behind is None:
-        joined = {name: front.take(name) for name in KEPT}
+        joined = {name: front.take(name) for name in ahead.names}
     else:
         back, shift = behind.columns(), behind.tip.arc
         back.arrays["arc"] *= -1.0
-        joined = {name: front.take_behind(name, back) for name in KEPT}
+        joined = {name: front.take_behind(name, back) for name in ahead.names}
         joined["arc"] += shift
     if origin is not None:
         first = {"values": origin.value, "joints": origin.joints, "arc": origin.arc}
         first |= {"labels": origin.labels, "mu": origin.mu}
-        joined = {name: np.concatenate([np.array([first[name]]), joined[name]]) for name in KEPT}
+        joined = {n: np.concatenate([np.array([first[n]]), joined[n]]) for n in ahead.names}
     return joined
