@@ -64,6 +64,9 @@ turning_signature = i8(i8, i8, f8, vector, f8, vector, vector, vector)
 hit_signature = f8(i8, i8, f8, types.boolean, f8, vector, f8, vector, vector)
 #: period(p, which, grad): period of the excitation; 0 for an autonomous model.
 period_signature = f8(vector, indices, vector)
+#: rate(mode, c, t, y, p, which, grad): rate of observable c along a mode; ``grad`` (1 + n + len(which))
+#: holds its derivatives with respect to t, y and the parameters ``which``; not filled if empty.
+rate_signature = f8(i8, i8, f8, vector, vector, indices, vector)
 
 FlowType = types.FunctionType(flow_signature)
 ObserveType = types.FunctionType(observe_signature)
@@ -71,6 +74,7 @@ LevelType = types.FunctionType(level_signature)
 TurningType = types.FunctionType(turning_signature)
 HitType = types.FunctionType(hit_signature)
 PeriodType = types.FunctionType(period_signature)
+RateType = types.FunctionType(rate_signature)
 
 
 class Kernel:

@@ -27,6 +27,7 @@ from contfric.compiled import (
     level_signature,
     observe_signature,
     period_signature,
+    rate_signature,
     turning_signature,
 )
 from contfric.flow.interface import CompiledFlow
@@ -191,6 +192,37 @@ def period(p, which, grad):  # type: ignore[no-untyped-def]
     return value
 
 
+@kernel(rate_signature)
+def rate(mode, c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
+    """Return ``u' = v - f'(t)`` or ``v' = f(t) - s S - 2 zeta v - x``, with the gradient."""
+    f, f1, f2 = excitation(p, t)
+    slides = 0.0 if mode == STICK else 1.0
+    friction = direction(mode) * slides
+    if grad.shape[0] > 0:
+        grad[:] = 0.0
+        if c == SPEED:
+            grad[0], grad[1], grad[2] = slides * f1, -slides, -slides * 2.0 * p[ZETA]
+        else:
+            grad[0], grad[2] = -f2, slides
+        for k in range(which.shape[0]):
+            j = which[k]
+            if c != SPEED and j == OMEGA:  # f' = Omega g(Omega t)
+                grad[3 + k] = -(f1 + t * f2) / p[OMEGA]
+            elif c != SPEED and j == H:
+                grad[3 + k] = 3.0 * p[OMEGA] * math.sin(3.0 * p[OMEGA] * t)
+            elif c == SPEED and j == OMEGA:
+                grad[3 + k] = slides * f1 * t / p[OMEGA]
+            elif c == SPEED and j == S:
+                grad[3 + k] = -friction
+            elif c == SPEED and j == H:
+                grad[3 + k] = slides * math.cos(3.0 * p[OMEGA] * t)
+            elif c == SPEED and j == ZETA:
+                grad[3 + k] = -slides * 2.0 * y[1]
+    if c != SPEED:
+        return slides * y[1] - f1
+    return slides * (f - friction * p[S] - 2.0 * p[ZETA] * y[1] - y[0])
+
+
 @kernel(hit_signature)
 def hit(mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-untyped-def]
     """Return the first time at which observable c takes a value, with the state there, or -1."""
@@ -229,4 +261,4 @@ def turning(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-d
 
 def compiled_flow() -> CompiledFlow:
     """Return the compiled functions of this flow."""
-    return CompiledFlow(flow, observe, level, turning, hit, period)
+    return CompiledFlow(flow, observe, level, turning, hit, period, rate)

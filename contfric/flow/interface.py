@@ -1,7 +1,7 @@
-"""What the engine asks of a flow, closed form or integrated: six compiled functions.
+"""What the engine asks of a flow, closed form or integrated: seven compiled functions.
 
 The engine knows nothing else of a model's motion: not how a state is advanced, how many states there
-are, or what the excitation looks like. The types of the six functions stand in
+are, or what the excitation looks like. The types of the seven functions stand in
 :mod:`contfric.compiled`.
 """
 
@@ -24,6 +24,7 @@ class CompiledFlow:
     turning : interior stationary times of an observable along a segment
     hit : first time at which an observable takes a level
     period : period of the excitation (0 for an autonomous model), with its gradient
+    rate : rate of an observable along a mode, with its gradient
     """
 
     flow: Any
@@ -32,14 +33,23 @@ class CompiledFlow:
     turning: Any
     hit: Any
     period: Any
+    rate: Any
 
     def functions(self) -> tuple[Any, ...]:
-        """Return the six functions as kernels take them."""
+        """Return the seven functions as kernels take them."""
         return self._first_class
 
     @cached_property
     def _first_class(self) -> tuple[Any, ...]:
         from contfric.compiled import FirstClass
 
-        kernels = (self.flow, self.observe, self.level, self.turning, self.hit, self.period)
-        return tuple(FirstClass(kernel) for kernel in kernels)
+        order = (
+            self.flow,
+            self.observe,
+            self.level,
+            self.turning,
+            self.hit,
+            self.period,
+            self.rate,
+        )
+        return tuple(FirstClass(kernel) for kernel in order)

@@ -21,6 +21,7 @@ from contfric.compiled import (
     LevelType,
     ObserveType,
     PeriodType,
+    RateType,
     TurningType,
     allocating_helper,
     f8,
@@ -35,7 +36,9 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.system import Layout
 
 #: Type of the model's functions and of a layout, as kernels take them.
-FunctionsType = types.Tuple((FlowType, ObserveType, LevelType, TurningType, HitType, PeriodType))
+FunctionsType = types.Tuple(
+    (FlowType, ObserveType, LevelType, TurningType, HitType, PeriodType, RateType)
+)
 LayoutType = types.NamedTuple(
     [indices, indices, indices, vector, table, table, table, matrix, f8, i8], Layout
 )
