@@ -7,22 +7,36 @@ from dataclasses import dataclass, field, replace
 from contfric.atlas.diagram import Diagram, LooseEnd, Node
 from contfric.atlas.matching import same_event
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation, End, EndReason
+from contfric.continuation.events import Bifurcation, End, EndReason, Proposal
 from contfric.continuation.points import Settings
 from contfric.models.definition import Model
 
 #: Ends that the exploration goes on from.
-_FOLLOWED = frozenset({EndReason.CS, EndReason.BP, EndReason.PD})
+_FOLLOWED = frozenset(EndReason[name] for name in ("CS", "SS", "AS", "GS", "BP", "PD"))
 #: Ends that need no follower.
-FINAL = frozenset({EndReason.RANGE, EndReason.LIMIT, EndReason.CLOSED, EndReason.UNBOUNDED})
+FINAL = frozenset(
+    {EndReason.RANGE, EndReason.LIMIT, EndReason.CLOSED, EndReason.UNBOUNDED, EndReason.REST}
+)
 
 
 @dataclass(eq=False)
 class Event:
-    """A bifurcation while the exploration runs, with the branches that meet there."""
+    """A bifurcation while the exploration runs.
+
+    Attributes
+    ----------
+    bifurcation : as located on the first branch that met it
+    branches : the branches that meet there
+    members : the same event as located on the other branches
+    proposals : what was proposed to follow it
+    rests : whether the mass stays at rest for ever behind it
+    """
 
     bifurcation: Bifurcation
     branches: list[int] = field(default_factory=list)
+    members: list[Bifurcation] = field(default_factory=list)
+    proposals: list[Proposal] = field(default_factory=list)
+    rests: bool = False
 
 
 def collect(
@@ -35,6 +49,7 @@ def collect(
     complete: bool,
 ) -> Diagram:
     """Return the diagram, with the mirror image of every asymmetric branch."""
+    computed = _with_proposals(model, computed, events)
     branches: list[Branch] = []
     place: dict[int, int] = {}
     image: dict[int, int] = {}
@@ -61,6 +76,38 @@ def collect(
         complete,
         notes,
     )
+
+
+def _with_proposals(model: Model, computed: list[Branch], events: list[Event]) -> list[Branch]:
+    """Return the branches with what was proposed at their bifurcations."""
+    place, count = {}, 0
+    for i, branch in enumerate(computed):  # where a branch will stand among the mirror images
+        place[i] = count
+        count += 1 if branch.symmetric or model.symmetry is None else 2
+    changed: dict[int, Bifurcation] = {}
+    for event in events:
+        proposals = tuple(
+            p if p.branch is None else replace(p, branch=place[p.branch]) for p in event.proposals
+        )
+        for member in event.members:
+            changed[id(member)] = replace(member, proposals=proposals)
+        event.bifurcation = changed[id(event.bifurcation)]
+    rests = {id(member) for event in events if event.rests for member in event.members}
+    return [_renewed(branch, changed, rests) for branch in computed]
+
+
+def _renewed(branch: Branch, changed: dict[int, Bifurcation], rests: set[int]) -> Branch:
+    ends = []
+    for end in branch.ends:
+        b = end.bifurcation
+        if b is None:
+            ends.append(end)
+        elif id(b) in rests:
+            ends.append(End(EndReason.REST, bifurcation=changed[id(b)]))
+        else:
+            ends.append(replace(end, bifurcation=changed.get(id(b), b)))
+    found = tuple(changed.get(id(b), b) for b in branch.bifurcations)
+    return replace(branch, bifurcations=found, ends=(ends[0], ends[1]))
 
 
 def _not_followed(end: End) -> End:

@@ -26,7 +26,15 @@ from contfric.continuation.steps import (
     step_room,
 )
 from contfric.orbit.equations import FunctionsType, LayoutType, close_chain
-from contfric.orbit.monitor import crossings, find_turnings, interior_margin, joint_margin
+from contfric.orbit.monitor import (
+    count_margins,
+    crossings,
+    find_turnings,
+    held_margin,
+    interior_margin,
+    joint_margin,
+    lasting_margin,
+)
 from contfric.orbit.newton import CHECKS, MULTIPLIERS
 from contfric.orbit.spectrum import multipliers
 
@@ -66,16 +74,24 @@ def margin_value(functions, layout, index, z, p, room):  # type: ignore[no-untyp
         i, c = layout.interior[index, 0], layout.observables[layout.interior[index, 1]]
         equations, turnings = room.equations, room.turnings
         found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
-        return interior_margin(functions, layout, index, found, p, equations, turnings)
+        return interior_margin(functions, layout, index, found, z, p, equations, turnings)
     if index < first + count:
-        return layout.exit_signs[index - first] * room.equations.rates[index - first]
-    return joint_margin(functions, layout, index - first - count, z, p, room.equations)
+        sign = layout.exit_signs[index - first]
+        return sign * room.equations.rates[index - first] if sign != 0.0 else np.inf
+    index -= first + count
+    if index < layout.joint.shape[0]:
+        return joint_margin(functions, layout, index, z, p, room.equations)
+    index -= layout.joint.shape[0]
+    if index < layout.lasting.shape[0]:
+        return lasting_margin(layout, index, z, room.equations)
+    index -= layout.lasting.shape[0]
+    return held_margin(functions, layout, index, z, p, room.equations, room.turnings)
 
 
 @helper
 def watched_value(functions, layout, kind, index, target, z, p, w, slope, mu, counts, room):  # type: ignore[no-untyped-def]
     """Return the function whose change of sign is sought, at a settled point."""
-    margins = layout.interior.shape[0] + z.shape[0] + layout.joint.shape[0]
+    margins = count_margins(layout)
     if kind == BY_PARAMETER:
         return w - target
     if kind == BY_LABEL:
@@ -201,7 +217,7 @@ def locate(  # type: ignore[no-untyped-def]
                 f_low = f
             else:
                 f_high = f
-    margins = layout.interior.shape[0] + count + layout.joint.shape[0]
+    margins = count_margins(layout)
     # margins and distances are positive before the event, the others have the sign that they have
     two_sided = kind == BY_PARAMETER or (kind == BY_TEST and index >= margins)
     noise = 0.1 * _NOISE if two_sided else _NOISE  # slopes and products of multipliers have less

@@ -106,6 +106,11 @@ class Branch:
         return self.system.half
 
     @property
+    def bridge(self) -> bool:
+        """Whether the orbits have holds: the branch bridges a jump of the flow."""
+        return bool(self.system.holds)
+
+    @property
     def multipliers(self) -> NDArray[np.complex128] | None:
         """Floquet multipliers of the whole orbit at each point, shape (k, n)."""
         if self.turn_multipliers is None:
@@ -115,7 +120,12 @@ class Branch:
 
     @cached_property
     def stable(self) -> BoolArray | None:
-        """Whether each point is stable, shape (k,); None if stability was not asked for."""
+        """Whether each point is stable, shape (k,); None if stability was not asked for.
+
+        An orbit of a bridge never is: the least disturbance ends a hold.
+        """
+        if self.bridge:
+            return np.zeros(len(self), dtype=bool)
         if self.turn_multipliers is None:
             return None
         return np.asarray(np.all(np.abs(self.turn_multipliers) < 1.0, axis=1))

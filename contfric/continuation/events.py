@@ -25,6 +25,7 @@ from functools import cached_property
 
 import numpy as np
 
+from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, System, Test, inside_sign
 
@@ -64,6 +65,8 @@ _MEANINGS = {
 TERMINAL = frozenset({Kind.CS, Kind.SS, Kind.AS, Kind.GS})
 
 
+#: A slide behind a hold that is this short has vanished: such an event is located to about 1e-10.
+_VANISHED = 1e-6
 #: Stops of a located event are good to about 1e-10; asymmetry this small is not seen in a diagram.
 _SYMMETRIC_STOPS = 1e-7
 
@@ -77,6 +80,7 @@ class EndReason(str, Enum):
     SS = "switching-sliding: the flow jumps"
     AS = "adding-sliding: the flow jumps"
     GS = "grazing-sliding: the flow jumps"
+    REST = "the mass stays at rest for ever beyond this point"
     BP = "the orbit has become symmetric: its mirror branch goes on from here"
     PD = "the doubled orbit meets the orbit of half its period"
     CLOSED = "the branch is a closed curve"
@@ -87,6 +91,36 @@ class EndReason(str, Enum):
     UNBOUNDED = "the amplitude grows without bound: resonance"
     BROKEN = "the orbit is not finite beyond this point"
     INTERRUPTED = "interrupted"
+
+
+class Verdict(str, Enum):
+    """What became of a candidate."""
+
+    ACCEPTED = "accepted"
+    KNOWN = "known"
+    REFUSED = "refused"
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A candidate for what follows an event, and what became of it.
+
+    Attributes
+    ----------
+    reason : what would happen, in words
+    verdict : whether a branch was accepted, was known already, or was refused
+    branch : index of the branch in its diagram; None if it was refused
+    why : why it was refused
+    """
+
+    reason: str
+    verdict: Verdict
+    branch: int | None = None
+    why: str = ""
+
+    def __str__(self) -> str:
+        which = "" if self.branch is None else f" (branch {self.branch + 1})"
+        return f"{self.verdict.value}{which}: {self.reason}{f': {self.why}' if self.why else ''}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +144,8 @@ class Bifurcation:
     located : bool
         False if a test changed sign but Newton failed on the way to the place: the parameters are
         those of the last solved point before it.
+    proposals : tuple of Proposal
+        What an exploration proposed to follow it, in order, and what became of it.
     """
 
     kind: Kind
@@ -120,6 +156,7 @@ class Bifurcation:
     stable_before: bool | None = None
     stable_after: bool | None = None
     located: bool = True
+    proposals: tuple[Proposal, ...] = ()
 
     @property
     def group(self) -> int:
@@ -173,11 +210,41 @@ def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
     """Classify the vanishing of a margin; see the table of the module."""
     model = system.model
     mode = system.word[test.segment][0]
+    hold = hold_of_test(test, orbit)
+    if hold is not None:
+        return kind_of_hold(hold, test)
     if test.margin is not Margin.JOINT:
         if model.mode_by_name[mode].sliding:
             return Kind.AS
         return Kind.T if inside_sign(model, mode, test.surface) == 0 else Kind.GS
     return Kind.CS if outward_rate(system, test, orbit) >= 0.0 else Kind.SS
+
+
+def hold_of_test(test: Test, orbit: Orbit) -> Hold | None:
+    """Return the hold that a margin belongs to: its own, or of the slide behind it that has vanished."""
+    for hold in orbit.system.holds:
+        if test.segment == hold.segment:
+            return hold
+        behind = (hold.segment + 1) % len(orbit.system.word)
+        if test.segment == behind and test.margin is not Margin.JOINT:
+            duration = orbit.ends[behind, 0] - orbit.cycle[behind, 0]
+            if duration < _VANISHED:
+                return hold
+    return None
+
+
+def kind_of_hold(hold: Hold, test: Test) -> Kind:
+    """Return the event that an end of a hold's freedom is: that which the hold is pinned to.
+
+    Unless it touches its limit on the way (AS), or can just not be left there (GS).
+    """
+    if test.margin is Margin.INTERIOR:
+        return Kind.AS
+    if test.margin is Margin.HELD:
+        return Kind.GS
+    if hold.pin is not None:
+        return Kind.SS
+    return Kind.AS if hold.after_rest else Kind.GS
 
 
 def outward_rate(system: System, test: Test, orbit: Orbit) -> float:

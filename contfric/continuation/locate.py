@@ -297,7 +297,7 @@ def _tangencies(
 
 
 def _label_place(orbit: Orbit, k: int) -> tuple[Margin, int, str]:
-    segment, observable, _ = orbit.system.layout.labels[k]
+    segment, observable, *_ = orbit.system.layout.labels[k]
     name = orbit.model.observables[int(observable)].name
     return Margin.INTERIOR, int(segment), name
 
@@ -333,10 +333,12 @@ def _bifurcation(
         here,
         tests,
         point.arc,
-        _stable(before, settings),
-        None if after is None else _stable(after, settings),
+        _stable(before, here, settings),
+        None if after is None else _stable(after, here, settings),
     )
 
 
-def _stable(point: Point, settings: Settings) -> bool | None:
+def _stable(point: Point, here: Orbit, settings: Settings) -> bool | None:
+    if here.system.holds:
+        return False
     return bool(np.all(np.abs(point.mu) < 1.0)) if settings.stability else None

@@ -5,6 +5,11 @@ of ``z_0``)::
 
     phi(mode_i; t_i, y_i, t_{i+1} - t_i; p) - y_{i+1} = 0        (n rows)
     observable(z_{i+1}; p) - level(p) = 0                        (1 row)
+
+The last row of a hold is its pin, a condition on ``z_i``: the observable of a surface less its level, or
+the rate of the exit before it. A slide that leaves a hold may shrink to nothing, where its exit row
+would be singular. It is divided by the duration there: with v on the level at ``z_i``,
+``v(d) / d`` is the mean of v' over the slide, a quadrature without cancellation.
 """
 
 from __future__ import annotations
@@ -33,14 +38,39 @@ from contfric.compiled import (
     vector,
 )
 from contfric.models.definition import FloatArray
+from contfric.orbit.holds import NO_PIN, TOUCH_PIN
 from contfric.orbit.system import Layout
+
+#: Times a slide after a hold is shorter than this (nondimensional), its exit row is divided by the
+#: duration: five points of Gauss are exact to rounding there (d^10 f^(10) / 5e32), and the row as it
+#: stands is well conditioned beyond.
+_SHORT = 0.1
+#: Abscissas and weights of Gauss and Legendre on (0, 1), five points.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+_NODES, _WEIGHTS = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
 
 #: Type of the model's functions and of a layout, as kernels take them.
 FunctionsType = types.Tuple(
     (FlowType, ObserveType, LevelType, TurningType, HitType, PeriodType, RateType)
 )
 LayoutType = types.NamedTuple(
-    [indices, indices, indices, vector, table, table, table, matrix, f8, i8], Layout
+    [
+        indices,
+        indices,
+        indices,
+        vector,
+        table,
+        table,
+        table,
+        indices,
+        indices,
+        indices,
+        indices,
+        matrix,
+        f8,
+        i8,
+    ],
+    Layout,
 )
 
 
@@ -111,6 +141,73 @@ def close_chain(functions, layout, z, p, which, room):  # type: ignore[no-untype
 
 
 @helper
+def pin_value(functions, layout, i, start, p, which, grad):  # type: ignore[no-untyped-def]
+    """Return what vanishes at the start of hold i, with the gradient where there is room for it."""
+    surface = layout.pins[i]
+    if surface == TOUCH_PIN:
+        c = layout.observables[layout.exits[i - 1]]
+        return functions[6](layout.modes[i - 1], c, start[0], start[1:], p, which, grad)
+    value = functions[1](layout.observables[surface], start[0], start[1:], p, which, grad)
+    return value - functions[2](surface, p, which, grad[grad.shape[0] :])
+
+
+@helper
+def pin_row(functions, layout, i, at, start, after, p, which, room, rows):  # type: ignore[no-untyped-def]
+    """Write the last row of hold i, and the rate with which it is left; return the residual."""
+    grad, level_grad = room.grad, room.level_grad
+    m, free, width = start.shape[0], which.shape[0], rows.shape[1]
+    row, left = 2 * m - 1, layout.observables[layout.exits[i]]
+    none, empty = room.none, room.empty
+    room.rates[i] = functions[6](layout.departs[i], left, after[0], after[1:], p, none, empty)
+    residual = pin_value(functions, layout, i, start, p, which, grad)
+    for k in range(width):
+        rows[row, k] = 0.0
+    for k in range(m):
+        rows[row, at + k] = grad[k]
+    for k in range(free):
+        rows[row, 3 * m + k] = grad[m + k]
+    if layout.pins[i] >= 0:
+        functions[2](layout.pins[i], p, which, level_grad)
+        for k in range(free):
+            rows[row, 3 * m + k] -= level_grad[k]
+    rows[row, 3 * m + free] = -residual
+    return abs(residual)
+
+
+@helper
+def mean_rate_row(functions, layout, i, at, start, duration, p, which, room, rows):  # type: ignore[no-untyped-def]
+    """Write the exit row of a short slide after a hold, divided by its duration; return the residual."""
+    state, jac, grad = room.state, room.jac, room.grad
+    n, free = state.shape[0], which.shape[0]
+    m = n + 1
+    row, mode, c = 2 * m - 1, layout.modes[i], layout.observables[layout.exits[i]]
+    mean = 0.0
+    for k in range(_NODES.shape[0]):
+        share, weight = _NODES[k], _WEIGHTS[k]
+        time = share * duration
+        functions[0](mode, start[0], start[1:], time, p, which, state, jac)
+        mean += weight * functions[6](mode, c, start[0] + time, state, p, which, grad)
+        for j in range(2 + n + free):  # t_0, y_0, duration, parameters
+            slope = 0.0
+            for a in range(n):
+                slope += grad[1 + a] * jac[a, j]
+            if j == 0 or j == 1 + n:
+                slope += grad[0]
+            elif j >= 2 + n:
+                slope += grad[m + j - 2 - n]
+            slope *= weight
+            if j == 1 + n:
+                rows[row, at] -= share * slope
+                rows[row, 2 * m] += share * slope
+            elif j < 1 + n:
+                rows[row, at + j] += slope
+            else:
+                rows[row, 3 * m + j - 2 - n] += slope
+    rows[row, 3 * m + free] = -mean
+    return abs(mean)
+
+
+@helper
 def segment_rows(functions, layout, i, at, start, after, p, which, room, rows):  # type: ignore[no-untyped-def]
     """Write the rows of segment i to the last m of ``rows``; return its residual against scale.
 
@@ -137,6 +234,9 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
             rows[row, 3 * m + k] = jac[j, 2 + n + k]
         rows[row, 3 * m + free] = -residual
     surface, row = layout.exits[i], m + n
+    if layout.pins[i] != NO_PIN:
+        worst += pin_row(functions, layout, i, at, start, after, p, which, room, rows)
+        return worst if math.isfinite(worst) else np.inf
     value = functions[1](layout.observables[surface], after[0], after[1:], p, which, grad)
     residual = value - functions[2](surface, p, which, level_grad)
     worst += abs(residual) / (1.0 + abs(value))
@@ -146,13 +246,17 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
     room.rates[i] = rate
     for k in range(2 * m):
         rows[row, k] = 0.0
+    for k in range(3 * m + free + 1, width):
+        rows[row, k] = 0.0
+    duration = after[0] - start[0]
+    if layout.pins[i - 1] != NO_PIN and abs(duration) < _SHORT:
+        worst += mean_rate_row(functions, layout, i, at, start, duration, p, which, room, rows)
+        return worst if math.isfinite(worst) else np.inf
     for k in range(m):
         rows[row, 2 * m + k] = grad[k]
     for k in range(free):
         rows[row, 3 * m + k] = grad[m + k] - level_grad[k]
     rows[row, 3 * m + free] = -residual
-    for k in range(3 * m + free + 1, width):
-        rows[row, k] = 0.0
     return worst if math.isfinite(worst) else np.inf
 
 
@@ -167,9 +271,12 @@ def mismatch(functions, layout, z, p, room):  # type: ignore[no-untyped-def]
         after = z[i + 1] if i + 1 < count else room.last
         duration = after[0] - z[i, 0]
         functions[0](layout.modes[i], z[i, 0], z[i, 1:], duration, p, none, state, room.nothing)
-        surface = layout.exits[i]
-        value = functions[1](layout.observables[surface], after[0], after[1:], p, none, empty)
-        here = abs(value - functions[2](surface, p, none, empty)) / (1.0 + abs(value))
+        if layout.pins[i] != NO_PIN:
+            here = abs(pin_value(functions, layout, i, z[i], p, none, empty))
+        else:
+            surface = layout.exits[i]
+            value = functions[1](layout.observables[surface], after[0], after[1:], p, none, empty)
+            here = abs(value - functions[2](surface, p, none, empty)) / (1.0 + abs(value))
         for j in range(m - 1):
             here += abs(state[j] - after[1 + j]) / (1.0 + abs(after[1 + j]))
         if not math.isfinite(here):

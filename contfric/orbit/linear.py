@@ -43,6 +43,21 @@ def assembled(system: System, joints: FloatArray, vector: FloatArray) -> FloatAr
     return full
 
 
+def tangent_of(
+    system: System, joints: FloatArray, vector: FloatArray, active: int
+) -> tuple[FloatArray, float]:
+    """Return the direction of the curve of orbits through one, and the parameter's share of it.
+
+    The null vector of the Jacobian with the parameter's column, by its singular value decomposition:
+    also where an exit is tangential and a joint alone moves.
+    """
+    _, _, c, _ = jacobian_blocks(system, joints, vector)
+    column = c[:, :, active].reshape(-1, 1)
+    full = np.hstack([assembled(system, joints, vector), column])
+    null: FloatArray = np.linalg.svd(full)[2][-1]
+    return null[:-1].reshape(joints.shape), float(null[-1])
+
+
 def pencil_of_turn(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:
     """Return (P, Q) with ``P z_0 + Q z_N = 0`` for one turn, shape (2, m, m).
 

@@ -22,6 +22,7 @@ from contfric.orbit.equations import (
     equation_room,
     segment_rows,
 )
+from contfric.orbit.holds import NO_PIN
 from contfric.orbit.newton import CHECKS
 
 #: Most interior stationary points of one observable in one segment; beyond it the orbit is reported
@@ -31,6 +32,10 @@ _MOST_TURNINGS = 256
 #: An observable this near to a level, relative to 1 + the level, touches it to rounding (ten units in
 #: the last place): it is not labelled as a crossing.
 _TOUCH = 2e-15
+
+#: Within this share of 1 + the duration from a joint that is pinned (a hold starts or ends there) a
+#: stationary point is the joint itself: what it misses is the square of it, 1e-12.
+_AT_PIN = 1e-6
 
 
 class Turnings(NamedTuple):
@@ -59,21 +64,30 @@ def find_turnings(functions, layout, i, c, z, p, last, turnings):  # type: ignor
 
 
 @helper
-def least_distance(found, sign, target, turnings):  # type: ignore[no-untyped-def]
-    """Return the smallest distance of the stationary points to a level; inf without any."""
+def least_distance(found, sign, target, turnings, first, last):  # type: ignore[no-untyped-def]
+    """Return the smallest distance of the stationary points from first to last to a level; or inf."""
     if found < 0:
         return np.nan
     least = np.inf  # also of a segment that vanishes: the joint and exit margins watch it
     for k in range(found):
-        least = min(least, sign * (turnings.values[k] - target))
+        if first <= turnings.times[k] <= last:
+            least = min(least, sign * (turnings.values[k] - target))
     return least
 
 
 @helper
-def interior_margin(functions, layout, k, found, p, room, turnings):  # type: ignore[no-untyped-def]
+def interior_margin(functions, layout, k, found, z, p, room, turnings):  # type: ignore[no-untyped-def]
     """Return interior margin k from the stationary points of its segment."""
+    i, count = layout.interior[k, 0], z.shape[0]
+    after = z[i + 1] if i + 1 < count else room.last
+    duration = after[0] - z[i, 0]
+    first, last = -np.inf, np.inf
+    if layout.pins[i] != NO_PIN or layout.pins[i - 1] != NO_PIN:
+        first = _AT_PIN * (1.0 + duration)
+    if layout.pins[i] != NO_PIN or layout.pins[(i + 1) % count] != NO_PIN:
+        last = duration - _AT_PIN * (1.0 + duration)
     target = functions[2](layout.interior[k, 1], p, room.none, room.empty)
-    return least_distance(found, float(layout.interior[k, 2]), target, turnings)
+    return least_distance(found, float(layout.interior[k, 2]), target, turnings, first, last)
 
 
 @helper
@@ -88,9 +102,10 @@ def joint_margin(functions, layout, k, z, p, room):  # type: ignore[no-untyped-d
 
 @helper
 def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-untyped-def]
-    """Fill the margins in the order interior, exit, joint; an interior one is inf without turnings.
+    """Fill the margins in the order interior, exit, joint, lasting, held.
 
-    The closure and the rates at the exits are in ``room``.
+    An interior margin is infinite without stationary points, that of a tangential exit always. The
+    closure and the rates at the exits are in ``room``.
     """
     interior, observables = layout.interior, layout.observables
     segment, watched, found = -1, -1, 0
@@ -99,24 +114,88 @@ def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-un
         if i != segment or c != watched:  # surfaces of one observable share its stationary points
             found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
             segment, watched = i, c
-        out[k] = interior_margin(functions, layout, k, found, p, room, turnings)
+        out[k] = interior_margin(functions, layout, k, found, z, p, room, turnings)
     at = interior.shape[0]
     for i in range(z.shape[0]):
-        out[at + i] = layout.exit_signs[i] * room.rates[i]
+        sign = layout.exit_signs[i]
+        out[at + i] = sign * room.rates[i] if sign != 0.0 else np.inf
     at += z.shape[0]
     for k in range(layout.joint.shape[0]):
         out[at + k] = joint_margin(functions, layout, k, z, p, room)
+    at += layout.joint.shape[0]
+    for k in range(layout.lasting.shape[0]):
+        out[at + k] = lasting_margin(layout, k, z, room)
+    at += layout.lasting.shape[0]
+    for k in range(layout.held.shape[0]):
+        out[at + k] = held_margin(functions, layout, k, z, p, room, turnings)
+
+
+@helper
+def lasting_margin(layout, k, z, room):  # type: ignore[no-untyped-def]
+    """Return the duration of hold k of those that must last."""
+    i = layout.lasting[k]
+    after = z[i + 1] if i + 1 < z.shape[0] else room.last
+    return after[0] - z[i, 0]
+
+
+@helper
+def held_margin(functions, layout, k, z, p, room, turnings):  # type: ignore[no-untyped-def]
+    """Return the least acceleration with which hold k could be left where an observable is stationary."""
+    i = layout.held[k]
+    left = layout.observables[layout.exits[i]]
+    after = z[i + 1] if i + 1 < z.shape[0] else room.last
+    duration = after[0] - z[i, 0]
+    first = _AT_PIN * (1.0 + duration)
+    state, least = room.state, np.inf
+    watched = -1
+    for row in range(layout.interior.shape[0]):
+        c = layout.observables[layout.interior[row, 1]]
+        if layout.interior[row, 0] != i or c == watched:
+            continue
+        watched = c
+        found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
+        for j in range(found):
+            time = turnings.times[j]
+            if time < first or time > duration - first:
+                continue
+            functions[0](
+                layout.modes[i], z[i, 0], z[i, 1:], time, p, room.none, state, room.nothing
+            )
+            rate = functions[6](
+                layout.departs[i], left, z[i, 0] + time, state, p, room.none, room.empty
+            )
+            least = min(least, layout.exit_signs[i] * rate)
+    return least
+
+
+@helper
+def count_margins(layout):  # type: ignore[no-untyped-def]
+    """Return the number of margins of a layout."""
+    return (
+        layout.interior.shape[0]
+        + layout.exits.shape[0]
+        + layout.joint.shape[0]
+        + layout.lasting.shape[0]
+        + layout.held.shape[0]
+    )
 
 
 @helper
 def ends_of(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
     """Return the values of the observable of label row k at both joints of its segment."""
-    i, c, on = layout.labels[k, 0], layout.labels[k, 1], layout.labels[k, 2]
+    i, c, on, to = (
+        layout.labels[k, 0],
+        layout.labels[k, 1],
+        layout.labels[k, 2],
+        layout.labels[k, 3],
+    )
     after = z[i + 1] if i + 1 < z.shape[0] else room.last
     if on >= 0:
         first = functions[2](on, p, room.none, room.empty)
     else:
         first = functions[1](c, z[i, 0], z[i, 1:], p, room.none, room.empty)
+    if to >= 0:
+        return first, functions[2](to, p, room.none, room.empty)
     return first, functions[1](c, after[0], after[1:], p, room.none, room.empty)
 
 
@@ -133,7 +212,12 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
 
     And the distance to the nearest change: of a stationary point or a joint from a surface.
     """
-    i, c, on = layout.labels[k, 0], layout.labels[k, 1], layout.labels[k, 2]
+    i, c, on, to = (
+        layout.labels[k, 0],
+        layout.labels[k, 1],
+        layout.labels[k, 2],
+        layout.labels[k, 3],
+    )
     found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
     if found < 0:
         return -1, np.inf
@@ -150,7 +234,8 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
             if layout.observables[surface] != c:
                 continue
             target = functions[2](surface, p, room.none, room.empty)
-            if piece >= 0 or surface != on:
+            is_joint = (piece < 0 and surface == on) or (piece == found and surface == to)
+            if not is_joint:
                 nearest = min(nearest, abs(following - target))
             side = side_of(following, target)
             before = (sides >> (2 * surface)) & 3
@@ -170,7 +255,7 @@ def watch(functions, layout, z, p, room, turnings, out, labels):  # type: ignore
     False if something is not finite.
     """
     margins(functions, layout, z, p, room, turnings, out)
-    count = layout.interior.shape[0] + z.shape[0] + layout.joint.shape[0]
+    count = count_margins(layout)
     for k in range(layout.labels.shape[0]):
         labels[k], out[count + k] = crossings(functions, layout, k, z, p, room, turnings)
     for k in range(count):

@@ -17,6 +17,7 @@ from contfric.orbit.simulation import signs_at
 from contfric.orbit.system import Margin, System, Word, build_system
 from contfric.orbit.words import decode, end_domain, half_of, mirror_pairs, passed_domains, whole_of
 from contfric.signature import Signature
+from contfric.signature.holds import domain_after, is_hold, mirror_exit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -192,7 +193,9 @@ class Orbit:
         """Multipliers of one turn, largest first, shape (n,)."""
         from contfric.orbit.spectrum import stability
 
-        mu = np.empty(len(self.model.states), dtype=np.complex128)
+        mu = np.full(len(self.model.states), np.inf, dtype=np.complex128)
+        if self.system.holds:  # the least disturbance ends a hold: it is no flow
+            return mu
         pencil = pencil_of_turn(self.system, self.joints, self.vector)
         stability(self.system.layout, pencil, mu, TALLY)
         return mu
@@ -260,10 +263,18 @@ class Orbit:
         domains: list[str] = []
         for i, passed in enumerate(crossed):
             entry = word[i - 1][1]  # of the whole word: its last exit leads into the first
-            start = model.transitions[ends[i - 1], entry]
+            if is_hold(word[i][1]):
+                domains.append(word[i][1])
+                continue
+            if is_hold(entry):
+                start = str(domain_after(model, word[i - 1][0], word[i][0]))
+            else:
+                start = model.transitions[ends[i - 1], entry]
             domains += passed_domains(model, start, ends[i], passed)
         if system.half:
-            domains += [model.mirror_domain[d] for d in domains]
+            assert model.symmetry is not None
+            image = {**model.symmetry.surfaces, **model.mirror_domain}
+            domains += [mirror_exit(d, image) if is_hold(d) else image[d] for d in domains]
         plain = Signature(model, tuple(domains), self.periods, symmetric=self.symmetric)
         return replace(plain, name=plain.auto_name(self.symmetric))
 
@@ -273,7 +284,12 @@ class Orbit:
         for i, (mode, exit_) in enumerate(word):
             end = self.ends[i]
             signs = signs_at(self.model, float(end[0]), end[1:].copy(), self.vector)
-            after = word[(i + 1) % len(word)][0]
+            after, following = word[(i + 1) % len(word)]
+            if is_hold(exit_):
+                found.append(next(d.name for d in self.model.domains if d.mode == mode))
+                continue
+            if is_hold(following) and mode == after:  # a stick: it leads beyond the hold
+                after = word[(i + 2) % len(word)][0]
             found.append(end_domain(self.model, mode, exit_, after, signs))
         return found
 

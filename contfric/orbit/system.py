@@ -10,6 +10,10 @@ admissible) are
 
 Crossings of transparent surfaces inside a segment do not matter to the motion; they label it.
 
+A hold (:mod:`contfric.orbit.holds`) has a pin at its start in the place of the exit surface. Its exit
+margin is the acceleration with which it is left, which must not be negative anywhere on the way (HELD);
+one that follows a stick must last (LASTING).
+
 Everything here derives from the model's definition; nothing knows what moves.
 """
 
@@ -24,6 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.holds import NO_PIN, TOUCH_PIN, Hold, holds_of
+from contfric.signature.holds import is_hold, mirror_exit
 
 IntArray = NDArray[np.int64]
 
@@ -33,12 +39,16 @@ class Layout(NamedTuple):
 
     Attributes
     ----------
-    modes, exits : mode and exit surface of each segment, shape (N,)
+    modes, exits : mode and exit surface of each segment, shape (N,); a hold's is the surface it leaves
     observables : observable of each surface, shape (surfaces,)
-    exit_signs : sign of the rate at which each exit is met, shape (N,)
+    exit_signs : sign of the rate at which each exit is met (a hold is left), shape (N,); 0 if tangential
     interior : rows (segment, surface, sign) of the interior margins
     joint : rows (segment, surface, sign) of the joint margins, at the segment's end
-    labels : rows (segment, observable, surface that the segment starts on or -1)
+    labels : rows (segment, observable, surfaces that the segment starts and ends on, or -1)
+    pins : surface that each hold starts on, shape (N,); -2 after a touch, -1 where there is no hold
+    departs : mode in which each hold is left, shape (N,); -1 where there is none
+    lasting : holds that must last: those after a stick, shape (k,)
+    held : all holds, which could be left at any time, shape (k,)
     closure : state matrix of the closure, shape (n, n)
     turn : duration of one turn in periods of the excitation
     rank : number of independent directions that survive one turn
@@ -51,6 +61,10 @@ class Layout(NamedTuple):
     interior: IntArray
     joint: IntArray
     labels: IntArray
+    pins: IntArray
+    departs: IntArray
+    lasting: IntArray
+    held: IntArray
     closure: FloatArray
     turn: float
     rank: int
@@ -62,6 +76,8 @@ class Margin(str, Enum):
     INTERIOR = "interior"
     EXIT = "exit"
     JOINT = "joint"
+    LASTING = "lasting"
+    HELD = "held"
 
 
 @dataclass(frozen=True)
@@ -82,7 +98,8 @@ class System:
     """A boundary-value problem: a reduced word with its closure, over one turn.
 
     ``half`` says that the turn is half of the orbit and closes by the model's symmetry; ``domains``
-    are those of the segments if the problem is in full form, empty if it is reduced.
+    are those of the segments if the problem is in full form, empty if it is reduced; ``holds`` are those
+    of the word.
     """
 
     model: Model
@@ -92,6 +109,7 @@ class System:
     layout: Layout
     tests: tuple[Test, ...]
     domains: tuple[str, ...] = ()
+    holds: tuple[Hold, ...] = ()
 
     @property
     def segments(self) -> int:
@@ -157,28 +175,38 @@ def build_system(
     following = [mode for mode, _ in word[1:]] + [_mode_after(model, word, half)]
     names = [mode.name for mode in model.modes]
     surfaces = [s.name for s in model.surfaces]
+    holds = holds_of(model, word)
     inside = [
-        _segment_domains(model, mode, exit_, after, domains[i : i + 1])
+        _segment_domains(model, mode, exit_, _leads_to(i, after, holds), domains[i : i + 1])
         for i, ((mode, exit_), after) in enumerate(zip(word, following, strict=True))
     ]
-    interior, joint, tests = _margins(model, word, inside, bool(domains))
+    interior, joint, tests = _margins(model, word, inside, bool(domains), holds)
+    exits = [_exit_surface(i, exit_, holds) for i, (_, exit_) in enumerate(word)]
+    held = {hold.segment: hold for hold in holds}
     symmetry = model.symmetry
     n = len(model.states)
     layout = Layout(
         modes=np.array([names.index(mode) for mode, _ in word], dtype=np.int64),
-        exits=np.array([surfaces.index(exit_) for _, exit_ in word], dtype=np.int64),
+        exits=np.array([surfaces.index(exit_) for exit_ in exits], dtype=np.int64),
         observables=_surface_observables(model),
         exit_signs=np.array(
-            [_exit_sign(model, i, e) for i, (_, e) in zip(inside, word, strict=True)]
+            [_exit_sign(model, i, inside[i], exit_, holds) for i, exit_ in enumerate(exits)]
         ),
         interior=interior,
         joint=joint,
-        labels=_label_rows(model, word, half, bool(domains)),
+        labels=_label_rows(model, word, half, bool(domains), holds),
+        pins=np.array([_pin(held.get(i), surfaces) for i in range(len(word))], dtype=np.int64),
+        departs=np.array(
+            [names.index(held[i].departs) if i in held else -1 for i in range(len(word))],
+            dtype=np.int64,
+        ),
+        lasting=np.array([hold.segment for hold in holds if hold.after_rest], dtype=np.int64),
+        held=np.array([hold.segment for hold in holds], dtype=np.int64),
         closure=symmetry.array() if half and symmetry else np.eye(n),
         turn=float(periods * symmetry.fraction) if half and symmetry else float(periods),
         rank=min(model.mode_by_name[mode].rank for mode, _ in word),
     )
-    return System(model, word, periods, half, layout, tests, domains)
+    return System(model, word, periods, half, layout, tests, domains, holds)
 
 
 def _mode_after(model: Model, word: Word, half: bool) -> str:
@@ -199,14 +227,38 @@ def _segment_domains(
     """Domains in which the segment may end."""
     if given:
         return list(given)
+    if is_hold(surface):
+        return mode_domains(model, mode)
     found = exit_domains(model, mode, surface, after)
     if not found:
         raise ValueError(f"no domain of {mode} leads through {surface} into {after}")
     return found
 
 
-def _exit_sign(model: Model, inside: list[str], surface: str) -> float:
+def _leads_to(index: int, after: str, holds: tuple[Hold, ...]) -> str:
+    """Mode that a segment leads to by the transitions: before a hold after a stick, the one beyond it."""
+    return next((h.departs for h in holds if h.after_rest and h.segment == index + 1), after)
+
+
+def _exit_surface(index: int, exit_: str, holds: tuple[Hold, ...]) -> str:
+    return next((hold.leaves for hold in holds if hold.segment == index), exit_)
+
+
+def _pin(hold: Hold | None, surfaces: list[str]) -> int:
+    if hold is None:
+        return NO_PIN
+    return TOUCH_PIN if hold.pin is None else surfaces.index(hold.pin)
+
+
+def _exit_sign(
+    model: Model, index: int, inside: list[str], surface: str, holds: tuple[Hold, ...]
+) -> float:
     """Sign of the rate of the observable where the exit surface is met from inside."""
+    for hold in holds:
+        if hold.segment == index:  # it is left to the side on which the departing mode lies
+            return float(model.domain_by_name[mode_domains(model, hold.departs)[0]].signs[surface])
+        if hold.segment == index + 1 and hold.pin is None:
+            return 0.0
     sign = model.domain_by_name[inside[0]].signs[surface]
     return float(-sign)
 
@@ -217,11 +269,11 @@ def _surface_observables(model: Model) -> IntArray:
 
 
 def _margins(
-    model: Model, word: Word, inside: list[list[str]], full: bool
+    model: Model, word: Word, inside: list[list[str]], full: bool, holds: tuple[Hold, ...]
 ) -> tuple[IntArray, IntArray, tuple[Test, ...]]:
     names = [s.name for s in model.surfaces]
-    interior: list[tuple[int, int, int]] = []
-    joint: list[tuple[int, int, int]] = []
+    interior: list[tuple[int, ...]] = []
+    joint: list[tuple[int, ...]] = []
     for i, (mode, exit_) in enumerate(word):
         for surface in names if full else mode_bounds(model)[mode]:
             sign = (
@@ -233,30 +285,40 @@ def _margins(
                 interior.append((i, names.index(surface), sign))
         for surface in names:
             signs = {model.domain_by_name[d].signs[surface] for d in inside[i]}
-            if surface != exit_ and len(signs) == 1 and (sign := signs.pop()) != 0:
+            pinned = any(h.segment == i + 1 and h.pin == surface for h in holds)
+            if surface == exit_ or pinned or len(signs) != 1:
+                continue
+            if (sign := signs.pop()) != 0:
                 joint.append((i, names.index(surface), sign))
     tests = (
         *(Test(Margin.INTERIOR, i, names[k]) for i, k, _ in interior),
-        *(Test(Margin.EXIT, i, exit_) for i, (_, exit_) in enumerate(word)),
+        *(
+            Test(Margin.EXIT, i, _exit_surface(i, exit_, holds))
+            for i, (_, exit_) in enumerate(word)
+        ),
         *(Test(Margin.JOINT, i, names[k]) for i, k, _ in joint),
+        *(Test(Margin.LASTING, h.segment, h.leaves) for h in holds if h.after_rest),
+        *(Test(Margin.HELD, h.segment, h.leaves) for h in holds),
     )
     return _rows(interior), _rows(joint), tests
 
 
-def _rows(rows: list[tuple[int, int, int]]) -> IntArray:
-    return np.array(rows, dtype=np.int64).reshape(len(rows), 3)
+def _rows(rows: list[tuple[int, ...]], width: int = 3) -> IntArray:
+    return np.array(rows, dtype=np.int64).reshape(len(rows), width)
 
 
-def _label_rows(model: Model, word: Word, half: bool, full: bool) -> IntArray:
-    """Segments and observables whose surfaces are transparent there, and where they start."""
+def _label_rows(
+    model: Model, word: Word, half: bool, full: bool, holds: tuple[Hold, ...]
+) -> IntArray:
+    """Segments and observables whose surfaces are transparent there, and where they start and end."""
     if full:
-        return _rows([])
+        return _rows([], 4)
     surfaces = [s.name for s in model.surfaces]
     first_entry = word[-1][1]
     if half and model.symmetry:
         inverse = {image: name for name, image in model.symmetry.surfaces.items()}
-        first_entry = inverse[first_entry]
-    rows: list[tuple[int, int, int]] = []
+        first_entry = mirror_exit(first_entry, inverse)
+    rows: list[tuple[int, ...]] = []
     for i, (mode, _) in enumerate(word):
         entry = word[i - 1][1] if i else first_entry
         for c, observable in enumerate(model.observables):
@@ -266,11 +328,14 @@ def _label_rows(model: Model, word: Word, half: bool, full: bool) -> IntArray:
                 if s.observable == observable.name and inside_sign(model, mode, s.name) == 0
             ]
             if clear and not model.mode_by_name[mode].sliding:
-                start = surfaces.index(entry) if _observable(model, entry) == c else -1
-                rows.append((i, c, start))
-    return _rows(rows)
+                pin = next((h.pin for h in holds if h.segment == i + 1), None)
+                rows.append((i, c, *(_place(model, s, c, surfaces) for s in (entry, pin))))
+    return _rows(rows, 4)
 
 
-def _observable(model: Model, surface: str) -> int:
-    names = [o.name for o in model.observables]
-    return names.index(model.surface_by_name[surface].observable)
+def _place(model: Model, surface: str | None, c: int, surfaces: list[str]) -> int:
+    """Return the index of a surface if it is one of observable c, else -1."""
+    if surface is None or is_hold(surface):
+        return -1
+    own = model.surface_by_name[surface].observable == model.observables[c].name
+    return surfaces.index(surface) if own else -1

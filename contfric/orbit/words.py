@@ -6,13 +6,14 @@ from collections import deque
 
 from contfric.models.definition import Model
 from contfric.orbit.system import Word, exit_domains, mirror_mode
+from contfric.signature.holds import mirror_exit
 
 
 def mirror_pairs(model: Model, word: Word) -> Word:
     """Return the mirror image of a word, segment by segment (not rotated)."""
     assert model.symmetry is not None
     surfaces = model.symmetry.surfaces
-    return tuple((mirror_mode(model)[mode], surfaces[exit_]) for mode, exit_ in word)
+    return tuple((mirror_mode(model)[mode], mirror_exit(exit_, surfaces)) for mode, exit_ in word)
 
 
 def half_of(model: Model, word: Word, periods: int) -> Word | None:

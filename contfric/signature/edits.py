@@ -1,16 +1,133 @@
-"""Edits of reduced words: what follows the events at which a signature changes.
+"""Edits of reduced words: operations on walks of the transition graph.
 
 Everything is derived from the transitions of the model: which modes slide, and where a surface
-leads from a domain. No edit returns a word that the transition graph cannot walk.
+leads from a domain. No edit returns a word that the graph cannot walk.
+
+An :class:`Edit` is a local change of a word: segments dropped, given another exit, or inserted behind
+one. Edits at several places are joined by ``|``. With it are made
+
+* **insert** and **drop**: a segment of length zero appears or vanishes,
+* **swap**: stick and reversal at a stop (:func:`swap_stops`),
+* **split**: a segment ends earlier, and others follow it,
+
+and of whole words **double** (:func:`double`), **mirror**
+(:func:`~contfric.signature.reduced.mirror_word`) and **concatenate** (:func:`concatenate`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from contfric.errors import NotationError, did_you_mean
 from contfric.models import Model
+from contfric.signature.holds import is_hold, without_holds
 from contfric.signature.reduced import NEVER, ReducedPair, ReducedWord, fuses
+
+
+@dataclass(frozen=True)
+class Edit:
+    """A local change of a word; segments are counted before the change.
+
+    Attributes
+    ----------
+    dropped : segments that go
+    renamed : new exits of segments
+    inserted : segments that come in behind others
+    """
+
+    dropped: frozenset[int] = frozenset()
+    renamed: Mapping[int, str] = field(default_factory=dict)
+    inserted: Mapping[int, tuple[ReducedPair, ...]] = field(default_factory=dict)
+
+    def __or__(self, other: Edit) -> Edit:
+        """Return both changes at once.
+
+        Raises
+        ------
+        NotationError
+            If both change the same segment.
+        """
+        clash = self._touched() & other._touched()
+        if clash:
+            raise NotationError(
+                f"two edits change segment {min(clash) + 1}: they exclude each other"
+            )
+        return Edit(
+            self.dropped | other.dropped,
+            {**self.renamed, **other.renamed},
+            {**self.inserted, **other.inserted},
+        )
+
+    def _touched(self) -> frozenset[int]:
+        return self.dropped | frozenset(self.renamed) | frozenset(self.inserted)
+
+
+def drop(*segments: int) -> Edit:
+    """Return the edit that leaves segments out.
+
+    Examples
+    --------
+    >>> from contfric.models import load_model
+    >>> word = (("slide+", "v"), ("stick", "F+"), ("slide-", "v"), ("stick", "F-"))
+    >>> apply_edit(word, drop(1), load_model("coulomb"))
+    (('slide+', 'v'), ('slide-', 'v'), ('stick', 'F-'))
+    """
+    return Edit(dropped=frozenset(segments))
+
+
+def insert(behind: int, *pairs: ReducedPair) -> Edit:
+    """Return the edit that puts segments behind one."""
+    return Edit(inserted={behind: pairs})
+
+
+def split(segment: int, exit_surface: str, *pairs: ReducedPair) -> Edit:
+    """Return the edit that ends a segment at another surface, with others behind it."""
+    return Edit(renamed={segment: exit_surface}, inserted={segment: pairs} if pairs else {})
+
+
+def apply_edit(word: Sequence[ReducedPair], edit: Edit, model: Model) -> ReducedWord:
+    """Return the word after an edit, in the same rotation.
+
+    Raises
+    ------
+    NotationError
+        If the graph has no such walk.
+    """
+    edited = tuple(pair for _, pair in edited_pieces(word, edit))
+    if not is_closed_walk(edited, model):
+        raise NotationError(
+            f"{show(word)} cannot become {show(edited)}: the transitions of model '{model.name}' "
+            "do not allow it"
+        )
+    return edited
+
+
+def edited_pieces(
+    word: Sequence[ReducedPair], edit: Edit
+) -> list[tuple[tuple[int, int], ReducedPair]]:
+    """Return the segments after an edit, each with where it comes from.
+
+    (segment, -1) for one that was there, (segment, k) for the k-th one put in behind a segment.
+    """
+    pieces: list[tuple[tuple[int, int], ReducedPair]] = []
+    for index, (mode, exit_) in enumerate(word):
+        if index not in edit.dropped:
+            pieces.append(((index, -1), (mode, edit.renamed.get(index, exit_))))
+        for k, pair in enumerate(edit.inserted.get(index, ())):
+            pieces.append(((index, k), pair))
+    return pieces
+
+
+def concatenate(*words: Sequence[ReducedPair]) -> ReducedWord:
+    """Return words run through one after the other, each in the rotation given.
+
+    Examples
+    --------
+    >>> concatenate((("slide+", "v"),), (("stick", "F-"),))
+    (('slide+', 'v'), ('stick', 'F-'))
+    """
+    return tuple(pair for word in words for pair in word)
 
 
 def swap_stop(
@@ -61,27 +178,20 @@ def swap_stops(
     NotationError
         If one of the joints is no stop, or the graph has no such walk.
     """
+    return apply_edit(segments, swap_edit(segments, events, model), model)
+
+
+def swap_edit(segments: Sequence[ReducedPair], events: Mapping[int, str], model: Model) -> Edit:
+    """Return the edit that swaps stick and reversal at stops; see :func:`swap_stops`."""
     word = _checked(segments, model)
-    dropped: set[int] = set()
-    added: dict[int, ReducedPair] = {}
+    edit = Edit()
     for joint, surface in events.items():
         following = _stop(word, joint, surface, model)
         if model.mode_by_name[word[following][0]].sliding:
-            dropped.add(_removable(word, following, surface))
+            edit |= drop(_removable(word, following, surface))
         else:
-            added[joint] = _new_stick(word, joint, surface, model)
-    edited: list[ReducedPair] = []
-    for index, pair in enumerate(word):
-        if index not in dropped:
-            edited.append(pair)
-        if index in added:
-            edited.append(added[index])
-    if not is_closed_walk(edited, model):
-        raise NotationError(
-            f"swapping the stop(s) {dict(events)} of {show(word)} gives {show(edited)}, which the "
-            f"transitions of model '{model.name}' do not allow"
-        )
-    return tuple(edited)
+            edit |= insert(joint, _new_stick(word, joint, surface, model))
+    return edit
 
 
 def double(word: Sequence[ReducedPair]) -> ReducedWord:
@@ -108,6 +218,11 @@ def is_closed_walk(word: Sequence[ReducedPair], model: Model) -> bool:
     >>> is_closed_walk((("slide+", "v"), ("stick", "F+")), load_model("coulomb"))
     False
     """
+    if any(is_hold(exit_) for _, exit_ in word):
+        try:
+            word = without_holds(tuple(word), model)
+        except NotationError:
+            return False
     modes = [mode for mode, _ in word]
     if len(word) == 1 and word[0][1] == NEVER:
         return _has_cycle(modes[0], model)

@@ -15,6 +15,7 @@ from contfric.errors import NotationError
 from contfric.models import Model
 from contfric.signature.cyclic import least_rotation, rotated
 from contfric.signature.graph import crossing, successors, unknown_domain
+from contfric.signature.holds import TOUCH, hold_at, hold_fault, is_hold, mirror_exit, surface_into
 
 #: Number of segments that a name leaves unsaid: that of the four typical orbits of the reference.
 TYPICAL_SEGMENTS = 6
@@ -99,20 +100,28 @@ class Signature:
     @cached_property
     def canonical(self) -> tuple[str, ...]:
         """The least rotation of the segments, by the order of the domains in the model."""
-        order = {domain.name: i for i, domain in enumerate(self.model.domains)}
+        names = [domain.name for domain in self.model.domains]
+        holds = [TOUCH, *(hold_at(surface.name) for surface in self.model.surfaces)]
+        order = {name: i for i, name in enumerate([*names, *holds])}
         return rotated(self.segments, least_rotation([order[s] for s in self.segments]))
 
     @cached_property
     def surfaces(self) -> tuple[str, ...]:
-        """The surface that ends each segment."""
-        following = rotated(self.segments, 1)
-        found = (crossing(self.model, a, b) for a, b in zip(self.segments, following, strict=True))
+        """The surface that ends each segment; a hold's own name, as it ends at a free time."""
+        found = (_exit(self.model, self.segments, i) for i in range(len(self.segments)))
         return tuple(surface for surface in found if surface is not None)
 
     @property
     def stops(self) -> int:
         """Number of sticks: segments of a sliding mode."""
-        return sum(is_sliding(self.model, segment) for segment in self.segments)
+        return sum(
+            is_sliding(self.model, segment) for segment in self.segments if not is_hold(segment)
+        )
+
+    @property
+    def holds(self) -> int:
+        """Number of holds; an orbit with one lies on a bridge."""
+        return sum(is_hold(segment) for segment in self.segments)
 
     @cached_property
     def is_mirror_symmetric(self) -> bool:
@@ -165,8 +174,9 @@ class Signature:
             Whether the orbit is symmetric; the segments alone do not tell.
         """
         name = f"{self.stops}{'s' if symmetric else 'a'}"
-        count = len(self.segments)
-        return name if count == TYPICAL_SEGMENTS else f"{name}, {count}seg"
+        count = len(self.segments) - self.holds
+        name = name if count == TYPICAL_SEGMENTS else f"{name}, {count}seg"
+        return f"{name}, {self.holds}hold" if self.holds else name
 
 
 @dataclass(frozen=True)
@@ -221,13 +231,20 @@ def walk_fault(model: Model, segments: Sequence[str]) -> Fault | None:
     if not segments:
         return Fault(0, "a signature needs segments, got none")
     for index, segment in enumerate(segments):
-        if segment not in model.domain_by_name:
+        if segment not in model.domain_by_name and not is_hold(segment):
             return Fault(index, f"segment {index + 1}: {_not_a_domain(model, segment)}")
     if len(segments) == 1:
         return Fault(0, f"the single segment '{segments[0]}' is no closed walk: it never ends")
     for index in range(len(segments)):
         following = (index + 1) % len(segments)
-        if crossing(model, segments[index], segments[following]) is None:
+        if is_hold(segments[index]):
+            fault = hold_fault(model, segments, index)
+            if fault is not None:
+                return Fault(index, f"segment {index + 1}: {fault}")
+        elif (
+            not is_hold(segments[following])
+            and crossing(model, segments[index], segments[following]) is None
+        ):
             return Fault(following, _impossible(model, segments, index, following))
     return None
 
@@ -269,4 +286,16 @@ def _impossible(model: Model, segments: Sequence[str], index: int, following: in
 def _mirrored(model: Model, segments: Iterable[str]) -> tuple[str, ...]:
     if model.symmetry is None:
         raise NotationError(f"model '{model.name}' has no symmetry: there is no mirror image")
-    return tuple(model.mirror_domain[segment] for segment in segments)
+    surfaces = model.symmetry.surfaces
+    return tuple(
+        mirror_exit(s, surfaces) if is_hold(s) else model.mirror_domain[s] for s in segments
+    )
+
+
+def _exit(model: Model, segments: Sequence[str], index: int) -> str | None:
+    following = (index + 1) % len(segments)
+    if is_hold(segments[index]):
+        return segments[index]
+    if is_hold(segments[following]):
+        return surface_into(model, segments, index)
+    return crossing(model, segments[index], segments[following])

@@ -14,6 +14,7 @@ from typing import TypeAlias
 from contfric.errors import NotationError
 from contfric.models import Model
 from contfric.signature.cyclic import least_rotation, primitive_length, rotated
+from contfric.signature.holds import TOUCH, hold_at, is_hold, known_hold, mirror_exit, mode_of
 from contfric.signature.notation import Signature
 
 #: Stands for the surface at the end of a segment that is the whole orbit and has no end. None of
@@ -58,7 +59,7 @@ def reduce_signature(signature: Signature) -> tuple[ReducedSegment, ...]:
     pieces = rotated(pieces, least_rotation([_key(piece.pair, model) for piece in pieces]))
     block = primitive_length([piece.pair for piece in pieces])
     order = {domain.name: i for i, domain in enumerate(model.domains)}
-    path = [tuple(order[name] for name in piece.domains) for piece in pieces]
+    path = [tuple(order.get(name, -1) for name in piece.domains) for piece in pieces]
     blocks = [tuple(path[i : i + block]) for i in range(0, len(path), block)]
     return rotated(pieces, block * least_rotation(blocks))
 
@@ -94,10 +95,11 @@ def mirror_pair(pair: ReducedPair, model: Model) -> ReducedPair:
         raise NotationError(f"model '{model.name}' has no symmetry: there is no mirror image")
     mode, surface = pair
     surfaces = {NEVER: NEVER, **model.symmetry.surfaces}
+    known = surface in surfaces or (is_hold(surface) and known_hold(surface, model))
     for domain in model.domains:
-        if domain.mode == mode and surface in surfaces:
+        if domain.mode == mode and known:
             image = model.domain_by_name[model.mirror_domain[domain.name]]
-            return image.mode, surfaces[surface]
+            return image.mode, mirror_exit(surface, surfaces)
     raise NotationError(f"model '{model.name}' has no mode '{mode}' with surface '{surface}'")
 
 
@@ -120,8 +122,9 @@ def fuses(model: Model, mode: str, surface: str, next_mode: str) -> bool:
 
 def _key(pair: ReducedPair, model: Model) -> tuple[int, int]:
     mode, surface = pair
+    exits = (NEVER, *model.surface_by_name, TOUCH, *map(hold_at, model.surface_by_name))
     try:
-        return tuple(model.mode_by_name).index(mode), (NEVER, *model.surface_by_name).index(surface)
+        return tuple(model.mode_by_name).index(mode), exits.index(surface)
     except ValueError:
         raise NotationError(f"model '{model.name}' has no segment {pair}") from None
 
@@ -129,10 +132,13 @@ def _key(pair: ReducedPair, model: Model) -> tuple[int, int]:
 def _fused(signature: Signature) -> tuple[ReducedSegment, ...]:
     """Fuse the segments; the first piece starts at the first joint that does not fuse."""
     model, names, surfaces = signature.model, signature.canonical, _canonical_surfaces(signature)
-    modes = [model.domain_by_name[name].mode for name in names]
+    modes = [mode_of(model, names, i) for i in range(len(names))]
     count = len(names)
     after = rotated(tuple(modes), 1)
-    ends = [i for i in range(count) if not fuses(model, modes[i], surfaces[i], after[i])]
+    beside = [is_hold(names[i]) or is_hold(names[(i + 1) % count]) for i in range(count)]
+    ends = [
+        i for i in range(count) if beside[i] or not fuses(model, modes[i], surfaces[i], after[i])
+    ]
     if not ends:
         return (ReducedSegment(modes[0], NEVER, names),)
     starts = [ends[-1] - count, *ends]

@@ -1,0 +1,111 @@
+"""The state of an exploration: branches traced, events met, events that wait to be followed."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from contfric.atlas.collect import Event
+from contfric.atlas.matching import identity, on_branch, same_event, stops_distance
+from contfric.continuation.branch import Branch
+from contfric.continuation.events import Bifurcation, EndReason, Kind, Proposal, Verdict
+from contfric.continuation.points import Settings
+from contfric.orbit.orbit import Orbit
+
+Progress = Callable[[str], None]
+
+#: Kinds that leave nothing to follow: the branch itself goes on.
+_PASSED = frozenset({Kind.SN, Kind.T, Kind.NS})
+#: The tip of a branch whose parameter (relative to the range) and stops agree with an event to these is
+#: at the event: located tips are good to 1e-10, those beside a singular point to 1e-6.
+_SAME_PLACE, _SAME_STOPS = 1e-8, 1e-6
+
+
+@dataclass(eq=False)
+class Exploration:
+    """State of one exploration."""
+
+    settings: Settings
+    max_periods: int
+    max_branches: int
+    bridges: bool
+    progress: Progress | None
+    branches: list[Branch] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    waiting: deque[Event] = field(default_factory=deque)
+    notes: list[str] = field(default_factory=list)
+    complete: bool = True
+
+    def say(self, text: str) -> None:
+        """Report progress."""
+        if self.progress is not None:
+            self.progress(text)
+
+    def add(self, branch: Branch) -> None:
+        """Register a branch and the events that it meets."""
+        index = len(self.branches)
+        self.branches.append(branch)
+        self.say(f"branch {index + 1}: {branch.name}, {len(branch)} points")
+        if any(end.reason is EndReason.INTERRUPTED for end in branch.ends):
+            raise KeyboardInterrupt
+        for bifurcation in branch.bifurcations:
+            self._meet(bifurcation, index)
+
+    def add_from(self, branch: Branch, event: Event) -> None:
+        """Register a branch that starts at an event."""
+        index = len(self.branches)
+        self.add(branch)
+        if index not in event.branches:
+            event.branches.append(index)
+
+    def judge(
+        self,
+        event: Event,
+        reason: str,
+        verdict: Verdict,
+        branch: int | None = None,
+        why: str = "",
+    ) -> None:
+        """Keep what became of a candidate."""
+        event.proposals.append(Proposal(reason, verdict, branch, why))
+
+    def _meet(self, bifurcation: Bifurcation, index: int) -> None:
+        settings = self.settings
+        for event in self.events:
+            if same_event(event.bifurcation, bifurcation, settings.parameter, settings.width):
+                event.members.append(bifurcation)
+                if index not in event.branches:
+                    event.branches.append(index)
+                return
+        event = Event(bifurcation, [index], [bifurcation])
+        self.events.append(event)
+        if not bifurcation.located:
+            why = "not located: Newton fails behind this point"
+            self.judge(event, "go on behind the event", Verdict.REFUSED, why=why)
+        elif bifurcation.kind not in _PASSED:
+            self.waiting.append(event)
+
+    def known(self, orbit: Orbit) -> int | None:
+        """Return the branch, of those already traced, that an orbit lies on; None if there is none."""
+        return next((i for i, b in enumerate(self.branches) if on_branch(orbit, b)), None)
+
+    def ends_here(self, orbit: Orbit, event: Event) -> int | None:
+        """Return the branch of the orbit's word that already ends at an event; None if none does."""
+        wanted, mirror = identity(orbit), orbit.model.symmetry is not None
+        width = self.settings.width
+        for index, branch in enumerate(self.branches):
+            if branch.system.periods != orbit.periods or branch.system.half != orbit.system.half:
+                continue
+            if identity(branch[0]) != wanted:
+                continue
+            for end in branch.ends:
+                b = end.bifurcation
+                if b and same_event(b, event.bifurcation, self.settings.parameter, width):
+                    return index
+            for tip in (branch[0], branch[-1]):
+                gap = abs(tip.params[branch.parameter] - orbit.params[branch.parameter])
+                near = stops_distance(tip.stops, orbit.stops, mirror) < _SAME_STOPS
+                if gap < _SAME_PLACE * width and near:
+                    return index
+        return None

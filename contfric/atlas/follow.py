@@ -1,0 +1,239 @@
+"""What leaves an event: the branches that each kind of bifurcation leads to.
+
+* CS, SS, AS, GS: every candidate that the transition graph proposes, bridges among them;
+* BP: the asymmetric branch from a symmetric one, or the symmetric branch from an asymmetric one;
+* PD: the branch of twice the period, or the one of half the period from it.
+
+A candidate is accepted when it is solved, and admissible beyond the event in one direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contfric.atlas.collect import Event
+from contfric.atlas.exploration import Exploration, Progress
+from contfric.continuation.branch import Branch
+from contfric.continuation.candidates import Candidate, candidates, directions
+from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind, Verdict
+from contfric.continuation.points import Point, Settings
+from contfric.continuation.side import Side, first_point
+from contfric.continuation.switching import NEARER, leave_branch_point, settings_value
+from contfric.continuation.trace import assemble, continue_orbit, trace_side
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.solve import polish
+
+#: First step away from an event, in largest steps: the new word is proved close to it.
+_NEAR_EVENT = 0.01
+#: A branch that gets no farther than this (arclength) from the event it starts at has left it in the
+#: direction in which it is not admissible.
+_NOWHERE = 1e-7
+
+
+def follow(state: Exploration, event: Event) -> None:
+    """Trace everything that leaves an event and is not known yet."""
+    kind = event.bifurcation.kind
+    if kind in TERMINAL:
+        _follow_sliding(state, event)
+    elif kind is Kind.BP:
+        _follow_branch_point(state, event)
+    elif kind is Kind.PD:
+        _follow_doubling(state, event)
+
+
+# -------------------------------------------------------------------------- sliding events
+
+
+def _follow_sliding(state: Exploration, event: Event) -> None:
+    for candidate in candidates(event.bifurcation):
+        if candidate.orbit is None:
+            state.judge(event, candidate.reason, Verdict.REFUSED, why=candidate.refusal)
+            event.rests = event.rests or candidate.rest
+        elif candidate.has_hold and not state.bridges:
+            state.judge(event, candidate.reason, Verdict.REFUSED, why="bridges are switched off")
+        elif (known := state.ends_here(candidate.orbit, event)) is not None:
+            state.judge(event, candidate.reason, Verdict.KNOWN, known)
+        else:
+            _try(state, event, candidate)
+
+
+def _try(state: Exploration, event: Event, candidate: Candidate) -> None:
+    branch = _leave_event(state, candidate, event)
+    if branch is None:
+        why = "no admissible orbit beyond the event"
+        state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
+    else:
+        state.judge(event, candidate.reason, Verdict.ACCEPTED, len(state.branches))
+        state.add_from(branch, event)
+
+
+def _leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branch | None:
+    """Trace away from an event, in the direction in which the orbit is admissible."""
+    orbit = candidate.orbit
+    assert orbit is not None
+    settings = settings_for(orbit, state.settings)
+    active = orbit.model.index_of(settings.parameter)
+    if candidate.away is not None:
+        return _leave_beside(state, orbit, candidate.away, event, settings)
+    for tangent, slope in directions(orbit, active):
+        start = first_point(orbit, settings, tangent, slope)
+        if start is None:
+            continue
+        there = start.orbit(orbit.system, orbit.vector, active)
+        for point in (start, start.reversed()):
+            side = _trace(there, point, settings, state.progress)
+            if _went_somewhere(side):
+                first = _first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
+                return assemble(there, settings, side, first)
+    return None
+
+
+def _leave_beside(
+    state: Exploration, orbit: Orbit, away: FloatArray, event: Event, settings: Settings
+) -> Branch | None:
+    """Trace away from an event at which the new orbit is singular, from a little beside it."""
+    active = orbit.model.index_of(settings.parameter)
+    for distance in NEARER:
+        moved = replace(orbit, joints=orbit.joints + distance * orbit.period * away)
+        for tangent, slope in directions(moved, active):
+            point = first_point(moved, settings, tangent, slope)
+            if point is None:
+                continue
+            there = point.orbit(orbit.system, orbit.vector, active)
+            if float(np.sum(away * point.tangent)) < 0.0:
+                point = point.reversed()
+            point.arc = float(np.linalg.norm(there.joints - orbit.joints)) / len(away) ** 0.5
+            side = _trace(there, point, settings, state.progress)
+            if there.admissible and side.count > 1:
+                origin = replace(point, joints=orbit.joints, value=settings_value(orbit, settings))
+                origin.arc = 0.0
+                first = _first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
+                return assemble(there, settings, side, first, origin)
+    return None
+
+
+def _trace(orbit: Orbit, point: Point, settings: Settings, progress: Progress | None) -> Side:
+    return trace_side(orbit, point, settings, first_step=_NEAR_EVENT, progress=progress)
+
+
+def settings_for(orbit: Orbit, settings: Settings) -> Settings:
+    """Return the settings for a branch: on a bridge there are no multipliers."""
+    return replace(settings, stability=False) if orbit.system.holds else settings
+
+
+def _went_somewhere(side: Side) -> bool:
+    return side.length > _NOWHERE
+
+
+def _first_end(reason: EndReason, event: Event, side: Side, settings: Settings) -> End:
+    """Return the end of a branch at the event that it starts from."""
+    b = event.bifurcation
+    stable: bool | None = False if side_is_bridge(side) else None
+    if settings.stability:
+        stable = bool(np.all(np.abs(side.second_multipliers) < 1.0))
+    here = replace(b, position=0.0, stable_before=None, stable_after=stable)
+    return End(reason, f"{EndReason.START.value}: {where(b, settings.parameter)}", here)
+
+
+def side_is_bridge(side: Side) -> bool:
+    """Return whether a side was traced without multipliers because it has holds."""
+    return "mu" not in side.names
+
+
+def where(bifurcation: Bifurcation, parameter: str) -> str:
+    """Return what a bifurcation is and where, for a message."""
+    return f"{bifurcation.label} at {parameter} = {bifurcation.params[parameter]:.10g}"
+
+
+# --------------------------------------------------------------------------- branch points
+
+
+def _follow_branch_point(state: Exploration, event: Event) -> None:
+    orbit = event.bifurcation.orbit
+    if not orbit.system.half:
+        _follow_both_ways(state, orbit, event)
+        return
+    if not any(state.branches[i].system.half for i in event.branches):
+        _follow_both_ways(state, orbit, event)
+    if any(not state.branches[i].system.half for i in event.branches):
+        return
+    _follow_departure(state, orbit.as_whole(), event, EndReason.BP)
+
+
+def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
+    """Continue a branch through an event that it passes, from just beside it."""
+    reason = "the branch that goes on through the event"
+    branch = _through(state, orbit)
+    if branch is None:
+        state.judge(event, reason, Verdict.REFUSED, why="no orbit beside the event was found")
+    elif (known := state.known(branch[len(branch) // 2])) is not None:
+        state.judge(event, reason, Verdict.KNOWN, known)
+    else:
+        state.judge(event, reason, Verdict.ACCEPTED, len(state.branches))
+        state.add_from(branch, event)
+
+
+def _follow_departure(state: Exploration, orbit: Orbit, event: Event, reason: EndReason) -> None:
+    """Trace the branch that leaves a branch point or a period doubling."""
+    settings = state.settings
+    text = "the branch that leaves along the null vector"
+    active = orbit.model.index_of(settings.parameter)
+    for distance in NEARER:
+        departure = leave_branch_point(orbit, settings, reason.value, distance)
+        if departure is None:
+            continue
+        known = state.known(departure.point.orbit(orbit.system, orbit.vector, active))
+        if known is not None:
+            state.judge(event, text, Verdict.KNOWN, known)
+            return
+        side = trace_side(orbit, departure.point, settings, progress=state.progress)
+        if _went_somewhere(side):
+            first = _first_end(reason, event, side, settings)
+            state.judge(event, text, Verdict.ACCEPTED, len(state.branches))
+            state.add_from(assemble(orbit, settings, side, first, departure.origin), event)
+            return
+    state.judge(event, text, Verdict.REFUSED, why="it is not admissible")
+
+
+def _through(state: Exploration, orbit: Orbit) -> Branch | None:
+    """Return the branch through an orbit at which it may be singular, from just beside it."""
+    settings = state.settings
+    value = settings_value(orbit, settings)
+    active = orbit.model.index_of(settings.parameter)
+    for share in (1e-4, -1e-4, 1e-3, -1e-3):
+        beside = value + share * settings.width
+        if not settings.low <= beside <= settings.high:
+            continue
+        vector = orbit.vector.copy()
+        vector[active] = beside
+        solved = polish(Orbit(orbit.system, orbit.joints, vector, np.inf))
+        if solved.converged and solved.admissible:
+            return continue_orbit(
+                solved,
+                settings.parameter,
+                (settings.low, settings.high),
+                max_step=settings.largest,
+                stability=settings.stability,
+                max_points=settings.most_points,
+            )
+    return None
+
+
+# ------------------------------------------------------------------------- period doubling
+
+
+def _follow_doubling(state: Exploration, event: Event) -> None:
+    orbit = event.bifurcation.orbit
+    if not any(state.branches[i].system.periods == orbit.periods for i in event.branches):
+        _follow_both_ways(state, orbit, event)
+    if any(state.branches[i].system.periods == 2 * orbit.periods for i in event.branches):
+        return
+    if 2 * orbit.periods > state.max_periods:
+        why = f"max_periods = {state.max_periods}"
+        reason = f"the branch of {2 * orbit.periods} periods"
+        state.judge(event, reason, Verdict.REFUSED, why=why)
+        return
+    _follow_departure(state, orbit.doubled(), event, EndReason.PD)

@@ -1,0 +1,284 @@
+"""What can follow a sliding event at one place of an orbit: the edit of its word, and why.
+
+The motion at the event is known, so the local structure of each outcome can be derived from it
+(``docs/bridges.md``). It needs the word, the transitions and the flow; nothing knows what moves.
+
+=====================================  ========================================================
+event, at the place                    outcome
+=====================================  ========================================================
+CS, the state at a stop meets F        swap stick and reversal (a stick of length zero)
+SS, followed by a reversal             insert a hold of length zero, pinned to F
+SS, followed by a stick                the stick becomes a hold pinned to F
+AS, a stick is released tangentially   insert a hold of length zero behind it
+AS, a stick touches F inside           split it there: a hold goes on
+GS, a slide touches rest inside        split it there: insert a hold of length zero
+GS, a slide stops tangentially         the stick behind it becomes a hold
+a hold has no length any more          drop it: the regular orbit with the earlier outcome
+a hold reaches its regular release     it becomes a stick: the regular orbit with the later outcome
+a hold is left without acceleration    the slide behind it is gone: the stick behind that takes over
+a hold touches F on its way            its pin moves to the touch
+a hold can just not be left inside     split it there: a slide and a second hold
+=====================================  ========================================================
+
+Where a stick becomes a hold, the hold lasts to the release, unless before that it cannot be left any
+more: there it ends, with a slide of length zero, and the rest of the stick follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from contfric.continuation.events import Bifurcation, Kind, hold_of_test
+from contfric.continuation.standstill import first_standstill, touch_of
+from contfric.errors import NotationError
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Margin, Test
+from contfric.signature.edits import Edit, drop, insert, split, swap_edit
+from contfric.signature.holds import TOUCH, hold_at, is_hold, release_mode
+
+#: A hold this short has no length: an event is located to about 1e-12, at a tangency to its root.
+NO_LENGTH = 1e-6
+
+#: A slide of length zero appears where the acceleration a that a rest is left with falls through zero,
+#: ``a = -k t``: it lasts from -d/2 to d/2, as ``v = k (d^2/4 - t^2) / 2`` vanishes there.
+_APPEARS = (-0.5, 0.5)
+#: Where a has a double zero, ``a = k (t^2 - w^2) / 2``, a slide that is left at -2w touches rest at w.
+_APPEARS_TOUCHING = (-2.0, 1.0)
+
+#: Where the segments of an edited word come from, as :func:`contfric.signature.edits.edited_pieces` says.
+Origin = tuple[int, int]
+
+
+class RestsForEver(NotationError):
+    """Nothing follows an event because nothing moves any more."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One outcome at one place.
+
+    Attributes
+    ----------
+    edit : the change of the word
+    joints : start joints of the segments that come in or move, by their origin
+    reason : what happens, in words
+    away : where the new orbit is singular at the event itself, how fast its joints move in time when it
+        leaves: where a slide of length zero appears in a rest, and where a hold is left without
+        acceleration
+    """
+
+    edit: Edit
+    joints: Mapping[Origin, FloatArray]
+    reason: str
+    away: Mapping[Origin, float] = field(default_factory=dict)
+
+
+def places_of(bifurcation: Bifurcation) -> list[Test]:
+    """Return the places of the whole orbit at which a sliding event happens."""
+    orbit = bifurcation.orbit
+    places = [_normal(test, orbit) for test in bifurcation.tests]
+    places = list(dict.fromkeys(places))
+    if orbit.system.half and orbit.model.symmetry is not None:
+        n, image = len(orbit.system.word), orbit.model.symmetry.surfaces
+        places += [Test(t.margin, t.segment + n, image[t.surface]) for t in places]
+    return places
+
+
+def _normal(test: Test, orbit: Orbit) -> Test:
+    """Return a test of what belongs to a hold as one of the hold itself."""
+    hold = hold_of_test(test, orbit)
+    if hold is None or hold.segment == test.segment:
+        return test
+    return Test(Margin.EXIT, hold.segment, hold.leaves)
+
+
+def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
+    """Return what can follow at one place of a whole orbit.
+
+    Raises
+    ------
+    NotationError
+        If nothing can: the reason says why.
+    """
+    mode, exit_ = orbit.word[place.segment]
+    if is_hold(exit_):
+        return _hold_ends(orbit, place)
+    if kind is Kind.CS:
+        reason = f"swap stick and reversal at stop {place.segment + 1}, at {place.surface}"
+        edit = swap_edit(orbit.word, {place.segment: place.surface}, orbit.model)
+        return Outcome(edit, {(place.segment, 0): orbit.ends[place.segment]}, reason)
+    if kind is Kind.SS:
+        return _stop_on_surface(orbit, place)
+    rests = orbit.model.mode_by_name[mode].sliding
+    if place.margin is Margin.EXIT:
+        return _released_tangentially(orbit, place) if rests else _stops_tangentially(orbit, place)
+    return _limit_touched(orbit, place) if rests else _rest_touched(orbit, place)
+
+
+def _stop_on_surface(orbit: Orbit, place: Test) -> Outcome:
+    """SS: the stop is on a surface, and the load falls."""
+    model, word, i = orbit.model, orbit.word, place.segment
+    j = (i + 1) % len(word)
+    if model.mode_by_name[word[j][0]].sliding:
+        return _stick_becomes_hold(orbit, j, hold_at(place.surface), place.surface)
+    rest = _rest_mode(orbit, i)
+    edit = insert(i, (rest, hold_at(place.surface)))
+    reason = f"hold at stop {i + 1}, on {place.surface}, instead of the reversal"
+    return Outcome(edit, {(i, 0): orbit.ends[i]}, reason)
+
+
+def _stops_tangentially(orbit: Orbit, place: Test) -> Outcome:
+    """GS: a stop without acceleration."""
+    word, i = orbit.word, place.segment
+    j = (i + 1) % len(word)
+    if not orbit.model.mode_by_name[word[j][0]].sliding:
+        raise NotationError(f"the tangential stop of segment {i + 1} is followed by no stick")
+    return _stick_becomes_hold(orbit, j, TOUCH, None)
+
+
+def _released_tangentially(orbit: Orbit, place: Test) -> Outcome:
+    """AS: a stick is released where its load just reaches the limit."""
+    i = place.segment
+    edit = insert(i, (orbit.word[i][0], TOUCH))
+    reason = f"hold behind the tangential release of stick {i + 1} at {orbit.word[i][1]}"
+    return Outcome(edit, {(i, 0): orbit.ends[i]}, reason)
+
+
+def _limit_touched(orbit: Orbit, place: Test) -> Outcome:
+    """AS: inside of a stick its load touches the limit."""
+    model, word, i = orbit.model, orbit.word, place.segment
+    mode, exit_ = word[i]
+    j = (i + 1) % len(word)
+    touch = touch_of(orbit, i, place.surface)
+    departs = release_mode(model, mode, place.surface)
+    reason = f"hold behind the touch of {place.surface} in stick {i + 1}"
+    still = first_standstill(orbit, i, touch[0], str(departs))
+    if still is not None:
+        left = (str(departs), _leaves(orbit, mode))
+        edit = split(i, place.surface, (mode, TOUCH), left, (mode, exit_))
+        away = {(i, 1): _APPEARS[0], (i, 2): _APPEARS[1]}
+        return Outcome(edit, {(i, 0): touch, (i, 1): still, (i, 2): still}, reason, away)
+    _same_way(orbit, mode, exit_, departs)
+    if is_hold(word[j][1]):  # the stick ended tangentially: its hold begins earlier
+        edit = Edit(renamed={i: place.surface, j: TOUCH})
+        return Outcome(edit, {(j, -1): touch}, reason)
+    return Outcome(split(i, place.surface, (mode, TOUCH)), {(i, 0): touch}, reason)
+
+
+def _rest_touched(orbit: Orbit, place: Test) -> Outcome:
+    """GS: inside of a slide the velocity touches zero."""
+    i = place.segment
+    mode, exit_ = orbit.word[i]
+    touch = touch_of(orbit, i, place.surface)
+    edit = split(i, place.surface, (_rest_mode(orbit, i), TOUCH), (mode, exit_))
+    reason = f"hold at the touch of rest in slide {i + 1}"
+    return Outcome(edit, {(i, 0): touch, (i, 1): touch}, reason, {(i, 1): 1.0})
+
+
+def _stick_becomes_hold(orbit: Orbit, j: int, hold: str, surface: str | None) -> Outcome:
+    """Return the outcome in which a stick that begins at the event is a hold."""
+    model, word = orbit.model, orbit.word
+    mode, exit_ = word[j]
+    behind = (j + 1) % len(word)
+    departs = word[j - 1][0] if surface is None else release_mode(model, mode, surface)
+    reason = f"hold instead of stick {j + 1}"
+    still = first_standstill(orbit, j, float(orbit.cycle[j, 0]), str(departs))
+    if still is not None:
+        left = (str(departs), _leaves(orbit, mode))
+        edit = split(j, hold, left, (mode, exit_))
+        away = {(j, 0): _APPEARS[0], (j, 1): _APPEARS[1]}
+        return Outcome(edit, {(j, 0): still, (j, 1): still}, reason, away)
+    _same_way(orbit, mode, exit_, departs)
+    edit = split(j, hold)
+    if is_hold(word[behind][1]):  # the stick ended tangentially: one hold takes the place of both
+        edit |= drop(behind)
+    return Outcome(edit, {}, reason)
+
+
+def _hold_ends(orbit: Orbit, place: Test) -> Outcome:
+    """Return what follows where a hold comes to an end of its freedom."""
+    h, word = place.segment, orbit.word
+    before, behind = h - 1, (h + 1) % len(word)
+    after_rest = orbit.model.mode_by_name[word[before][0]].sliding
+    at_touch = word[h][1] == TOUCH
+    if orbit.ends[h, 0] - orbit.cycle[h, 0] < NO_LENGTH:
+        reason = f"hold {h + 1} vanishes"
+        if at_touch and not after_rest:  # the slide goes on
+            fused = Edit(frozenset({h, behind}), {before % len(word): word[behind][1]})
+            return Outcome(fused, {}, reason)
+        return Outcome(drop(h), {}, reason)
+    if place.margin is Margin.JOINT:
+        reason = f"hold {h + 1} lasts to its regular release at {place.surface}"
+        return Outcome(_as_stick(orbit, h, place.surface, after_rest, ()), {}, reason)
+    if place.margin is Margin.EXIT:
+        return _never_left(orbit, h, after_rest)
+    if place.margin is Margin.INTERIOR:
+        return _pin_moves(orbit, place, after_rest)
+    touch = touch_of(orbit, h, None)
+    left = (word[behind][0], _leaves(orbit, word[h][0]))
+    reason = f"hold {h + 1} cannot be left inside: a slide and a second hold"
+    edit = insert(h, left, (word[h][0], TOUCH))
+    away = {(h, 0): _APPEARS_TOUCHING[0], (h, 1): _APPEARS_TOUCHING[1]}
+    return Outcome(edit, {(h, 0): touch, (h, 1): touch}, reason, away)
+
+
+def _as_stick(orbit: Orbit, h: int, surface: str, after_rest: bool, gone: tuple[int, ...]) -> Edit:
+    """Return the edit that makes a hold the stick that it stands for, and drops others."""
+    if after_rest:
+        return Edit(frozenset({h, *gone}), {(h - 1) % len(orbit.word): surface})
+    return Edit(frozenset(gone), {h: surface})
+
+
+def _never_left(orbit: Orbit, h: int, after_rest: bool) -> Outcome:
+    """Return the outcome where the slide behind a hold has vanished: the rest behind it takes over."""
+    word, count = orbit.word, len(orbit.word)
+    slide, rest = (h + 1) % count, (h + 2) % count
+    if not orbit.model.mode_by_name[word[rest][0]].sliding:
+        raise NotationError(f"the slide behind hold {h + 1} vanishes, and no rest follows it")
+    reason = f"the slide behind hold {h + 1} vanishes: it is held"
+    if rest in (h, (h - 1) % count):
+        raise RestsForEver(f"{reason} for ever: nothing else moves in a period")
+    if word[rest][1] == TOUCH:  # two holds become one
+        return Outcome(drop(slide, rest), {}, reason)
+    return Outcome(_as_stick(orbit, h, word[rest][1], after_rest, (slide, rest)), {}, reason)
+
+
+def _pin_moves(orbit: Orbit, place: Test, after_rest: bool) -> Outcome:
+    """Return the outcome where a hold touches its limit: a stick to there, and the hold behind it."""
+    h = place.segment
+    touch = touch_of(orbit, h, place.surface)
+    reason = f"hold {h + 1} touches {place.surface}: its pin moves there"
+    if after_rest:
+        edit = Edit(renamed={(h - 1) % len(orbit.word): place.surface, h: TOUCH})
+        return Outcome(edit, {(h, -1): touch}, reason)
+    return Outcome(split(h, place.surface, (orbit.word[h][0], TOUCH)), {(h, 0): touch}, reason)
+
+
+def _same_way(orbit: Orbit, mode: str, exit_: str, departs: str | None) -> None:
+    """Check that a stick is released the way in which a hold would be left."""
+    released = release_mode(orbit.model, mode, exit_)
+    if released != departs:
+        raise NotationError(f"the stick is released at {exit_} into '{released}', not '{departs}'")
+
+
+def _rest_mode(orbit: Orbit, i: int) -> str:
+    """Return the mode of rest that a slide comes to at its end, or at a touch of rest."""
+    model = orbit.model
+    for domain in model.domains:
+        if domain.mode != orbit.word[i][0]:
+            continue
+        for surface in model.surfaces:
+            target = (
+                model.transitions.get((domain.name, surface.name)) if surface.switching else None
+            )
+            if target and model.mode_by_name[model.domain_by_name[target].mode].sliding:
+                return model.domain_by_name[target].mode
+    raise NotationError(f"mode '{orbit.word[i][0]}' of model '{model.name}' never comes to rest")
+
+
+def _leaves(orbit: Orbit, mode: str) -> str:
+    """Return the surface that a mode of rest lies on."""
+    rest = next(domain for domain in orbit.model.domains if domain.mode == mode)
+    return next(name for name, sign in rest.signs.items() if sign == 0)

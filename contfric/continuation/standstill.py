@@ -1,0 +1,146 @@
+"""Where a motion at rest could just not be left any more, and where a segment touches a surface.
+
+Both are places on one known segment, looked for once an event.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import inside_sign, mode_domains
+
+_NONE = np.empty(0, dtype=np.int64)
+_EMPTY = np.empty(0)
+#: Pieces of a rest between two stationary points of its observables: where the acceleration that it
+#: would be left with depends on them monotonically, as in every model of a load, one would do.
+_PIECES = 8
+#: An acceleration this small (relative to 1) at the start of a rest is zero: the rest begins at a touch.
+_ZERO = 1e-9
+#: Halvings of a bracket: to the resolution of time.
+_HALVINGS = 60
+
+
+def first_standstill(orbit: Orbit, i: int, start: float, departs: str) -> FloatArray | None:
+    """Return the first joint of a rest after a time at which the departing mode has no acceleration.
+
+    Parameters
+    ----------
+    i : int
+        Segment of the whole orbit at which the rest takes place.
+    departs : str
+        Mode in which it would be left.
+
+    Returns
+    -------
+    ndarray, shape (1 + n,), or None
+        None if it can be left all the time until the segment ends.
+    """
+    rate = _departure_rate(orbit, i, departs)
+    end = float(orbit.ends[i, 0])
+    places = [t for t in _stationary(orbit, i) if start < t < end]
+    grid = np.unique(
+        np.concatenate(
+            [
+                np.linspace(a, b, _PIECES + 1)
+                for a, b in zip([start, *places], [*places, end], strict=True)
+            ]
+        )
+    )
+    for a, b in pairwise(grid):
+        if rate(b) < (0.0 if b < end else -_ZERO) and (rate(a) > 0.0 or a > start):
+            return joint_within(orbit, i, _crossing(rate, a, b))
+    return None
+
+
+def _crossing(rate: Callable[[float], float], a: float, b: float) -> float:
+    """Return the last time before a rate becomes negative, by halving."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (a + b)
+        if rate(middle) > 0.0:
+            a = middle
+        else:
+            b = middle
+    return 0.5 * (a + b)
+
+
+def _departure_rate(orbit: Orbit, i: int, departs: str) -> Callable[[float], float]:
+    """Return the acceleration with which a rest would be left, as a function of time."""
+    model = orbit.model
+    rest = next(d for d in model.domains if d.mode == orbit.word[i][0])
+    leaves = next(name for name, sign in rest.signs.items() if sign == 0)
+    sign = model.domain_by_name[mode_domains(model, departs)[0]].signs[leaves]
+    mode = [m.name for m in model.modes].index(departs)
+    c = [o.name for o in model.observables].index(model.surface_by_name[leaves].observable)
+
+    def rate(time: float) -> float:
+        y = joint_within(orbit, i, time)[1:].copy()
+        return sign * float(model.flow.rate(mode, c, time, y, orbit.vector, _NONE, _EMPTY))
+
+    return rate
+
+
+def joint_within(orbit: Orbit, i: int, time: float) -> FloatArray:
+    """Return the joint (t, y) of a segment of the whole orbit at a time inside it."""
+    modes = [m.name for m in orbit.model.modes]
+    start, out = orbit.cycle[i], np.empty(len(orbit.model.states))
+    orbit.model.flow.flow(
+        modes.index(orbit.word[i][0]),
+        float(start[0]),
+        start[1:].copy(),
+        time - float(start[0]),
+        orbit.vector,
+        _NONE,
+        out,
+        np.empty((0, 0)),
+    )
+    return np.array([time, *out])
+
+
+def _turnings(orbit: Orbit, i: int, c: int) -> list[tuple[float, float]]:
+    """Return times and values of the stationary points of observable c along a segment."""
+    modes = [m.name for m in orbit.model.modes]
+    start, end = orbit.cycle[i], float(orbit.ends[i, 0])
+    times, values = np.empty(512), np.empty(512)
+    found = orbit.model.flow.turning(
+        modes.index(orbit.word[i][0]),
+        c,
+        float(start[0]),
+        start[1:].copy(),
+        end - float(start[0]),
+        orbit.vector,
+        times,
+        values,
+    )
+    return [
+        (float(start[0] + t), float(v)) for t, v in zip(times[:found], values[:found], strict=True)
+    ]
+
+
+def _stationary(orbit: Orbit, i: int) -> list[float]:
+    """Return the stationary times of all observables along a segment."""
+    return sorted(t for c in range(len(orbit.model.observables)) for t, _ in _turnings(orbit, i, c))
+
+
+def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
+    """Return the joint at which a segment comes nearest to a surface inside.
+
+    Without a surface: at which a hold is nearest to not being left any more.
+    """
+    model = orbit.model
+    if surface is None:
+        departs = orbit.word[(i + 1) % len(orbit.word)][0]
+        rate = _departure_rate(orbit, i, departs)
+        time = min(_stationary(orbit, i), key=rate)
+        return joint_within(orbit, i, time)
+    k = [s.name for s in model.surfaces].index(surface)
+    c = [o.name for o in model.observables].index(model.surfaces[k].observable)
+    level = model.flow.level(k, orbit.vector, _NONE, _EMPTY)
+    sign = inside_sign(model, orbit.word[i][0], surface)
+    found = _turnings(orbit, i, c)
+    time = min(found, key=lambda pair: sign * (pair[1] - level))[0]
+    return joint_within(orbit, i, time)

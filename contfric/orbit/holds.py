@@ -1,0 +1,81 @@
+"""Holds in the boundary-value problem: what pins the start of a hold, and how it is left.
+
+A hold has no exit condition; in its place stands its pin, a condition at its start:
+
+* on a surface (SS): ``observable(z_i) = level``;
+* after a touch (GS, AS): the exit of the segment before it is tangential, the rate of its observable
+  along that segment vanishes at ``z_i``.
+
+It is left at ``z_{i+1}`` along the departing mode, with an acceleration that must not be negative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from contfric.models.definition import Model
+from contfric.signature.holds import (
+    departing_mode,
+    is_hold,
+    known_hold,
+    pinned_surface,
+)
+
+#: In the array of pins: a segment that is no hold, and a hold after a touch; else the surface.
+NO_PIN, TOUCH_PIN = -1, -2
+
+Word = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Hold:
+    """One hold of a word.
+
+    Attributes
+    ----------
+    segment : its index
+    pin : surface that it starts on; None after a touch
+    after_rest : whether it follows a stick (AS)
+    departs : mode in which it is left
+    leaves : surface that it is left from
+    """
+
+    segment: int
+    pin: str | None
+    after_rest: bool
+    departs: str
+    leaves: str
+
+
+def holds_of(model: Model, word: Word) -> tuple[Hold, ...]:
+    """Return the holds of one turn.
+
+    Raises
+    ------
+    ValueError
+        If a hold comes first (the pin is a condition on the segment before it), follows another
+        hold, or is none of the model.
+    """
+    found = []
+    for index, (mode, exit_) in enumerate(word):
+        if not is_hold(exit_):
+            continue
+        before = word[index - 1]
+        if index == 0 or is_hold(before[1]) or not known_hold(exit_, model):
+            raise ValueError(f"'{exit_}' cannot stand at place {index + 1} of {word}")
+        rest = next(d for d in model.domains if d.mode == mode)
+        found.append(
+            Hold(
+                index,
+                pinned_surface(exit_),
+                model.mode_by_name[before[0]].sliding,
+                departing_mode(model, before, (mode, exit_)),
+                next(name for name, sign in rest.signs.items() if sign == 0),
+            )
+        )
+    return tuple(found)
+
+
+def with_holds_behind(word: Word) -> int:
+    """Return how far a word is to be rotated so that it does not start with a hold."""
+    return next(i for i, (_, exit_) in enumerate(word) if not is_hold(exit_))

@@ -1,0 +1,211 @@
+"""Holds: rest that ends at a free time, and the condition at its start that makes up for it.
+
+Where static friction exceeds the kinetic one, a mass at rest that bears a load between the two may leave
+at any instant (equation (2) of the reference, read as a differential inclusion). The rule "it is held
+until the load reaches the static limit" selects one of these motions, the stick. A **hold** is another
+one: it leaves at a free time, and is pinned at its start, so that orbits with a hold form a curve in one
+parameter. See ``docs/bridges.md``.
+
+``hold@F+``
+    follows a slide that stops on the surface F+, with the load falling (SS);
+``hold@touch``
+    follows a segment that ends tangentially: a slide that touches rest (GS), or a stick that touches its
+    limit (AS).
+
+In a reduced word a hold is the pair (sliding mode, ``hold@...``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from contfric.errors import NotationError
+from contfric.models import Model
+
+_HOLD = "hold@"
+#: A hold that follows a segment which ends tangentially.
+TOUCH = f"{_HOLD}touch"
+
+Pair = tuple[str, str]
+
+
+def hold_at(surface: str) -> str:
+    """Return the name of a hold that starts on a surface.
+
+    Examples
+    --------
+    >>> hold_at("F+")
+    'hold@F+'
+    """
+    return f"{_HOLD}{surface}"
+
+
+def is_hold(name: str) -> bool:
+    """Return whether a name (of a segment, or of an exit in a word) is that of a hold."""
+    return name.startswith(_HOLD)
+
+
+def pinned_surface(hold: str) -> str | None:
+    """Return the surface that a hold starts on; None if it follows a touch."""
+    return None if hold == TOUCH else hold.removeprefix(_HOLD)
+
+
+def mirror_exit(name: str, surfaces: Mapping[str, str]) -> str:
+    """Return the mirror image of the exit of a segment, a surface or a hold."""
+    if not is_hold(name):
+        return surfaces[name]
+    surface = pinned_surface(name)
+    return TOUCH if surface is None else hold_at(surfaces[surface])
+
+
+def known_hold(name: str, model: Model) -> bool:
+    """Return whether a hold is one of a model: pinned to a surface that bounds its rest, or a touch."""
+    surface = pinned_surface(name)
+    return surface is None or any(
+        (domain.name, surface) in model.transitions
+        for domain in model.domains
+        if model.mode_by_name[domain.mode].sliding
+    )
+
+
+def held_modes(model: Model) -> tuple[str, ...]:
+    """Return the modes in which a model rests on a surface: those that a hold can have."""
+    return tuple(mode.name for mode in model.modes if mode.sliding)
+
+
+def release_mode(model: Model, mode: str, surface: str) -> str | None:
+    """Return the mode that a regular release through a surface leads to; None if there is none."""
+    for domain in model.domains:
+        target = model.transitions.get((domain.name, surface))
+        if domain.mode == mode and target is not None:
+            return model.domain_by_name[target].mode
+    return None
+
+
+def departing_mode(model: Model, before: Pair, hold: Pair) -> str:
+    """Return the mode in which a hold is left, from the segment before it.
+
+    On a surface as from a regular release there; after a touch of rest as the slide went on; after a
+    touch of the limit as released there.
+
+    Raises
+    ------
+    NotationError
+        If no such hold can follow the segment.
+
+    Examples
+    --------
+    >>> from contfric.models import load_model
+    >>> departing_mode(load_model("coulomb"), ("slide+", "v"), ("stick", "hold@F+"))
+    'slide-'
+    """
+    surface = pinned_surface(hold[1])
+    found: str | None
+    if surface is not None:
+        found = release_mode(model, hold[0], surface)
+    elif model.mode_by_name[before[0]].sliding:
+        found = release_mode(model, hold[0], before[1])
+    else:
+        found = before[0]
+    if found is None:
+        raise NotationError(f"no '{hold[1]}' of model '{model.name}' can follow {before}")
+    return found
+
+
+def mode_of(model: Model, segments: Sequence[str], index: int) -> str:
+    """Return the mode of a segment of a walk; that of a hold is the rest that it starts from."""
+    if not is_hold(segments[index]):
+        return model.domain_by_name[segments[index]].mode
+    before = model.domain_by_name[segments[index - 1]]
+    if model.mode_by_name[before.mode].sliding:
+        return before.mode
+    targets = (t for (source, _), t in model.transitions.items() if source == before.name)
+    modes = (model.domain_by_name[target].mode for target in targets)
+    return next((mode for mode in modes if model.mode_by_name[mode].sliding), before.mode)
+
+
+def surface_into(model: Model, segments: Sequence[str], index: int) -> str | None:
+    """Return the surface through which a segment of a walk ends where a hold begins, None if none.
+
+    A slide comes to rest there; a stick touches the surface that releases it the way the hold goes.
+    """
+    source, mode = segments[index], mode_of(model, segments, (index + 1) % len(segments))
+    rests = model.mode_by_name[model.domain_by_name[source].mode].sliding
+    beyond = model.domain_by_name[segments[(index + 2) % len(segments)]].mode
+    wanted = beyond if rests else mode
+    for (start, surface), target in model.transitions.items():
+        if start == source and model.domain_by_name[target].mode == wanted:
+            return surface
+    return None
+
+
+def domain_after(model: Model, mode: str, departs: str) -> str | None:
+    """Return the domain that a hold is left into: beside its rest, in the departing mode."""
+    rest = next(domain for domain in model.domains if domain.mode == mode)
+    for domain in model.domains:
+        beside = all(domain.signs[name] == sign for name, sign in rest.signs.items() if sign)
+        if domain.mode == departs and beside:
+            return domain.name
+    return None
+
+
+def hold_fault(model: Model, segments: Sequence[str], index: int) -> str | None:
+    """Return what is wrong with the hold at a place of a walk; None if nothing is.
+
+    Examples
+    --------
+    >>> from contfric.models import load_model
+    >>> hold_fault(load_model("coulomb"), ("x0v+", "hold@F+", "x+v-"), 1)
+    "'hold@F+' leads to x0v-, not to x+v-"
+    """
+    hold, before, after = (
+        segments[index],
+        segments[index - 1],
+        segments[(index + 1) % len(segments)],
+    )
+    if not known_hold(hold, model):
+        valid = ", ".join([TOUCH, *(hold_at(s) for s in model.surface_by_name)])
+        return f"model '{model.name}' has no '{hold}'; a hold is one of {valid}"
+    if is_hold(before) or is_hold(after) or before not in model.domain_by_name:
+        return f"'{hold}' must stand between two domains"
+    surface = surface_into(model, segments, (index - 1) % len(segments))
+    if surface is None:
+        return f"no '{hold}' can follow {before}"
+    mode = mode_of(model, segments, index)
+    source = model.domain_by_name[before].mode
+    try:
+        expected = domain_after(model, mode, departing_mode(model, (source, surface), (mode, hold)))
+    except NotationError as error:
+        return str(error)
+    return None if after == expected else f"'{hold}' leads to {expected}, not to {after}"
+
+
+def without_holds(word: tuple[Pair, ...], model: Model) -> tuple[Pair, ...]:
+    """Return the word with a stick in the place of each hold that leads the same way.
+
+    It is a closed walk of the transition graph exactly if the word with its holds can be walked.
+
+    Examples
+    --------
+    >>> from contfric.models import load_model
+    >>> walk = (("slide+", "v"), ("stick", "hold@F+"), ("slide-", "v"), ("stick", "F-"))
+    >>> without_holds(walk, load_model("coulomb"))
+    (('slide+', 'v'), ('stick', 'F+'), ('slide-', 'v'), ('stick', 'F-'))
+    """
+    found: list[Pair] = []
+    for index, pair in enumerate(word):
+        before = word[index - 1]
+        if not is_hold(pair[1]):
+            found.append(pair)
+        elif not model.mode_by_name[before[0]].sliding:
+            wanted = departing_mode(model, before, pair)
+            found.append((pair[0], _surface_towards(model, pair[0], wanted)))
+    return tuple(found)
+
+
+def _surface_towards(model: Model, mode: str, wanted: str) -> str:
+    """Return the surface through which a stick is released into a mode."""
+    for surface in model.surface_by_name:
+        if release_mode(model, mode, surface) == wanted:
+            return surface
+    raise NotationError(f"rest '{mode}' of model '{model.name}' is never left into '{wanted}'")
