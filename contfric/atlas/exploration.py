@@ -69,6 +69,8 @@ class Exploration:
     ) -> None:
         """Keep what became of a candidate."""
         event.proposals.append(Proposal(reason, verdict, branch, why))
+        if verdict is Verdict.KNOWN and branch is not None and branch not in event.branches:
+            event.branches.append(branch)
 
     def _meet(self, bifurcation: Bifurcation, index: int) -> None:
         settings = self.settings

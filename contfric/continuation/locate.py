@@ -13,6 +13,7 @@ from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
 from contfric.orbit.system import Margin, Test
+from contfric.signature.holds import is_hold
 
 #: Margins below this at a located event vanish with it: they form a group. Located margins are
 #: zero to about 1e-13; distinct events this near are beyond what a diagram can tell apart.
@@ -188,6 +189,8 @@ def _is_degenerate(here: Orbit, kind: Kind, test: Test) -> bool:
     CS and AS at once: the margin vanishes quadratically, and the orbit is one of a continuum (as at
     Omega = 1/2, where a slide lasts a whole natural period whatever its amplitude).
     """
+    if is_hold(here.word[test.segment][1]):
+        return False
     start, end = here.cycle[test.segment, 0], here.ends[test.segment, 0]
     return kind is Kind.AS and end - start < _VANISHED * here.period
 
