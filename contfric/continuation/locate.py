@@ -26,6 +26,9 @@ SAME_PLACE = 1e-7
 _SAME_TANGENCY = 2e-6
 
 
+#: Newton may fail right behind an event (a slide that vanishes, several conditions at once): it is reached
+#: where the margin is this small.
+_REACHED = 1e-8
 #: Share of the period below which a stick at a tangential release has vanished: the square root of
 #: the rounding of its quadratic margin.
 _VANISHED = 1e-5
@@ -157,6 +160,8 @@ def _sliding_events(
         first, point = min(hidden, key=lambda pair: pair[1].arc)
     here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     kind = kind_of_margin(orbit.system, orbit.system.tests[first], here)
+    if point.lost and abs(point.tests[first]) < _REACHED:
+        point.lost = False
     if _is_degenerate(here, kind, orbit.system.tests[first]):
         point.lost = True
     group = tuple(

@@ -181,6 +181,8 @@ def mean_rate_row(functions, layout, i, at, start, duration, p, which, room, row
     n, free = state.shape[0], which.shape[0]
     m = n + 1
     row, mode, c = 2 * m - 1, layout.modes[i], layout.observables[layout.exits[i]]
+    for k in range(rows.shape[1]):
+        rows[row, k] = 0.0
     mean = 0.0
     for k in range(_NODES.shape[0]):
         share, weight = _NODES[k], _WEIGHTS[k]
