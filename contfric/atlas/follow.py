@@ -16,7 +16,7 @@ import numpy as np
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.continuation.branch import Branch
-from contfric.continuation.candidates import Candidate, candidates, directions
+from contfric.continuation.candidates import Candidate, candidates, directions, wider_candidates
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind, Verdict
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side, first_point
@@ -48,19 +48,29 @@ def follow(state: Exploration, event: Event) -> None:
 
 
 def _follow_sliding(state: Exploration, event: Event) -> None:
-    for candidate in candidates(event.bifurcation):
-        if candidate.orbit is None:
-            state.judge(event, candidate.reason, Verdict.REFUSED, why=candidate.refusal)
-            event.rests = event.rests or candidate.rest
-        elif candidate.has_hold and not state.bridges:
-            state.judge(event, candidate.reason, Verdict.REFUSED, why="bridges are switched off")
-        elif (known := state.ends_here(candidate.orbit, event)) is not None:
-            state.judge(event, candidate.reason, Verdict.KNOWN, known)
-        else:
-            _try(state, event, candidate)
+    accepted = [_judge(state, event, c) for c in candidates(event.bifurcation)]
+    if not any(accepted):
+        for candidate in wider_candidates(event.bifurcation):
+            _judge(state, event, candidate)
 
 
-def _try(state: Exploration, event: Event, candidate: Candidate) -> None:
+def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:
+    """Try one candidate; return whether a branch of it meets the event."""
+    if candidate.orbit is None:
+        state.judge(event, candidate.reason, Verdict.REFUSED, why=candidate.refusal)
+        event.rests = event.rests or candidate.rest
+        return candidate.rest
+    if candidate.has_hold and not state.bridges:
+        state.judge(event, candidate.reason, Verdict.REFUSED, why="bridges are switched off")
+        return False
+    known = state.ends_here(candidate.orbit, event)
+    if known is not None:
+        state.judge(event, candidate.reason, Verdict.KNOWN, known)
+        return True
+    return _try(state, event, candidate)
+
+
+def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
     branch = _leave_event(state, candidate, event)
     if branch is None:
         why = "no admissible orbit beyond the event"
@@ -68,6 +78,7 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> None:
     else:
         state.judge(event, candidate.reason, Verdict.ACCEPTED, len(state.branches))
         state.add_from(branch, event)
+    return branch is not None
 
 
 def _leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branch | None:

@@ -14,7 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
-from contfric.continuation.events import Bifurcation
+from contfric.continuation.events import Bifurcation, kind_of_margin
 from contfric.continuation.outcomes import Origin, Outcome, RestsForEver, outcome_at, places_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
@@ -25,6 +25,14 @@ from contfric.orbit.system import Test, Word, build_system
 from contfric.orbit.words import half_of, mirror_pairs
 from contfric.signature import canonical_word
 from contfric.signature.edits import Edit, apply_edit, edited_pieces
+
+#: Margins this small (nondimensional) may vanish with an event of a nearly singular system: the root of
+#: rounding.
+_NEARLY = 1e-6
+#: Most places of such a group: the combinations double with each.
+_MOST_PLACES = 6
+#: Parts of a cycle that agree to this (nondimensional) are the same motion: the root of rounding again.
+_SAME_MOTION = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +65,27 @@ def candidates(bifurcation: Bifurcation) -> Iterator[Candidate]:
 
     Words that are mirror images of one already given are left out: their branches are mirrored.
     """
+    yield from _candidates(bifurcation, set())
+
+
+def wider_candidates(bifurcation: Bifurcation) -> Iterator[Candidate]:
+    """Yield what can follow if margins that are nearly zero vanish at the event as well.
+
+    Where an orbit of several periods comes to one of fewer, all its copies meet the event at once, and
+    the equations are so nearly singular that the place is good to half of the digits only.
+    """
+    orbit = bifurcation.orbit
+    near = tuple(
+        test
+        for test, value in zip(orbit.system.tests, orbit.margins, strict=True)
+        if abs(value) < _NEARLY and kind_of_margin(orbit.system, test, orbit) is bifurcation.kind
+    )
+    known = set(bifurcation.tests)
+    if known < set(near) and len(near) <= _MOST_PLACES:
+        yield from _candidates(replace(bifurcation, tests=near), set())
+
+
+def _candidates(bifurcation: Bifurcation, seen: set[frozenset[Word]]) -> Iterator[Candidate]:
     orbit = bifurcation.orbit.as_whole()
     found: list[tuple[Test, Outcome]] = []
     for place in places_of(bifurcation):
@@ -65,7 +94,6 @@ def candidates(bifurcation: Bifurcation) -> Iterator[Candidate]:
         except NotationError as error:
             rest = isinstance(error, RestsForEver)
             yield Candidate(f"change at segment {place.segment + 1}", None, str(error), rest=rest)
-    seen: set[frozenset[Word]] = set()
     for size in range(len(found), 0, -1):
         for chosen in combinations(found, size):
             reason = "; ".join(outcome.reason for _, outcome in chosen)
@@ -111,19 +139,35 @@ def edited_orbit(orbit: Orbit, outcomes: list[Outcome]) -> tuple[Orbit, FloatArr
     away[:, 0] = [speeds.get(origin, 0.0) for origin in origins]
     _, away = _rotated(word, away, 0.0)
     word, cycle = _rotated(word, np.array(starts), orbit.period)
+    turns = _turns(word, cycle, orbit)
+    count = len(word) // turns
+    word, cycle, away = word[:count], cycle[:count], away[:count]
     moves = away if speeds else None
     try:
-        system = build_system(orbit.model, word, orbit.periods)
+        system = build_system(orbit.model, word, orbit.periods // turns)
     except ValueError as error:
         raise NotationError(str(error)) from None
     edited = Orbit(system, cycle, orbit.vector.copy(), np.inf, Status.CONVERGED)
-    half = half_of(orbit.model, word, orbit.periods)
+    half = half_of(orbit.model, word, system.periods)
     if half is not None and edited.symmetric:
-        part = build_system(orbit.model, half, orbit.periods, half=True)
+        part = build_system(orbit.model, half, system.periods, half=True)
         return replace(edited, system=part, joints=cycle[: len(half)]), (
             None if moves is None else moves[: len(half)]
         )
     return edited, moves
+
+
+def _turns(word: Word, cycle: FloatArray, orbit: Orbit) -> int:
+    """Return how often a cycle runs through an orbit of fewer periods: once, in general."""
+    for turns in range(min(orbit.periods, len(word)), 1, -1):
+        part, rest = divmod(len(word), turns)
+        if rest or orbit.periods % turns or word != word[:part] * turns:
+            continue
+        shift = np.zeros_like(cycle)
+        shift[:, 0] = np.repeat(np.arange(turns), part) * (orbit.period / turns)
+        if np.max(np.abs(cycle - shift - np.tile(cycle[:part], (turns, 1)))) < _SAME_MOTION:
+            return turns
+    return 1
 
 
 def _rotated(word: Word, joints: FloatArray, period: float) -> tuple[Word, FloatArray]:

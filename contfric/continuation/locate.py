@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.continuation.events import Bifurcation, Kind, kind_of_margin
+from contfric.continuation.events import Bifurcation, Kind, hold_of_test, kind_of_margin
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.vertices import parabola_vertex, symmetric_part, undoubled_part
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
 from contfric.orbit.system import Margin, Test
-from contfric.signature.holds import is_hold
 
 #: Margins below this at a located event vanish with it: they form a group. Located margins are
 #: zero to about 1e-13; distinct events this near are beyond what a diagram can tell apart.
@@ -29,6 +28,8 @@ _SAME_TANGENCY = 2e-6
 #: Newton may fail right behind an event (a slide that vanishes, several conditions at once): it is reached
 #: where the margin is this small.
 _REACHED = 1e-8
+#: The same where several holds end at once; what their lengths do to the orbit is the square of it.
+_NEARLY_REACHED = 1e-5
 #: Share of the period below which a stick at a tangential release has vanished: the square root of
 #: the rounding of its quadratic margin.
 _VANISHED = 1e-5
@@ -194,10 +195,29 @@ def _is_degenerate(here: Orbit, kind: Kind, test: Test) -> bool:
     CS and AS at once: the margin vanishes quadratically, and the orbit is one of a continuum (as at
     Omega = 1/2, where a slide lasts a whole natural period whatever its amplitude).
     """
-    if is_hold(here.word[test.segment][1]):
+    if hold_of_test(test, here) is not None:
         return False
     start, end = here.cycle[test.segment, 0], here.ends[test.segment, 0]
     return kind is Kind.AS and end - start < _VANISHED * here.period
+
+
+def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation | None:
+    """Return the event at which several holds end at once, where Newton fails just before it.
+
+    The ends of two holds are singular each (a hold without acceleration moves nothing), and together
+    they stop Newton at the root of rounding.
+    """
+    here = tip.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    near = [
+        test
+        for test, value in zip(orbit.system.tests, tip.tests, strict=False)
+        if 0.0 <= value < _NEARLY_REACHED and hold_of_test(test, here) is not None
+    ]
+    if not near:
+        return None
+    kind = kind_of_margin(orbit.system, near[0], here)
+    group = tuple(test for test in near if kind_of_margin(orbit.system, test, here) is kind)
+    return _bifurcation(kind, here, tip, None, tip, settings, group)
 
 
 def _is_free(first: Test, other: Test) -> bool:

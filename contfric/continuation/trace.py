@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
-from contfric.continuation.locate import SAME_PLACE, locate_events, locate_value
+from contfric.continuation.locate import SAME_PLACE, locate_events, locate_value, nearly_reached
 from contfric.continuation.points import (
     EXTRA,
     FIRST_STEP,
@@ -145,7 +145,10 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         kernels.UNBOUNDED: EndReason.UNBOUNDED,
     }
     if why in reasons:
+        reached = nearly_reached(orbit, side.tip, settings) if why == kernels.STEP else None
         side.end = End(reasons[why])
+        if reached is not None:
+            side.end = End(EndReason[reached.kind.name], bifurcation=reached)
         return True, step
     if why == kernels.FULL:
         return False, step

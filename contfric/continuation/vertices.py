@@ -13,6 +13,7 @@ import numpy as np
 
 from contfric.continuation.points import Point
 from contfric.models.definition import FloatArray
+from contfric.orbit.linear import assembled
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
 from contfric.orbit.system import build_system
@@ -71,12 +72,16 @@ def at_vertex(point: Point, simple: Orbit, active: int) -> Point:
 def _vertex(orbit: Orbit, active: int) -> Orbit | None:
     """Return the orbit solved if its turn has a multiplier -1, else None."""
     solved = polish(orbit, damped=False)
-    if not solved.converged or abs(_chi_minus(solved)) > _VERTEX_CHI:
+    if not solved.converged or not abs(_chi_minus(solved)) < _VERTEX_CHI:
         return None
-    return _refined(solved, active)
+    # the parameter of a bridge's vertex is stationary along it: good to the square of what the state is
+    return solved if solved.system.holds else _refined(solved, active)
 
 
 def _chi_minus(orbit: Orbit) -> float:
+    if orbit.system.holds:  # no multipliers: how near the equations are to singular
+        full = assembled(orbit.system, orbit.joints, orbit.vector, closing=-1.0)
+        return float(np.linalg.svd(full, compute_uv=False)[-1])
     return float(np.prod(1.0 + orbit.turn_multipliers).real)
 
 
