@@ -214,7 +214,7 @@ def _through(state: Exploration, orbit: Orbit) -> Branch | None:
     settings = state.settings
     value = settings_value(orbit, settings)
     active = orbit.model.index_of(settings.parameter)
-    for share in (1e-4, -1e-4, 1e-3, -1e-3):
+    for share in (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6):
         beside = value + share * settings.width
         if not settings.low <= beside <= settings.high:
             continue
@@ -227,7 +227,7 @@ def _through(state: Exploration, orbit: Orbit) -> Branch | None:
                 settings.parameter,
                 (settings.low, settings.high),
                 max_step=settings.largest,
-                stability=settings.stability,
+                stability=settings.stability and not orbit.system.holds,
                 max_points=settings.most_points,
             )
     return None

@@ -161,8 +161,11 @@ def _sliding_events(
         first, point = min(hidden, key=lambda pair: pair[1].arc)
     here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     kind = kind_of_margin(orbit.system, orbit.system.tests[first], here)
-    if point.lost and abs(point.tests[first]) < _REACHED:
-        point.lost = False
+    together = _TOGETHER
+    if point.lost:
+        held = hold_of_test(orbit.system.tests[first], here) is not None
+        together = _NEARLY_REACHED if held else _REACHED
+        point.lost = bool(abs(point.tests[first]) >= together)
     if _is_degenerate(here, kind, orbit.system.tests[first]):
         point.lost = True
     group = tuple(
@@ -170,7 +173,7 @@ def _sliding_events(
         for k, test in enumerate(orbit.system.tests)
         if k == first
         or (
-            abs(point.tests[k]) < _TOGETHER
+            abs(point.tests[k]) < together
             and kind_of_margin(orbit.system, test, here) is kind
             and _is_free(orbit.system.tests[first], test)
         )

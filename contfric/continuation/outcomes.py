@@ -40,6 +40,8 @@ from contfric.signature.holds import TOUCH, hold_at, is_hold, release_mode
 
 #: A hold this short has no length: an event is located to about 1e-12, at a tangency to its root.
 NO_LENGTH = 1e-6
+#: A slide between two holds vanishes with a double zero: it is located to the root of that.
+NEARLY_NO_LENGTH = 1e-3
 
 #: A slide of length zero appears where the acceleration a that a rest is left with falls through zero,
 #: ``a = -k t``: it lasts from -d/2 to d/2, as ``v = k (d^2/4 - t^2) / 2`` vanishes there.
@@ -216,6 +218,9 @@ def _hold_ends(orbit: Orbit, place: Test) -> Outcome:
         return _never_left(orbit, h, after_rest)
     if place.margin is Margin.INTERIOR:
         return _pin_moves(orbit, place, after_rest)
+    gone = orbit.ends[behind, 0] - orbit.cycle[behind, 0] < NEARLY_NO_LENGTH
+    if gone and word[(h + 2) % len(word)][1] == TOUCH:  # a second hold, and the slide between them
+        return _never_left(orbit, h, after_rest)
     touch = touch_of(orbit, h, None)
     left = (word[behind][0], _leaves(orbit, word[h][0]))
     reason = f"hold {h + 1} cannot be left inside: a slide and a second hold"

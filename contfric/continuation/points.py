@@ -160,6 +160,6 @@ def settings_of(
         why_top if top <= high else "",
         width,
         max_step or LARGEST_STEP,
-        stability,
+        stability and not orbit.system.holds,
         max_points,
     )

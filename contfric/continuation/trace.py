@@ -37,6 +37,9 @@ _VIOLATED = 1e-9
 #: to about 1e-4 only. The branch that leaves starts at twice the distance.
 _CROWD = 5e-4
 
+#: A step this short after hundreds of points (arclength) gets nowhere.
+_CRAWLS = 1e-6
+
 Progress = Callable[[str], None]
 
 
@@ -145,14 +148,19 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         kernels.UNBOUNDED: EndReason.UNBOUNDED,
     }
     if why in reasons:
-        reached = nearly_reached(orbit, side.tip, settings) if why == kernels.STEP else None
         side.end = End(reasons[why])
-        if reached is not None:
-            side.end = End(EndReason[reached.kind.name], bifurcation=reached)
-        return True, step
+        return _end_of_holds(orbit, side, settings, why == kernels.STEP) or True, step
     if why == kernels.FULL:
-        return False, step
+        return _end_of_holds(orbit, side, settings, step < _CRAWLS), step
     return _resolve(orbit, side, settings), step
+
+
+def _end_of_holds(orbit: Orbit, side: Side, settings: Settings, stuck: bool) -> bool:
+    """End a side that is stuck just before several holds end at once; True if that is so."""
+    reached = nearly_reached(orbit, side.tip, settings) if stuck else None
+    if reached is not None:
+        side.end = End(EndReason[reached.kind.name], bifurcation=reached)
+    return reached is not None
 
 
 def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
