@@ -9,12 +9,13 @@ come in have length zero, and those that are held have their pins.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
-from contfric.continuation.events import Bifurcation, kind_of_margin
+from contfric.continuation.events import Bifurcation, Kind, kind_of_margin
 from contfric.continuation.outcomes import Origin, Outcome, RestsForEver, outcome_at, places_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
@@ -63,49 +64,74 @@ class Candidate:
 def candidates(bifurcation: Bifurcation) -> Iterator[Candidate]:
     """Yield what can follow a sliding event, all places of a group first.
 
-    Words that are mirror images of one already given are left out: their branches are mirrored.
+    Words that are mirror images of one already given are left out: their branches are mirrored. An
+    orbit that has become several times one of fewer periods is followed as that: each of its copies
+    could take its own outcome, and what leaves the shorter orbit is found there.
     """
-    yield from _candidates(bifurcation, set())
+    seen: set[frozenset[Word]] = set()
+    copies = shorter_orbits(bifurcation.orbit.as_whole())
+    if not copies:
+        yield from _combinations(bifurcation, seen)
+    for copy in copies:
+        reason = f"the orbit has become one of {copy.periods} period(s), run through several times"
+        if _is_new(copy, seen):
+            yield Candidate(reason, copy)
+        tests = nearly_vanishing(copy, bifurcation.kind)
+        yield from _combinations(replace(bifurcation, orbit=copy, tests=tests), seen)
 
 
 def wider_candidates(bifurcation: Bifurcation) -> Iterator[Candidate]:
     """Yield what can follow if margins that are nearly zero vanish at the event as well.
 
-    Where an orbit of several periods comes to one of fewer, all its copies meet the event at once, and
-    the equations are so nearly singular that the place is good to half of the digits only.
+    Where several conditions fail together the equations are so nearly singular that the place is good
+    to half of the digits only.
     """
-    orbit = bifurcation.orbit
-    near = tuple(
+    near = nearly_vanishing(bifurcation.orbit, bifurcation.kind)
+    if set(bifurcation.tests) < set(near):
+        yield from _combinations(replace(bifurcation, tests=near), set())
+
+
+def nearly_vanishing(orbit: Orbit, kind: Kind) -> tuple[Test, ...]:
+    """Return the margins that vanish at an event of a kind, if it is located to half of the digits."""
+    return tuple(
         test
         for test, value in zip(orbit.system.tests, orbit.margins, strict=True)
-        if abs(value) < _NEARLY and kind_of_margin(orbit.system, test, orbit) is bifurcation.kind
+        if abs(value) < _NEARLY and kind_of_margin(orbit.system, test, orbit) is kind
     )
-    known = set(bifurcation.tests)
-    if known < set(near) and len(near) <= _MOST_PLACES:
-        yield from _candidates(replace(bifurcation, tests=near), set())
 
 
-def _candidates(bifurcation: Bifurcation, seen: set[frozenset[Word]]) -> Iterator[Candidate]:
+def _combinations(bifurcation: Bifurcation, seen: set[frozenset[Word]]) -> Iterator[Candidate]:
+    """Yield the orbits of every combination of the outcomes at the places of a group."""
     orbit = bifurcation.orbit.as_whole()
-    found: list[tuple[Test, Outcome]] = []
+    found: list[Outcome] = []
     for place in places_of(bifurcation):
         try:
-            found.append((place, outcome_at(orbit, place, bifurcation.kind)))
+            found.append(outcome_at(orbit, place, bifurcation.kind))
         except NotationError as error:
             rest = isinstance(error, RestsForEver)
             yield Candidate(f"change at segment {place.segment + 1}", None, str(error), rest=rest)
-    for size in range(len(found), 0, -1):
+    sizes = list(range(len(found), 0, -1))
+    if len(found) > _MOST_PLACES:
+        sizes = [len(found), 1]
+        why = f"{len(found)} places at once: only all of them and each alone are tried"
+        yield Candidate("other combinations of places", None, why)
+    for size in sizes:
         for chosen in combinations(found, size):
-            reason = "; ".join(outcome.reason for _, outcome in chosen)
+            reason = "; ".join(outcome.reason for outcome in chosen)
             try:
-                edited, away = edited_orbit(orbit, [outcome for _, outcome in chosen])
+                edited, away = edited_orbit(orbit, list(chosen))
             except NotationError as error:
                 yield Candidate(reason, None, str(error))
                 continue
-            key = _up_to_mirror(edited)
-            if key not in seen:
-                seen.add(key)
+            if _is_new(edited, seen):
                 yield Candidate(reason, edited, away=away)
+
+
+def _is_new(orbit: Orbit, seen: set[frozenset[Word]]) -> bool:
+    key = _up_to_mirror(orbit)
+    new = key not in seen
+    seen.add(key)
+    return new
 
 
 def _up_to_mirror(orbit: Orbit) -> frozenset[Word]:
@@ -139,35 +165,68 @@ def edited_orbit(orbit: Orbit, outcomes: list[Outcome]) -> tuple[Orbit, FloatArr
     away[:, 0] = [speeds.get(origin, 0.0) for origin in origins]
     _, away = _rotated(word, away, 0.0)
     word, cycle = _rotated(word, np.array(starts), orbit.period)
-    turns = _turns(word, cycle, orbit)
-    count = len(word) // turns
-    word, cycle, away = word[:count], cycle[:count], away[:count]
     moves = away if speeds else None
     try:
-        system = build_system(orbit.model, word, orbit.periods // turns)
+        system = build_system(orbit.model, word, orbit.periods)
     except ValueError as error:
         raise NotationError(str(error)) from None
     edited = Orbit(system, cycle, orbit.vector.copy(), np.inf, Status.CONVERGED)
-    half = half_of(orbit.model, word, system.periods)
-    if half is not None and edited.symmetric:
-        part = build_system(orbit.model, half, system.periods, half=True)
-        return replace(edited, system=part, joints=cycle[: len(half)]), (
-            None if moves is None else moves[: len(half)]
-        )
-    return edited, moves
+    part = _on_half(edited, word)
+    return part, moves if moves is None else moves[: part.system.segments]
 
 
-def _turns(word: Word, cycle: FloatArray, orbit: Orbit) -> int:
-    """Return how often a cycle runs through an orbit of fewer periods: once, in general."""
-    for turns in range(min(orbit.periods, len(word)), 1, -1):
-        part, rest = divmod(len(word), turns)
-        if rest or orbit.periods % turns or word != word[:part] * turns:
+def shorter_orbits(orbit: Orbit) -> list[Orbit]:
+    """Return the copies of an orbit of fewer periods that a motion runs through; none in general.
+
+    The copies are the same motion, but may have different words: one with a hold where another has a
+    stick. They are recognised by their slides, as a rest of length zero may be in one and not in another.
+    """
+    slides = _slides(orbit)
+    for turns in range(orbit.periods, 1, -1):
+        count, rest = divmod(len(slides), turns)
+        if rest or orbit.periods % turns or not _repeats(orbit, slides, count, turns):
             continue
-        shift = np.zeros_like(cycle)
-        shift[:, 0] = np.repeat(np.arange(turns), part) * (orbit.period / turns)
-        if np.max(np.abs(cycle - shift - np.tile(cycle[:part], (turns, 1)))) < _SAME_MOTION:
-            return turns
-    return 1
+        cuts = [slides[k * count] for k in range(turns)]
+        return [_copy(orbit, a, b, turns) for a, b in zip(cuts, [*cuts[1:], cuts[0]], strict=True)]
+    return []
+
+
+def _slides(orbit: Orbit) -> list[int]:
+    """Return the segments that are slides of some length, joined over a touch of rest."""
+    sliding = {mode.name for mode in orbit.model.modes if mode.sliding}
+    return [
+        i
+        for i, (mode, _) in enumerate(orbit.word)
+        if mode not in sliding and orbit.ends[i, 0] - orbit.cycle[i, 0] > _SAME_MOTION
+    ]
+
+
+def _repeats(orbit: Orbit, slides: list[int], count: int, turns: int) -> bool:
+    """Tell whether the slides repeat themselves after a part of the period."""
+    starts = orbit.cycle[slides]
+    ahead = np.roll(starts, -count, axis=0)
+    ahead[len(starts) - count :, 0] += orbit.period
+    ahead[:, 0] -= orbit.period / turns
+    return bool(np.max(np.abs(ahead - starts)) < _SAME_MOTION)
+
+
+def _copy(orbit: Orbit, first: int, after: int, turns: int) -> Orbit:
+    """Return the part of a cycle from one slide to its image as an orbit."""
+    count = len(orbit.word)
+    places = range(first, after if after > first else after + count)
+    word = tuple(orbit.word[i % count] for i in places)
+    cycle = np.array([orbit.cycle[i % count] for i in places])
+    system = build_system(orbit.model, word, orbit.periods // turns)
+    copy = Orbit(system, cycle, orbit.vector.copy(), np.inf, Status.CONVERGED)
+    return _on_half(copy, word)
+
+
+def _on_half(orbit: Orbit, word: Word) -> Orbit:
+    half = half_of(orbit.model, word, orbit.periods)
+    if half is None or not orbit.symmetric:
+        return orbit
+    part = build_system(orbit.model, half, orbit.periods, half=True)
+    return replace(orbit, system=part, joints=orbit.joints[: len(half)])
 
 
 def _rotated(word: Word, joints: FloatArray, period: float) -> tuple[Word, FloatArray]:
@@ -183,5 +242,6 @@ def directions(orbit: Orbit, active: int) -> Iterator[tuple[FloatArray | None, f
 
     The direction of the curve itself; where rounding leaves more than one, the parameter is fixed.
     """
-    yield tangent_of(orbit.system, orbit.joints, orbit.vector, active)
+    with suppress(np.linalg.LinAlgError):
+        yield tangent_of(orbit.system, orbit.joints, orbit.vector, active)
     yield None, 1.0

@@ -54,14 +54,27 @@ def tangent_of(
 ) -> tuple[FloatArray, float]:
     """Return the direction of the curve of orbits through one, and the parameter's share of it.
 
-    The null vector of the Jacobian with the parameter's column, by its singular value decomposition:
-    also where an exit is tangential and a joint alone moves.
+    The null vector of the Jacobian with the parameter's column: also where an exit is tangential and a
+    joint alone moves. By two steps of inverse iteration, each with the last iterate as border row
+    (W. Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, SIAM 2000, section 3.3).
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the curve has no unique direction.
     """
     _, _, c, _ = jacobian_blocks(system, joints, vector)
-    column = c[:, :, active].reshape(-1, 1)
-    full = np.hstack([assembled(system, joints, vector), column])
-    null: FloatArray = np.linalg.svd(full)[2][-1]
-    return null[:-1].reshape(joints.shape), float(null[-1])
+    size = joints.size
+    full = np.empty((size + 1, size + 1))
+    full[:size, :size] = assembled(system, joints, vector)
+    full[:size, size] = c[:, :, active].ravel()
+    wanted = np.zeros(size + 1)
+    wanted[size] = 1.0
+    null: FloatArray = np.cos(np.arange(1.0, size + 2.0))  # no direction of an orbit
+    for _ in range(2):
+        full[size] = null / np.linalg.norm(null)
+        null = np.asarray(np.linalg.solve(full, wanted), dtype=np.float64)
+    return null[:size].reshape(joints.shape), float(null[size])
 
 
 def pencil_of_turn(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:
