@@ -12,10 +12,8 @@ from contfric.orbit.solve import polish
 from contfric.orbit.words import mirror_pairs
 from contfric.signature import ReducedWord, canonical_word
 
-#: Events whose parameters agree to this (relative to the range) and whose stops agree to
-#: `_SAME_STOPS` are one: far above the accuracy of a located event (1e-10), far below what a diagram
-#: resolves.
-_SAME_PARAMETER, _SAME_STOPS = 1e-8, 1e-4
+#: Events whose parameters agree to their accuracy and whose stops agree to this are one.
+_SAME_STOPS = 1e-4
 #: Orbits solved at the same parameter are one if their stops agree to this.
 _SAME_ORBIT = 1e-8
 
@@ -44,7 +42,7 @@ def same_event(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> 
     """Tell whether two branches have met the same event (or its mirror image)."""
     if a.kind is not b.kind:
         return False
-    if abs(a.params[parameter] - b.params[parameter]) > _SAME_PARAMETER * width:
+    if abs(a.params[parameter] - b.params[parameter]) > max(a.accuracy, b.accuracy) * width:
         return False
     mirror = a.orbit.model.symmetry is not None
     return stops_distance(a.orbit.stops, b.orbit.stops, mirror) < _SAME_STOPS

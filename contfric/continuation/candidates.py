@@ -223,7 +223,7 @@ def _copy(orbit: Orbit, first: int, after: int, turns: int) -> Orbit:
 
 def _on_half(orbit: Orbit, word: Word) -> Orbit:
     half = half_of(orbit.model, word, orbit.periods)
-    if half is None or not orbit.symmetric:
+    if half is None or orbit.mirror_distance > _SAME_MOTION:
         return orbit
     part = build_system(orbit.model, half, orbit.periods, half=True)
     return replace(orbit, system=part, joints=orbit.joints[: len(half)])

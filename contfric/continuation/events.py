@@ -93,6 +93,11 @@ class EndReason(str, Enum):
     INTERRUPTED = "interrupted"
 
 
+#: Accuracy of a located event, relative to the range: far above what it is located to (1e-10), far below
+#: what a diagram resolves.
+ACCURACY = 1e-8
+
+
 class Verdict(str, Enum):
     """What became of a candidate."""
 
@@ -144,6 +149,8 @@ class Bifurcation:
     located : bool
         False if a test changed sign but Newton failed on the way to the place: the parameters are
         those of the last solved point before it.
+    accuracy : float
+        How well the parameter is located, relative to the range.
     proposals : tuple of Proposal
         What an exploration proposed to follow it, in order, and what became of it.
     """
@@ -156,6 +163,7 @@ class Bifurcation:
     stable_before: bool | None = None
     stable_after: bool | None = None
     located: bool = True
+    accuracy: float = ACCURACY
     proposals: tuple[Proposal, ...] = ()
 
     @property

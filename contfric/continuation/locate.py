@@ -6,7 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.continuation.events import Bifurcation, Kind, hold_of_test, kind_of_margin
+from contfric.continuation.events import (
+    ACCURACY,
+    Bifurcation,
+    Kind,
+    hold_of_test,
+    kind_of_margin,
+    outward_rate,
+)
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.vertices import parabola_vertex, symmetric_part, undoubled_part
 from contfric.orbit.counts import TALLY
@@ -33,6 +40,13 @@ _NEARLY_REACHED = 1e-5
 #: Share of the period below which a stick at a tangential release has vanished: the square root of
 #: the rounding of its quadratic margin.
 _VANISHED = 1e-5
+#: Accuracy of an event (relative to the range) where CS and AS coincide: the root of rounding.
+_ROUGH = 1e-6
+#: A load that changes this slowly at a stop stands still there.
+_STILL = 1e-4
+#: A parameter that changes this slowly along a branch, in units of arclength, is constant: the orbits are
+#: a continuum at one value, and the sign of the slope is rounding.
+_VERTICAL = 1e-5
 #: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
 _COMPLEX = 1e-6
 
@@ -166,8 +180,10 @@ def _sliding_events(
         held = hold_of_test(orbit.system.tests[first], here) is not None
         together = _NEARLY_REACHED if held else _REACHED
         point.lost = bool(abs(point.tests[first]) >= together)
-    if _is_degenerate(here, kind, orbit.system.tests[first]):
-        point.lost = True
+    vanished = _vanished_stick(here, kind, orbit.system.tests[first])
+    if vanished is not None:
+        point.lost = False
+        return [(_bifurcation(Kind.CS, here, before, None, point, settings, (vanished,)), point)]
     group = tuple(
         test
         for k, test in enumerate(orbit.system.tests)
@@ -192,16 +208,24 @@ def _located_before(
     return [(k, p) for k, p in found if p is not None and p.arc < point.arc]
 
 
-def _is_degenerate(here: Orbit, kind: Kind, test: Test) -> bool:
-    """Tell whether a stick vanishes just where its release becomes tangential.
+def _vanished_stick(here: Orbit, kind: Kind, test: Test) -> Test | None:
+    """Return the stop (as a margin) of a stick that vanishes just where its release is tangential.
 
     CS and AS at once: the margin vanishes quadratically, and the orbit is one of a continuum (as at
     Omega = 1/2, where a slide lasts a whole natural period whatever its amplitude).
     """
-    if hold_of_test(test, here) is not None:
-        return False
+    if kind is not Kind.AS or hold_of_test(test, here) is not None:
+        return None
     start, end = here.cycle[test.segment, 0], here.ends[test.segment, 0]
-    return kind is Kind.AS and end - start < _VANISHED * here.period
+    if end - start >= _VANISHED * here.period:
+        return None
+    surface, segment = here.word[test.segment][1], test.segment - 1
+    if segment < 0:  # of a half: the stop is the mirror image of the last one
+        segment += here.system.segments
+        symmetry = here.model.symmetry
+        if here.system.half and symmetry is not None:
+            surface = {image: name for name, image in symmetry.surfaces.items()}[surface]
+    return Test(Margin.JOINT, segment, surface)
 
 
 def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation | None:
@@ -244,6 +268,8 @@ def _smooth_events(
         a, b = before.tests[base + column], after.tests[base + column]
         if not a * b < 0.0 or (column == CHI_ONE and folded):
             continue  # chi(1) of a fold vanishes with it
+        if column == FOLD and max(abs(a), abs(b)) < _VERTICAL:
+            continue
         point = _trial(orbit, before, after, settings, BY_TEST, base + column)
         if point is None or point.lost or _is_pole(point.tests[base + column], a, b):
             if column == FOLD:
@@ -366,6 +392,14 @@ def _bifurcation(
         point.arc,
         _stable(before, here, settings),
         None if after is None else _stable(after, here, settings),
+        accuracy=_ROUGH if _is_rough(kind, here, tests) else ACCURACY,
+    )
+
+
+def _is_rough(kind: Kind, here: Orbit, tests: tuple[Test, ...]) -> bool:
+    """Tell whether an event is located to the root of rounding only: CS where the load stands still."""
+    return kind is Kind.CS and any(
+        abs(outward_rate(here.system, test, here)) < _STILL for test in tests
     )
 
 

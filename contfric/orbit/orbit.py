@@ -162,17 +162,22 @@ class Orbit:
     @cached_property
     def symmetric(self) -> bool:
         """Whether the orbit is its own mirror image."""
+        size = 1.0 + float(np.max(np.abs(self.joints)))
+        return self.mirror_distance < SYMMETRY_TOLERANCE * size
+
+    @cached_property
+    def mirror_distance(self) -> float:
+        """Largest distance of a joint to its mirror image; infinite if the words differ."""
         if self.system.half:
-            return True
+            return 0.0
         if half_of(self.model, self.system.word, self.periods) is None:
-            return False
+            return float(np.inf)
         assert self.model.symmetry is not None
         n = len(self.joints) // 2
         image = self.joints[:n].copy()
         image[:, 0] += 0.5 * self.period
         image[:, 1:] = image[:, 1:] @ self.model.symmetry.array().T
-        size = 1.0 + float(np.max(np.abs(self.joints)))
-        return float(np.max(np.abs(image - self.joints[n:]))) < SYMMETRY_TOLERANCE * size
+        return float(np.max(np.abs(image - self.joints[n:])))
 
     # ------------------------------------------------------------------ what is watched
 

@@ -159,6 +159,10 @@ class Packer:
             "stable_before": bifurcation.stable_before,
             "stable_after": bifurcation.stable_after,
             "located": bifurcation.located,
+            "accuracy": bifurcation.accuracy,
+            "proposals": [
+                [p.reason, p.verdict.value, p.branch, p.why] for p in bifurcation.proposals
+            ],
         }
 
 

@@ -8,7 +8,15 @@ from itertools import accumulate
 
 from contfric.atlas.diagram import Diagram, LooseEnd, Node
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation, End, EndReason, Kind
+from contfric.continuation.events import (
+    ACCURACY,
+    Bifurcation,
+    End,
+    EndReason,
+    Kind,
+    Proposal,
+    Verdict,
+)
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.system import Margin, System, Test, build_system
@@ -73,6 +81,11 @@ class Unpacker:
                 entry["stable_before"],
                 entry["stable_after"],
                 entry.get("located", True),
+                entry.get("accuracy", ACCURACY),
+                tuple(
+                    Proposal(reason, Verdict(verdict), branch, why)
+                    for reason, verdict, branch, why in entry.get("proposals", ())
+                ),
             )
             for entry, position in zip(self.header["bifurcations"], positions, strict=True)
         ]
