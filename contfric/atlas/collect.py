@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from contfric.atlas.diagram import Diagram, LooseEnd, Node
 from contfric.atlas.matching import same_event
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation, End, EndReason, Proposal
+from contfric.continuation.events import Bifurcation, End, EndReason, Proposal, Verdict
 from contfric.continuation.points import Settings
 from contfric.models.definition import Model
 
@@ -134,5 +134,8 @@ def _is_followed(events: list[Event], settings: Settings, index: int, end: End) 
         if index in event.branches and same_event(
             event.bifurcation, end.bifurcation, settings.parameter, settings.width
         ):
-            return len(event.branches) > 1
+            through = event.bifurcation.symmetric and any(
+                p.verdict is Verdict.KNOWN for p in event.proposals
+            )
+            return len(event.branches) > 1 or through  # through: its mirror image goes on
     return False

@@ -17,7 +17,15 @@ from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, candidates, directions, wider_candidates
-from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind, Verdict
+from contfric.continuation.events import (
+    ACCURACY,
+    TERMINAL,
+    Bifurcation,
+    End,
+    EndReason,
+    Kind,
+    Verdict,
+)
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import NEARER, leave_branch_point, settings_value
@@ -72,13 +80,20 @@ def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:
 
 def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
     branch = _leave_event(state, candidate, event)
+    if branch is None and event.bifurcation.accuracy > ACCURACY:
+        assert candidate.orbit is not None
+        branch = _through(state, candidate.orbit)
+        known = None if branch is None else state.known(branch[len(branch) // 2])
+        if known is not None:
+            state.judge(event, candidate.reason, Verdict.KNOWN, known)
+            return True
     if branch is None:
         why = "no admissible orbit beyond the event"
         state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
-    else:
-        state.judge(event, candidate.reason, Verdict.ACCEPTED, len(state.branches))
-        state.add_from(branch, event)
-    return branch is not None
+        return False
+    state.judge(event, candidate.reason, Verdict.ACCEPTED, len(state.branches))
+    state.add_from(branch, event)
+    return True
 
 
 def _leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branch | None:

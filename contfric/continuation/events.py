@@ -179,7 +179,8 @@ class Bifurcation:
         stops = self.orbit.stops
         if self.orbit.model.symmetry is None or len(stops) % 2:
             return False
-        return bool(np.max(np.abs(np.sort(stops) + np.sort(stops)[::-1])) < _SYMMETRIC_STOPS)
+        gap = np.max(np.abs(np.sort(stops) + np.sort(stops)[::-1]))
+        return bool(gap < max(_SYMMETRIC_STOPS, self.accuracy))
 
     @property
     def label(self) -> str:

@@ -35,6 +35,9 @@ _SAME_TANGENCY = 2e-6
 #: Newton may fail right behind an event (a slide that vanishes, several conditions at once): it is reached
 #: where the margin is this small.
 _REACHED = 1e-8
+#: Where two conditions fail together at an orbit that is symmetric in time (without damping), Newton fails
+#: at the root of that: such an event is as good as this, relative to the range.
+_ROUGHLY_REACHED = 1e-4
 #: The same where several holds end at once; what their lengths do to the orbit is the square of it.
 _NEARLY_REACHED = 1e-5
 #: Share of the period below which a stick at a tangential release has vanished: the square root of
@@ -47,6 +50,8 @@ _STILL = 1e-4
 #: A parameter that changes this slowly along a branch, in units of arclength, is constant: the orbits are
 #: a continuum at one value, and the sign of the slope is rounding.
 _VERTICAL = 1e-5
+#: What it may change by over a step, relative to the range: the root of rounding.
+_CONSTANT = 1e-7
 #: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
 _COMPLEX = 1e-6
 
@@ -176,10 +181,12 @@ def _sliding_events(
     here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     kind = kind_of_margin(orbit.system, orbit.system.tests[first], here)
     together = _TOGETHER
+    rough = False
     if point.lost:
         held = hold_of_test(orbit.system.tests[first], here) is not None
-        together = _NEARLY_REACHED if held else _REACHED
-        point.lost = bool(abs(point.tests[first]) >= together)
+        rough = abs(point.tests[first]) >= (_NEARLY_REACHED if held else _REACHED)
+        together = 2.0 * _ROUGHLY_REACHED if rough else _NEARLY_REACHED if held else _REACHED
+        point.lost = bool(abs(point.tests[first]) >= _ROUGHLY_REACHED)
     vanished = _vanished_stick(here, kind, orbit.system.tests[first])
     if vanished is not None:
         point.lost = False
@@ -194,7 +201,8 @@ def _sliding_events(
             and _is_free(orbit.system.tests[first], test)
         )
     )
-    return [(_bifurcation(kind, here, before, None, point, settings, group), point)]
+    found = _bifurcation(kind, here, before, None, point, settings, group)
+    return [(replace(found, accuracy=_ROUGHLY_REACHED) if rough else found, point)]
 
 
 def _located_before(
@@ -268,8 +276,6 @@ def _smooth_events(
         a, b = before.tests[base + column], after.tests[base + column]
         if not a * b < 0.0 or (column == CHI_ONE and folded):
             continue  # chi(1) of a fold vanishes with it
-        if column == FOLD and max(abs(a), abs(b)) < _VERTICAL:
-            continue
         point = _trial(orbit, before, after, settings, BY_TEST, base + column)
         if point is None or point.lost or _is_pole(point.tests[base + column], a, b):
             if column == FOLD:
@@ -279,7 +285,8 @@ def _smooth_events(
                 vertex = _fold(orbit, before, beyond, between, settings)
                 folded = True
                 if vertex[0].kind is Kind.SN:
-                    found.append(_not_located(orbit, Kind.SN, before, beyond, settings))
+                    if not _is_vertical(before, after, settings):
+                        found.append(_not_located(orbit, Kind.SN, before, beyond, settings))
                 else:
                     found.append(vertex)
             elif point is None or point.lost:
@@ -290,7 +297,9 @@ def _smooth_events(
             continue
         if column == FOLD:
             folded = True
-            found.append(_fold(orbit, before, beyond, point, settings))
+            vertex = _fold(orbit, before, beyond, point, settings)
+            if vertex[0].kind is not Kind.SN or not _is_vertical(before, after, settings):
+                found.append(vertex)
             continue
         kind = Kind.BP
         if column == CHI_PAIR:
@@ -305,6 +314,12 @@ def _smooth_events(
             continue  # the fold there says what it is; beside it chi(1) is rounding
         found.append((_bifurcation(kind, here, before, beyond, point, settings), point))
     return [*found, *_tangencies(orbit, before, beyond, settings)]
+
+
+def _is_vertical(before: Point, after: Point, settings: Settings) -> bool:
+    """Tell whether the parameter is constant over a step: the sign of its slope is rounding."""
+    slopes = max(abs(before.slope), abs(after.slope))
+    return slopes < _VERTICAL and abs(after.value - before.value) < _CONSTANT * settings.width
 
 
 def _is_vertex(here: Orbit, active: int) -> bool:
