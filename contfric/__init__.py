@@ -17,6 +17,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
     from contfric.atlas.explore import explore
+    from contfric.chaos.compute import lyapunov_map
+    from contfric.chaos.exponents import LyapunovExponents, lyapunov_exponent
+    from contfric.chaos.map import LyapunovMap
+    from contfric.chaos.status import Motion
     from contfric.continuation.branch import Branch
     from contfric.continuation.events import Bifurcation, EndReason, Kind
     from contfric.continuation.trace import continue_orbit
@@ -48,7 +52,10 @@ _HOMES = {
     "Diagram": "contfric.atlas.diagram",
     "EndReason": "contfric.continuation.events",
     "Kind": "contfric.continuation.events",
+    "LyapunovExponents": "contfric.chaos.exponents",
+    "LyapunovMap": "contfric.chaos.map",
     "Model": "contfric.models",
+    "Motion": "contfric.chaos.status",
     "NotationError": "contfric.errors",
     "Orbit": "contfric.orbit.orbit",
     "ParameterError": "contfric.errors",
@@ -61,6 +68,8 @@ _HOMES = {
     "load": "contfric.results",
     "load_model": "contfric.models",
     "load_signature": "contfric.signature",
+    "lyapunov_exponent": "contfric.chaos.exponents",
+    "lyapunov_map": "contfric.chaos.compute",
     "model_names": "contfric.models",
     "run_study": "contfric.study",
     "save": "contfric.results",
@@ -79,7 +88,10 @@ __all__ = [
     "Diagram",
     "EndReason",
     "Kind",
+    "LyapunovExponents",
+    "LyapunovMap",
     "Model",
+    "Motion",
     "NotationError",
     "Orbit",
     "ParameterError",
@@ -93,6 +105,8 @@ __all__ = [
     "load",
     "load_model",
     "load_signature",
+    "lyapunov_exponent",
+    "lyapunov_map",
     "model_names",
     "run_study",
     "save",

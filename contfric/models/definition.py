@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -159,6 +159,10 @@ class Model:
     def flow(self) -> CompiledFlow:
         """The compiled flow of this model (loads numba at first use)."""
         return self.flow_factory()
+
+    def __getstate__(self) -> dict[str, Any]:
+        # what is derived, compiled code above all, belongs to this process
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def defaults(self) -> dict[str, float]:

@@ -38,14 +38,14 @@ class StateRoom(NamedTuple):
 #: How a simulation ended.
 ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE = range(5)
 #: A sliding mode that is not left within this many periods is never left; a slide gets far more.
-_HOLD_PERIODS, _SLIDE_PERIODS = 1.001, 1e4
+HOLD_PERIODS, SLIDE_PERIODS = 1.001, 1e4
 
 #: Events within this share of a period follow each other at once; more of them in a row than this do
 #: not come to an end (a stop, a release and a reversal may fall together, twice).
-_NO_TIME, _MOST_AT_ONCE = 1e-12, 16
+NO_TIME, MOST_AT_ONCE = 1e-12, 16
 #: A state this large grows for ever (negative damping, or resonance without any): its square is still
 #: far from overflow, and its events are still exact.
-_INFINITE = 1e100
+TOO_LARGE = 1e100
 
 
 @helper
@@ -107,7 +107,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
         left = (periods - (cycle - first_cycle)) * unit - (t - first_time)
         if period <= 0.0:
             left = periods - (t - first_time)
-        allowance = (_HOLD_PERIODS if tables.sliding[mode] else _SLIDE_PERIODS) * unit
+        allowance = (HOLD_PERIODS if tables.sliding[mode] else SLIDE_PERIODS) * unit
         tau, surface = first_hit(functions, tables, mode, on, t, y, p, min(left, allowance), room)
         if surface < 0:
             if left > allowance:
@@ -126,14 +126,14 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
             t -= period
             cycle += 1
         for j in range(y.shape[0]):
-            if not abs(y[j]) < _INFINITE:
+            if not abs(y[j]) < TOO_LARGE:
                 return INFINITE, event, mode, cycle, t
         code = sign_code(functions, observables, surface, t, y, p, none, empty)
         target = following[
             (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code
         ]
-        at_once = at_once + 1 if tau <= _NO_TIME * unit else 0
-        if at_once > _MOST_AT_ONCE:
+        at_once = at_once + 1 if tau <= NO_TIME * unit else 0
+        if at_once > MOST_AT_ONCE:
             return IMPOSSIBLE, event, mode, cycle, t
         on = 1 << surface
         if target < 0:

@@ -204,3 +204,26 @@ class DiagramLike(Protocol):
     @property
     def bifurcations(self) -> Sequence[BifurcationLike]:
         """Each bifurcation once."""
+
+
+class LyapunovMapLike(Protocol):
+    """Largest Lyapunov exponents on a grid."""
+
+    @property
+    def axes(self) -> Mapping[str, FloatArray]:
+        """The two parameters that vary, and their values."""
+
+    @property
+    def params(self) -> Mapping[str, float]:
+        """The parameters that do not vary."""
+
+    @property
+    def values(self) -> FloatArray:
+        """Largest exponent, shape (len, len); nan where there is none."""
+
+    @property
+    def chaotic(self) -> NDArray[np.bool_]:
+        """Where it is positive beyond its error, shape (len, len)."""
+
+    def absent(self, missing: bool) -> NDArray[np.bool_]:
+        """Tell where no motion has an exponent, or (``missing``) where nothing was computed."""

@@ -14,16 +14,18 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from contfric.atlas.diagram import Diagram
+from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
 from contfric.errors import ParameterError, ResultFileError
+from contfric.files import replacing
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
-from contfric.results.files import replacing
+from contfric.results.lyapunov import pack_map, unpack_map
 from contfric.results.pack import Arrays, Header, Packer
 from contfric.results.unpack import Unpacker
 
-Saveable: TypeAlias = Orbit | Branch | Diagram
+Saveable: TypeAlias = Orbit | Branch | Diagram | LyapunovMap
 
 #: Version of the format; it grows when an older contfric could not read what is written.
 FORMAT = 1
@@ -35,7 +37,7 @@ _DAMAGE = (ValueError, LookupError, TypeError, AttributeError, AssertionError)
 
 
 def save(x: Saveable, path: str | Path) -> None:
-    """Write an orbit, a branch or a diagram to a file; a file of that name is replaced.
+    """Write an orbit, a branch, a diagram or a Lyapunov map to a file; a file of that name is replaced.
 
     Raises
     ------
@@ -52,9 +54,9 @@ def save(x: Saveable, path: str | Path) -> None:
     >>> bool((cf.load(file).joints == orbit.joints).all())
     True
     """
-    if not isinstance(x, (Orbit, Branch, Diagram)):
+    if not isinstance(x, Saveable):
         raise ResultFileError(
-            f"only an Orbit, a Branch or a Diagram can be saved, got {type(x).__name__}"
+            f"only an Orbit, a Branch, a Diagram or a LyapunovMap can be saved, got {type(x).__name__}"
         )
     packer = Packer(x.model)
     content = _content(x, packer)
@@ -84,11 +86,13 @@ def _content(x: Saveable, packer: Packer) -> Header:
         return {"kind": "orbit", "index": packer.orbit(x)}
     if isinstance(x, Branch):
         return {"kind": "branch", "index": packer.branch(x)}
+    if isinstance(x, LyapunovMap):
+        return {"kind": "lyapunov map", **pack_map(x, packer.arrays)}
     return {"kind": "diagram", **packer.diagram(x)}
 
 
 def load(path: str | Path, model: Model | None = None) -> Saveable:
-    """Read an orbit, a branch or a diagram from a file that :func:`save` wrote.
+    """Read an orbit, a branch, a diagram or a Lyapunov map from a file that :func:`save` wrote.
 
     Parameters
     ----------
@@ -130,6 +134,8 @@ def _restored(content: Header, pool: Unpacker) -> Saveable:
         return pool.branches[content["index"]]
     if kind == "diagram":
         return pool.diagram(content)
+    if kind == "lyapunov map":
+        return unpack_map(pool.model, content, pool.arrays)
     raise ValueError(f"unknown kind of result {kind!r}")
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from contfric.errors import ResultFileError
-from contfric.results.files import unwritable
+from contfric.files import unwritable
 from contfric.study.plan import RECORD, RESULT_FILES
 
 

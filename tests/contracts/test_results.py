@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric import files
 from contfric.continuation.events import EndReason
 from contfric.orbit.system import build_system
-from contfric.results import files
 from contfric.signature import load_signature
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
@@ -165,7 +165,7 @@ def test_loading_does_not_load_the_engine(branch, tmp_path) -> None:
 
 def test_other_objects_are_refused(tmp_path) -> None:
     with pytest.raises(
-        cf.ResultFileError, match=r"only an Orbit, a Branch or a Diagram .* got dict"
+        cf.ResultFileError, match=r"only an Orbit, a Branch, a Diagram or a LyapunovMap .* got dict"
     ):
         cf.save({}, tmp_path / "x.npz")  # type: ignore[arg-type]
 

@@ -594,7 +594,7 @@ def test_interrupted_while_writing(tmp_path, study, monkeypatch) -> None:
 
 
 def test_a_full_disk_loses_no_result(tmp_path, study, monkeypatch) -> None:
-    from contfric.results import files
+    from contfric import files
 
     synced: list[int] = []
 

@@ -1,0 +1,292 @@
+"""Lyapunov exponents of many motions in one call, compiled.
+
+Each cell is one motion: parameters and an initial state. It is followed from joint to joint with the
+tangent map. It ends as soon as it has become periodic (:mod:`contfric.chaos.cycle`), is held or unbounded;
+otherwise its growth is averaged (:mod:`contfric.chaos.averaging`) over the periods behind a transient,
+until the error is below the tolerance or the periods are over.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+
+from contfric.chaos.averaging import (
+    Averages,
+    clear,
+    close_periods,
+    gather,
+    grows,
+    mean_rate,
+    new_averages,
+    sign_of,
+)
+from contfric.chaos.cycle import (
+    CycleRoom,
+    Memory,
+    doubt,
+    forget,
+    new_cycle_room,
+    new_memory,
+    returned,
+    shortest,
+    solve_cycle,
+)
+from contfric.chaos.rows import CellRows, Limits, Starting
+from contfric.chaos.tangent import (
+    ARRIVED,
+    Walk,
+    differentiate,
+    new_walk,
+    orthonormalise,
+    push,
+    seed,
+    state_room,
+    to_joint,
+)
+from contfric.compiled import allocating_helper, f8, helper, i8, indices, kernel, matrix
+from contfric.models.definition import FloatArray
+from contfric.orbit.equations import FunctionsType
+from contfric.orbit.spectrum import spectrum
+from contfric.orbit.trajectory import HELD, IMPOSSIBLE, StateRoom, TablesType
+
+#: The motions, by their numbers in :class:`contfric.chaos.status.Motion`.
+PERIODIC, TRANSIENT, CHAOTIC, SETTLING, UNDECIDED, AT_REST, UNBOUNDED, NO_MOTION = range(8)
+#: A separation that grew by this factor has grown from rounding to the size of the motion: the motion
+#: forgot where it started, which one that only settles never does.
+_FORGOTTEN = -math.log(np.finfo(np.float64).eps)
+
+StartingType = types.NamedTuple([indices, indices, indices], Starting)
+LimitsType = types.NamedTuple([i8, i8, f8, i8], Limits)
+CellRowsType = types.NamedTuple([matrix, matrix, indices, indices, indices], CellRows)
+
+
+class Rooms(NamedTuple):
+    """All room that the cells of one call share."""
+
+    walk: Walk
+    state: StateRoom
+    frame: FloatArray
+    growth: FloatArray
+    memory: Memory
+    averages: Averages
+    cycle: CycleRoom
+
+
+@allocating_helper
+def new_rooms(n):  # type: ignore[no-untyped-def]
+    """Return the room for motions of n states."""
+    return Rooms(
+        new_walk(n),
+        state_room(n),
+        np.empty((n, n + 1)),
+        np.empty(n),
+        new_memory(n),
+        new_averages(n),
+        new_cycle_room(n),
+    )
+
+
+@helper
+def start_code(functions, observables, t, y, p, room):  # type: ignore[no-untyped-def]
+    """Return the row of an initial state in the table of starts: the signs as digits."""
+    code, place = 0, 1
+    for k in range(observables.shape[0]):
+        value = functions[1](observables[k], t, y, p, room.none, room.empty)
+        value -= functions[2](k, p, room.none, room.empty)
+        code += place * (1 if value == 0.0 else (2 if value > 0.0 else 0))
+        place *= 3
+    return code
+
+
+@helper
+def write_rest(functions, rank, mode, t, p, period, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+    """Write the exponents of a mode that is never left: those of its flow over one period."""
+    n = walk.y.shape[0]
+    functions[0](mode, t, walk.y, period, p, rows.turns[:0], walk.end, walk.jac)
+    for i in range(n):
+        for j in range(n):
+            cycle.work[i, j] = walk.jac[i, 1 + j]
+    square = cycle.work[:n, :n]
+    spectrum(square, rank, cycle.mu, cycle.symmetric, cycle.left, cycle.product)
+    for k in range(n):
+        size = abs(cycle.mu[k]) if k < rank else 0.0
+        rows.exponents[cell, k] = math.log(size) / period if size > 0.0 else -np.inf
+        rows.errors[cell, k] = 0.0
+    rows.motions[cell] = AT_REST
+
+
+@helper
+def try_cycle(  # type: ignore[no-untyped-def]
+    functions, tables, ranks, mode, on, key, t, joints, turns, p, period, rooms, rows, cell
+):
+    """Solve for the cycle that the last joint seems to be on, and write its exponents if it is."""
+    cycle, walk = rooms.cycle, rooms.walk
+    n = walk.y.shape[0]
+    cycle.z[0] = t
+    for j in range(n):
+        cycle.z[1 + j] = walk.y[j]
+        for k in range(n + 1):
+            cycle.frame[j, k] = rooms.frame[j, k]
+    error = solve_cycle(
+        functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, rooms.state
+    )
+    if error < 0.0:
+        doubt(rooms.memory)
+        return False
+    for k in range(n):
+        rows.exponents[cell, k] = cycle.rates[k]
+        rows.errors[cell, k] = error
+    rows.turns[cell] = shortest(
+        functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, rooms.state
+    )
+    return True
+
+
+@helper
+def write_means(averages, live, rows, cell):  # type: ignore[no-untyped-def]
+    """Write the averaged exponents, their errors, and what they say of the motion."""
+    for k in range(rows.exponents.shape[1]):
+        rate, error = -np.inf, 0.0
+        if k < live:
+            rate, error = mean_rate(averages, k)
+        rows.exponents[cell, k], rows.errors[cell, k] = rate, error
+    sign = sign_of(averages, rows.exponents[cell, 0], rows.errors[cell, 0]) if live > 0 else 0
+    rows.motions[cell] = CHAOTIC if sign > 0 else (SETTLING if sign < 0 else UNDECIDED)
+
+
+@helper
+def write_nothing(motion, rows, cell):  # type: ignore[no-untyped-def]
+    """Write that there are no exponents."""
+    for k in range(rows.exponents.shape[1]):
+        rows.exponents[cell, k], rows.errors[cell, k] = np.nan, np.nan
+    rows.motions[cell] = motion
+
+
+@helper
+def averaged(averages, live, turns, over, tolerance, rows, cell):  # type: ignore[no-untyped-def]
+    """Close some periods; return whether the average is good enough, or over, and written."""
+    filled = close_periods(averages, turns)
+    if filled and not over:
+        rate, error = mean_rate(averages, 0)
+        # a motion whose exponent is negative may yet settle
+        over = error <= tolerance * rate and sign_of(averages, rate, error) > 0
+    if over:
+        write_means(averages, live, rows, cell)
+        if grows(averages):
+            write_nothing(UNBOUNDED, rows, cell)
+    return over
+
+
+@helper
+def carry_on(functions, tables, ranks, mode, on, t, p, period, live, rooms):  # type: ignore[no-untyped-def]
+    """Go on to the next joint, and carry the frame there.
+
+    Returns
+    -------
+    tuple
+        (outcome, surface, mode that follows, duration, periods completed, phase, directions left).
+    """
+    walk, room = rooms.walk, rooms.state
+    outcome, surface, following, duration, turns, t = to_joint(
+        functions, tables, mode, on, t, p, period, walk, room
+    )
+    if outcome == ARRIVED:
+        observable = tables.observables[surface]
+        rate = differentiate(functions, observable, mode, duration, t, p, walk, room.none)
+        live = min(live, ranks[mode])
+        push(rooms.frame, live, rate, walk.jac, walk.grad, walk.image)
+        if not orthonormalise(rooms.frame, live, rooms.growth):
+            outcome = IMPOSSIBLE
+    return outcome, surface, following, duration, turns, t, live
+
+
+@helper
+def follow_cell(functions, tables, ranks, mode, on, t, p, period, limits, rooms, rows, cell):  # type: ignore[no-untyped-def]
+    """Follow one motion from ``rooms.walk.y`` and write what it is and its exponents."""
+    walk, growth, averages = rooms.walk, rooms.growth, rooms.averages
+    surfaces, n = tables.observables.shape[0], growth.shape[0]
+    live, cycle, joint, walk.at_once[0] = n, 0, 0, 0
+    total, lowest, rise = 0.0, 0.0, 0.0
+    averaging, done, end = limits.transient == 0, False, limits.periods
+    seed(rooms.frame, 0)
+    forget(rooms.memory)
+    clear(averages)
+    while not (done and cycle >= end):
+        outcome, surface, following, duration, turns, t, live = carry_on(
+            functions, tables, ranks, mode, on, t, p, period, live, rooms
+        )
+        if outcome == HELD:
+            rank = ranks[mode]
+            write_rest(functions, rank, mode, t, p, period, walk, rooms.cycle, rows, cell)
+            break
+        if outcome != ARRIVED:
+            write_nothing(NO_MOTION if outcome == IMPOSSIBLE else UNBOUNDED, rows, cell)
+            break
+        total += growth[0] if live > 0 else 0.0
+        lowest = min(lowest, total)
+        rise = max(rise, total - lowest)
+        on = (1 << surface) | tables.lies_on[mode]
+        mode, joint, cycle = following, joint + 1, cycle + turns
+        key = mode * surfaces + surface
+        joints, lag = returned(rooms.memory, key, cycle, joint, t, walk.y, period)
+        if joints > 0 and try_cycle(
+            functions, tables, ranks, mode, on, key, t, joints, lag, p, period, rooms, rows, cell
+        ):
+            rows.motions[cell] = TRANSIENT if rise > _FORGOTTEN else PERIODIC
+            break
+        if averaging:
+            gather(averages.pending, growth, live, duration, walk.y)
+            if turns > 0 and averaged(
+                averages, live, turns, cycle >= end, limits.tolerance, rows, cell
+            ):
+                averaging, done, end = False, True, cycle + limits.confirm
+        elif not done and cycle >= limits.transient:
+            averaging, end = True, cycle + limits.periods
+            seed(rooms.frame, live)  # what only the transient forgot counts again
+            live = n
+    rows.followed[cell] = cycle
+
+
+@kernel(
+    types.void(
+        FunctionsType, TablesType, StartingType, f8, matrix, matrix, LimitsType, CellRowsType
+    )
+)
+def follow_cells(functions, tables, starting, time, vectors, states, limits, rows):  # type: ignore[no-untyped-def]
+    """Follow motions from ``states`` at ``time``, and fill the rows.
+
+    Parameters
+    ----------
+    vectors, states : parameters and initial states, shapes (cells, parameters) and (cells, n)
+    """
+    n = states.shape[1]
+    rooms = new_rooms(n)
+    for cell in range(states.shape[0]):
+        p = vectors[cell]
+        for j in range(n):
+            rooms.walk.y[j] = states[cell, j]
+        rows.turns[cell], rows.followed[cell] = 0, 0
+        period = functions[5](p, rooms.state.none, rooms.state.empty)
+        code = start_code(functions, tables.observables, time, rooms.walk.y, p, rooms.state)
+        if starting.mode[code] < 0:
+            write_nothing(NO_MOTION, rows, cell)
+            continue
+        phase = time - math.floor(time / period) * period
+        follow_cell(
+            functions,
+            tables,
+            starting.ranks,
+            starting.mode[code],
+            starting.on[code],
+            phase,
+            p,
+            period,
+            limits,
+            rooms,
+            rows,
+            cell,
+        )

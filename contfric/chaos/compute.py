@@ -1,0 +1,253 @@
+"""The computation of a map: arguments checked, tiles cut, spread, gathered, kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from contfric.chaos.exponents import checked_time, limits_of
+from contfric.chaos.map import LyapunovMap, points_of
+from contfric.chaos.rows import Limits, check_excited
+from contfric.chaos.running import Progress, Timer, compute_all
+from contfric.chaos.starts import StateLike, given_states, number_of_starts
+from contfric.chaos.store import TileFolder, digest, open_tiles
+from contfric.chaos.tiles import Place, Tile, TileRows, empty_tile, inside, places
+from contfric.errors import ParameterError, whole_number
+from contfric.models import load_model
+from contfric.models.definition import FloatArray, Model
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """A map to be computed."""
+
+    model: Model
+    axes: dict[str, FloatArray]
+    vector: FloatArray
+    starts: int
+    states: FloatArray | None
+    time: float
+    limits: Limits
+    side: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        rows, columns = self.axes.values()
+        return len(rows), len(columns)
+
+    def places(self) -> list[Place]:
+        return list(places(self.shape, self.side))
+
+    def tile(self, place: Place) -> Tile:
+        (first, rows), (second, columns) = self.axes.items()
+        return Tile(
+            self.model,
+            self.limits,
+            self.vector,
+            (self.model.index_of(first), self.model.index_of(second)),
+            (rows[place[0]], columns[place[1]]),
+            self.starts,
+            None if self.states is None else self.states[place],
+            self.time,
+        )
+
+    def record(self) -> dict[str, Any]:
+        """Describe the map, so that tiles of another one, or of another version, are not taken for its."""
+        from importlib.metadata import version
+
+        from contfric.compiled import cache_folder
+
+        return {
+            "contfric": version("contfric"),
+            "kernels": cache_folder(Path(__file__)).name,
+            "model": self.model.name,
+            "params": self.model.mapping(self.vector),
+            "axes": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in self.axes.items()},
+            "grid": digest(*self.axes.values()),
+            "starts": self.starts,
+            "states": digest(self.states) if self.states is not None else "default",
+            "time": self.time,
+            "limits": list(self.limits),
+            "tile": self.side,
+        }
+
+
+def lyapunov_map(
+    model: str | Model,
+    axes: Mapping[str, ArrayLike],
+    params: Mapping[str, float] | None = None,
+    *,
+    periods: int = 600,
+    transient: int = 100,
+    tolerance: float = 0.01,
+    confirm: int = 0,
+    state: StateLike | None = None,
+    starts: int = 1,
+    time: float = 0.0,
+    executor: Executor | None = None,
+    folder: str | Path | None = None,
+    tile: int = 16,
+    progress: Progress | None = None,
+) -> LyapunovMap:
+    """Compute Lyapunov exponents on a grid of two parameters.
+
+    Every point is a motion from an initial state, as in :func:`contfric.lyapunov_exponent`. The grid is
+    cut into tiles, and the result is the same to the last bit wherever they are computed. Ctrl-C ends
+    the computation; the map that is returned has what was finished.
+
+    Parameters
+    ----------
+    model, params : the model (or its name) and the parameters that do not vary; defaults fill in
+    axes : mapping of two parameters to their values, each ascending
+    periods : most periods of the excitation to average over
+    transient : periods before averaging begins
+    tolerance : relative error of the largest exponent at which averaging ends
+    confirm : periods to follow a motion further, after averaging, to see whether it settles after all
+    state : initial state, shape (n,), or several, shape (starts, n), or a function of the parameters
+        that returns either; by default displaced from rest
+    starts : number of initial states to draw at each point, the first displaced from rest
+    time : initial time, nondimensional
+    executor : any :class:`concurrent.futures.Executor`: processes, loky, dask, MPI; by default threads
+        of this process. What it loses is computed here.
+    folder : where finished tiles are kept; the same call goes on from them
+    tile : points along the side of a tile
+    progress : called with one line of text now and then
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not valid, or the model is defined nowhere on the grid.
+    ResultFileError
+        If the folder holds tiles of another map, or cannot be written.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> grid = {"Omega": np.linspace(0.3, 0.6, 3), "S": np.linspace(0.1, 0.3, 2)}
+    >>> cf.lyapunov_map("coulomb", grid, {"S0": 0.4}, periods=100).complete
+    True
+    """
+    model = load_model(model)
+    limits = limits_of(transient, periods, tolerance, confirm)
+    whole_number("tile", tile, least=1)
+    if executor is not None and not isinstance(executor, Executor):
+        raise ParameterError(
+            f"executor is a concurrent.futures.Executor, got {type(executor).__name__} (of a dask "
+            "client: client.get_executor())"
+        )
+    grid = _checked_axes(model, axes)
+    vector, example = _checked_params(model, grid, params or {})
+    check_excited(model, vector)
+    count = number_of_starts(model, state, starts, example)
+    states = None if state is None else _all_states(model, grid, vector, state, count)
+    job = _Job(model, grid, vector, count, states, checked_time(time), limits, tile)
+    kept = None if folder is None else open_tiles(Path(folder), job.record())
+    return LyapunovMap(model, grid, vector, _computed(job, executor, kept, progress))
+
+
+def _computed(
+    job: _Job, executor: Executor | None, kept: TileFolder | None, progress: Progress | None
+) -> TileRows:
+    rows = empty_tile((*job.shape, job.starts), len(job.model.states))
+    cut, tiles = job.places(), {}
+    for number, place in enumerate(cut):
+        tile = job.tile(place)
+        finished = kept.read(number, tile) if kept is not None else None
+        if finished is None:
+            tiles[number] = tile
+        else:
+            _put(rows, place, finished)
+    timer = Timer(len(cut), len(cut) - len(tiles), progress)
+    if kept is not None and timer.done:
+        timer.say(f"{timer.done} of {len(cut)} tiles are in {kept.path} already")
+    try:
+        if tiles:
+            _compile(job.model)
+        for number, found in compute_all(tiles, executor, timer.say):
+            if kept is not None:
+                kept.write(number, found)
+            _put(rows, cut[number], found)
+            timer.tick()
+    except KeyboardInterrupt:
+        timer.say(f"interrupted: {timer.done} of {len(cut)} tiles are finished")
+    return rows
+
+
+def _put(rows: TileRows, place: Place, found: TileRows) -> None:
+    # motions last: an interrupt in between must not leave a tile that counts as computed
+    for name in sorted((field.name for field in fields(TileRows)), key="motions".__eq__):
+        getattr(rows, name)[place] = getattr(found, name)
+
+
+def _compile(model: Model) -> None:
+    """Compile before tiles are spread, so that it is done once and found in the cache."""
+    from contfric.chaos.cells import follow_cells
+
+    model.flow.functions()
+    assert follow_cells.dispatcher is not None
+
+
+def _checked_axes(model: Model, axes: object) -> dict[str, FloatArray]:
+    if not isinstance(axes, Mapping) or len(axes) != 2:
+        raise ParameterError(
+            f"axes is a mapping of two parameters to their values, such as "
+            f'{{"Omega": [0.4, 0.5], "S": [0.1, 0.2]}}; got {axes!r}'
+        )
+    grid: dict[str, FloatArray] = {}
+    for name, given in axes.items():
+        model.index_of(name)
+        try:
+            values = np.array(given, dtype=np.float64)
+        except (TypeError, ValueError):
+            values = np.empty(0)
+        fine = values.ndim == 1 and len(values) > 0 and bool(np.isfinite(values).all())
+        if not fine or np.any(np.diff(values) <= 0.0):
+            raise ParameterError(
+                f"the values of '{name}' are a list of finite numbers in ascending order, got {given!r}"
+            )
+        grid[name] = values
+    return grid
+
+
+def _checked_params(
+    model: Model, grid: Mapping[str, FloatArray], params: Mapping[str, float]
+) -> tuple[FloatArray, dict[str, float]]:
+    """Return the fixed parameters as a vector, and all parameters of a point where the model is defined."""
+    (first, rows), (second, columns) = grid.items()
+    named = {**model.defaults, **params, first: rows[:, None], second: columns[None, :]}
+    try:
+        defined = np.argwhere(inside(model, named, (len(rows), len(columns))))
+    except TypeError:  # a value that is no number: what follows says so
+        defined = np.empty((0, 2), dtype=np.int64)
+    i, j = defined[0] if len(defined) else (0, 0)
+    example = model.check_params({**params, first: rows[i], second: columns[j]})
+    return model.vector(example), example
+
+
+def _all_states(
+    model: Model,
+    grid: Mapping[str, FloatArray],
+    vector: FloatArray,
+    state: StateLike,
+    count: int,
+) -> FloatArray:
+    """Return the initial states at each point, shape (len, len, starts, n)."""
+    shape = (*(len(values) for values in grid.values()), count, len(model.states))
+    if not callable(state):
+        return np.broadcast_to(given_states(model, state, {}), shape)
+    base = model.mapping(vector)
+    states = np.empty(shape)
+    for place, point in zip(np.ndindex(*shape[:2]), points_of(grid), strict=True):
+        found = given_states(model, state, {**base, **point})
+        if len(found) != count:
+            raise ParameterError(
+                f"state returns {count} states at one point and {len(found)} at another"
+            )
+        states[place] = found
+    return states

@@ -1,0 +1,320 @@
+"""Motions that have become periodic: recognised at a near return, solved for, exponents exact; compiled.
+
+Three joints of the past are remembered: one of the last period, one of the last 8, and one of a stretch that
+doubles from 64 on (R. P. Brent, BIT 20 (1980) 176-184). A later joint at the same surface, before the same
+mode, at the same phase and state to within 1e-6, is a near return. The cycle between the two is then
+solved for by Newton's method with the tangent map M of the cycle, ``(1 - M) dz = P(z) - z``, and accepted
+if it returns to 1e-11 and attracts. (A near return of a chaotic motion leads to a cycle that repels, or
+nowhere; then the motion goes on, and the next return has to be ten times nearer.)
+
+The exponents of the cycle are ``ln|mu| / T`` with the eigenvalues mu of M over its period T. Of the
+smallest one that is not zero, which a matrix in floating point would lose beside a large one, the sum is
+known: the logarithms of an orthonormalised frame (:func:`contfric.chaos.tangent.orthonormalise`) add up to
+``ln|mu_1 .. mu_r|`` over a cycle, without cancellation.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.chaos.tangent import (
+    ARRIVED,
+    Walk,
+    differentiate,
+    new_walk,
+    orthonormalise,
+    push,
+    to_joint,
+)
+from contfric.compiled import allocating_helper, helper
+from contfric.models.definition import FloatArray
+from contfric.orbit.cyclic import dense_solve
+from contfric.orbit.spectrum import spectrum
+from contfric.orbit.system import IntArray
+
+#: Joints that are remembered.
+_MEMORIES = 3
+#: A return this near (nondimensional) is worth solving for; each failure asks for a tenth of it. Small
+#: against the attractors (of size 1), and large enough to save two thirds of the way to rounding.
+NEAR = 1e-6
+#: A cycle that returns this near is periodic to rounding, which a period of a hundred events amplifies.
+_EXACT = 1e-11
+#: The same where rounding is amplified so much that Newton's method stands still before.
+_STALLED = 1e-9
+#: Most passes through a cycle: Newton's method squares 1e-6 to rounding in two.
+_PASSES = 6
+#: Longest correction: the orbit must be near, even where returns contract by 1e-3 only.
+_REACH = 1e-3
+#: A cycle that attracts to rounding; one of a continuum has a multiplier 1.
+_ATTRACTS = 1.0 + 1e-6
+#: What rounding adds to the logarithm of a multiplier at each joint.
+_ROUNDING = 1e-15
+#: Below this share of the largest multiplier the others of a matrix are rounding.
+_RESOLVED = 1e-8
+
+
+class Memory(NamedTuple):
+    """The joints that are remembered.
+
+    Attributes
+    ----------
+    key, cycle, event, span : mode and surface, period, number of the joint, and periods until it is
+        replaced; shape (3,)
+    z : phase and state, shape (3, 1 + n)
+    near : distance that counts as a return, shape (1,)
+    """
+
+    key: IntArray
+    cycle: IntArray
+    event: IntArray
+    span: IntArray
+    z: FloatArray
+    near: FloatArray
+
+
+class CycleRoom(NamedTuple):
+    """Room for a cycle: its own walk, its joint z, frames, and the algebra of a matrix."""
+
+    walk: Walk
+    z: FloatArray
+    images: FloatArray
+    frame: FloatArray
+    growth: FloatArray
+    logs: FloatArray
+    left: FloatArray
+    right: FloatArray
+    mu: NDArray[np.complex128]
+    symmetric: FloatArray
+    work: FloatArray
+    product: FloatArray
+    rates: FloatArray
+
+
+@allocating_helper
+def new_memory(n):  # type: ignore[no-untyped-def]
+    """Return room for the joints that are remembered."""
+    return Memory(
+        np.empty(_MEMORIES, dtype=np.int64),
+        np.empty(_MEMORIES, dtype=np.int64),
+        np.empty(_MEMORIES, dtype=np.int64),
+        np.empty(_MEMORIES, dtype=np.int64),
+        np.empty((_MEMORIES, 1 + n)),
+        np.empty(1),
+    )
+
+
+@allocating_helper
+def new_cycle_room(n):  # type: ignore[no-untyped-def]
+    """Return room for a cycle of n states."""
+    m = n + 1
+    return CycleRoom(
+        new_walk(n),
+        np.empty(m),
+        np.empty((m, m)),
+        np.empty((n, m)),
+        np.empty(n),
+        np.empty(n),
+        np.empty((m, m)),
+        np.empty((m, 1)),
+        np.empty(n, dtype=np.complex128),
+        np.empty(m + 1),
+        np.empty((m, m)),
+        np.empty((m, m)),
+        np.empty(n),
+    )
+
+
+@helper
+def forget(memory):  # type: ignore[no-untyped-def]
+    """Remember nothing."""
+    for i in range(memory.key.shape[0]):
+        memory.key[i] = -1
+        memory.cycle[i] = -1
+        memory.span[i] = 8**i
+    memory.near[0] = NEAR
+
+
+@helper
+def returned(memory, key, cycle, event, t, y, period):  # type: ignore[no-untyped-def]
+    """Return (joints, periods) since a joint that this one is a near return of; zeros if none.
+
+    What has been remembered for its span is replaced by this joint.
+    """
+    near = memory.near[0]
+    for i in range(memory.key.shape[0]):
+        turns = cycle - memory.cycle[i]
+        if memory.key[i] == key and turns >= 0:
+            slip = t - memory.z[i, 0]
+            if slip > 0.5 * period:
+                slip, turns = slip - period, turns + 1
+            elif slip < -0.5 * period:
+                slip, turns = slip + period, turns - 1
+            same = turns > 0 and abs(slip) <= near
+            for j in range(y.shape[0]):
+                same = same and abs(y[j] - memory.z[i, 1 + j]) <= near * (1.0 + abs(y[j]))
+            if same:
+                return event - memory.event[i], turns
+        if memory.key[i] < 0 or cycle - memory.cycle[i] > memory.span[i]:
+            if memory.key[i] >= 0 and i == memory.key.shape[0] - 1:
+                memory.span[i] *= 2
+            memory.key[i], memory.cycle[i], memory.event[i] = key, cycle, event
+            memory.z[i, 0] = t
+            for j in range(y.shape[0]):
+                memory.z[i, 1 + j] = y[j]
+    return 0, 0
+
+
+@helper
+def doubt(memory):  # type: ignore[no-untyped-def]
+    """Forget, and ask the next return to be nearer."""
+    for i in range(memory.key.shape[0]):
+        memory.key[i] = -1
+    memory.near[0] = max(0.1 * memory.near[0], _EXACT)
+
+
+@helper
+def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, room):  # type: ignore[no-untyped-def]
+    """Walk ``joints`` segments from the joint ``cycle.z`` with the tangent map.
+
+    Returns
+    -------
+    tuple
+        (mode and surface at the end as one number, -1 if the walk broke off; rank; periods; phase).
+        ``cycle.images`` holds the images of the unit vectors, row by row; ``cycle.logs`` the growth
+        of the frame.
+    """
+    walk, z, images, frame = cycle.walk, cycle.z, cycle.images, cycle.frame
+    n = walk.y.shape[0]
+    walk.at_once[0] = 0
+    t, turns, rank = z[0], 0, n
+    for i in range(n + 1):
+        for j in range(n + 1):
+            images[i, j] = 1.0 if i == j else 0.0
+    for j in range(n):
+        walk.y[j] = z[1 + j]
+        cycle.logs[j] = 0.0
+    key = -1
+    for _ in range(joints):
+        outcome, surface, following, duration, more, t = to_joint(
+            functions, tables, mode, on, t, p, period, walk, room
+        )
+        if outcome != ARRIVED:
+            return -1, rank, turns, t
+        observable = tables.observables[surface]
+        rate = differentiate(functions, observable, mode, duration, t, p, walk, room.none)
+        rank = min(rank, ranks[mode])
+        push(images, n + 1, rate, walk.jac, walk.grad, walk.image)
+        push(frame, rank, rate, walk.jac, walk.grad, walk.image)
+        if not orthonormalise(frame, rank, cycle.growth):
+            return -1, rank, turns, t
+        for k in range(rank):
+            cycle.logs[k] += cycle.growth[k]
+        turns += more
+        on = (1 << surface) | tables.lies_on[mode]
+        mode = following
+        key = mode * tables.observables.shape[0] + surface
+    return key, rank, turns, t
+
+
+@helper
+def correction(cycle):  # type: ignore[no-untyped-def]
+    """Solve ``(1 - M) dz = r`` in place of r; return the size of dz, infinity if singular."""
+    m = cycle.z.shape[0]
+    for i in range(m):
+        for j in range(m):
+            cycle.left[i, j] = (1.0 if i == j else 0.0) - cycle.images[j, i]
+    if not dense_solve(cycle.left, cycle.right):
+        return np.inf
+    size = 0.0
+    for i in range(m):
+        size = max(size, abs(cycle.right[i, 0]) / (1.0 + abs(cycle.z[i])))
+    return size if size < np.inf else np.inf
+
+
+@helper
+def cycle_rates(cycle, rank, time):  # type: ignore[no-untyped-def]
+    """Write the exponents of a cycle, largest first; return the largest modulus of a multiplier."""
+    n = cycle.rates.shape[0]
+    spectrum(cycle.images, rank, cycle.mu, cycle.symmetric, cycle.work, cycle.product)
+    total = 0.0
+    for k in range(rank):
+        total += cycle.logs[k]
+    largest = abs(cycle.mu[0]) if rank > 0 else 0.0
+    for k in range(n):
+        size = abs(cycle.mu[k]) if k < rank else 0.0
+        last = k == rank - 1 and k > 0
+        if size > 0.0 and not last and size > _RESOLVED * largest:
+            growth = math.log(size)
+        elif k < rank:
+            growth = total if last or k == 0 else cycle.logs[k]
+        else:
+            growth = -np.inf
+        cycle.rates[k] = growth / time
+        total -= growth if k < rank else 0.0
+    return largest
+
+
+@helper
+def solve_cycle(functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, room):  # type: ignore[no-untyped-def]
+    """Solve for the cycle through the joint ``cycle.z``.
+
+    Returns
+    -------
+    float
+        An estimate of the error of the largest exponent; negative if there is no such cycle, or it
+        repels. ``cycle.rates`` holds the exponents.
+    """
+    n, time = cycle.walk.y.shape[0], turns * period
+    before, moved, rate_before = np.inf, 0.0, 0.0
+    sensitivity, amplified = 0.0, 0.0
+    for step in range(_PASSES):
+        last, rank, done, t = go_round(
+            functions, tables, ranks, mode, on, joints, p, period, cycle, room
+        )
+        if last != key:
+            return -1.0
+        cycle.right[0, 0] = t + (done - turns) * period - cycle.z[0]
+        for j in range(n):
+            cycle.right[1 + j, 0] = cycle.walk.y[j] - cycle.z[1 + j]
+        gap = 0.0
+        for j in range(n + 1):
+            gap = max(gap, abs(cycle.right[j, 0]) / (1.0 + abs(cycle.z[j])))
+        largest = cycle_rates(cycle, rank, time)
+        if moved > 0.0:
+            sensitivity, amplified = abs(cycle.rates[0] - rate_before) / moved, moved / before
+        stalled = gap > 0.5 * before
+        if step > 0 and (gap <= _EXACT or (stalled and gap <= _STALLED)):
+            if not largest <= _ATTRACTS:
+                return -1.0
+            return sensitivity * gap * amplified + _ROUNDING * joints / time
+        if stalled or not gap < np.inf:
+            return -1.0
+        moved, rate_before, before = 0.0, cycle.rates[0], gap
+        if gap > _EXACT:
+            moved = correction(cycle)
+            if not moved <= _REACH:
+                return -1.0
+            for j in range(n + 1):
+                cycle.z[j] += cycle.right[j, 0]
+    return -1.0
+
+
+@helper
+def shortest(functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, room):  # type: ignore[no-untyped-def]
+    """Return the period of the cycle through ``cycle.z``, which may close before its end."""
+    for parts in range(turns, 1, -1):
+        if turns % parts != 0 or joints % parts != 0:
+            continue
+        last, _, done, t = go_round(
+            functions, tables, ranks, mode, on, joints // parts, p, period, cycle, room
+        )
+        gap = abs(t + (done - turns // parts) * period - cycle.z[0])
+        for j in range(cycle.walk.y.shape[0]):
+            gap = max(gap, abs(cycle.walk.y[j] - cycle.z[1 + j]) / (1.0 + abs(cycle.z[1 + j])))
+        if last == key and gap <= NEAR:
+            return turns // parts
+    return turns

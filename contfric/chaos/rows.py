@@ -1,0 +1,140 @@
+"""What the compiled cells take and fill: tables of a model, limits, and the rows of results."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from contfric.errors import ParameterError
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.simulation import tables
+from contfric.orbit.system import IntArray, mode_bounds
+
+
+class Starting(NamedTuple):
+    """Where a motion starts, and how much its modes pass on.
+
+    Attributes
+    ----------
+    mode, on : mode of an initial state, -1 if it is in no domain, and the surfaces that it leaves as
+        bits; by the signs of (observable - level), shape (3 ** surfaces,), surface k counting 3 ** k
+        for zero and twice that for plus
+    ranks : directions that survive a mode, shape (modes,)
+    """
+
+    mode: IntArray
+    on: IntArray
+    ranks: IntArray
+
+
+class Limits(NamedTuple):
+    """How long motions are followed.
+
+    Attributes
+    ----------
+    transient, periods : periods before the growth is averaged, and most periods that it is averaged over
+    tolerance : relative error of the largest exponent at which averaging ends
+    confirm : periods that a motion is followed further afterwards, whether it settles
+    """
+
+    transient: int
+    periods: int
+    tolerance: float
+    confirm: int = 0
+
+
+class CellRows(NamedTuple):
+    """Results of a call, one row a cell.
+
+    Attributes
+    ----------
+    exponents, errors : shape (cells, n), largest exponent first
+    motions, turns, followed : number of the motion, its period (0 if none) and the periods that it was
+        followed, shape (cells,)
+    """
+
+    exponents: FloatArray
+    errors: FloatArray
+    motions: IntArray
+    turns: IntArray
+    followed: IntArray
+
+
+def empty_rows(cells: int, n: int) -> CellRows:
+    """Return room for the results of some cells."""
+    numbers = (np.empty(cells, dtype=np.int64) for _ in range(3))
+    return CellRows(np.empty((cells, n)), np.empty((cells, n)), *numbers)
+
+
+@cache
+def starting(model: Model) -> Starting:
+    """Return the table of starts of a model."""
+    surfaces = [s.name for s in model.surfaces]
+    modes = [m.name for m in model.modes]
+    bounds = mode_bounds(model)
+    mode = np.full(3 ** len(surfaces), -1, dtype=np.int64)
+    on = np.zeros(3 ** len(surfaces), dtype=np.int64)
+    for signs in product((-1, 0, 1), repeat=len(surfaces)):
+        code = sum((sign + 1) * 3**k for k, sign in enumerate(signs))
+        named = dict(zip(surfaces, signs, strict=True))
+        domain = model.domain_at(named)
+        if domain is None:
+            continue
+        name = model.domain_by_name[domain].mode
+        mode[code] = modes.index(name)
+        on[code] = sum(1 << surfaces.index(k) for k in bounds[name] if named[k] == 0)
+    return Starting(mode, on, np.array([m.rank for m in model.modes], dtype=np.int64))
+
+
+def follow(
+    model: Model, vectors: FloatArray, states: FloatArray, time: float, limits: Limits
+) -> CellRows:
+    """Follow motions, compiled and without Python's lock, and return their rows.
+
+    Parameters
+    ----------
+    vectors, states : parameters and initial states, shapes (cells, parameters) and (cells, n)
+    time : initial time
+
+    Examples
+    --------
+    >>> from contfric.models import load_model
+    >>> model = load_model("coulomb")
+    >>> vectors = model.vector({"Omega": 0.5, "S": 0.32, "S0": 0.4})[None]
+    >>> rows = follow(model, vectors, np.array([[1.3, 0.0]]), 0.0, Limits(100, 600, 0.0))
+    >>> rows.turns
+    array([1])
+    """
+    from contfric.chaos.cells import follow_cells
+
+    rows = empty_rows(len(vectors), len(model.states))
+    follow_cells(
+        model.flow.functions(),
+        tables(model),
+        starting(model),
+        float(time),
+        np.ascontiguousarray(vectors),
+        np.ascontiguousarray(states),
+        limits,
+        rows,
+    )
+    return rows
+
+
+def check_excited(model: Model, vector: FloatArray) -> None:
+    """Refuse a model without a period: its motions would not be recognised as periodic.
+
+    Raises
+    ------
+    ParameterError
+        If the model is autonomous.
+    """
+    period = model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0))
+    if not period > 0.0:
+        raise ParameterError(
+            f"model '{model.name}' has no period of excitation: exponents are computed for models "
+            "that are excited periodically"
+        )

@@ -1,0 +1,146 @@
+"""Computing tiles on any executor: what it loses is computed again here, so that nothing is lost."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import (
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    as_completed,
+)
+from time import monotonic
+from typing import TypeAlias
+
+from contfric.chaos.tiles import Tile, TileRows, compute_tile
+
+Progress: TypeAlias = Callable[[str], None]
+
+#: Tiles that one process has under way for each of its threads: enough that none waits for the next,
+#: few enough that an interrupt has little to wait for.
+_AHEAD = 2
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def compute_all(
+    tiles: Mapping[int, Tile], executor: Executor | None, say: Progress
+) -> Iterator[tuple[int, TileRows]]:
+    """Yield (number, rows) of each tile as it is finished.
+
+    Parameters
+    ----------
+    executor : where the tiles are computed; by default threads of this process, as the kernels run
+        without Python's lock
+    say : called when the executor has lost tiles
+
+    A tile that fails there (a killed worker, a broken pool, a lost connection) is computed in this
+    process; only if that fails, too, is it an error.
+    """
+    left = dict(tiles)
+    if executor is not None:
+        lost: dict[int, BaseException] = {}
+        yield from _on_executor(left, executor, lost)
+        left = {number: tiles[number] for number in sorted(lost)}
+        if left:
+            why = type(next(iter(lost.values()))).__name__
+            say(f"{len(left)} tiles were lost by the executor ({why}): they are computed here")
+    if left:
+        yield from _on_threads(left)
+
+
+def _on_executor(
+    tiles: Mapping[int, Tile], executor: Executor, lost: dict[int, BaseException]
+) -> Iterator[tuple[int, TileRows]]:
+    numbers: dict[Future[TileRows], int] = {}
+    try:
+        for number, tile in tiles.items():
+            try:
+                numbers[executor.submit(compute_tile, tile)] = number
+            except (
+                Exception
+            ) as error:  # a pool that is broken, or has been shut down, takes no more
+                lost[number] = error
+        for future in as_completed(numbers):
+            try:
+                rows = future.result()
+            except (Exception, CancelledError) as error:
+                lost[numbers[future]] = error
+                continue
+            yield numbers[future], rows
+    finally:
+        _cancel(numbers)
+
+
+def _on_threads(tiles: Mapping[int, Tile]) -> Iterator[tuple[int, TileRows]]:
+    count = min(processors(), len(tiles))
+    pool = ThreadPoolExecutor(count, thread_name_prefix="contfric-tile")
+    waiting = iter(tiles.items())
+    running: dict[Future[TileRows], int] = {}
+
+    def start(most: int) -> None:
+        while len(running) < most and (following := next(waiting, None)) is not None:
+            running[pool.submit(compute_tile, following[1])] = following[0]
+
+    try:
+        start(count * _AHEAD)
+        while running:
+            done = next(as_completed(running))
+            number = running.pop(done)
+            start(count * _AHEAD)
+            yield number, done.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _cancel(futures: Iterable[Future[TileRows]]) -> None:
+    for future in futures:
+        future.cancel()
+
+
+class Timer:
+    """Says how far a map is, and when it will be done."""
+
+    def __init__(self, total: int, done: int, progress: Progress | None) -> None:
+        self.total, self.first, self.done = total, done, done
+        self.progress, self.began = progress, monotonic()
+
+    def say(self, text: str) -> None:
+        """Say something, if anybody listens."""
+        if self.progress is not None:
+            self.progress(text)
+
+    def tick(self) -> None:
+        """Count a tile, and say what is left."""
+        self.done += 1
+        if self.progress is None:
+            return
+        text = f"Lyapunov map: {self.done} of {self.total} tiles"
+        left = self.total - self.done
+        if left:
+            each = (monotonic() - self.began) / (self.done - self.first)
+            text += f", {self.done / self.total:.0%}, about {duration(each * left)} left"
+        self.say(text)
+
+
+def duration(seconds: float) -> str:
+    """Return a time as people say it.
+
+    Examples
+    --------
+    >>> duration(4.2), duration(250), duration(8000)
+    ('4 s', '4 min 10 s', '2 h 13 min')
+    """
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

@@ -1,0 +1,38 @@
+"""What a motion turned out to be."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class Motion(str, Enum):
+    """What a motion turned out to be; the text says what its exponents mean.
+
+    The order is that of the numbers in the arrays of a :class:`~contfric.chaos.map.LyapunovMap`.
+
+    Examples
+    --------
+    >>> Motion.CHAOTIC.code
+    2
+    """
+
+    PERIODIC = "settled on a periodic orbit; the exponents are exact"
+    TRANSIENT = "irregular for a time, then settled on a periodic orbit, whose exponents are given"
+    CHAOTIC = "no period found, and the largest exponent is positive beyond doubt"
+    SETTLING = "not periodic yet, but the largest exponent is negative beyond its error"
+    UNDECIDED = "no period found, and the sign of the largest exponent is not certain"
+    HELD = "the mass stays at rest for ever; the exponents are those of the rest position"
+    UNBOUNDED = "the motion grew with no bound in sight; there are no exponents"
+    NO_MOTION = "no motion starts there, or its events follow each other at once; no exponents"
+    OUTSIDE = "the model is not defined at these parameters; there are no exponents"
+    MISSING = "not computed: the map was interrupted"
+
+    @property
+    def code(self) -> int:
+        """Its number in arrays."""
+        return list(Motion).index(self)
+
+    @property
+    def exact(self) -> bool:
+        """Whether the exponents come from a multiplier, not from an average."""
+        return self in (Motion.PERIODIC, Motion.TRANSIENT, Motion.HELD)

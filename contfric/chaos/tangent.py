@@ -1,0 +1,196 @@
+"""The exact tangent map of the event-driven flow, joint by joint, compiled.
+
+A joint is a point ``z = (t, y)`` where one segment ends on a surface and the next one starts. With the
+flow ``phi(t_0, y_0, d)`` of the segment's mode and the surface ``g(t, y) = 0`` that it ends on, the next
+joint ``(t_1, y_1)`` solves::
+
+    y_1 = phi(t_0, y_0, t_1 - t_0),      g(t_1, y_1) = 0.
+
+A perturbation ``(dt_0, dy_0)`` of the joint therefore becomes (implicit function theorem; phi_t, phi_y
+and phi_d are the derivatives of phi)::
+
+    a = (phi_t - phi_d) dt_0 + phi_y dy_0,       rate = g_t + g_y . phi_d,
+    dt_1 = -(g_y . a) / rate,                    dy_1 = a + phi_d dt_1.
+
+The next segment starts where this one ends, so nothing has to be added at a switch: in the coordinates
+of the joint, time among them, the map is the product over the segments. (At a fixed time the same
+perturbation is ``dy - f dt`` with f the field before or behind the switch; the difference of the two is
+the saltation matrix of P. C. Mueller, Chaos, Solitons & Fractals 5 (1995) 1671-1681, which is contained
+here.) The direction of the flow, ``(1, f)``, is mapped to zero: n directions are left of 1 + n.
+
+A stick forgets the velocity and passes fewer directions than a slide: the rank of the mode says how many.
+``docs/lyapunov.md`` has the derivation at length, and what happens at jumps of the return map.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from contfric.compiled import allocating_helper, helper
+from contfric.models.definition import FloatArray
+from contfric.orbit.system import IntArray
+from contfric.orbit.trajectory import (
+    HELD,
+    HOLD_PERIODS,
+    IMPOSSIBLE,
+    INFINITE,
+    MOST_AT_ONCE,
+    NO_TIME,
+    SLIDE_PERIODS,
+    TOO_LARGE,
+    StateRoom,
+    copy_state,
+    first_hit,
+    sign_code,
+)
+
+#: A walk has come to the next joint; otherwise it ended as a simulation does (HELD, IMPOSSIBLE, INFINITE).
+ARRIVED = 0
+
+
+class Walk(NamedTuple):
+    """A state on its way from joint to joint, with the derivative of the last segment.
+
+    Attributes
+    ----------
+    y, start : state, and start (t, y) of the segment, shapes (n,) and (1 + n,)
+    jac, grad : derivatives of the segment's flow and of the observable at its end
+    end, image : room for a state and for the image of a perturbation, shape (n,)
+    at_once : number of events in a row that followed each other at once, shape (1,)
+    """
+
+    y: FloatArray
+    start: FloatArray
+    jac: FloatArray
+    grad: FloatArray
+    end: FloatArray
+    image: FloatArray
+    at_once: IntArray
+
+
+@allocating_helper
+def new_walk(n):  # type: ignore[no-untyped-def]
+    """Return the room for a walk of n states."""
+    return Walk(
+        np.empty(n),
+        np.empty(1 + n),
+        np.empty((n, 2 + n)),
+        np.empty(1 + n),
+        np.empty(n),
+        np.empty(n),
+        np.zeros(1, dtype=np.int64),
+    )
+
+
+@allocating_helper
+def state_room(n):  # type: ignore[no-untyped-def]
+    """Return the room that the search of first hits needs."""
+    none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
+    return StateRoom(none, empty, nothing, np.empty(n), np.empty(n))
+
+
+@helper
+def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ignore[no-untyped-def]
+    """Go on to the next joint; a surface that is only touched is passed.
+
+    Returns
+    -------
+    tuple
+        (outcome, surface, mode that follows, duration, periods completed, phase).
+    """
+    y, observables = walk.y, tables.observables
+    walk.start[0] = t
+    for j in range(y.shape[0]):
+        walk.start[1 + j] = y[j]
+    duration, turns = 0.0, 0
+    longest = (HOLD_PERIODS if tables.sliding[mode] else SLIDE_PERIODS) * period
+    while True:
+        tau, surface = first_hit(functions, tables, mode, on, t, y, p, longest, room)
+        if surface < 0:  # a slide that is never left would be an error
+            held = tables.sliding[mode] != 0
+            return HELD if held else IMPOSSIBLE, surface, mode, duration, turns, t
+        copy_state(room.after, y)
+        t, duration = t + tau, duration + tau
+        while t >= period:
+            t -= period
+            turns += 1
+        for j in range(y.shape[0]):
+            if not abs(y[j]) < TOO_LARGE:
+                return INFINITE, surface, mode, duration, turns, t
+        walk.at_once[0] = walk.at_once[0] + 1 if tau <= NO_TIME * period else 0
+        if walk.at_once[0] > MOST_AT_ONCE:
+            return IMPOSSIBLE, surface, mode, duration, turns, t
+        code = sign_code(functions, observables, surface, t, y, p, room.none, room.empty)
+        count = observables.shape[0]
+        following = tables.following[(mode * count + surface) * (1 << count) + code]
+        if following >= 0:
+            return ARRIVED, surface, following, duration, turns, t
+        on = 1 << surface
+
+
+@helper
+def differentiate(functions, observable, mode, duration, t, p, walk, none):  # type: ignore[no-untyped-def]
+    """Differentiate the segment that a walk has just finished; return the rate at its exit."""
+    n = walk.y.shape[0]
+    jac, grad, start = walk.jac, walk.grad, walk.start
+    functions[0](mode, start[0], start[1:], duration, p, none, walk.end, jac)
+    functions[1](observable, t, walk.y, p, none, grad)
+    rate = grad[0]
+    for k in range(n):
+        rate += grad[1 + k] * jac[k, 1 + n]
+    return rate
+
+
+@helper
+def push(frame, count, rate, jac, grad, image):  # type: ignore[no-untyped-def]
+    """Replace the first rows of a frame, perturbations (dt, dy), by their images."""
+    n = image.shape[0]
+    for i in range(count):
+        along = 0.0
+        for j in range(n):
+            a = (jac[j, 0] - jac[j, 1 + n]) * frame[i, 0]
+            for k in range(n):
+                a += jac[j, 1 + k] * frame[i, 1 + k]
+            image[j] = a
+            along += grad[1 + j] * a
+        later = -along / rate
+        frame[i, 0] = later
+        for j in range(n):
+            frame[i, 1 + j] = image[j] + jac[j, 1 + n] * later
+
+
+@helper
+def orthonormalise(frame, count, growth):  # type: ignore[no-untyped-def]
+    """Make the first rows orthonormal (Gram and Schmidt); write the logarithms of their lengths.
+
+    False if a length is zero or not finite.
+    """
+    width = frame.shape[1]
+    for i in range(count):
+        for k in range(i):
+            share = 0.0
+            for j in range(width):
+                share += frame[i, j] * frame[k, j]
+            for j in range(width):
+                frame[i, j] -= share * frame[k, j]
+        square = 0.0
+        for j in range(width):
+            square += frame[i, j] * frame[i, j]
+        if not 0.0 < square < np.inf:
+            return False
+        growth[i] = 0.5 * math.log(square)
+        scale = 1.0 / math.sqrt(square)
+        for j in range(width):
+            frame[i, j] *= scale
+    return True
+
+
+@helper
+def seed(frame, first):  # type: ignore[no-untyped-def]
+    """Start the rows from ``first`` on as perturbations of one state each."""
+    for i in range(first, frame.shape[0]):
+        for j in range(frame.shape[1]):
+            frame[i, j] = 1.0 if j == 1 + i else 0.0

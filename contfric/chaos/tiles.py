@@ -1,0 +1,193 @@
+"""A tile of a map: an independent task that any process can compute, to the same bits.
+
+A task carries numbers and the model's name, and the cells of a tile do not know of each other. A model that
+is not known by its name is carried as it is; each process keeps it, so that what belongs to it (the
+tables of its transitions) is made once.
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.chaos.rows import Limits, follow
+from contfric.chaos.starts import default_states
+from contfric.chaos.status import Motion
+from contfric.errors import ParameterError
+from contfric.models import load_model
+from contfric.models.definition import FloatArray, Model
+
+
+@dataclass(frozen=True, eq=False)
+class TileRows:
+    """Results of a tile; all arrays begin with shape (rows, columns, starts).
+
+    Attributes
+    ----------
+    exponents : shape (rows, columns, starts, n)
+    errors, motions, periods, followed : error of the largest exponent, number of the motion, its period,
+        periods that it was followed
+    """
+
+    exponents: FloatArray
+    errors: FloatArray
+    motions: NDArray[np.uint8]
+    periods: NDArray[np.int32]
+    followed: NDArray[np.int32]
+
+
+def empty_tile(shape: tuple[int, int, int], n: int) -> TileRows:
+    """Return rows of which nothing is computed yet."""
+    return TileRows(
+        np.full((*shape, n), np.nan),
+        np.full(shape, np.nan),
+        np.full(shape, Motion.MISSING.code, dtype=np.uint8),
+        np.zeros(shape, dtype=np.int32),
+        np.zeros(shape, dtype=np.int32),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """A task: the cells of a rectangle of the grid.
+
+    Attributes
+    ----------
+    model : Model
+    limits : Limits
+        How long motions are followed.
+    vector : ndarray, shape (parameters,)
+        The parameters that do not vary.
+    varied : tuple of int
+        Positions of the two that do.
+    values : tuple of ndarray
+        Their values in this tile, shapes (rows,) and (columns,).
+    starts : int
+        Motions in each cell.
+    states : ndarray or None
+        Their initial states, shape (rows, columns, starts, n); None for the default ones.
+    time : float
+        Their initial time.
+    """
+
+    model: Model
+    limits: Limits
+    vector: FloatArray
+    varied: tuple[int, int]
+    values: tuple[FloatArray, FloatArray]
+    starts: int
+    states: FloatArray | None
+    time: float
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        rest = (self.vector, self.varied, self.values, self.starts, self.states, self.time)
+        return _rebuilt, (_packed(self.model), tuple(self.limits), *rest)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Rows, columns and starts."""
+        return len(self.values[0]), len(self.values[1]), self.starts
+
+    def vectors(self) -> FloatArray:
+        """Return the parameters of each cell, shape (rows * columns, parameters)."""
+        rows, columns, _ = self.shape
+        vectors = np.tile(self.vector, (rows, columns, 1))
+        vectors[:, :, self.varied[0]] = self.values[0][:, None]
+        vectors[:, :, self.varied[1]] = self.values[1][None, :]
+        return vectors.reshape(rows * columns, -1)
+
+
+def _packed(model: Model) -> str | bytes:
+    try:
+        if load_model(model.name) is model:
+            return model.name
+    except ParameterError:
+        pass
+    return pickle.dumps(model)
+
+
+@lru_cache(maxsize=16)
+def _unpacked(model: str | bytes) -> Model:
+    found = load_model(model) if isinstance(model, str) else pickle.loads(model)
+    assert isinstance(found, Model)
+    return found
+
+
+def _rebuilt(model: str | bytes, limits: tuple[int, int, float, int], *rest: Any) -> Tile:
+    return Tile(_unpacked(model), Limits(*limits), *rest)
+
+
+def inside(model: Model, named: Mapping[str, Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Tell where a model is defined; its parameters are numbers or arrays that make up ``shape``."""
+    holds = np.ones(shape, dtype=np.bool_)
+    for constraint in model.constraints:
+        left = constraint.value(named)
+        holds &= (left > 0.0) if constraint.strict else (left >= 0.0)
+    return holds
+
+
+def compute_tile(tile: Tile) -> TileRows:
+    """Compute the cells of a tile; what it returns depends on nothing but the tile."""
+    rows, columns, starts = tile.shape
+    n = len(tile.model.states)
+    vectors = tile.vectors()
+    columns_of = dict(zip(tile.model.parameter_names, vectors.T, strict=True))
+    defined = inside(tile.model, columns_of, (len(vectors),))
+    found = empty_tile((rows * columns, starts, 1), n)
+    found.motions[~defined] = Motion.OUTSIDE.code
+    vectors = vectors[defined]
+    if tile.states is not None:
+        states = tile.states.reshape(rows * columns, starts, n)[defined]
+    else:
+        named = (tile.model.mapping(vector) for vector in vectors)
+        states = np.array([default_states(tile.model, params, starts) for params in named])
+    cells = follow(
+        tile.model,
+        np.repeat(vectors, starts, axis=0),
+        states.reshape(-1, n),
+        tile.time,
+        tile.limits,
+    )
+    shape = (len(vectors), starts, 1)
+    found.exponents[defined] = cells.exponents.reshape(*shape, n)
+    found.errors[defined] = cells.errors[:, 0].reshape(shape)
+    found.motions[defined] = cells.motions.reshape(shape)
+    found.periods[defined] = cells.turns.reshape(shape)
+    found.followed[defined] = cells.followed.reshape(shape)
+    return reshaped(found, (rows, columns, starts))
+
+
+def reshaped(rows: TileRows, shape: tuple[int, int, int]) -> TileRows:
+    """Return the same rows in another shape."""
+    return TileRows(
+        rows.exponents.reshape(*shape, -1),
+        rows.errors.reshape(shape),
+        rows.motions.reshape(shape),
+        rows.periods.reshape(shape),
+        rows.followed.reshape(shape),
+    )
+
+
+Place = tuple[slice, slice]
+
+
+def places(shape: tuple[int, int], side: int) -> Iterator[Place]:
+    """Yield the rectangles that a grid is cut into, row by row.
+
+    Examples
+    --------
+    >>> [(rows.start, columns.stop) for rows, columns in places((2, 3), 2)]
+    [(0, 2), (0, 3)]
+    """
+    for row in range(0, shape[0], side):
+        for column in range(0, shape[1], side):
+            yield (
+                slice(row, min(row + side, shape[0])),
+                slice(column, min(column + side, shape[1])),
+            )
