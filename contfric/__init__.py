@@ -15,6 +15,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from contfric.atlas.census import census
+    from contfric.atlas.census_result import Census
     from contfric.atlas.diagram import Diagram
     from contfric.atlas.explore import explore
     from contfric.chaos.compute import lyapunov_map
@@ -47,6 +49,7 @@ _HOMES = {
     "AperiodicError": "contfric.errors",
     "Bifurcation": "contfric.continuation.events",
     "Branch": "contfric.continuation.branch",
+    "Census": "contfric.atlas.census_result",
     "ContfricError": "contfric.errors",
     "ConvergenceError": "contfric.errors",
     "Diagram": "contfric.atlas.diagram",
@@ -62,6 +65,7 @@ _HOMES = {
     "ResultFileError": "contfric.errors",
     "Signature": "contfric.signature",
     "StudyError": "contfric.errors",
+    "census": "contfric.atlas.census",
     "continue_orbit": "contfric.continuation.trace",
     "explore": "contfric.atlas.explore",
     "find_orbit": "contfric.orbit.find",
@@ -83,6 +87,7 @@ __all__ = [
     "AperiodicError",
     "Bifurcation",
     "Branch",
+    "Census",
     "ContfricError",
     "ConvergenceError",
     "Diagram",
@@ -99,6 +104,7 @@ __all__ = [
     "Signature",
     "StudyError",
     "__version__",
+    "census",
     "continue_orbit",
     "explore",
     "find_orbit",

@@ -230,6 +230,29 @@ def _say_what_settles(
     say(f"x from {orbit.x_min:.12g} to {orbit.x_max:.12g}, multipliers {multipliers}")
 
 
+def census(options: argparse.Namespace) -> int:
+    """``contfric census``: the orbits as a table, then what was tried and what bounds it."""
+    from contfric.atlas.census import census as take
+    from contfric.cli.progress import ProgressLine
+
+    params = dict(_assignment(text) for text in options.params)
+    with ProgressLine(options.quiet) as progress:
+        found = take(
+            options.model,
+            params,
+            periods=options.periods,
+            stops=options.stops,
+            finer=options.finer,
+            seed=options.seed,
+            progress=progress,
+        )
+    print(json.dumps(found.to_dict(), indent=2) if options.json else found)
+    if found.interrupted:
+        say("interrupted: what was found until then is listed")
+        return Exit.INTERRUPTED
+    return Exit.DONE
+
+
 def _assignment(text: str) -> tuple[str, float]:
     name, sign, value = text.partition("=")
     if not sign or not name.strip():

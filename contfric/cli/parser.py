@@ -10,7 +10,7 @@ from typing import NoReturn
 from contfric.cli import commands
 from contfric.errors import ContfricError, did_you_mean
 
-_COMMANDS = ("run", "explain", "info", "signatures", "graph", "simulate")
+_COMMANDS = ("run", "explain", "info", "signatures", "graph", "simulate", "census")
 _DEBUG = "show the traceback of an error"
 
 
@@ -82,6 +82,7 @@ def _parser() -> _Parser:
     _fill_signatures(add("signatures", commands.list_signatures, "list, show or check signatures"))
     _fill_graph(add("graph", commands.graph, "print or draw the transitions of a model"))
     _fill_simulate(add("simulate", commands.simulate, "print the events of a trajectory as CSV"))
+    _fill_census(add("census", commands.census, "list all periodic orbits, stable or not"))
     return parser
 
 
@@ -144,6 +145,25 @@ def _fill_simulate(parser: argparse.ArgumentParser) -> None:
     add("--periods", type=_number, default=100.0, help="excitation periods (%(default)s)")
     add("--events", type=_count, default=1_000_000, help="most events to follow (%(default)s)")
     add("--find", action="store_true", help="say on stderr what the motion settles on")
+
+
+def _fill_census(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("model", metavar="MODEL", nargs="?", default="coulomb", help="a model (%(default)s)")
+    add(
+        *("-p", "--param"),
+        dest="params",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="a parameter",
+    )
+    add("--periods", type=_count, default=2, help="most excitation periods (%(default)s)")
+    add("--stops", type=_count, default=6, help="most stops (%(default)s)")
+    add("--finer", type=int, default=0, help="halvings of all cells, 0 to 3 (%(default)s)")
+    add("--seed", type=int, default=0, help="shifts the nets (%(default)s)")
+    add("--json", action="store_true", help="print everything as JSON")
+    add("--quiet", action="store_true", help="no progress")
 
 
 def _number(text: str) -> float:

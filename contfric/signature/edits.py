@@ -234,7 +234,7 @@ def is_closed_walk(word: Sequence[ReducedPair], model: Model) -> bool:
     for entry in (domain.name for domain in model.domains if domain.mode == modes[0]):
         reached = {entry}
         for index, (mode, surface) in enumerate(word):
-            reached = _entered(reached, surface, model, mode, modes[(index + 1) % len(word)])
+            reached = entered(reached, surface, model, mode, modes[(index + 1) % len(word)])
         if entry in reached:
             return True
     return False
@@ -245,7 +245,7 @@ def show(word: Iterable[ReducedPair]) -> str:
     return " ".join(mode if surface == NEVER else f"{mode}|{surface}" for mode, surface in word)
 
 
-def _entered(
+def entered(
     entries: Iterable[str], surface: str, model: Model, mode: str, next_mode: str
 ) -> set[str]:
     """Return the domains of the next mode that a segment can lead to from its entries."""
@@ -317,8 +317,8 @@ def _new_stick(word: ReducedWord, joint: int, surface: str, model: Model) -> Red
     next_mode = word[(joint + 1) % len(word)][0]
     slides = [domain.name for domain in model.domains if domain.mode == mode]
     for stick in (m.name for m in model.modes if m.sliding):
-        held = _entered(slides, stop, model, mode, stick)
-        if _entered(held, surface, model, stick, next_mode):
+        held = entered(slides, stop, model, mode, stick)
+        if entered(held, surface, model, stick, next_mode):
             return stick, surface
     raise NotationError(
         f"no stick that ends at {surface} fits between '{mode}' and '{next_mode}' "

@@ -1,0 +1,44 @@
+"""The page on the census: its code runs, and its output is what the command prints."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from contfric.cli import main
+from contfric.cli.exits import Exit
+
+PAGE = (Path(__file__).parents[2] / "docs/census.md").read_text()
+
+
+def test_code_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    blocks = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    assert blocks
+    scope: dict[str, object] = {}
+    for block in blocks:
+        exec(compile(block, "docs/census.md", "exec"), scope)
+    assert "1a False" in capsys.readouterr().out
+
+
+def test_output_is_that_of_the_command(capsys: pytest.CaptureFixture[str]) -> None:
+    shown = re.search(r"```console\n\$ contfric (census [^\n]*)\n(.*?)```", PAGE, re.DOTALL)
+    assert shown is not None
+    assert main(shlex.split(shown[1])) == Exit.DONE
+    printed = capsys.readouterr().out
+    # how many starts the net takes may depend on the last bit of the flow; the rest may not
+    assert re.sub(r"\d+ (of \d+ )?starts", "N starts", printed) == re.sub(
+        r"\d+ (of \d+ )?starts", "N starts", shown[2]
+    )
+
+
+def test_numbers_of_words() -> None:
+    from contfric.atlas.census_words import closed_words
+    from contfric.models import load_model
+
+    found = re.search(r"pair: ([\d, ]+) of the oscillator for N = ([\d, ]+),", PAGE)
+    assert found is not None
+    counts, stops = ([int(n) for n in part.split(",")] for part in found.groups())
+    assert [len(closed_words(load_model("coulomb"), n)) for n in stops] == counts
