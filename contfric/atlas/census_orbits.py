@@ -9,6 +9,7 @@ import numpy as np
 from contfric.atlas.census_words import canonical_pair
 from contfric.atlas.matching import stops_distance
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import settle
 from contfric.signature import ReducedWord
 
@@ -34,7 +35,7 @@ class Catalogue:
 
     def add(self, orbit: Orbit) -> None:
         """Add an orbit unless it is known, or repeats a shorter one."""
-        if is_repetition(orbit):
+        if shortest(orbit) is not orbit:
             return
         walk = canonical_pair(orbit.model, orbit.word), orbit.periods
         found = self.orbits.setdefault(walk, [])
@@ -57,20 +58,3 @@ class Catalogue:
 def extent(orbit: Orbit) -> float:
     """Return the largest displacement of an orbit or its mirror image."""
     return float(np.max(np.abs(orbit.stops)))
-
-
-def is_repetition(orbit: Orbit) -> bool:
-    """Tell whether an orbit is a shorter one run through several times."""
-    whole = orbit.as_whole()
-    word, joints = whole.system.word, whole.joints
-    for turns in range(2, whole.periods + 1):
-        if whole.periods % turns or len(word) % turns:
-            continue
-        part = len(word) // turns
-        if word != word[:part] * turns:
-            continue
-        step = joints[part:] - joints[:-part]
-        step[:, 0] -= whole.period / turns
-        if np.max(np.abs(step)) < _SAME * (1.0 + np.max(np.abs(joints))):
-            return True
-    return False

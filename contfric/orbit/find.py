@@ -11,6 +11,7 @@ from contfric.errors import AperiodicError, ConvergenceError, whole_number
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.repetition import shortest
 from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
 from contfric.orbit.solve import settle
 from contfric.orbit.system import build_system
@@ -154,7 +155,7 @@ def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:
         orbit = _orbit_of_lag(trajectory, lag, turns)
         if orbit is None:
             continue
-        solved = settle(orbit)
+        solved = settle(shortest(settle(orbit)))
         if solved.converged and solved.admissible and (mismatch <= _EXACT or _attracts(solved)):
             return solved
         if mismatch <= _EXACT and not solved.converged:

@@ -166,7 +166,9 @@ def correct(  # type: ignore[no-untyped-def]
             return CONVERGED, step + 1, first, worst
         if not damped and step > 1 and size > 2.0 * before:
             return NOT_CONVERGED, step + 1, first, worst
-        before = size
+        before = (
+            size if share == 1.0 else np.inf
+        )  # a correction that was cut tells nothing of the order
     return NOT_CONVERGED, _MOST_STEPS, first, worst
 
 

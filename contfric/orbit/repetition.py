@@ -1,0 +1,38 @@
+"""Orbits that are shorter ones run through several times."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import build_system
+
+#: Joints that repeat themselves to this (relative to 1 + their size) are the same: rounding over a
+#: multiplier's distance from 1 of 1e-7.
+_SAME = 1e-8
+
+
+def shortest(orbit: Orbit) -> Orbit:
+    """Return the orbit of fewest periods that runs through the same motion; most often the same.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> shortest(orbit.doubled()).periods
+    1
+    """
+    whole = orbit.as_whole()
+    word, joints = whole.system.word, whole.joints
+    for turns in range(whole.periods, 1, -1):
+        part, rest = divmod(len(word), turns)
+        if whole.periods % turns or rest or word != word[:part] * turns:
+            continue
+        step = joints[part:] - joints[:-part]
+        step[:, 0] -= whole.period / turns
+        if np.max(np.abs(step)) < _SAME * (1.0 + np.max(np.abs(joints))):
+            system = build_system(whole.model, word[:part], whole.periods // turns)
+            return replace(whole, system=system, joints=joints[:part])
+    return orbit
