@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
-from contfric.continuation.locate import SAME_PLACE, locate_events, locate_value, nearly_reached
+from contfric.continuation.locate import locate_events
 from contfric.continuation.points import (
     EXTRA,
     FIRST_STEP,
@@ -21,6 +21,9 @@ from contfric.continuation.points import (
     settings_of,
 )
 from contfric.continuation.side import Side, first_point
+from contfric.continuation.sliding import nearly_reached
+from contfric.continuation.smooth import SAME_PLACE
+from contfric.continuation.trial import locate_value
 from contfric.continuation.vertices import at_vertex
 from contfric.errors import ConvergenceError
 from contfric.orbit.orbit import Orbit
@@ -167,15 +170,17 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     """Locate what happened over the last step; True if the side ends there."""
     before, after = side.before_tip, side.tip
     limit = _limit_crossed(orbit, before, after, settings)
-    for bifurcation, point in locate_events(orbit, before, after, settings):
+    located = locate_events(orbit, before, after, settings)
+    for bifurcation, point in located:
         if limit is not None and (
             point.arc > limit[0].arc - _AT_LIMIT * (after.arc - before.arc)
             or not settings.low <= point.value <= settings.high
         ):
             break
         if _is_at_limit(point.value, settings):
-            if settings.low <= point.value <= settings.high:
-                side.put_tip(point)
+            inside = [p for _, p in located if settings.low <= p.value <= settings.high]
+            if inside:
+                side.put_tip(inside[0])
             else:  # conditions degenerate together there: the last good point is as near as one gets
                 side.drop_tip()
             side.end = _limit_end(point.value > 0.5 * (settings.low + settings.high), settings)

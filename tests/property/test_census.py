@@ -16,11 +16,11 @@ import contfric as cf
 from contfric.atlas.census import _Census
 from contfric.atlas.census_conditions import Arcs, Fate, least_periods
 from contfric.atlas.census_net import Limits
-from contfric.atlas.census_orbits import is_repetition
 from contfric.atlas.census_sections import sections_of
 from contfric.atlas.census_words import canonical_pair, closed_words, letters_of, stops_of
 from contfric.atlas.matching import identity, stops_distance
 from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish
 from contfric.signature import ReducedWord
 from contfric.signature.edits import is_closed_walk
@@ -56,7 +56,7 @@ def has(found: cf.Census, orbit: Orbit) -> bool:
 
 
 def asked_for(orbit: Orbit) -> bool:
-    return orbit.periods <= PERIODS and len(orbit.stops) <= STOPS and not is_repetition(orbit)
+    return orbit.periods <= PERIODS and len(orbit.stops) <= STOPS and shortest(orbit) is orbit
 
 
 def attractors(seed: int) -> Iterator[Orbit]:

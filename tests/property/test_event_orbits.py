@@ -110,21 +110,21 @@ def test_an_event_that_cannot_be_located_is_said(
     column: int, kind: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """The sign change is known, the place is not: reported at the point before, and not followed."""
-    from contfric.continuation import locate
+    from contfric.continuation import smooth
     from contfric.continuation.points import EXTRA
 
-    trial = locate._trial
+    trial = smooth.locate_change
 
     def failing(orbit, before, after, settings, by, index, *rest):  # type: ignore[no-untyped-def]
         if by == 0 and index == len(before.tests) - EXTRA + column:
             return None
         return trial(orbit, before, after, settings, by, index, *rest)
 
-    monkeypatch.setattr(locate, "_trial", failing)
+    monkeypatch.setattr(smooth, "locate_change", failing)
     found = cf.explore(cf.find_orbit("coulomb", PARAMS), "Omega", (0.4, 0.6))
     (event,) = [b for b in found.bifurcations if not b.located]
     assert event.kind == kind
     assert "not located" in repr(event)
-    assert any("not located" in note for note in found.notes)
+    assert any("not located" in proposal.why for proposal in event.proposals)
     cf.save(found, tmp_path / "diagram.npz")
     assert [b.located for b in cf.load(tmp_path / "diagram.npz").bifurcations].count(False) == 1

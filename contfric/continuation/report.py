@@ -1,0 +1,50 @@
+"""A located event as a result."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind, outward_rate
+from contfric.continuation.points import Point, Settings
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Test
+
+#: Accuracy of an event (relative to the range) where CS and AS coincide: the root of rounding.
+_ROUGH = 1e-6
+#: A load that changes this slowly at a stop stands still there.
+_STILL = 1e-4
+
+
+def bifurcation_at(
+    kind: Kind,
+    here: Orbit,
+    before: Point,
+    after: Point | None,
+    point: Point,
+    settings: Settings,
+    tests: tuple[Test, ...] = (),
+) -> Bifurcation:
+    """Return the event at a point, with the stability of the points before and after it."""
+    return Bifurcation(
+        kind,
+        here.params,
+        here,
+        tests,
+        point.arc,
+        _stable(before, here, settings),
+        None if after is None else _stable(after, here, settings),
+        accuracy=_ROUGH if _is_rough(kind, here, tests) else ACCURACY,
+    )
+
+
+def _is_rough(kind: Kind, here: Orbit, tests: tuple[Test, ...]) -> bool:
+    """Tell whether an event is located to the root of rounding only: CS where the load stands still."""
+    return kind is Kind.CS and any(
+        abs(outward_rate(here.system, test, here)) < _STILL for test in tests
+    )
+
+
+def _stable(point: Point, here: Orbit, settings: Settings) -> bool | None:
+    if here.system.holds:
+        return False
+    return bool(np.all(np.abs(point.mu) < 1.0)) if settings.stability else None

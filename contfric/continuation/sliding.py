@@ -1,0 +1,130 @@
+"""Sliding events between two points of a branch: the first margin that vanishes, and its group."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contfric.continuation.events import Bifurcation, Kind, hold_of_test, kind_of_margin
+from contfric.continuation.points import Point, Settings
+from contfric.continuation.report import bifurcation_at
+from contfric.continuation.trial import locate_change
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Margin, Test
+
+#: Margins below this at a located event vanish with it: they form a group. Located margins are
+#: zero to about 1e-13; distinct events this near are beyond what a diagram can tell apart.
+_TOGETHER = 1e-9
+#: Newton may fail right behind an event (a slide that vanishes, several conditions at once): it is reached
+#: where the margin is this small.
+_REACHED = 1e-8
+#: Where two conditions fail together at an orbit that is symmetric in time (without damping), Newton fails
+#: at the root of that: such an event is as good as this, relative to the range.
+_ROUGHLY_REACHED = 1e-4
+#: The same where several holds end at once; what their lengths do to the orbit is the square of it.
+_NEARLY_REACHED = 1e-5
+#: Share of the period below which a stick at a tangential release has vanished: the square root of
+#: the rounding of its quadratic margin.
+_VANISHED = 1e-5
+
+
+def sliding_events(
+    orbit: Orbit, before: Point, after: Point, settings: Settings
+) -> list[tuple[Bifurcation, Point]]:
+    """Return the sliding event that ends the branch between two points, if there is one."""
+    from contfric.continuation.bracket import BY_TEST
+
+    margins = len(orbit.system.tests)
+    located: list[tuple[int, Point]] = []
+    for k in range(margins):
+        if after.tests[k] < 0.0:
+            point = locate_change(orbit, before, after, settings, BY_TEST, k)
+            if point is not None:
+                located.append((k, point))
+    if not located:
+        return []
+    # what comes first ends the branch; what vanishes with it is of its group
+    first, point = min(located, key=lambda pair: pair[1].arc)
+    while hidden := _located_before(orbit, before, point, settings):
+        first, point = min(hidden, key=lambda pair: pair[1].arc)
+    here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    kind = kind_of_margin(orbit.system, orbit.system.tests[first], here)
+    together = _TOGETHER
+    rough = False
+    if point.lost:
+        held = hold_of_test(orbit.system.tests[first], here) is not None
+        rough = abs(point.tests[first]) >= (_NEARLY_REACHED if held else _REACHED)
+        together = 2.0 * _ROUGHLY_REACHED if rough else _NEARLY_REACHED if held else _REACHED
+        point.lost = bool(abs(point.tests[first]) >= _ROUGHLY_REACHED)
+    vanished = _vanished_stick(here, kind, orbit.system.tests[first])
+    if vanished is not None:
+        point.lost = False
+        return [(bifurcation_at(Kind.CS, here, before, None, point, settings, (vanished,)), point)]
+    group = tuple(
+        test
+        for k, test in enumerate(orbit.system.tests)
+        if k == first
+        or (
+            abs(point.tests[k]) < together
+            and kind_of_margin(orbit.system, test, here) is kind
+            and _is_free(orbit.system.tests[first], test)
+        )
+    )
+    found = bifurcation_at(kind, here, before, None, point, settings, group)
+    return [(replace(found, accuracy=_ROUGHLY_REACHED) if rough else found, point)]
+
+
+def _located_before(
+    orbit: Orbit, before: Point, point: Point, settings: Settings
+) -> list[tuple[int, Point]]:
+    """Return the margins violated at a located event: they vanish before it, and come back behind."""
+    from contfric.continuation.bracket import BY_TEST
+
+    violated = map(int, np.flatnonzero(point.tests[: len(orbit.system.tests)] < -_TOGETHER))
+    found = [(k, locate_change(orbit, before, point, settings, BY_TEST, k)) for k in violated]
+    return [(k, p) for k, p in found if p is not None and p.arc < point.arc]
+
+
+def _vanished_stick(here: Orbit, kind: Kind, test: Test) -> Test | None:
+    """Return the stop (as a margin) of a stick that vanishes just where its release is tangential.
+
+    CS and AS at once: the margin vanishes quadratically, and the orbit is one of a continuum (as at
+    Omega = 1/2, where a slide lasts a whole natural period whatever its amplitude).
+    """
+    if kind is not Kind.AS or hold_of_test(test, here) is not None:
+        return None
+    start, end = here.cycle[test.segment, 0], here.ends[test.segment, 0]
+    if end - start >= _VANISHED * here.period:
+        return None
+    surface, segment = here.word[test.segment][1], test.segment - 1
+    if segment < 0:  # of a half: the stop is the mirror image of the last one
+        segment += here.system.segments
+        symmetry = here.model.symmetry
+        if here.system.half and symmetry is not None:
+            surface = {image: name for name, image in symmetry.surfaces.items()}[surface]
+    return Test(Margin.JOINT, segment, surface)
+
+
+def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation | None:
+    """Return the event at which several holds end at once, where Newton fails just before it.
+
+    The ends of two holds are singular each (a hold without acceleration moves nothing), and together
+    they stop Newton at the root of rounding.
+    """
+    here = tip.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    near = [
+        test
+        for test, value in zip(orbit.system.tests, tip.tests, strict=False)
+        if 0.0 <= value < _NEARLY_REACHED and hold_of_test(test, here) is not None
+    ]
+    if not near:
+        return None
+    kind = kind_of_margin(orbit.system, near[0], here)
+    group = tuple(test for test in near if kind_of_margin(orbit.system, test, here) is kind)
+    return bifurcation_at(kind, here, tip, None, tip, settings, group)
+
+
+def _is_free(first: Test, other: Test) -> bool:
+    """Tell whether two vanishing margins are two events: not the same surface at the same place."""
+    return (first.segment, first.surface) != (other.segment, other.surface)

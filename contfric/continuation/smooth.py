@@ -1,0 +1,156 @@
+"""Smooth events between two points of a branch: folds, branch points, doublings, tori, tangencies."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contfric.continuation.events import Bifurcation, Kind
+from contfric.continuation.points import EXTRA, Point, Settings
+from contfric.continuation.report import bifurcation_at
+from contfric.continuation.trial import locate_change
+from contfric.continuation.vertices import parabola_vertex, symmetric_part, undoubled_part
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Margin, Test
+
+#: Arclength within which a smooth event belongs to a sliding event: where a stop becomes tangential
+#: the branch folds and its multipliers are infinite, and where it meets a surface labels change.
+SAME_PLACE = 1e-7
+#: A parameter that changes this slowly along a branch, in units of arclength, is constant: the orbits are
+#: a continuum at one value, and the sign of the slope is rounding.
+_VERTICAL = 1e-5
+#: What it may change by over a step, relative to the range: the root of rounding.
+_CONSTANT = 1e-7
+#: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
+_COMPLEX = 1e-6
+
+
+def smooth_events(
+    orbit: Orbit, before: Point, after: Point, settings: Settings, beyond: Point
+) -> list[tuple[Bifurcation, Point]]:
+    """Return folds, branch points, doublings, tori and tangencies; ``beyond`` is good behind them."""
+    from contfric.continuation.bracket import BY_TEST
+    from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
+
+    base = len(before.tests) - EXTRA
+    # an event behind a sliding one is none; but where a stop becomes tangential multipliers are infinite
+    after = beyond if np.all(np.isfinite(beyond.tests[base:])) else after
+    found: list[tuple[Bifurcation, Point]] = []
+    folded = False
+    for column in (FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR):
+        a, b = before.tests[base + column], after.tests[base + column]
+        if not a * b < 0.0 or (column == CHI_ONE and folded):
+            continue  # chi(1) of a fold vanishes with it
+        point = locate_change(orbit, before, after, settings, BY_TEST, base + column)
+        if point is None or point.lost or _is_pole(point.tests[base + column], a, b):
+            if column == FOLD:
+                # at the vertex of a pitchfork or of a period doubling the arclength system itself is
+                # singular, and Newton may be lost around it: look from between the two points
+                between = parabola_vertex(before, after, a / (a - b))
+                vertex = _fold(orbit, before, beyond, between, settings)
+                folded = True
+                if vertex[0].kind is Kind.SN:
+                    if not _is_vertical(before, after, settings):
+                        found.append(_not_located(orbit, Kind.SN, before, beyond, settings))
+                else:
+                    found.append(vertex)
+            elif point is None or point.lost:
+                # a pole is no event: multipliers are infinite where an exit becomes tangential
+                half = orbit.system.half or column == CHI_ONE
+                kind = Kind.NS if column == CHI_PAIR else Kind.BP if half else Kind.PD
+                found.append(_not_located(orbit, kind, before, beyond, settings))
+            continue
+        if column == FOLD:
+            folded = True
+            vertex = _fold(orbit, before, beyond, point, settings)
+            if vertex[0].kind is not Kind.SN or not _is_vertical(before, after, settings):
+                found.append(vertex)
+            continue
+        kind = Kind.BP
+        if column == CHI_PAIR:
+            if abs(point.mu[0].imag) < _COMPLEX:
+                continue  # two real multipliers with product 1: nothing happens
+            kind = Kind.NS
+        elif column == CHI_MINUS and not orbit.system.half:
+            kind = Kind.PD
+        active = orbit.model.index_of(settings.parameter)
+        here = point.orbit(orbit.system, orbit.vector, active)
+        if kind is Kind.BP and not orbit.system.half and _is_vertex(here, active):
+            continue  # the fold there says what it is; beside it chi(1) is rounding
+        found.append((bifurcation_at(kind, here, before, beyond, point, settings), point))
+    return [*found, *_tangencies(orbit, before, beyond, settings)]
+
+
+def _is_vertical(before: Point, after: Point, settings: Settings) -> bool:
+    """Tell whether the parameter is constant over a step: the sign of its slope is rounding."""
+    slopes = max(abs(before.slope), abs(after.slope))
+    return slopes < _VERTICAL and abs(after.value - before.value) < _CONSTANT * settings.width
+
+
+def _is_vertex(here: Orbit, active: int) -> bool:
+    """Tell whether an orbit is at the vertex of a pitchfork or of a period doubling."""
+    return (symmetric_part(here, active) or undoubled_part(here, active)) is not None
+
+
+def _not_located(
+    orbit: Orbit, kind: Kind, before: Point, beyond: Point, settings: Settings
+) -> tuple[Bifurcation, Point]:
+    """Return an event that is known to lie behind a point, and no better: it is not kept silent."""
+    here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    bifurcation = bifurcation_at(kind, here, before, beyond, before, settings)
+    return replace(bifurcation, located=False), before
+
+
+def _is_pole(value: float, a: float, b: float) -> bool:
+    """Tell whether a test changes sign through infinity."""
+    return not np.isfinite(value) or abs(value) > 2.0 * max(abs(a), abs(b))
+
+
+def _tangencies(
+    orbit: Orbit, before: Point, after: Point, settings: Settings
+) -> list[tuple[Bifurcation, Point]]:
+    """Return the events T: changes of the surfaces that a segment crosses."""
+    from contfric.continuation.bracket import BY_LABEL
+
+    found: list[tuple[Bifurcation, Point]] = []
+    active = orbit.model.index_of(settings.parameter)
+    for k in range(len(before.labels)):
+        if before.labels[k] == after.labels[k]:
+            continue
+        # the first change, seen from the start, and the last one, seen from the end of the step
+        first = locate_change(orbit, before, after, settings, BY_LABEL, k, float(before.labels[k]))
+        last = locate_change(orbit, after, before, settings, BY_LABEL, k, float(after.labels[k]))
+        places = [p for p in (first, last) if p is not None]
+        if len(places) > 1 and places[1].arc - places[0].arc < SAME_PLACE:
+            places.pop()
+        if not places:
+            found.append(_not_located(orbit, Kind.T, before, after, settings))
+        for point in places:
+            here = point.orbit(orbit.system, orbit.vector, active)
+            test = Test(*_label_place(orbit, k))
+            b = bifurcation_at(Kind.T, here, point, point, point, settings, (test,))
+            found.append((b, point))
+    return found
+
+
+def _label_place(orbit: Orbit, k: int) -> tuple[Margin, int, str]:
+    segment, observable, *_ = orbit.system.layout.labels[k]
+    name = orbit.model.observables[int(observable)].name
+    return Margin.INTERIOR, int(segment), name
+
+
+def _fold(
+    orbit: Orbit, before: Point, after: Point, point: Point, settings: Settings
+) -> tuple[Bifurcation, Point]:
+    """Tell a fold from the vertex of a pitchfork or of a period doubling."""
+    active = orbit.model.index_of(settings.parameter)
+    here = point.orbit(orbit.system, orbit.vector, active)
+    symmetric = symmetric_part(here, active)
+    if symmetric is not None:
+        kind, here = Kind.BP, symmetric
+    elif (undoubled := undoubled_part(here, active)) is not None:
+        kind, here = Kind.PD, undoubled
+    else:
+        kind = Kind.SN
+    return bifurcation_at(kind, here, before, after, point, settings), point
