@@ -74,7 +74,7 @@ def one_case(tally: Tally, orbit: cf.Orbit, parameter: str, bounds: tuple[float,
     where = f"{orbit.params}, {parameter} in ({bounds[0]!r}, {bounds[1]!r})"
     try:
         branch = cf.continue_orbit(orbit, parameter, bounds)
-        diagram = cf.explore(orbit, parameter, bounds, max_branches=MOST_BRANCHES)
+        diagram = cf.explore(orbit, parameter, bounds, bridges=False, max_branches=MOST_BRANCHES)
     except cf.ContfricError as error:
         tally.met(refusal(error))
         return
@@ -108,7 +108,14 @@ def explored(
         tally.met("diagram with more branches than asked for, and says so")
         return
     step = LARGEST_STEP / FINER
-    fine = cf.explore(orbit, diagram.parameter, bounds, max_step=step, max_branches=MOST_BRANCHES)
+    fine = cf.explore(
+        orbit,
+        diagram.parameter,
+        bounds,
+        bridges=False,
+        max_step=step,
+        max_branches=MOST_BRANCHES,
+    )
     words = [
         Counter((identity(b[0]), b.system.half, b.mirrored) for b in d.branches)
         for d in (diagram, fine)

@@ -179,7 +179,7 @@ def cascade(tally: Tally, orbit: cf.Orbit, rng: np.random.Generator) -> None:
     parameter = str(rng.choice(["Omega", "S", "S0"]))
     value = orbit.params[parameter]
     bounds = (0.95 * value, 1.05 * value)
-    diagram = cf.explore(orbit, parameter, bounds, max_periods=64, max_branches=12)
+    diagram = cf.explore(orbit, parameter, bounds, bridges=False, max_periods=64, max_branches=12)
     for branch in diagram.branches:
         middle = branch[len(branch) // 2]
         if branch.mirrored or len(middle.joints) > MOST_JOINTS or middle.degenerate:

@@ -32,6 +32,7 @@ from contfric.continuation.switching import NEARER, leave_branch_point, settings
 from contfric.continuation.trace import assemble, continue_orbit, trace_side
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish
 
 #: First step away from an event, in largest steps: the new word is proved close to it.
@@ -142,7 +143,9 @@ def _leave_beside(
 
 
 def _trace(orbit: Orbit, point: Point, settings: Settings, progress: Progress | None) -> Side:
-    return trace_side(orbit, point, settings, first_step=_NEAR_EVENT, progress=progress)
+    return trace_side(
+        orbit, point, settings, first_step=_NEAR_EVENT, at_event=True, progress=progress
+    )
 
 
 def settings_for(orbit: Orbit, settings: Settings) -> Settings:
@@ -211,7 +214,10 @@ def _follow_departure(state: Exploration, orbit: Orbit, event: Event, reason: En
         departure = leave_branch_point(orbit, settings, reason.value, distance)
         if departure is None:
             continue
-        known = state.known(departure.point.orbit(orbit.system, orbit.vector, active))
+        there = departure.point.orbit(orbit.system, orbit.vector, active)
+        if shortest(there) is not there:
+            continue  # Newton has fallen back on the orbit that it is to leave
+        known = state.known(there)
         if known is not None:
             state.judge(event, text, Verdict.KNOWN, known)
             return

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from contfric.continuation.events import Bifurcation, Kind
+from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.sliding import sliding_events
 from contfric.continuation.smooth import SAME_PLACE, smooth_events
@@ -13,6 +11,8 @@ from contfric.orbit.orbit import Orbit
 #: The same for a tangency: beside a tangential release (AS) the load overshoots its limit by the square
 #: of the release's rate, which is rounding up to this distance.
 _SAME_TANGENCY = 2e-6
+#: The same for a place known by its parameter (relative to the range), which is stationary at a fold.
+_SAME_VALUE, _SAME_FOLD = 1e-9, 1e-4
 
 
 def locate_events(
@@ -23,11 +23,28 @@ def locate_events(
     A point that is ``lost`` is no event: Newton fails behind it before any condition is violated.
     """
     sliding = sliding_events(orbit, before, after, settings)
-    first = min((point.arc for _, point in sliding), default=np.inf)
-    beyond = sliding[0][1] if sliding else after
+    if not sliding:
+        smooth = smooth_events(orbit, before, after, settings, after)
+        return sorted(smooth, key=lambda pair: pair[1].arc)
+    end = sliding[0][1]
     smooth = [
         (b, point)
-        for b, point in smooth_events(orbit, before, after, settings, beyond)
-        if point.arc < first - (_SAME_TANGENCY if b.kind is Kind.T else SAME_PLACE)
+        for b, point in smooth_events(orbit, before, after, settings, end)
+        if point.arc < end.arc and not belongs_to(b.kind, point, end, settings)
     ]
     return sorted([*smooth, *sliding], key=lambda pair: pair[1].arc)
+
+
+def belongs_to(kind: Kind, point: Point, end: Point, settings: Settings) -> bool:
+    """Tell whether a smooth event before a sliding event, or after it, is part of it.
+
+    Where an exit becomes tangential the branch folds and multipliers are infinite, and near there a place
+    along the branch is good to the root of what the parameter is.
+    """
+    if kind in TERMINAL:
+        return False
+    apart = abs(point.arc - end.arc)
+    if apart < (_SAME_TANGENCY if kind is Kind.T else SAME_PLACE):
+        return True
+    same_value = abs(point.value - end.value) < _SAME_VALUE * settings.width
+    return kind is not Kind.T and same_value and apart < _SAME_FOLD

@@ -141,6 +141,7 @@ class Side:
     names : the columns that are kept of its points
     rows, last : the points at work, and the row of the last one
     count : points so far
+    at_event : whether the first point is at a sliding event
     """
 
     first: Point
@@ -149,6 +150,7 @@ class Side:
     rows: Rows
     last: int = 0
     count: int = 1
+    at_event: bool = False
     bifurcations: list[Bifurcation] = field(default_factory=list)
     _kept: Columns = field(default_factory=lambda: Columns({}))
     _fresh: int = 0

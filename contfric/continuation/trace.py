@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
-from contfric.continuation.locate import locate_events
+from contfric.continuation.locate import belongs_to, locate_events
 from contfric.continuation.points import (
     EXTRA,
     FIRST_STEP,
@@ -119,10 +119,15 @@ def trace_side(
     settings: Settings,
     *,
     first_step: float = FIRST_STEP,
+    at_event: bool = False,
     progress: Progress | None = None,
 ) -> Side:
-    """Follow a branch from a point along its tangent until it ends."""
+    """Follow a branch from a point along its tangent until it ends.
+
+    ``at_event`` says that the point is at a sliding event, to which smooth events in the same place belong.
+    """
     side = Side.starting(start, orbit.system, End(EndReason.START), settings.stability)
+    side.at_event = at_event
     step = first_step * settings.largest
     while True:
         try:
@@ -185,6 +190,8 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
                 side.drop_tip()
             side.end = _limit_end(point.value > 0.5 * (settings.low + settings.high), settings)
             return True
+        if side.at_event and belongs_to(bifurcation.kind, side.first, point, settings):
+            continue
         if bifurcation.kind is Kind.T and _is_start(side, before, point):
             side.relabel_first(
                 after.labels

@@ -13,7 +13,7 @@ import numpy as np
 
 from contfric.continuation.points import Point
 from contfric.models.definition import FloatArray
-from contfric.orbit.linear import assembled
+from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
 from contfric.orbit.system import build_system
@@ -23,9 +23,9 @@ from contfric.orbit.words import half_of
 #: of a pitchfork (of a period doubling). There the system is singular and the state is good to about
 #: 1e-5 only, while the parameter, stationary along the branch, is good to the square of that.
 _NEARLY = 1e-2
-#: At such a vertex the symmetric (the undoubled) orbit has a multiplier -1 of its turn; chi(-1) of it
-#: is zero to the accuracy of the parameter, far below this.
-_VERTEX_CHI = 1e-4
+#: At such a vertex the symmetric (the undoubled) orbit has a multiplier -1 of its turn; what vanishes
+#: there is zero to the accuracy of the parameter, far below this.
+_OPENS = 1e-4
 
 
 def symmetric_part(orbit: Orbit, active: int) -> Orbit | None:
@@ -72,17 +72,24 @@ def at_vertex(point: Point, simple: Orbit, active: int) -> Point:
 def _vertex(orbit: Orbit, active: int) -> Orbit | None:
     """Return the orbit solved if its turn has a multiplier -1, else None."""
     solved = polish(orbit, damped=False)
-    if not solved.converged or not abs(_chi_minus(solved)) < _VERTEX_CHI:
+    if not solved.converged or not abs(_opening(solved)) < _OPENS:
         return None
-    # the parameter of a bridge's vertex is stationary along it: good to the square of what the state is
-    return solved if solved.system.holds else _refined(solved, active)
+    return _refined(solved, active)
 
 
-def _chi_minus(orbit: Orbit) -> float:
-    if orbit.system.holds:  # no multipliers: how near the equations are to singular
-        full = assembled(orbit.system, orbit.joints, orbit.vector, closing=-1.0)
-        return float(np.linalg.svd(full, compute_uv=False)[-1])
-    return float(np.prod(1.0 + orbit.turn_multipliers).real)
+def _opening(orbit: Orbit) -> float:
+    """Return what vanishes where a disturbance that changes sign after one turn solves the equations.
+
+    The pencil of one turn, ``P z_0 + Q z_N = 0``, with ``z_N = -K z_0``: the least singular value of
+    P - Q K against the largest, with the sign of the determinant. Other than the multiplier -1 that it
+    stands for, it is defined also on a bridge.
+    """
+    p, q = pencil_of_turn(orbit.system, orbit.joints, orbit.vector)
+    close = np.eye(len(p))
+    close[1:, 1:] = orbit.system.layout.closure
+    left = p - q @ close
+    values = np.linalg.svd(left, compute_uv=False)
+    return float(np.copysign(values[-1] / values[0], np.linalg.det(left)))
 
 
 def _refined(orbit: Orbit, active: int) -> Orbit:
@@ -92,10 +99,10 @@ def _refined(orbit: Orbit, active: int) -> Orbit:
     orbits = [orbit, _moved(orbit, active, value + offset)]
     for _ in range(8):
         a, b = orbits[-2:]
-        chi_a, chi_b = _chi_minus(a), _chi_minus(b)
-        if not b.converged or chi_a == chi_b:
+        open_a, open_b = _opening(a), _opening(b)
+        if not b.converged or open_a == open_b:
             return orbit
-        step = -chi_b * float(b.vector[active] - a.vector[active]) / (chi_b - chi_a)
+        step = -open_b * float(b.vector[active] - a.vector[active]) / (open_b - open_a)
         if abs(step) > 100.0 * offset:
             return orbit
         orbits.append(_moved(b, active, float(b.vector[active]) + step))

@@ -28,14 +28,8 @@ def jacobian_blocks(
     return a, b, c, close
 
 
-def assembled(
-    system: System, joints: FloatArray, vector: FloatArray, closing: float = 1.0
-) -> FloatArray:
-    """Return the Jacobian with respect to all joints, shape (N m, N m).
-
-    With ``closing`` -1 for disturbances that change sign after one turn: it is singular where the orbit
-    has a multiplier -1 of its turn, and defined also where a hold makes multipliers infinite.
-    """
+def assembled(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:
+    """Return the Jacobian with respect to all joints, shape (N m, N m)."""
     a, b, _, close = jacobian_blocks(system, joints, vector)
     count, m = joints.shape
     full = np.zeros((count * m, count * m))
@@ -45,7 +39,7 @@ def assembled(
         if i + 1 < count:
             full[rows, (i + 1) * m : (i + 2) * m] += b[i]
         else:
-            full[rows, :m] += closing * b[i] @ close
+            full[rows, :m] += b[i] @ close
     return full
 
 

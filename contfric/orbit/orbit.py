@@ -17,7 +17,7 @@ from contfric.orbit.simulation import signs_at
 from contfric.orbit.system import Margin, System, Word, build_system
 from contfric.orbit.words import decode, end_domain, half_of, mirror_pairs, passed_domains, whole_of
 from contfric.signature import Signature
-from contfric.signature.holds import domain_after, is_hold, mirror_exit
+from contfric.signature.holds import TOUCH, domain_after, is_hold, mirror_exit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -209,7 +209,7 @@ class Orbit:
     def multipliers(self) -> ComplexArray:
         """Floquet multipliers of the whole orbit, largest first, shape (n,)."""
         mu = self.turn_multipliers
-        return mu**2 if self.system.half else mu
+        return mu**2 if self.system.half and not self.system.holds else mu
 
     @property
     def stable(self) -> bool:
@@ -293,7 +293,9 @@ class Orbit:
             if is_hold(exit_):
                 found.append(next(d.name for d in self.model.domains if d.mode == mode))
                 continue
-            if is_hold(following) and mode == after:  # a stick: it leads beyond the hold
+            if is_hold(following) and (
+                mode == after or following != TOUCH
+            ):  # it leads beyond the hold
                 after = word[(i + 2) % len(word)][0]
             found.append(end_domain(self.model, mode, exit_, after, signs))
         return found

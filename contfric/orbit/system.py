@@ -236,8 +236,14 @@ def _segment_domains(
 
 
 def _leads_to(index: int, after: str, holds: tuple[Hold, ...]) -> str:
-    """Mode that a segment leads to by the transitions: before a hold after a stick, the one beyond it."""
-    return next((h.departs for h in holds if h.after_rest and h.segment == index + 1), after)
+    """Mode that a segment leads to by the transitions: behind a hold, but where rest is touched (GS).
+
+    The load at a stop on a surface falls: the slide comes from beyond it, where it would reverse.
+    """
+    for hold in holds:
+        if hold.segment == index + 1 and (hold.after_rest or hold.pin is not None):
+            return hold.departs
+    return after
 
 
 def _exit_surface(index: int, exit_: str, holds: tuple[Hold, ...]) -> str:

@@ -116,23 +116,27 @@ def mode_of(model: Model, segments: Sequence[str], index: int) -> str:
     """Return the mode of a segment of a walk; that of a hold is the rest that it starts from."""
     if not is_hold(segments[index]):
         return model.domain_by_name[segments[index]].mode
-    before = model.domain_by_name[segments[index - 1]]
-    if model.mode_by_name[before.mode].sliding:
-        return before.mode
-    targets = (t for (source, _), t in model.transitions.items() if source == before.name)
-    modes = (model.domain_by_name[target].mode for target in targets)
-    return next((mode for mode in modes if model.mode_by_name[mode].sliding), before.mode)
+    before = model.domain_by_name[segments[index - 1]].mode
+    if model.mode_by_name[before].sliding:
+        return before
+    for (source, _), target in model.transitions.items():
+        mode = model.domain_by_name[target].mode
+        if model.domain_by_name[source].mode == before and model.mode_by_name[mode].sliding:
+            return mode
+    return before
 
 
 def surface_into(model: Model, segments: Sequence[str], index: int) -> str | None:
     """Return the surface through which a segment of a walk ends where a hold begins, None if none.
 
-    A slide comes to rest there; a stick touches the surface that releases it the way the hold goes.
+    A slide that touches rest would come to it there; one that stops on a surface comes from beyond it,
+    where it would reverse; a stick touches the surface that releases it the way the hold goes.
     """
-    source, mode = segments[index], mode_of(model, segments, (index + 1) % len(segments))
+    source, hold = segments[index], (index + 1) % len(segments)
     rests = model.mode_by_name[model.domain_by_name[source].mode].sliding
     beyond = model.domain_by_name[segments[(index + 2) % len(segments)]].mode
-    wanted = beyond if rests else mode
+    touches = segments[hold] == TOUCH and not rests
+    wanted = mode_of(model, segments, hold) if touches else beyond
     for (start, surface), target in model.transitions.items():
         if start == source and model.domain_by_name[target].mode == wanted:
             return surface
@@ -155,7 +159,7 @@ def hold_fault(model: Model, segments: Sequence[str], index: int) -> str | None:
     Examples
     --------
     >>> from contfric.models import load_model
-    >>> hold_fault(load_model("coulomb"), ("x0v+", "hold@F+", "x+v-"), 1)
+    >>> hold_fault(load_model("coulomb"), ("x+v+", "hold@F+", "x+v-"), 1)
     "'hold@F+' leads to x0v-, not to x+v-"
     """
     hold, before, after = (

@@ -33,7 +33,9 @@ DIAGRAMS = {
 @cache
 def found(parameter: str) -> tuple[cf.Bifurcation, ...]:
     params, bounds = DIAGRAMS[parameter]
-    return cf.explore(cf.find_orbit("coulomb", params), parameter, bounds).bifurcations
+    return cf.explore(
+        cf.find_orbit("coulomb", params), parameter, bounds, bridges=False
+    ).bifurcations
 
 
 def test_random_events() -> None:

@@ -281,7 +281,7 @@ def test_autonomous_models_are_refused() -> None:
         model,
         name="still",
         flow_factory=lambda: CompiledFlow(
-            flow.flow, flow.observe, flow.level, flow.turning, flow.hit, never
+            flow.flow, flow.observe, flow.level, flow.turning, flow.hit, never, flow.rate
         ),
     )
     with pytest.raises(cf.ParameterError, match="no period of excitation"):

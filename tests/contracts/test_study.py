@@ -258,7 +258,7 @@ def test_everything(tmp_path, study) -> None:
     assert list(points[0])[:9] == ["branch", "signature", *result.study.params, "x_max", "x_min"]
     assert list(points[0])[9:12] == ["psi", "stop_1", "stop_2"]
     assert list(points[0])[-1] == "stable"
-    assert {row["signature"] for row in points} == {"0s", "1a", "2a", "2s"}
+    assert {row["signature"] for row in points} == {"0s", "1a", "1a, 1hold", "2a", "2s"}
     assert {row["stable"] for row in points} == {"True", "False"}
     assert result.info["counts"]["multiplier_evaluations"] > 0
 

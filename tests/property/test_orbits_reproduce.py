@@ -41,7 +41,7 @@ def branches(name: str) -> tuple[cf.Branch, ...]:
     params, parameter, bounds = DIAGRAMS[name]
     diagram = cf.explore(cf.find_orbit("coulomb", params), parameter, bounds)
     assert diagram.complete and diagram.branches
-    return diagram.branches
+    return tuple(branch for branch in diagram.branches if not branch.bridge)  # those are no motions
 
 
 def orbits(name: str, every: int = 1) -> Iterator[cf.Orbit]:

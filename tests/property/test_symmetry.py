@@ -116,7 +116,7 @@ def test_an_asymmetric_orbit_has_no_half() -> None:
 
 
 def test_mirror_branches_of_a_diagram() -> None:
-    branches = fig05().branches
+    branches = [branch for branch in fig05().branches if not branch.bridge]
     computed = [b for b in branches if not b.mirrored and not b.symmetric]
     assert sorted(b.name for b in computed) == ["1a", "2a"]
     for branch in computed:
