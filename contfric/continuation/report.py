@@ -10,7 +10,7 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Test
 
 #: Accuracy of an event (relative to the range) where CS and AS coincide: the root of rounding.
-_ROUGH = 1e-6
+ROUGH = 1e-6
 #: A load that changes this slowly at a stop stands still there.
 _STILL = 1e-4
 
@@ -33,7 +33,7 @@ def bifurcation_at(
         point.arc,
         _stable(before, here, settings),
         None if after is None else _stable(after, here, settings),
-        accuracy=_ROUGH if _is_rough(kind, here, tests) else ACCURACY,
+        accuracy=ROUGH if _is_rough(kind, here, tests) else ACCURACY,
     )
 
 

@@ -192,6 +192,11 @@ class Side:
         self.last -= 1
         self.count -= 1
 
+    def rewind(self, row: int) -> None:
+        """Take away the points behind a row."""
+        self.count -= self.last - row
+        self.last = row
+
     def drop_crowd(self, arc: float) -> None:
         """Take away the points behind a place, but for the last one."""
         while self.last > 1 and self.rows.arc[self.last - 1] > arc:

@@ -8,7 +8,7 @@ import numpy as np
 
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.points import EXTRA, Point, Settings
-from contfric.continuation.report import bifurcation_at
+from contfric.continuation.report import ROUGH, bifurcation_at
 from contfric.continuation.trial import locate_change
 from contfric.continuation.vertices import parabola_vertex, symmetric_part, undoubled_part
 from contfric.orbit.orbit import Orbit
@@ -80,6 +80,20 @@ def smooth_events(
             continue  # the fold there says what it is; beside it chi(1) is rounding
         found.append((bifurcation_at(kind, here, before, beyond, point, settings), point))
     return [*found, *_tangencies(orbit, before, beyond, settings)]
+
+
+def leapt_vertex(
+    orbit: Orbit, before: Point, after: Point, share: float, settings: Settings
+) -> tuple[Bifurcation, Point] | None:
+    """Return the vertex between two points on its two sides, if it is one."""
+    point = parabola_vertex(before, after, share)
+    point.value = before.value + share * (after.value - before.value)
+    found, place = _fold(orbit, before, after, point, settings)
+    if found.kind is Kind.SN:
+        return None
+    if _is_vertical(before, after, settings):
+        found = replace(found, accuracy=ROUGH)
+    return found, place
 
 
 def _is_vertical(before: Point, after: Point, settings: Settings) -> bool:

@@ -22,9 +22,9 @@ from contfric.continuation.points import (
 )
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.sliding import nearly_reached
-from contfric.continuation.smooth import SAME_PLACE
+from contfric.continuation.smooth import SAME_PLACE, leapt_vertex
 from contfric.continuation.trial import locate_value
-from contfric.continuation.vertices import at_vertex
+from contfric.continuation.vertices import at_vertex, passed_vertex
 from contfric.errors import ConvergenceError
 from contfric.orbit.orbit import Orbit
 
@@ -148,7 +148,10 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     if side.count >= settings.most_points:
         side.end = End(EndReason.POINTS)
         return True, step
+    count = side.count
     why, step = side.march(orbit, settings, step)
+    if _leaps_over_vertex(orbit, side, settings, side.count - count):
+        return True, step
     reasons = {
         kernels.STEP: EndReason.STEP,
         kernels.BROKEN: EndReason.BROKEN,
@@ -161,6 +164,24 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     if why == kernels.FULL:
         return _end_of_holds(orbit, side, settings, step < _CRAWLS), step
     return _resolve(orbit, side, settings), step
+
+
+def _leaps_over_vertex(orbit: Orbit, side: Side, settings: Settings, written: int) -> bool:
+    """End a side where its last points have passed a vertex that no fold has shown."""
+    first = side.last - written
+    passed = passed_vertex(orbit.system, side.rows.joints[first : side.last + 1])
+    if passed is None:
+        return False
+    before = side.rows.point(first + passed[0])
+    after = side.rows.point(first + passed[0] + 1)
+    found = leapt_vertex(orbit, before, after, passed[1], settings)
+    if found is None:
+        return False
+    bifurcation, point = found
+    side.rewind(first + passed[0] + 1)
+    side.put_tip(at_vertex(point, bifurcation.orbit, orbit.model.index_of(settings.parameter)))
+    side.end = End(EndReason[bifurcation.kind.name], bifurcation=bifurcation)
+    return True
 
 
 def _end_of_holds(orbit: Orbit, side: Side, settings: Settings, stuck: bool) -> bool:

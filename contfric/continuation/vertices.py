@@ -16,7 +16,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
-from contfric.orbit.system import build_system
+from contfric.orbit.system import System, build_system
 from contfric.orbit.words import half_of
 
 #: Distance of a fold to its mirror image (or to its own second half) below which it may be the vertex
@@ -26,6 +26,8 @@ _NEARLY = 1e-2
 #: At such a vertex the symmetric (the undoubled) orbit has a multiplier -1 of its turn; what vanishes
 #: there is zero to the accuracy of the parameter, far below this.
 _OPENS = 1e-4
+#: Odd parts below this (nondimensional) are what a singular system leaves undetermined.
+_ODD = 1e-5
 
 
 def symmetric_part(orbit: Orbit, active: int) -> Orbit | None:
@@ -57,6 +59,48 @@ def undoubled_part(orbit: Orbit, active: int) -> Orbit | None:
         return None
     part = build_system(orbit.model, system.word[:n], system.periods // 2)
     return _vertex(replace(orbit, system=part, joints=0.5 * (image + orbit.joints[:n])), active)
+
+
+def passed_vertex(system: System, joints: FloatArray) -> tuple[int, float] | None:
+    """Return the step over which orbits become their own mirror images, or their own second halves.
+
+    What is odd about them (the states of one half less their image in the other) changes sign there. A
+    step that leaps over a vertex goes on along the mirror branch, and no fold is seen.
+
+    Parameters
+    ----------
+    joints : ndarray, shape (k, N, 1 + n)
+        Consecutive points of a branch.
+
+    Returns
+    -------
+    (int, float) or None
+        Index of the point before it, and the share of the step at which it is.
+    """
+    image = _image_of_second_half(system)
+    if image is None or len(joints) < 2:
+        return None
+    n = len(system.word) // 2
+    odd = (joints[:, n:, 1:] @ image - joints[:, :n, 1:]).reshape(len(joints), -1)
+    size = np.sum(odd * odd, axis=1)
+    ahead = np.sum(odd[1:] * odd[:-1], axis=1)
+    turned = np.flatnonzero((ahead < 0.0) & (np.minimum(size[1:], size[:-1]) > _ODD**2))
+    if not len(turned):
+        return None
+    k = int(turned[0])
+    return k, float(size[k] / (size[k] - ahead[k]))
+
+
+def _image_of_second_half(system: System) -> FloatArray | None:
+    """Return the state matrix that takes the second half of a word to the first; None if none does."""
+    n, odd = divmod(len(system.word), 2)
+    if system.half or odd:
+        return None
+    symmetry = system.model.symmetry
+    if symmetry is not None and half_of(system.model, system.word, system.periods) is not None:
+        return symmetry.array()
+    doubled = system.periods % 2 == 0 and system.word[:n] == system.word[n:]
+    return np.eye(len(system.model.states)) if doubled else None
 
 
 def at_vertex(point: Point, simple: Orbit, active: int) -> Point:
