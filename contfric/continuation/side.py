@@ -142,6 +142,7 @@ class Side:
     rows, last : the points at work, and the row of the last one
     count : points so far
     at_event : whether the first point is at a sliding event
+    largest : longest step, where the settings' would leap over what is near
     """
 
     first: Point
@@ -151,6 +152,7 @@ class Side:
     last: int = 0
     count: int = 1
     at_event: bool = False
+    largest: float = np.inf
     bifurcations: list[Bifurcation] = field(default_factory=list)
     _kept: Columns = field(default_factory=lambda: Columns({}))
     _fresh: int = 0
@@ -218,7 +220,7 @@ class Side:
             orbit.system.layout,
             orbit.vector,
             orbit.model.index_of(settings.parameter),
-            march_options(settings, step),
+            march_options(settings, step, self.largest),
             self.last,
             settings.stability,
             self.first.as_start(),
@@ -248,10 +250,11 @@ class Side:
         return self._kept
 
 
-def march_options(settings: Settings, step: float) -> FloatArray:
+def march_options(settings: Settings, step: float, largest: float = np.inf) -> FloatArray:
     """Return the numbers that steer the march."""
+    largest = min(largest, settings.largest)
     return np.array(
-        [step, settings.largest, SMALLEST_STEP, settings.low, settings.high, settings.scale]
+        [min(step, largest), largest, SMALLEST_STEP, settings.low, settings.high, settings.scale]
     )
 
 

@@ -21,7 +21,7 @@ _TOGETHER = 1e-9
 _REACHED = 1e-8
 #: Where two conditions fail together at an orbit that is symmetric in time (without damping), Newton fails
 #: at the root of that: such an event is as good as this, relative to the range.
-_ROUGHLY_REACHED = 1e-4
+ROUGHLY_REACHED = 1e-4
 #: The same where several holds end at once; what their lengths do to the orbit is the square of it.
 _NEARLY_REACHED = 1e-5
 #: Share of the period below which a stick at a tangential release has vanished: the square root of
@@ -55,8 +55,8 @@ def sliding_events(
     if point.lost:
         held = hold_of_test(orbit.system.tests[first], here) is not None
         rough = abs(point.tests[first]) >= (_NEARLY_REACHED if held else _REACHED)
-        together = 2.0 * _ROUGHLY_REACHED if rough else _NEARLY_REACHED if held else _REACHED
-        point.lost = bool(abs(point.tests[first]) >= _ROUGHLY_REACHED)
+        together = 2.0 * ROUGHLY_REACHED if rough else _NEARLY_REACHED if held else _REACHED
+        point.lost = bool(abs(point.tests[first]) >= ROUGHLY_REACHED)
     vanished = _vanished_stick(here, kind, orbit.system.tests[first])
     if vanished is not None:
         point.lost = False
@@ -72,7 +72,7 @@ def sliding_events(
         )
     )
     found = bifurcation_at(kind, here, before, None, point, settings, group)
-    return [(replace(found, accuracy=_ROUGHLY_REACHED) if rough else found, point)]
+    return [(replace(found, accuracy=ROUGHLY_REACHED) if rough else found, point)]
 
 
 def _located_before(

@@ -21,7 +21,7 @@ from contfric.continuation.points import (
     settings_of,
 )
 from contfric.continuation.side import Side, first_point
-from contfric.continuation.sliding import nearly_reached
+from contfric.continuation.sliding import ROUGHLY_REACHED, nearly_reached
 from contfric.continuation.smooth import SAME_PLACE, leapt_vertex
 from contfric.continuation.trial import locate_value
 from contfric.continuation.vertices import at_vertex, passed_vertex
@@ -40,6 +40,8 @@ _VIOLATED = 1e-9
 #: to about 1e-4 only. The branch that leaves starts at twice the distance.
 _CROWD = 5e-4
 
+#: Beside an event at which Newton fails steps are shortened by this factor, down to this length.
+_SHORTER, _NEAREST = 8.0, 1e-8
 #: A step this short after hundreds of points (arclength) gets nowhere.
 _CRAWLS = 1e-6
 
@@ -197,6 +199,8 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     before, after = side.before_tip, side.tip
     limit = _limit_crossed(orbit, before, after, settings)
     located = locate_events(orbit, before, after, settings)
+    if _comes_closer(side, located, after.arc - before.arc):
+        return False
     for bifurcation, point in located:
         if limit is not None and (
             point.arc > limit[0].arc - _AT_LIMIT * (after.arc - before.arc)
@@ -239,6 +243,20 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         return False
     side.put_tip(limit[0])
     side.end = _limit_end(after.value > settings.high, settings)
+    return True
+
+
+def _comes_closer(side: Side, located: list[tuple[Bifurcation, Point]], step: float) -> bool:
+    """Go back to the point before an event beside which Newton fails, and on in shorter steps.
+
+    Where two curves of orbits cross, Newton converges from no farther than the crossing is away: a step
+    across may end on the other curve, and what is between its ends belongs to neither.
+    """
+    fails = any(point.lost or b.accuracy >= ROUGHLY_REACHED for b, point in located)
+    if not fails or step < _NEAREST:
+        return False
+    side.drop_tip()
+    side.largest = step / _SHORTER
     return True
 
 
