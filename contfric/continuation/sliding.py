@@ -107,20 +107,23 @@ def _vanished_stick(here: Orbit, kind: Kind, test: Test) -> Test | None:
 
 
 def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation | None:
-    """Return the event at which several holds end at once, where Newton fails just before it.
+    """Return the event at which several conditions fail at once, where Newton fails just before it.
 
     The ends of two holds are singular each (a hold without acceleration moves nothing), and together
-    they stop Newton at the root of rounding.
+    they stop Newton at the root of rounding; as does a stick that vanishes at a tangential release.
     """
     here = tip.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     near = [
         test
         for test, value in zip(orbit.system.tests, tip.tests, strict=False)
-        if 0.0 <= value < _NEARLY_REACHED and hold_of_test(test, here) is not None
+        if 0.0 <= value < _NEARLY_REACHED
+        and (value < _TOGETHER or hold_of_test(test, here) is not None)
     ]
     if not near:
         return None
-    kind = kind_of_margin(orbit.system, near[0], here)
+    # a stop that meets a surface says more than a stick that has no length any more
+    first = next((test for test in near if test.margin is Margin.JOINT), near[0])
+    kind = kind_of_margin(orbit.system, first, here)
     group = tuple(test for test in near if kind_of_margin(orbit.system, test, here) is kind)
     return bifurcation_at(kind, here, tip, None, tip, settings, group)
 

@@ -72,7 +72,8 @@ def roots_along(mode, c, order, target, on, sign, phase, t0, y0, end, p, times, 
     q -= target
     if not single:
         leaving = abs(q) <= AT_START * (1.0 + size)
-    while tau < end:
+    stop = end if single else last  # what lies behind the last place is at the joint
+    while tau < stop:
         if leaving and abs(q1) <= AT_START * (1.0 + size):
             q1 = 0.0  # the rate vanishes at the start (a release with S0 = S): rounding is no sign
         if sign == 0.0:
@@ -140,7 +141,8 @@ def roots_along(mode, c, order, target, on, sign, phase, t0, y0, end, p, times, 
                 step, found = taylor_step(mode, c, order, sign, p, q, q1, q2, size, natural, tau)
                 root = tau + step
                 value += step * (q + step * (0.5 * q1 + step * q2 / 6.0))
-            tau += step
+            moved = tau + step
+            tau = moved if moved > tau or found else end  # a root at the end, to the last digit
         if found:
             if single:
                 return 1, root, math.nan
