@@ -61,7 +61,7 @@ def explore(
     >>> import contfric as cf
     >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     >>> sorted({b.name for b in cf.explore(orbit, "Omega", (0.48, 0.55)).branches})
-    ['0s', '1a', '1a, 1hold', '2a', '2s']
+    ['0s', '1a', '1a, 7seg, 1hold', '2a', '2s']
     """
     settings = settings_of(orbit, parameter, range, max_step, stability, max_points)
     if not orbit.converged:

@@ -40,6 +40,8 @@ _NEAR_EVENT = 0.01
 #: A branch that gets no farther than this (arclength) from the event it starts at has left it in the
 #: direction in which it is not admissible.
 _NOWHERE = 1e-7
+#: The same for an event that is located to the root of rounding only.
+_NOWHERE_ROUGHLY = 1e-3
 
 
 def follow(state: Exploration, event: Event) -> None:
@@ -112,7 +114,7 @@ def _leave_event(state: Exploration, candidate: Candidate, event: Event) -> Bran
         there = start.orbit(orbit.system, orbit.vector, active)
         for point in (start, start.reversed()):
             side = _trace(there, point, settings, state.progress)
-            if _went_somewhere(side):
+            if _went_somewhere(side, event):
                 first = _first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
                 return assemble(there, settings, side, first)
     return None
@@ -153,8 +155,9 @@ def settings_for(orbit: Orbit, settings: Settings) -> Settings:
     return replace(settings, stability=False) if orbit.system.holds else settings
 
 
-def _went_somewhere(side: Side) -> bool:
-    return side.length > _NOWHERE
+def _went_somewhere(side: Side, event: Event) -> bool:
+    rough = event.bifurcation.accuracy > ACCURACY
+    return side.length > (_NOWHERE_ROUGHLY if rough else _NOWHERE)
 
 
 def _first_end(reason: EndReason, event: Event, side: Side, settings: Settings) -> End:
@@ -222,7 +225,7 @@ def _follow_departure(state: Exploration, orbit: Orbit, event: Event, reason: En
             state.judge(event, text, Verdict.KNOWN, known)
             return
         side = trace_side(orbit, departure.point, settings, progress=state.progress)
-        if _went_somewhere(side):
+        if _went_somewhere(side, event):
             first = _first_end(reason, event, side, settings)
             state.judge(event, text, Verdict.ACCEPTED, len(state.branches))
             state.add_from(assemble(orbit, settings, side, first, departure.origin), event)

@@ -64,8 +64,10 @@ def smooth_events(
         if column == FOLD:
             folded = True
             vertex = _fold(orbit, before, beyond, point, settings)
-            if vertex[0].kind is not Kind.SN or not _is_vertical(before, after, settings):
+            if not _is_vertical(before, after, settings):
                 found.append(vertex)
+            elif vertex[0].kind is not Kind.SN:
+                found.append((replace(vertex[0], accuracy=ROUGH), vertex[1]))
             continue
         kind = Kind.BP
         if column == CHI_PAIR:

@@ -235,9 +235,10 @@ class Orbit:
 
     @property
     def _slack(self) -> FloatArray:
-        """A joint may touch a surface (at an event) to rounding; nothing else may."""
-        joint = np.array([t.margin is Margin.JOINT for t in self.system.tests])
-        return np.where(joint, -1e-9, 0.0)
+        """A joint may touch a surface to rounding (at an event), and a hold its limits; nothing else may."""
+        held = {hold.segment for hold in self.system.holds}
+        may = [t.margin is Margin.JOINT or t.segment in held for t in self.system.tests]
+        return np.where(np.array(may), -1e-9, 0.0)
 
     def violations(self) -> list[str]:
         """Return what makes the orbit not admissible, one line each."""

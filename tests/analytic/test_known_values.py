@@ -307,7 +307,7 @@ def test_kinds_and_ends_of_fig05() -> None:
     kinds = [b.kind.value for b in found.bifurcations]
     assert kinds == ["BP", "T", "SS", "SS", "T", "CS", "SN"]
     names = sorted(branch.name for branch in found.branches)
-    assert names == ["0s", "1a", "1a", "1a, 1hold", "1a, 1hold", "2a", "2a", "2s"]
+    assert names == ["0s", "1a", "1a", "1a, 7seg, 1hold", "1a, 7seg, 1hold", "2a", "2a", "2s"]
     assert sum(branch.mirrored for branch in found.branches) == 3
     meeting = {i for node in found.nodes if node.bifurcation.kind == "CS" for i in node.branches}
     names = sorted(found.branches[i].name for i in meeting)
