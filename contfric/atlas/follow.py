@@ -86,6 +86,8 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
     if branch is None and event.bifurcation.accuracy > ACCURACY:
         assert candidate.orbit is not None
         branch = _through(state, candidate.orbit)
+        if branch is not None and branch.arc[-1] < _NOWHERE_ROUGHLY:
+            branch = None
         known = None if branch is None else state.known(branch[len(branch) // 2])
         if known is not None:
             state.judge(event, candidate.reason, Verdict.KNOWN, known)

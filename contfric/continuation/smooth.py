@@ -10,7 +10,12 @@ from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.report import ROUGH, bifurcation_at
 from contfric.continuation.trial import locate_change
-from contfric.continuation.vertices import parabola_vertex, symmetric_part, undoubled_part
+from contfric.continuation.vertices import (
+    opens_through,
+    parabola_vertex,
+    symmetric_part,
+    undoubled_part,
+)
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test
 
@@ -19,7 +24,9 @@ from contfric.orbit.system import Margin, Test
 SAME_PLACE = 1e-7
 #: A parameter that changes this slowly along a branch, in units of arclength, is constant: the orbits are
 #: a continuum at one value, and the sign of the slope is rounding.
-_VERTICAL = 1e-5
+_VERTICAL = 1e-3
+#: A multiplier of a continuum is 1 to the root of rounding and a little.
+_MARGINAL = 1e-5
 #: What it may change by over a step, relative to the range: the root of rounding.
 _CONSTANT = 1e-7
 #: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
@@ -64,10 +71,8 @@ def smooth_events(
         if column == FOLD:
             folded = True
             vertex = _fold(orbit, before, beyond, point, settings)
-            if not _is_vertical(before, after, settings):
+            if vertex[0].kind is not Kind.SN or not _is_vertical(before, after, settings):
                 found.append(vertex)
-            elif vertex[0].kind is not Kind.SN:
-                found.append((replace(vertex[0], accuracy=ROUGH), vertex[1]))
             continue
         kind = Kind.BP
         if column == CHI_PAIR:
@@ -80,7 +85,10 @@ def smooth_events(
         here = point.orbit(orbit.system, orbit.vector, active)
         if kind is Kind.BP and not orbit.system.half and _is_vertex(here, active):
             continue  # the fold there says what it is; beside it chi(1) is rounding
-        found.append((bifurcation_at(kind, here, before, beyond, point, settings), point))
+        event = bifurcation_at(kind, here, before, beyond, point, settings)
+        if column == CHI_MINUS and not opens_through(here, active):
+            event = replace(event, accuracy=ROUGH)
+        found.append((event, point))
     return [*found, *_tangencies(orbit, before, beyond, settings)]
 
 
@@ -93,15 +101,20 @@ def leapt_vertex(
     found, place = _fold(orbit, before, after, point, settings)
     if found.kind is Kind.SN:
         return None
-    if _is_vertical(before, after, settings):
-        found = replace(found, accuracy=ROUGH)
     return found, place
 
 
 def _is_vertical(before: Point, after: Point, settings: Settings) -> bool:
-    """Tell whether the parameter is constant over a step: the sign of its slope is rounding."""
+    """Tell whether the parameter is constant over a step: the sign of its slope is rounding.
+
+    At a fold the multiplier passes 1 as fast as the parameter turns; on a continuum it is 1.
+    """
     slopes = max(abs(before.slope), abs(after.slope))
-    return slopes < _VERTICAL and abs(after.value - before.value) < _CONSTANT * settings.width
+    if slopes > _VERTICAL or abs(after.value - before.value) > _CONSTANT * settings.width:
+        return False
+    if not settings.stability:
+        return True
+    return all(float(np.min(np.abs(point.mu - 1.0))) < _MARGINAL for point in (before, after))
 
 
 def _is_vertex(here: Orbit, active: int) -> bool:
@@ -169,4 +182,7 @@ def _fold(
         kind, here = Kind.PD, undoubled
     else:
         kind = Kind.SN
-    return bifurcation_at(kind, here, before, after, point, settings), point
+    found = bifurcation_at(kind, here, before, after, point, settings)
+    if kind is not Kind.SN and not opens_through(here, active):
+        found = replace(found, accuracy=ROUGH)
+    return found, point

@@ -26,6 +26,8 @@ _NEARLY = 1e-2
 #: At such a vertex the symmetric (the undoubled) orbit has a multiplier -1 of its turn; what vanishes
 #: there is zero to the accuracy of the parameter, far below this.
 _OPENS = 1e-4
+#: Distance in the parameter at which a multiplier that passes -1 is told from one that touches it.
+_BESIDE = 1e-6
 #: Odd parts below this (nondimensional) are what a singular system leaves undetermined.
 _ODD = 1e-5
 
@@ -134,6 +136,17 @@ def _opening(orbit: Orbit) -> float:
     left = p - q @ close
     values = np.linalg.svd(left, compute_uv=False)
     return float(np.copysign(values[-1] / values[0], np.linalg.det(left)))
+
+
+def opens_through(orbit: Orbit, active: int) -> bool:
+    """Tell whether a multiplier of the turn passes -1 at a vertex, and does not only touch it.
+
+    At a continuum (Omega = 1/2) it touches: the place is good to the root of rounding.
+    """
+    value = float(orbit.vector[active])
+    offset = _BESIDE * (1.0 + abs(value))
+    sides = [_opening(_moved(orbit, active, value + s * offset)) for s in (-1.0, 1.0)]
+    return sides[0] * sides[1] < 0.0
 
 
 def _refined(orbit: Orbit, active: int) -> Orbit:

@@ -85,6 +85,8 @@ def test_every_point_is_a_solved_admissible_orbit(case: int | str) -> None:
         for i in range(1, len(branch) - 1):
             orbit = branch[i]
             assert orbit.admissible, (orbit, orbit.violations())
+            if branch.bridge:
+                continue  # without acceleration the end of a hold moves nothing: singular
             away = float(np.min(np.abs(orbit.multipliers - 1.0)))
             if away < 1e-4:
                 continue  # a fold or a branch point: at fixed parameters the problem is singular
