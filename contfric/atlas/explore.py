@@ -10,6 +10,7 @@ from contfric.atlas.collect import collect
 from contfric.atlas.diagram import Diagram
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.follow import follow
+from contfric.atlas.seeds import Seeds, attractors
 from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import continue_orbit
@@ -28,6 +29,7 @@ def explore(
     max_periods: int = 4,
     max_branches: int = 200,
     max_points: int = MOST_POINTS,
+    seeds: Seeds | None = None,
     progress: Progress | None = None,
 ) -> Diagram:
     """Continue an orbit through every event and branch point that can be followed.
@@ -43,6 +45,9 @@ def explore(
         Longest orbit, in periods of the excitation, that a period doubling is followed to.
     max_branches : int
         Most branches to compute; reached, it is said in the diagram's notes.
+
+    seeds : Seeds, optional
+        Simulations whose attractors start new branches where they lie on none that is known.
 
     Returns
     -------
@@ -82,6 +87,8 @@ def explore(
             )
         )
         _follow_all(state)
+        if seeds is not None:
+            _follow_seeds(state, orbit, seeds)
     except KeyboardInterrupt:
         state.complete = False
         state.notes.append(EndReason.INTERRUPTED.value)
@@ -94,6 +101,40 @@ def explore(
         tuple(state.notes),
         state.complete,
     )
+
+
+def _follow_seeds(state: Exploration, orbit: Orbit, seeds: Seeds) -> None:
+    """Continue from every attractor that lies on no known branch."""
+    settings = state.settings
+    bounds = settings.low, settings.high
+    found = attractors(
+        orbit.model,
+        orbit.vector,
+        settings.parameter,
+        bounds,
+        seeds,
+        state.max_periods,
+        state.progress,
+    )
+    for attractor in found:
+        if state.known(attractor) is not None:
+            continue
+        try:
+            branch = continue_orbit(
+                attractor,
+                settings.parameter,
+                bounds,
+                max_step=settings.largest,
+                stability=settings.stability,
+                max_points=settings.most_points,
+            )
+        except ConvergenceError as error:  # one orbit of a continuum
+            state.notes.append(f"seed at {attractor.params[settings.parameter]:.6g}: {error}")
+            continue
+        state.add(branch)
+        _follow_all(state)
+        if not state.complete:
+            return
 
 
 def _follow_all(state: Exploration) -> None:

@@ -1,0 +1,91 @@
+"""Seeds: attractors that simulations settle on, as starts of families that nothing else reaches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from contfric.errors import AperiodicError, ConvergenceError, whole_number
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.find import find_orbit
+from contfric.orbit.orbit import Orbit
+
+#: Periods after which a seed that has not settled is given up: there are many seeds, and attractors that
+#: take longer are nearly marginal.
+_LONGEST = 2000
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """Simulations that are asked for orbits.
+
+    Attributes
+    ----------
+    values : int
+        Values of the parameter, evenly over its range (the middles of as many parts).
+    states : int
+        Initial conditions at each value: the model's own displaced one, then random ones.
+    seed : int
+        Of the random numbers; the same seed gives the same starts.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not a whole one >= 1 (seed: >= 0).
+    """
+
+    values: int = 20
+    states: int = 3
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        whole_number("values", self.values, least=1)
+        whole_number("states", self.states, least=1)
+        whole_number("seed", self.seed, least=0)
+
+    @property
+    def count(self) -> int:
+        """Number of simulations."""
+        return self.values * self.states
+
+
+def attractors(
+    model: Model,
+    vector: FloatArray,
+    parameter: str,
+    bounds: tuple[float, float],
+    seeds: Seeds,
+    max_periods: int,
+    progress: Callable[[str], None] | None = None,
+) -> Iterator[Orbit]:
+    """Yield the periodic orbits that simulations settle on, one for each start that settles.
+
+    Parameters
+    ----------
+    vector : ndarray, shape (parameters,)
+        The other parameters.
+    bounds : (float, float)
+        Range of the parameter, inside the model's limits.
+    max_periods : int
+        Longest orbit that counts.
+    """
+    rng = np.random.default_rng(seeds.seed)
+    low, high = bounds
+    for k in range(seeds.values):
+        params = model.mapping(vector)
+        params[parameter] = low + (k + 0.5) * (high - low) / seeds.values
+        if progress is not None:
+            progress(f"seeds at {parameter} = {params[parameter]:.6g}")
+        spread = model.spread(params)
+        period = float(model.flow.period(model.vector(params), np.empty(0, np.int64), np.empty(0)))
+        for j in range(seeds.states):
+            state = None if j == 0 else rng.uniform(-1.0, 1.0, spread.shape) * spread
+            time = 0.0 if j == 0 else float(rng.uniform(0.0, period or 1.0))
+            try:
+                orbit = find_orbit(model, params, state=state, time=time, longest=_LONGEST)
+            except (AperiodicError, ConvergenceError):
+                continue
+            if orbit.converged and orbit.periods <= max_periods:
+                yield orbit
