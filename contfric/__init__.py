@@ -15,10 +15,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from contfric.atlas.adding import Window, period_adding
     from contfric.atlas.census import census
     from contfric.atlas.census_result import Census
     from contfric.atlas.diagram import Diagram
     from contfric.atlas.explore import explore
+    from contfric.atlas.seeds import Seeds
     from contfric.chaos.compute import lyapunov_map
     from contfric.chaos.exponents import LyapunovExponents, lyapunov_exponent
     from contfric.chaos.map import LyapunovMap
@@ -63,6 +65,8 @@ _HOMES = {
     "Orbit": "contfric.orbit.orbit",
     "ParameterError": "contfric.errors",
     "ResultFileError": "contfric.errors",
+    "Seeds": "contfric.atlas.seeds",
+    "Window": "contfric.atlas.adding",
     "Signature": "contfric.signature",
     "StudyError": "contfric.errors",
     "census": "contfric.atlas.census",
@@ -75,6 +79,7 @@ _HOMES = {
     "lyapunov_exponent": "contfric.chaos.exponents",
     "lyapunov_map": "contfric.chaos.compute",
     "model_names": "contfric.models",
+    "period_adding": "contfric.atlas.adding",
     "run_study": "contfric.study",
     "save": "contfric.results",
     "signature_names": "contfric.signature",
@@ -101,8 +106,10 @@ __all__ = [
     "Orbit",
     "ParameterError",
     "ResultFileError",
+    "Seeds",
     "Signature",
     "StudyError",
+    "Window",
     "__version__",
     "census",
     "continue_orbit",
@@ -114,6 +121,7 @@ __all__ = [
     "lyapunov_exponent",
     "lyapunov_map",
     "model_names",
+    "period_adding",
     "run_study",
     "save",
     "signature_names",
