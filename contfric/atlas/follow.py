@@ -15,6 +15,7 @@ import numpy as np
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration, Progress
+from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, candidates, directions, wider_candidates
 from contfric.continuation.events import (
@@ -29,7 +30,7 @@ from contfric.continuation.events import (
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import NEARER, leave_branch_point, settings_value
-from contfric.continuation.trace import assemble, continue_orbit, trace_side
+from contfric.continuation.trace import continue_orbit, trace_side
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest

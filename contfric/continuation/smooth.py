@@ -104,6 +104,12 @@ def leapt_vertex(
     return found, place
 
 
+def vertex_at(orbit: Orbit, point: Point, settings: Settings) -> Bifurcation | None:
+    """Return the vertex that a point is next to, if it is."""
+    found, _ = _fold(orbit, point, point, point, settings)
+    return None if found.kind is Kind.SN else found
+
+
 def _is_vertical(before: Point, after: Point, settings: Settings) -> bool:
     """Tell whether the parameter is constant over a step: the sign of its slope is rounding.
 

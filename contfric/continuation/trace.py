@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.locate import belongs_to, locate_events
@@ -22,7 +20,7 @@ from contfric.continuation.points import (
 )
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.sliding import ROUGHLY_REACHED, nearly_reached
-from contfric.continuation.smooth import SAME_PLACE, leapt_vertex
+from contfric.continuation.smooth import SAME_PLACE, leapt_vertex, vertex_at
 from contfric.continuation.trial import locate_value
 from contfric.continuation.vertices import at_vertex, passed_vertex
 from contfric.errors import ConvergenceError
@@ -162,7 +160,9 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     }
     if why in reasons:
         side.end = End(reasons[why])
-        return _end_of_holds(orbit, side, settings, why == kernels.STEP) or True, step
+        if why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
+            _stuck_at_vertex(orbit, side, settings)
+        return True, step
     if why == kernels.FULL:
         return _end_of_holds(orbit, side, settings, step < _CRAWLS), step
     return _resolve(orbit, side, settings), step
@@ -176,14 +176,32 @@ def _leaps_over_vertex(orbit: Orbit, side: Side, settings: Settings, written: in
         return False
     before = side.rows.point(first + passed[0])
     after = side.rows.point(first + passed[0] + 1)
+    if not np.isfinite(passed[1]):
+        side.rewind(first + passed[0])
+        side.largest = (after.arc - before.arc) / _SHORTER
+        return side.largest < _NEAREST and _stuck_at_vertex(orbit, side, settings)
     found = leapt_vertex(orbit, before, after, passed[1], settings)
     if found is None:
         return False
     bifurcation, point = found
     side.rewind(first + passed[0] + 1)
+    _end_at_vertex(orbit, side, settings, bifurcation, point)
+    return True
+
+
+def _stuck_at_vertex(orbit: Orbit, side: Side, settings: Settings) -> bool:
+    """End a side that gets no farther because a vertex is before it; True if that is so."""
+    found = vertex_at(orbit, side.tip, settings)
+    if found is not None:
+        _end_at_vertex(orbit, side, settings, found, side.tip)
+    return found is not None
+
+
+def _end_at_vertex(
+    orbit: Orbit, side: Side, settings: Settings, bifurcation: Bifurcation, point: Point
+) -> None:
     side.put_tip(at_vertex(point, bifurcation.orbit, orbit.model.index_of(settings.parameter)))
     side.end = End(EndReason[bifurcation.kind.name], bifurcation=bifurcation)
-    return True
 
 
 def _end_of_holds(orbit: Orbit, side: Side, settings: Settings, stuck: bool) -> bool:
@@ -300,92 +318,3 @@ def _ends_branch(bifurcation: Bifurcation, orbit: Orbit) -> EndReason | None:
     if bifurcation.kind is Kind.PD and bifurcation.orbit.periods < orbit.periods:
         return EndReason.PD
     return None
-
-
-def join(orbit: Orbit, settings: Settings, behind: Side, ahead: Side) -> Branch:
-    """Return one branch from the two sides of its start."""
-    shift = behind.tip.arc
-    back = [
-        replace(
-            b,
-            position=shift - b.position,
-            stable_before=b.stable_after,
-            stable_after=b.stable_before,
-        )
-        for b in reversed(behind.bifurcations)
-    ]
-    front = [replace(b, position=shift + b.position) for b in ahead.bifurcations]
-    first, last = behind.end, ahead.end
-    if first.bifurcation is not None:
-        b = first.bifurcation
-        first = replace(
-            first,
-            bifurcation=replace(
-                b,
-                position=shift - b.position,
-                stable_before=b.stable_after,
-                stable_after=b.stable_before,
-            ),
-        )
-    if last.bifurcation is not None:
-        moved = replace(last.bifurcation, position=shift + last.bifurcation.position)
-        last = replace(last, bifurcation=moved)
-    return _branch(orbit, settings, behind, ahead, (*back, *front), (first, last))
-
-
-def assemble(
-    orbit: Orbit, settings: Settings, side: Side, first: End, origin: Point | None = None
-) -> Branch:
-    """Return a branch of one side, with the end at which it starts and, if known, the point there."""
-    ends = first, side.end
-    return _branch(orbit, settings, None, side, tuple(side.bifurcations), ends, origin)
-
-
-def _branch(
-    orbit: Orbit,
-    settings: Settings,
-    behind: Side | None,
-    ahead: Side,
-    bifurcations: tuple[Bifurcation, ...],
-    ends: tuple[End, End],
-    origin: Point | None = None,
-) -> Branch:
-    events = [end.bifurcation for end in ends]
-    listed = (
-        *([events[0]] if events[0] is not None else []),
-        *bifurcations,
-        *([events[1]] if events[1] is not None else []),
-    )
-    columns = _joined(behind, ahead, origin)
-    return Branch(
-        orbit.system,
-        settings.parameter,
-        orbit.vector,
-        columns["values"],
-        columns["joints"],
-        columns["arc"],
-        columns["labels"],
-        columns["mu"] if settings.stability else None,
-        listed,
-        ends,
-    )
-
-
-def _joined(behind: Side | None, ahead: Side, origin: Point | None) -> dict[str, NDArray[Any]]:
-    """Return the columns of both sides as one; the first point of ``behind`` is that of ``ahead``.
-
-    ``origin`` is a point before the first one.
-    """
-    front = ahead.columns()
-    if behind is None:
-        joined = {name: front.take(name) for name in ahead.names}
-    else:
-        back, shift = behind.columns(), behind.tip.arc
-        back.arrays["arc"] *= -1.0
-        joined = {name: front.take_behind(name, back) for name in ahead.names}
-        joined["arc"] += shift
-    if origin is not None:
-        first = {"values": origin.value, "joints": origin.joints, "arc": origin.arc}
-        first |= {"labels": origin.labels, "mu": origin.mu}
-        joined = {n: np.concatenate([np.array([first[n]]), joined[n]]) for n in ahead.names}
-    return joined

@@ -77,7 +77,8 @@ def passed_vertex(system: System, joints: FloatArray) -> tuple[int, float] | Non
     Returns
     -------
     (int, float) or None
-        Index of the point before it, and the share of the step at which it is.
+        Index of the point before it, and the share of the step at which it is; infinite if the step has
+        gone over to the simpler orbits, and tells nothing of it.
     """
     image = _image_of_second_half(system)
     if image is None or len(joints) < 2:
@@ -86,11 +87,13 @@ def passed_vertex(system: System, joints: FloatArray) -> tuple[int, float] | Non
     odd = (joints[:, n:, 1:] @ image - joints[:, :n, 1:]).reshape(len(joints), -1)
     size = np.sum(odd * odd, axis=1)
     ahead = np.sum(odd[1:] * odd[:-1], axis=1)
-    turned = np.flatnonzero((ahead < 0.0) & (np.minimum(size[1:], size[:-1]) > _ODD**2))
-    if not len(turned):
+    turned = (ahead < 0.0) & (np.minimum(size[1:], size[:-1]) > _ODD**2)
+    fallen = (size[1:] < _ODD**2) & (size[:-1] > (10.0 * _ODD) ** 2)
+    places = np.flatnonzero(turned | fallen)
+    if not len(places):
         return None
-    k = int(turned[0])
-    return k, float(size[k] / (size[k] - ahead[k]))
+    k = int(places[0])
+    return k, float(size[k] / (size[k] - ahead[k])) if turned[k] else np.inf
 
 
 def _image_of_second_half(system: System) -> FloatArray | None:
