@@ -105,6 +105,17 @@ class Diagram:
                 )
         return graph
 
+    @property
+    def connected(self) -> bool:
+        """Whether events join all branches, a branch and its mirror image counted as one."""
+        import networkx as nx
+
+        graph = self.graph.copy()
+        for i in range(1, len(self.branches)):
+            if self.branches[i].mirrored:  # it stands behind the branch that it is the image of
+                graph.add_edge(i - 1, i)
+        return len(graph) == 0 or bool(nx.is_connected(graph))
+
     def to_dataframe(self) -> pd.DataFrame:
         """Return the points of all branches as one table, with the branch's number and name."""
         import pandas as pd
