@@ -46,7 +46,7 @@ class Window:
     Attributes
     ----------
     word : str
-        The orbits that follow each other, such as ``2a-1a-1a``.
+        The orbits that follow each other, such as ``1a-1a-2a``.
     turns : str
         The same in letters, a and b.
     branch : Branch
@@ -95,7 +95,7 @@ def period_adding(bridge: Branch, longest: int = 6) -> tuple[Window, ...]:
     >>> found = cf.explore(orbit, "Omega", (0.48, 0.55))
     >>> bridge = next(branch for branch in found.branches if branch.bridge)
     >>> [window.word for window in cf.period_adding(bridge, longest=3)]
-    ['2a-2a-1a', '2a-1a', '2a-1a-1a']
+    ['1a-2a', '1a-1a-2a']
     """
     whole_number("longest", longest, least=2)
     if not bridge.bridge:
