@@ -112,7 +112,7 @@ def _renewed(branch: Branch, changed: dict[int, Bifurcation], rests: set[int]) -
 
 def _not_followed(end: End) -> End:
     """Return an end that could be followed and was not, saying so."""
-    return replace(end, message=f"{end.reason.value}; not followed (see the notes)")
+    return replace(end, message=f"{end.reason.value}; not followed (its bifurcation says why)")
 
 
 def _nodes(event: Event, place: dict[int, int], image: dict[int, int]) -> list[Node]:
