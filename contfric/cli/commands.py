@@ -70,13 +70,13 @@ def explain(options: argparse.Namespace) -> int:
 
 def info(options: argparse.Namespace) -> int:
     """``contfric info DIR``."""
-    from contfric.cli.summary import findings, headline, work
+    from contfric.cli.summary import findings, headline, proposals, work
     from contfric.study.plan import RECORD
 
     path: Path = options.folder / RECORD
     try:
         record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        lines = [*headline(record), *findings(record), *work(record)]
+        lines = [*headline(record), *findings(record), *proposals(record), *work(record)]
     except OSError as error:
         raise ResultFileError(
             f"{options.folder} is no folder of a run: cannot read {path} ({error.strerror})"

@@ -28,10 +28,11 @@ def findings(record: Record) -> Iterator[str]:
         if branch["mirrored"]:
             rows[-1][1] += " and mirror"
             continue
+        label = branch["signature"] + (" (bridge)" if branch["bridge"] else "")
         number, points = str(branch["branch"]), str(branch["points"])
         low, high = f"{branch['from']:.8g}", f"{branch['to']:.8g}"
         ends = "; ".join(branch["ends"])
-        rows.append([number, branch["signature"], points, low, high, ends])
+        rows.append([number, label, points, low, high, ends])
     yield ""
     yield from table(rows)
     yield from _bifurcations(record)
@@ -55,6 +56,22 @@ def _bifurcations(record: Record) -> Iterator[str]:
         rows.append([event["label"], f"{event['params'][name]:.13g}", joined])
     yield ""
     yield from table(rows)
+
+
+def proposals(record: Record) -> Iterator[str]:
+    """Yield what was proposed to follow each event, and what became of it."""
+    events = [event for event in record.get("bifurcations", []) if event["proposals"]]
+    if not events:
+        return
+    name = record["parameter"]
+    yield ""
+    yield "what was proposed to follow the events"
+    for event in events:
+        yield f"  {event['label']} at {name} = {event['params'][name]:.10g}"
+        for item in event["proposals"]:
+            branch = "" if item["branch"] is None else f" as branch {item['branch']}"
+            why = f": {item['why']}" if item["why"] else ""
+            yield f"    {item['verdict']}{branch}: {item['reason']}{why}"
 
 
 def work(record: Record) -> Iterator[str]:

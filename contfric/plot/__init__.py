@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from contfric.plot.branch_graph import plot_branch_graph
     from contfric.plot.diagram import plot_branches, plot_diagram, plot_diagram_row
     from contfric.plot.graph import plot_diagram_graph, plot_transition_graph
     from contfric.plot.lyapunov import plot_lyapunov_map
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "ROWS": "contfric.plot.style",
     "new_figure": "contfric.plot.save",
+    "plot_branch_graph": "contfric.plot.branch_graph",
     "plot_branches": "contfric.plot.diagram",
     "plot_diagram": "contfric.plot.diagram",
     "plot_diagram_graph": "contfric.plot.graph",
@@ -37,6 +39,7 @@ _HOMES = {
 __all__ = [
     "ROWS",
     "new_figure",
+    "plot_branch_graph",
     "plot_branches",
     "plot_diagram",
     "plot_diagram_graph",

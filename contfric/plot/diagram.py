@@ -16,6 +16,10 @@ from contfric.plot.runs import stability_runs
 from contfric.plot.save import axes_or_new, figure_or_new
 from contfric.plot.style import (
     BESIDE,
+    BRIDGE,
+    BRIDGE_COLOUR,
+    BRIDGE_NAME,
+    BRIDGE_WIDTH,
     GREY,
     LINE_WIDTH,
     MARKERS,
@@ -46,7 +50,8 @@ def plot_branches(
 ) -> Axes:
     r"""Draw one quantity of some branches against their parameter.
 
-    Stable parts are solid, unstable ones dashed, and they meet at the located bifurcation.
+    Stable parts are solid, unstable ones dashed, and they meet at the located bifurcation. Bridges,
+    whose orbits have holds, are finely dotted and grey.
 
     Parameters
     ----------
@@ -146,7 +151,8 @@ def plot_diagram(
         _draw_row(ax, diagram.branches, found, row)
         ax.label_outer()
     fig.align_ylabels(axes)
-    handles = _handles(diagram.branches, marks[0])
+    mirrors = any(not row_of(row).even for row in rows)
+    handles = _handles(diagram.branches, marks[0], mirrors=mirrors)
     if fig.get_layout_engine() is None:
         axes[0].legend(handles=handles, fontsize=SMALL, **BESIDE)
     else:
@@ -179,23 +185,29 @@ def _plot_row(
     attribute = row_of(row).attribute
     parameter = branches[0].parameter if branches else ""
     marks = marks_of(events, branches, attribute, parameter)
+    mirrors = not row_of(row).even
     _draw_row(ax, branches, marks, row)
     if legend and outside:
-        ax.legend(handles=_handles(branches, marks), fontsize=SMALL, frameon=False, **BESIDE)
+        handles = _handles(branches, marks, mirrors=mirrors)
+        ax.legend(handles=handles, fontsize=SMALL, frameon=False, **BESIDE)
     settle(ax)
     label_marks(ax, marks)
     if legend and not outside:  # there is no room for the meaning of the markers
-        ax.legend(handles=_handles(branches, ()), fontsize=SMALL - 1.0, loc="best")
+        handles = _handles(branches, (), mirrors=mirrors)
+        ax.legend(handles=handles, fontsize=SMALL - 1.0, loc="best")
     return ax
 
 
 def _draw_row(ax: Axes, branches: Sequence[BranchLike], marks: Sequence[Mark], row: str) -> None:
-    colours = branch_colours(b.name for b in branches)
+    colours = _colours(branches)
     twins = {b.name for b in branches if not b.mirrored} if row_of(row).even else set()
     for branch in sorted(branches, key=lambda b: not b.mirrored):
         if branch.mirrored and branch.name in twins:
             continue  # it lies on its original
-        _draw_branch(ax, branch, row_of(row).attribute, colours[branch.name])
+        if branch.bridge:
+            _draw_bridge(ax, branch, row_of(row).attribute)
+        else:
+            _draw_branch(ax, branch, row_of(row).attribute, colours[branch.name])
     draw_marks(ax, marks)
     ax.margins(y=0.12)
     ax.set_ylabel(row_of(row).label, fontsize=TEXT + 1)
@@ -222,19 +234,46 @@ def _draw_branch(ax: Axes, branch: BranchLike, attribute: str, colour: str) -> N
             line.set_gid(branch.name)
 
 
-def _handles(branches: Sequence[BranchLike], marks: Sequence[Mark]) -> list[Line2D]:
-    """Return the entries of the legend: branches, meaning of the lines, meaning of the markers."""
-    colours = branch_colours(b.name for b in branches)
+def _draw_bridge(ax: Axes, branch: BranchLike, attribute: str) -> None:
+    for run in stability_runs(branch, attribute):
+        lines = ax.plot(
+            run.x,
+            run.y,
+            color=lighter(BRIDGE_COLOUR, 0.3) if branch.mirrored else BRIDGE_COLOUR,
+            linestyle=BRIDGE,
+            linewidth=BRIDGE_WIDTH,
+            zorder=1.6 - 0.1 * branch.mirrored,
+        )
+        for line in lines:
+            line.set_gid(branch.name)
+
+
+def _colours(branches: Sequence[BranchLike]) -> dict[str, str]:
+    """Return a colour for each name; bridges have no colour of their own."""
+    return branch_colours(b.name for b in branches if not b.bridge)
+
+
+def _handles(
+    branches: Sequence[BranchLike], marks: Sequence[Mark], *, mirrors: bool
+) -> list[Line2D]:
+    """Return the entries of the legend: branches, meaning of the lines, meaning of the markers.
+
+    Where all rows are even, ``mirrors`` is false: images lie on their originals.
+    """
+    colours = _colours(branches)
     handles = [_line(name, colour) for name, colour in colours.items()]
-    if any(b.mirrored for b in branches):
+    if mirrors and any(b.mirrored for b in branches):
         handles.append(_line("mirror image: lighter", lighter(GREY), width=MIRROR_WIDTH))
-    known = {bool(s) for b in branches if b.stable is not None for s in b.stable}
+    regular = [b for b in branches if not b.bridge]
+    known = {bool(s) for b in regular if b.stable is not None for s in b.stable}
     if True in known:
         handles.append(_line("stable", GREY))
     if False in known:
         handles.append(_line("unstable", GREY, style=UNSTABLE))
-    if any(b.stable is None for b in branches):
+    if any(b.stable is None for b in regular):
         handles.append(_line("stability not computed", GREY, width=UNKNOWN_WIDTH))
+    if len(regular) < len(branches):
+        handles.append(_line(BRIDGE_NAME, BRIDGE_COLOUR, style=BRIDGE, width=BRIDGE_WIDTH))
     kinds = {m.kind.value: m.kind for m in marks}
     order = [*MARKERS, *(k for k in kinds if k not in MARKERS)]
     return handles + [_marker(k, kinds[k].meaning) for k in order if k in kinds]

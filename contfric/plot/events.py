@@ -16,18 +16,28 @@ from contfric.plot.style import MARKERS, OTHER_MARKER, event_label
 
 #: Relative: events of one kind this near in the parameter are images of one another.
 _SAME = 1e-9
-#: A diagram with more tangencies than this does not label them.
-MOST_TANGENCIES = 4
+#: Extrema of the orbits of one event agree to this: an event beside a singular point, where a branch is
+#: vertical, is located to about 1e-6.
+_SAME_MOTION = 1e-5
+#: A diagram with more tangencies than this does not label them; nor does it label the events that lie on
+#: bridges only if there are more of those.
+MOST_TANGENCIES, MOST_ON_BRIDGES = 4, 4
+#: Size of the marks that lie on bridges only.
+_SMALLER = 0.6
 
 
 @dataclass(frozen=True)
 class Mark:
-    """One event of a row: its images (mirror images, several stops) at one parameter value."""
+    """One event of a row: its images (mirror images, several stops) at one parameter value.
+
+    ``on_bridges`` tells whether it lies on bridges only.
+    """
 
     kind: KindLike
     label: str
     x: float
     y: FloatArray
+    on_bridges: bool = False
 
 
 def marks_of(
@@ -36,21 +46,34 @@ def marks_of(
     attribute: str,
     parameter: str,
 ) -> list[Mark]:
-    """Return the marks of a row, with the images of each event on all branches."""
-    elsewhere = [b for branch in branches for b in branch.bifurcations]
+    """Return the marks of a row, with the images of each event on all branches.
+
+    An event at which a bridge meets a branch is one event, with the label that it has there.
+    """
+    bridges = [b for branch in branches if branch.bridge for b in branch.bifurcations]
+    regular = [b for branch in branches if not branch.bridge for b in branch.bifurcations]
     found: list[Mark] = []
     for event in events:
         x = event.params[parameter]
-        images = [b for b in elsewhere if _coincide(b, event, parameter)]
+        there = [b for b in regular if _coincide(b, event, parameter)]
+        images = [*there, *(b for b in bridges if _coincide(b, event, parameter))]
         y = np.concatenate([quantity(b.orbit, attribute) for b in (event, *images)])
-        if not any(m.label == event.label and abs(m.x - x) <= _SAME * abs(x) for m in found):
-            found.append(Mark(event.kind, event.label, x, _distinct(y)))
+        label = event.label if event in there or not there else there[0].label
+        if not any(m.label == label and abs(m.x - x) <= _SAME * abs(x) for m in found):
+            found.append(Mark(event.kind, label, x, _distinct(y), bool(images) and not there))
     return found
 
 
 def _coincide(a: BifurcationLike, b: BifurcationLike, parameter: str) -> bool:
+    """Tell whether two located events are one, or mirror images of one another."""
     difference = abs(a.params[parameter] - b.params[parameter])
-    return a.kind.value == b.kind.value and difference <= _SAME * abs(b.params[parameter])
+    if a.kind.value != b.kind.value or difference > _SAME * abs(b.params[parameter]):
+        return False
+    if a.orbit is b.orbit:
+        return True
+    spans = [np.array([o.x_max, o.x_min]) for o in (a.orbit, b.orbit)]
+    gaps = (spans[0] - spans[1], spans[0] + spans[1][::-1])
+    return any(bool(np.all(np.abs(gap) <= _SAME_MOTION)) for gap in gaps)
 
 
 def _distinct(values: FloatArray) -> FloatArray:
@@ -68,26 +91,41 @@ def draw_marks(ax: Axes, marks: Sequence[Mark]) -> None:
             mark.y,
             linestyle="none",
             marker=look.shape,
-            markersize=look.size,
+            markersize=look.size * (_SMALLER if mark.on_bridges else 1.0),
             markerfacecolor=look.face,
             markeredgecolor=look.edge,
-            markeredgewidth=0.8,
-            zorder=4 if mark.kind.value == "T" else 5,
+            markeredgewidth=0.5 if mark.on_bridges else 0.8,
+            zorder=4 if mark.kind.value == "T" or mark.on_bridges else 5,
         )
         line.set_gid(mark.label)
+
+
+def draw_event(ax: Axes, event: BifurcationLike, place: tuple[float, float]) -> None:
+    """Mark an event at a place of a graph."""
+    look = MARKERS.get(event.kind.value, OTHER_MARKER)
+    ax.plot(
+        *place,
+        marker=look.shape,
+        markersize=look.size + 1.0,
+        markerfacecolor=look.face,
+        markeredgecolor=look.edge,
+        zorder=3,
+    )
 
 
 def label_marks(ax: Axes, marks: Sequence[Mark]) -> None:
     """Write the label of each event once, at the highest of its images.
 
-    Tangencies, at which nothing but the labels of the segments changes, give way to the others.
+    Events that lie on bridges only, and tangencies, at which nothing but the labels of the segments
+    changes, give way to the others; a tangency of a bridge has no label.
     """
-    minor = [m for m in marks if m.kind.value == "T"]
-    shown = [m for m in marks if m.kind.value != "T"]
-    major = [_anchor(m) for m in shown]
-    if len(minor) <= MOST_TANGENCIES:
-        major += [a for a in map(_anchor, minor) if not near(ax, a, major)]
-    place_labels(ax, major)
+    tangencies = [m for m in marks if m.kind.value == "T" and not m.on_bridges]
+    on_bridges = [m for m in marks if m.kind.value != "T" and m.on_bridges]
+    shown = [_anchor(m) for m in marks if m.kind.value != "T" and not m.on_bridges]
+    for minor, most in ((on_bridges, MOST_ON_BRIDGES), (tangencies, MOST_TANGENCIES)):
+        if len(minor) <= most:
+            shown += [a for a in map(_anchor, minor) if not near(ax, a, shown)]
+    place_labels(ax, shown)
 
 
 def _anchor(mark: Mark) -> Anchor:

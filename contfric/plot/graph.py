@@ -10,14 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch
 
 from contfric.models import Model
+from contfric.plot.events import draw_event
 from contfric.plot.labels import Anchor, place_labels, settle
 from contfric.plot.protocols import BifurcationLike, BranchLike, DiagramLike, SignatureLike
 from contfric.plot.save import axes_or_new
 from contfric.plot.style import (
     BLACK,
+    BRIDGE_COLOUR,
     GREY,
-    MARKERS,
-    OTHER_MARKER,
     SMALL,
     TEXT,
     branch_colours,
@@ -67,8 +67,8 @@ def plot_transition_graph(
     visited = {source for source, _ in steps}
     for name, place in places.items():
         faded = bool(steps) and name not in visited
-        _draw_domain(new, model.domain_by_name[name].label or name, place, colours[name], faded)
-    _frame(new, list(places.values()))
+        draw_node(new, model.domain_by_name[name].label or name, place, colours[name], faded)
+    frame_nodes(new, list(places.values()))
     return new
 
 
@@ -114,16 +114,16 @@ def plot_diagram_graph(diagram: DiagramLike, ax: Axes | None = None) -> Axes:
     new = axes_or_new(ax, 7.6, 4.2)
     events = _joined(diagram)
     branches, nodes = _graph_places(diagram, events)
-    colours = branch_colours(b.name for b in diagram.branches)
+    colours = branch_colours(b.name for b in diagram.branches if not b.bridge)
     for (event, meeting), place in zip(events, nodes, strict=True):
         for k in sorted(meeting):
             new.plot(*zip(place, branches[k], strict=True), color=GREY, linewidth=1.0, zorder=1)
-        _draw_event(new, event, place)
+        draw_event(new, event, place)
     for branch, place in zip(diagram.branches, branches, strict=True):
-        colour = colours[branch.name]
+        colour = BRIDGE_COLOUR if branch.bridge else colours[branch.name]
         colour = lighter(colour) if branch.mirrored else colour
-        _draw_domain(new, branch.name, place, colour, False)
-    _frame(new, [*branches, *nodes])
+        draw_node(new, branch.name, place, colour, False)
+    frame_nodes(new, [*branches, *nodes])
     settle(new)
     anchors = [
         Anchor(*place, _event_text(event, diagram.parameter))
@@ -188,9 +188,8 @@ def _draw_transition(
     )
 
 
-def _draw_domain(
-    ax: Axes, label: str, place: tuple[float, float], colour: str, faded: bool
-) -> None:
+def draw_node(ax: Axes, label: str, place: tuple[float, float], colour: str, faded: bool) -> None:
+    """Draw a node with its name in it."""
     colour = lighter(colour, 0.8) if faded else colour
     ax.plot(
         *place,
@@ -207,7 +206,7 @@ def _draw_domain(
     ax.text(*place, wrapped, ha="center", va="center", fontsize=size, color=grey, zorder=5)
 
 
-def _frame(ax: Axes, places: Sequence[tuple[float, float]]) -> None:
+def frame_nodes(ax: Axes, places: Sequence[tuple[float, float]]) -> None:
     """Leave room for the nodes and draw no frame."""
     points = np.array(places) if places else np.zeros((1, 2))
     for limits, column in ((ax.set_xlim, points[:, 0]), (ax.set_ylim, points[:, 1])):
@@ -235,18 +234,6 @@ def _joined(diagram: DiagramLike) -> list[_Event]:
         else:
             events.append((new, meeting))
     return events
-
-
-def _draw_event(ax: Axes, event: BifurcationLike, place: tuple[float, float]) -> None:
-    look = MARKERS.get(event.kind.value, OTHER_MARKER)
-    ax.plot(
-        *place,
-        marker=look.shape,
-        markersize=look.size + 1.0,
-        markerfacecolor=look.face,
-        markeredgecolor=look.edge,
-        zorder=3,
-    )
 
 
 def _graph_places(

@@ -36,6 +36,7 @@ from contfric.plot.style import (
 #: Colour of where the mass can rest, and width of the line of an orbit.
 BAND = "#E4E4E4"
 _WIDTH = 2.0
+_HELD = (0, (0.6, 0.8))
 
 
 def value_of(orbit: OrbitLike, name: str, time: float, state: FloatArray) -> float:
@@ -65,11 +66,18 @@ def draw_pieces(
     across: Sequence[FloatArray],
     up: Sequence[FloatArray],
 ) -> None:
-    """Draw the pieces in the colours of their domains (the domain is the id of the line)."""
+    """Draw the pieces in the colours of their domains (the domain is the id of the line); holds dotted."""
     colours = domain_colours(model)
     for piece, x, y in zip(pieces, across, up, strict=True):
         (line,) = ax.plot(x, y, color=colours[piece.domain], linewidth=_WIDTH, zorder=3)
         line.set_gid(piece.domain)
+        if _is_hold(model, piece):
+            line.set_linestyle(_HELD)
+
+
+def _is_hold(model: Model, piece: Piece) -> bool:
+    """Tell whether a piece is a hold: what ends it is no surface."""
+    return piece.exit not in model.surface_by_name
 
 
 def draw_surfaces(ax: Axes, orbit: OrbitLike, across: str, up: str) -> None:
@@ -127,8 +135,10 @@ def draw_moving_surfaces(
     limits = np.array([ax.get_xlim(), ax.get_ylim()])
     spans, middle = np.ptp(limits, axis=1), limits.mean(axis=1)
     for piece in pieces:
+        if is_sliding(orbit.model, piece.domain):
+            continue
         surface = orbit.model.surface_by_name[piece.exit]
-        if surface.switching or is_sliding(orbit.model, piece.domain):
+        if surface.switching:
             continue
         time, state = float(piece.times[-1]), piece.states[-1]
         slope = observe_gradient(orbit, surface.observable, time, state)[[i, j]] * spans
@@ -226,6 +236,11 @@ def legend_handles(orbit: OrbitLike, pieces: Sequence[Piece]) -> list[Line2D | P
             label=model.domain_by_name[name].label or name,
         )
         for name in visited
+    ]
+    holds = {p.domain for p in pieces if _is_hold(model, p)}
+    handles += [
+        Line2D([], [], color=colours[d], linewidth=_WIDTH, linestyle=_HELD, label="hold")
+        for d in sorted(holds)
     ]
     kinds = {sticks for sticks, _ in _stops(orbit)}
     handles += [_stop_marker(sticks) for sticks in sorted(kinds, reverse=True)]

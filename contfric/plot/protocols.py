@@ -59,6 +59,14 @@ class OrbitLike(Protocol):
         """End time and state of each segment, shape (segments, 1 + n)."""
 
     @property
+    def x_max(self) -> float:
+        """Largest value of the first state."""
+
+    @property
+    def x_min(self) -> float:
+        """Smallest value of the first state."""
+
+    @property
     def stops(self) -> FloatArray:
         """Displacements at the stops, shape (stops,)."""
 
@@ -136,6 +144,10 @@ class BranchLike(Protocol):
     @property
     def symmetric(self) -> bool:
         """Whether the orbits are their own mirror images."""
+
+    @property
+    def bridge(self) -> bool:
+        """Whether the orbits have holds: the branch bridges a jump of the flow."""
 
     @property
     def parameter(self) -> str:

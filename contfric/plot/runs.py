@@ -46,12 +46,13 @@ def stability_runs(branch: BranchLike, attribute: str) -> list[Run]:
     """Cut a branch where its stability changes.
 
     Consecutive runs share the point of change, which is the located bifurcation. A branch whose
-    stability was not computed is one run with ``stable`` None.
+    stability was not computed is one run with ``stable`` None; a bridge, which is nowhere stable,
+    is one run too.
     """
     vertices = _vertices(branch, attribute)
     runs: list[Run] = []
     start = 0
-    states = list(_between(vertices))
+    states = [False] * (len(vertices) - 1) if branch.bridge else list(_between(vertices))
     for k in range(1, len(states) + 1):
         if k == len(states) or states[k] is not states[start]:
             part = vertices[start : k + 1]

@@ -26,6 +26,9 @@ _DOMAIN_PAIRS = ((BLUE, SKY), (VERMILLION, "#F2A45C"), (GREEN, "#7BCBA9"), (PURP
 
 STABLE, UNSTABLE, UNKNOWN = "-", (0, (4.0, 2.2)), "-"
 LINE_WIDTH, MIRROR_WIDTH, UNKNOWN_WIDTH = 1.7, 1.1, 0.9
+#: Bridges lie apart: finely dotted, thin, of one colour, beneath the branches of motions without holds.
+BRIDGE, BRIDGE_COLOUR, BRIDGE_WIDTH = (0, (1.4, 1.4)), "#8C8C8C", 1.0
+BRIDGE_NAME = "bridge (orbits with a hold)"
 SMALL, TEXT = 8.0, 10.0
 
 #: Where a legend beside the axes stands.

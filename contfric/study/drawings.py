@@ -37,9 +37,10 @@ def _rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row, ..
     if figure.kind is not FigureKind.DIAGRAM:
         if figure.rows is not None:
             located.fail(("figures", index, "rows"), "only a diagram has rows")
+        if figure.kind is FigureKind.BRANCHES:
+            _check_task(located, content, index, "a graph of branches")
         return ()
-    if content.task is None:
-        located.fail(("figures", index), "a diagram needs 'explore' or 'continue'")
+    _check_task(located, content, index, "a diagram")
     if figure.rows is None:
         return _default_rows(located, content, index)
     for place, row in enumerate(figure.rows):
@@ -49,6 +50,11 @@ def _rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row, ..
                 f"row '{row.value}' shows {row.needs.value}: add {row.needs.value} to 'want'",
             )
     return tuple(figure.rows)
+
+
+def _check_task(located: LocatedYaml, content: StudyFile, index: int, what: str) -> None:
+    if content.task is None:
+        located.fail(("figures", index), f"{what} needs 'explore' or 'continue'")
 
 
 def _default_rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row, ...]:

@@ -16,11 +16,13 @@ _SIZES = {
     FigureKind.DIAGRAM: (9.6, 1.2, 2.4),
     FigureKind.ORBIT: (9.0, 6.2, 0.0),
     FigureKind.TRANSITIONS: (7.0, 5.0, 0.0),
+    FigureKind.BRANCHES: (9.6, 4.4, 0.0),
 }
 
 
 def paint(path: Path, drawing: Drawing, orbit: Orbit, diagram: Diagram | None, title: str) -> None:
     """Draw a figure and write it; a diagram carries the study's title."""
+    from contfric.plot.branch_graph import plot_branch_graph
     from contfric.plot.diagram import plot_diagram
     from contfric.plot.graph import plot_transition_graph
     from contfric.plot.orbit import plot_orbit_panels
@@ -28,11 +30,16 @@ def paint(path: Path, drawing: Drawing, orbit: Orbit, diagram: Diagram | None, t
 
     width, height, row_height = _SIZES[drawing.kind]
     figure = new_figure(width, height + row_height * len(drawing.rows))
-    if drawing.kind is FigureKind.DIAGRAM:
+    if drawing.kind in (FigureKind.DIAGRAM, FigureKind.BRANCHES):
         if diagram is None:
             raise StudyError(f"{drawing.file}: there is no diagram to draw")
         figure.suptitle(title)
+    if drawing.kind is FigureKind.DIAGRAM:
+        assert diagram is not None
         plot_diagram(diagram, rows=[row.value for row in drawing.rows], fig=figure)
+    elif drawing.kind is FigureKind.BRANCHES:
+        assert diagram is not None
+        plot_branch_graph(diagram, ax=figure.add_subplot())
     elif drawing.kind is FigureKind.ORBIT:
         plot_orbit_panels(orbit, fig=figure)
     else:

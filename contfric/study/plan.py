@@ -133,6 +133,8 @@ def _task_text(study: Study, task: ExploreTask | ContinueTask) -> str:
         text = f"the branch of the first orbit, {where}"
     else:
         text = f"every branch that can be reached, {where}"
+        if task.max_periods is not None:
+            text += f", of up to {task.max_periods} period(s)"
     return text + (", with multipliers" if study.wants(Want.STABILITY) else "")
 
 
@@ -165,6 +167,8 @@ def _skipped(study: Study) -> Iterator[Skipped]:
         yield Skipped("continuation", "neither 'explore' nor 'continue' is given")
     elif isinstance(task, ContinueTask):
         yield Skipped("other branches", "'continue' follows one branch only")
+    elif task.bridges is False:
+        yield Skipped("bridges: branches end where the flow jumps", "switched off (bridges: false)")
     if not study.wants(Want.STABILITY):
         lost = "" if task is None else ", and BP and PD with them"
         yield Skipped(f"multipliers{lost}", "not wanted (stability)")

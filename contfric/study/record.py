@@ -14,6 +14,7 @@ from typing import Any
 
 from contfric.atlas.diagram import Diagram
 from contfric.continuation.branch import Branch
+from contfric.continuation.events import Proposal
 from contfric.orbit.counts import Counts
 from contfric.orbit.orbit import Orbit
 from contfric.results import replacing
@@ -86,11 +87,21 @@ def _diagram_entries(diagram: Diagram) -> dict[str, Any]:
                 "stable_before": node.bifurcation.stable_before,
                 "stable_after": node.bifurcation.stable_after,
                 "located": node.bifurcation.located,
+                "proposals": [_proposal_entry(p) for p in node.bifurcation.proposals],
             }
             for node in listed_nodes(diagram)
         ],
         "loose_ends": [str(end) for end in diagram.loose_ends],
         "notes": list(diagram.notes),
+    }
+
+
+def _proposal_entry(proposal: Proposal) -> dict[str, Any]:
+    return {
+        "verdict": proposal.verdict.value,
+        "reason": proposal.reason,
+        "branch": None if proposal.branch is None else proposal.branch + 1,
+        "why": proposal.why,
     }
 
 
@@ -102,6 +113,7 @@ def _branch_entry(number: int, branch: Branch) -> dict[str, Any]:
         "branch": number,
         "signature": branch.name,
         "mirrored": branch.mirrored,
+        "bridge": branch.bridge,
         "points": len(branch),
         "from": min(values),
         "to": max(values),

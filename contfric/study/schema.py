@@ -23,6 +23,7 @@ class FigureKind(str, Enum):
     DIAGRAM = "diagram"
     ORBIT = "orbit"
     TRANSITIONS = "transitions"
+    BRANCHES = "branches"
 
 
 class Row(str, Enum):
@@ -118,8 +119,15 @@ class ContinueTask(_Task):
 class ExploreTask(_Task):
     """Follow all branches that can be reached from the first orbit."""
 
+    bridges: bool | None = Field(
+        None,
+        description="true or false: whether orbits with holds lead on where the flow jumps",
+    )
     max_periods: int | None = Field(
-        None, ge=1, description="a whole number >= 1: longest period followed through doublings"
+        None,
+        ge=1,
+        le=16,
+        description="a whole number from 1 to 16: longest period followed through doublings",
     )
     max_branches: int | None = Field(
         None, ge=1, description="a whole number >= 1: most branches to compute"
@@ -130,7 +138,7 @@ class Figure(_Part):
     """One figure."""
 
     kind: Annotated[FigureKind, Field(strict=False)] = Field(
-        description="one of diagram, orbit, transitions"
+        description="one of diagram, orbit, transitions, branches"
     )
     rows: _Rows | None = Field(
         None, description="a list of rows of a diagram: any of x_max, x_min, stops, psi"
@@ -159,8 +167,8 @@ class StudyFile(_Part):
     )
     explore: ExploreTask | None = Field(
         None,
-        description="a mapping with parameter and range; also max_step, max_points, max_periods, "
-        "max_branches",
+        description="a mapping with parameter and range; also bridges, max_step, max_points, "
+        "max_periods, max_branches",
     )
     continue_: ContinueTask | None = Field(
         None,

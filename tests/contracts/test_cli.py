@@ -58,8 +58,13 @@ def test_run_and_info(study, tmp_path, capsys) -> None:
     for text in ("scene: A scene", "1a and mirror", "SN_1a", "0.541912816945", "loose ends"):
         assert text in printed.out
     assert f"written to {out}: points.csv, bifurcations.csv" in printed.out
+    assert "(bridge) and mirror" in printed.out
+    assert "proposed" not in printed.out, "what was proposed is for those who ask for it"
     assert main(["info", str(out)]) == Exit.DONE
     shown = capsys.readouterr().out
+    assert "(bridge) and mirror" in shown
+    assert "what was proposed to follow the events\n  SS_a at Omega = 0.4917488139\n" in shown
+    assert "accepted as branch 3: hold at stop" in shown
     for text in ("scene: A scene", "1a and mirror", "SN_1a", "0.541912816945", "loose ends"):
         assert text in shown
     for text in ("newton solves", "multiplier evaluations", "matplotlib: no figures", "run.json"):

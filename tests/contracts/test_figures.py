@@ -26,6 +26,7 @@ from contfric.errors import ParameterError
 from contfric.plot import (
     ROWS,
     new_figure,
+    plot_branch_graph,
     plot_branches,
     plot_diagram,
     plot_diagram_graph,
@@ -36,9 +37,12 @@ from contfric.plot import (
     plot_transition_graph,
     save_figure,
 )
+from contfric.plot.events import marks_of
 from contfric.plot.pieces import level, observe, pieces_of
 from contfric.plot.runs import aligned, stability_runs
 from contfric.plot.style import (
+    BRIDGE_COLOUR,
+    BRIDGE_NAME,
     UNSTABLE,
     branch_colours,
     domain_colours,
@@ -120,6 +124,7 @@ def fold(stable: list[bool] | None, events: list[Any]) -> Any:
         parameter="p",
         name="1a",
         mirrored=False,
+        bridge=False,
         values=1.0 - s**2,
         arc=s + 0.9,
         x_max=x_max,
@@ -240,7 +245,7 @@ def test_diagram_rows_share_their_parameter(diagram: Any) -> None:
 def test_legend_says_branches_lines_and_events(diagram: Any) -> None:
     (legend,) = plot_diagram(diagram)[0].figure.legends
     known = entries(legend)
-    assert {b.name for b in diagram.branches} <= set(known)
+    assert {b.name for b in diagram.branches if not b.bridge} <= set(known)
     assert {"stable", "unstable", "mirror image: lighter"} <= set(known)
     for bif in diagram.bifurcations:
         assert f"{bif.kind.value}: {bif.kind.meaning}" in known
@@ -279,6 +284,53 @@ def test_events_and_legend_can_be_left_out(diagram: Any) -> None:
     assert texts(ax) == []
 
 
+def test_bridges_are_drawn_apart(diagram: Any) -> None:
+    ax = plot_diagram_row(diagram, "x_max")
+    bridges = {b.name for b in diagram.branches if b.bridge}
+    assert bridges
+    drawn = [line for name in bridges for line in curves(ax, name)]
+    others = [line for b in diagram.branches if not b.bridge for line in curves(ax, b.name)]
+    assert len(drawn) == 2, "one line for a bridge, one for its mirror image"
+    assert {line.get_color() for line in drawn} == {BRIDGE_COLOUR, lighter(BRIDGE_COLOUR, 0.3)}
+    assert max(b.get_zorder() for b in drawn) < min(o.get_zorder() for o in others)
+    assert max(b.get_linewidth() for b in drawn) < min(o.get_linewidth() for o in others)
+    assert all(is_dashed(line) for line in drawn)
+    known = entries(ax.get_legend())
+    assert known.count(BRIDGE_NAME) == 1
+    assert not bridges & set(known)
+    plain = plot_branches([b for b in diagram.branches if not b.bridge])
+    assert BRIDGE_NAME not in entries(plain.get_legend())
+
+
+def test_a_bridge_is_one_run(diagram: Any) -> None:
+    (bridge,) = (b for b in diagram.branches if b.bridge and not b.mirrored)
+    (run,) = stability_runs(bridge, "x_max")
+    assert run.stable is False
+    assert run.x[[0, -1]] == pytest.approx(bridge.values[[0, -1]], abs=1e-9)
+
+
+def test_an_event_of_branch_and_bridge_is_one_mark(diagram: Any) -> None:
+    events = [b for branch in diagram.branches for b in branch.bifurcations]
+    found = marks_of(events, diagram.branches, "x_max", "Omega")
+    jumps = [(m.label, round(m.x, 9)) for m in found if m.kind.value == "SS"]
+    assert jumps == [("SS_a", 0.49181666), ("SS_a", 0.491748814)]
+    assert not any(m.on_bridges for m in found)
+
+
+def test_what_lies_on_bridges_only_gives_way() -> None:
+    start = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.22, "S0": 0.4})
+    found = cf.explore(start, "Omega", (0.4, 0.56))
+    marks = marks_of(found.bifurcations, found.branches, "asymmetry", "Omega")
+    (alone,) = (m for m in marks if m.on_bridges)
+    assert alone.kind.value == "T"
+    fig = new_figure()
+    ax = plot_diagram_row(found, "psi", fig.add_subplot(), legend=False)
+    sizes = {m.get_xdata()[0]: m.get_markersize() for m in markers(ax, "T")}
+    assert sizes[alone.x] < max(sizes.values())
+    labels = [t for t in ax.texts if isinstance(t, Annotation) and t.get_text() == event_label("T")]
+    assert alone.x not in {t.xy[0] for t in labels}
+
+
 def test_unknown_row_has_a_remedy(diagram: Any) -> None:
     for draw in (plot_diagram_row, lambda d, row: plot_diagram(d, rows=(row,))):
         with pytest.raises(ParameterError, match="did you mean 'x_max'"):
@@ -289,6 +341,7 @@ def test_an_empty_diagram_is_drawn() -> None:
     empty = SimpleNamespace(parameter="p", range=(0.0, 1.0), branches=(), nodes=(), bifurcations=())
     assert len(plot_diagram(empty)) == 3
     assert isinstance(plot_diagram_graph(empty), Axes)
+    assert isinstance(plot_branch_graph(empty), Axes)
 
 
 def test_methods_draw(orbit: Any, branch: Any, diagram: Any) -> None:
@@ -346,6 +399,19 @@ def test_observables_in_time_with_their_levels(orbit: Any) -> None:
         plot_orbit_in_time(orbit, own[:1])
 
 
+def test_holds_are_dotted(orbit: Any, diagram: Any) -> None:
+    (bridge,) = (b for b in diagram.branches if b.bridge and not b.mirrored)
+    held = bridge[len(bridge) // 2]
+    ax = plot_orbit(held)
+    sticks = curves(ax, "stick")
+    assert [is_dashed(line) for line in sticks].count(True) == 1
+    assert entries(ax.get_legend()).count("hold") == 1
+    assert len(plot_orbit_panels(held)) == 4
+    ax = plot_orbit(orbit)
+    assert not any(is_dashed(line) for line in curves(ax, "stick"))
+    assert "hold" not in entries(ax.get_legend())
+
+
 def test_orbit_panels(orbit: Any) -> None:
     fig = new_figure(9, 6)
     axes = plot_orbit_panels(orbit, fig)
@@ -384,6 +450,26 @@ def test_diagram_graph_has_every_branch(diagram: Any) -> None:
     for branch in diagram.branches:
         assert branch.name.replace(", ", ",\n") in texts(ax)
     assert any(text.startswith(r"$\mathrm{BP}_{2s}$") for text in texts(ax))
+
+
+def test_branch_graph_has_every_branch_and_every_joint_once(diagram: Any) -> None:
+    ax = plot_branch_graph(diagram)
+    originals = [b for b in diagram.branches if not b.mirrored]
+    shown = texts(ax)
+    for branch in originals:
+        assert shown.count(branch.name.replace(", ", ",\n")) == 1
+    for label, value in (("BP_2s", "0.48874"), ("SS_a", "0.49175"), ("SS_a", "0.49182")):
+        assert shown.count(f"{event_label(label)}\n$\\Omega$ = {value}") == 1
+    assert len(shown) == len(originals) + 4  # and CS_s; folds and tangencies join nothing
+    edges = [line for line in ax.lines if line.get_marker() == "None"]
+    assert len(edges) == 3 + 3, "CS_s joins three branches"
+
+
+def test_branch_graph_of_separate_parts(diagram: Any) -> None:
+    apart = SimpleNamespace(parameter="Omega", branches=diagram.branches, nodes=())
+    ax = plot_branch_graph(apart)
+    places = {tuple(line.get_xydata()[0]) for line in ax.lines}
+    assert len(places) == len([b for b in diagram.branches if not b.mirrored])
 
 
 # ------------------------------------------------------------------------- look, axes and files

@@ -101,7 +101,10 @@ def run_python(code: str, *args: object) -> subprocess.CompletedProcess[str]:
         (HEAD + "explore: {parameter: Omega, range: [0.4, .nan]}\n", 3, "'range': .*got nan"),
         (HEAD + EXPLORE.replace("}", ", max_step: 0}"), 3, r"'max_step': .*in \(0, 1\].*got 0"),
         (HEAD + EXPLORE.replace("}", ", max_periods: 1.5}"), 3, "'max_periods': .*whole number"),
+        (HEAD + EXPLORE.replace("}", ", max_periods: 17}"), 3, "'max_periods': .*from 1 to 16"),
+        (HEAD + EXPLORE.replace("}", ", bridges: 0}"), 3, "'bridges': .*true or false.*got 0"),
         (HEAD + CONTINUE.replace("}", ", max_periods: 2}"), 3, "unknown key 'max_periods'"),
+        (HEAD + CONTINUE.replace("}", ", bridges: true}"), 3, "unknown key 'bridges'"),
         (HEAD + "start: {simulate: {state: [1.0]}}\n", 3, r"is 2 numbers \(x, v\), got 1"),
         (HEAD + "start: {simulate: {state: [a, 0]}}\n", 3, "'state': .*finite numbers.*got 'a'"),
         (HEAD + "start: {simulate: {periods: 0}}\n", 3, "'periods': .*from 1 to 64"),
@@ -122,6 +125,7 @@ def run_python(code: str, *args: object) -> subprocess.CompletedProcess[str]:
         (HEAD + EXPLORE + CONTINUE, 4, "one of explore and continue, not both"),
         (HEAD + "start: {simulate: {}, signature: 1a}\n", 3, "got simulate and signature"),
         (HEAD + "figures: [{kind: diagram}]\n", 3, "a diagram needs 'explore' or 'continue'"),
+        (HEAD + "figures: [{kind: branches}]\n", 3, "a graph of branches needs 'explore'"),
         (HEAD + EXPLORE + "figures: [{kind: diagram}]\n", 4, "nothing to show: add any of extrema"),
         (
             HEAD
@@ -196,7 +200,7 @@ def test_a_billion_laughs_end_in_one_line(study) -> None:
 
 
 def test_bundled_studies_are_valid() -> None:
-    assert "fig05" in study_names()
+    assert {"fig03", "fig04", "fig05", "fig06", "fig07", "fig13"} <= set(study_names())
     for name in study_names():
         assert make_plan(read_study(name)).steps
 
@@ -216,6 +220,35 @@ def test_plan_says_what_is_skipped(study) -> None:
     everything = str(make_plan(read_study("fig05")))
     assert "skipped:" not in everything
     assert "diagram (x_max, stops, psi), orbit" in everything
+
+
+def test_bridges_are_switched_off(tmp_path, study) -> None:
+    path = study(HEAD + EXPLORE.replace("}", ", bridges: false, max_periods: 16}"))
+    text = str(make_plan(read_study(path)))
+    assert "- bridges: branches end where the flow jumps: switched off (bridges: false)" in text
+    assert "Omega from 0.45 to 0.56, of up to 16 period(s)" in text
+    record = cf.run_study(path, tmp_path / "out").info
+    assert not any(branch["bridge"] for branch in record["branches"])
+    assert len(record["loose_ends"]) > 0
+    refused = [p for event in record["bifurcations"] for p in event["proposals"]]
+    assert "bridges are switched off" in {p["why"] for p in refused if p["verdict"] == "refused"}
+    plain = study(HEAD + EXPLORE, "plain.yaml")
+    assert "bridges" not in str(make_plan(read_study(plain)))
+    record = cf.run_study(plain, tmp_path / "plain").info
+    assert {b["bridge"] for b in record["branches"]} == {True, False}
+    assert record["loose_ends"] == []
+
+
+def test_proposals_are_recorded(tmp_path, study) -> None:
+    result = cf.run_study(study(HEAD + EXPLORE), tmp_path / "out")
+    events = result.info["bifurcations"]
+    assert [e["label"] for e in events] == [b.label for b in result.diagram.bifurcations]
+    for entry, event in zip(events, result.diagram.bifurcations, strict=True):
+        assert [p["reason"] for p in entry["proposals"]] == [p.reason for p in event.proposals]
+        for item in entry["proposals"]:
+            assert (item["branch"] is None) is (item["verdict"] == "refused")
+            assert bool(item["why"]) is (item["verdict"] == "refused")
+    assert any(e["proposals"] for e in events)
 
 
 def test_plan_of_other_scenes(study) -> None:
@@ -443,12 +476,13 @@ def test_figures(tmp_path, study) -> None:
         + CONTINUE
         + "want: [extrema]\nfigures:\n- {kind: diagram}\n"
         + "- {kind: diagram, rows: [x_min], format: svg}\n"
-        + "- {kind: transitions, file: moves.pdf}\n"
+        + "- {kind: transitions, file: moves.pdf}\n- {kind: branches}\n"
     )
     result = cf.run_study(study(text), tmp_path / "out")
-    figures = [result.out / name for name in ("diagram.png", "diagram.svg", "moves.pdf")]
+    names = ("diagram.png", "diagram.svg", "moves.pdf", "branches.png")
+    figures = [result.out / name for name in names]
     starts = [path.read_bytes()[:5] for path in figures]
-    assert starts == [b"\x89PNG\r", b"<?xml", b"%PDF-"]
+    assert starts == [b"\x89PNG\r", b"<?xml", b"%PDF-", b"\x89PNG\r"]
     assert {p.name for p in figures} < {p.name for p in result.files}
     assert "figures" in result.info["timings"]
 

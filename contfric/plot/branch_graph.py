@@ -1,0 +1,153 @@
+"""The graph of a diagram: its branches are the nodes, its bifurcations the edges between them.
+
+A branch and its mirror image are one node, so what the drawing shows is the diagram up to the symmetry:
+a bifurcation and its mirror image are one edge. Folds and tangencies join no two branches and are left
+out. Where more than two branches meet, the edges of that bifurcation run between all of them.
+
+The nodes stand where springs along the shortest paths would pull them (T. Kamada and S. Kawai,
+Inf. Process. Lett. 31 (1989) 7-15), which needs no random start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from contfric.plot.events import draw_event
+from contfric.plot.graph import draw_node, frame_nodes
+from contfric.plot.labels import Anchor, place_labels, settle
+from contfric.plot.protocols import BifurcationLike, BranchLike, DiagramLike
+from contfric.plot.save import axes_or_new
+from contfric.plot.style import (
+    BRIDGE_COLOUR,
+    GREY,
+    branch_colours,
+    event_label,
+    parameter_label,
+)
+
+#: Relative: bifurcations of one kind this near in the parameter, on the same branches, are mirror images.
+_SAME = 1e-9
+
+_Place = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """A bifurcation and the nodes that it joins."""
+
+    event: BifurcationLike
+    value: float
+    nodes: tuple[int, ...]
+
+
+def plot_branch_graph(diagram: DiagramLike, ax: Axes | None = None) -> Axes:
+    """Draw how the branches of a diagram are joined by its bifurcations, up to mirror images.
+
+    Parameters
+    ----------
+    diagram : Diagram
+    ax : Axes, optional
+        Where to draw; new axes by default.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> ax = plot_branch_graph(cf.explore(orbit, "Omega", (0.4, 0.6)))
+    """
+    new = axes_or_new(ax, 8.4, 5.6)
+    new.set_axis_off()
+    branches, node_of = _nodes(diagram.branches)
+    joints = _joints(diagram, node_of)
+    places = _places(len(branches), joints)
+    for joint in joints:
+        for one, other in combinations(joint.nodes, 2):
+            new.plot(*zip(places[one], places[other], strict=True), color=GREY, lw=1.0, zorder=1)
+    colours = branch_colours(b.name for b in branches if not b.bridge)
+    for branch, place in zip(branches, places, strict=True):
+        colour = BRIDGE_COLOUR if branch.bridge else colours[branch.name]
+        draw_node(new, branch.name, place, colour, faded=False)
+    anchors = _events(new, joints, places, diagram.parameter)
+    frame_nodes(new, places)
+    settle(new)
+    place_labels(new, anchors)
+    return new
+
+
+def _nodes(branches: Sequence[BranchLike]) -> tuple[list[BranchLike], list[int]]:
+    """Return the branches that are nodes, and the node of each branch: images follow originals."""
+    nodes: list[BranchLike] = []
+    node_of: list[int] = []
+    for branch in branches:
+        if not branch.mirrored:
+            nodes.append(branch)
+        node_of.append(len(nodes) - 1)
+    return nodes, node_of
+
+
+def _joints(diagram: DiagramLike, node_of: Sequence[int]) -> list[_Joint]:
+    """Return every bifurcation that joins two nodes or more, each once."""
+    found: list[_Joint] = []
+    for node in diagram.nodes:
+        event, nodes = node.bifurcation, tuple(sorted({node_of[i] for i in node.branches}))
+        value = event.params[diagram.parameter]
+        known = any(
+            j.nodes == nodes
+            and j.event.kind.value == event.kind.value
+            and abs(j.value - value) <= _SAME * abs(value)
+            for j in found
+        )
+        if len(nodes) > 1 and not known:
+            found.append(_Joint(event, value, nodes))
+    return found
+
+
+def _places(count: int, joints: Sequence[_Joint]) -> list[_Place]:
+    """Return where the nodes stand; parts that nothing joins stand side by side."""
+    import networkx as nx
+
+    graph: nx.Graph[int] = nx.Graph()
+    graph.add_nodes_from(range(count))
+    for joint in joints:
+        graph.add_edges_from(combinations(joint.nodes, 2))
+    places: dict[int, _Place] = {}
+    left = 0.0
+    for part in nx.connected_components(graph):
+        nodes = sorted(part)
+        at = nx.kamada_kawai_layout(graph.subgraph(nodes), scale=float(len(nodes)) ** 0.5)
+        points = _lying(np.array([at[k] for k in nodes]))
+        points[:, 0] += left - points[:, 0].min()
+        left = float(points[:, 0].max()) + 1.0
+        places |= {k: (float(x), float(y)) for k, (x, y) in zip(nodes, points, strict=True)}
+    return [places[k] for k in range(count)]
+
+
+def _lying(points: np.ndarray) -> np.ndarray:
+    """Return points turned so that their longest extent lies, the first of them to the left."""
+    centred = points - points.mean(axis=0)
+    turned = np.asarray(centred @ np.linalg.svd(centred, full_matrices=False)[2].T)
+    if turned.shape[1] < 2:
+        turned = np.column_stack([turned, np.zeros(len(turned))])
+    return np.asarray(turned * np.where(turned[0] > 0.0, -1.0, 1.0))
+
+
+def _events(
+    ax: Axes, joints: Sequence[_Joint], places: Sequence[_Place], parameter: str
+) -> list[Anchor]:
+    """Mark each bifurcation in the middle of what it joins, and return its label."""
+    anchors: list[Anchor] = []
+    for index, joint in enumerate(joints):
+        middle = np.mean([places[k] for k in joint.nodes], axis=0)
+        twins = [k for k, other in enumerate(joints) if other.nodes == joint.nodes]
+        if len(twins) > 1:  # they share an edge
+            one, other = (np.array(places[k]) for k in joint.nodes[:2])
+            middle = one + (other - one) * (twins.index(index) + 1.0) / (len(twins) + 1.0)
+        draw_event(ax, joint.event, (float(middle[0]), float(middle[1])))
+        name = f"{event_label(joint.event.label)}\n{parameter_label(parameter)} = {joint.value:.5g}"
+        anchors.append(Anchor(float(middle[0]), float(middle[1]), name))
+    return anchors

@@ -1,0 +1,125 @@
+"""The gallery: every study runs to its end, and the pages show what is computed."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import sys
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import networkx as nx
+import pytest
+
+from contfric.signature.notation import parse_signature
+
+GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
+
+
+def load_script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("gallery_make", GALLERY / "make.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+make = load_script()
+PAGE_OF = {study: page for page, studies in make.PAGES.items() for study in studies}
+DIAGRAMS = [name for name in make.STUDIES if name != "fig03"]
+
+
+@pytest.fixture(scope="module")
+def result_of(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    @cache
+    def run(name: str) -> Any:
+        return make.run(name, tmp_path_factory.mktemp(name) / "out", figures=False)
+
+    return run
+
+
+def page(name: str) -> str:
+    return (GALLERY / f"{PAGE_OF[name]}.md").read_text(encoding="utf-8")
+
+
+def test_every_bundled_study_has_a_page() -> None:
+    from contfric.study import study_names
+
+    assert set(study_names()) <= set(make.STUDIES)
+    listed = (GALLERY / "README.md").read_text(encoding="utf-8")
+    assert re.findall(r"\]\((fig\d+)\.md\)", listed) == list(make.PAGES)
+
+
+@pytest.mark.parametrize("name", DIAGRAMS)
+def test_nothing_is_left_over(name: str, result_of: Any) -> None:
+    result = result_of(name)
+    assert result.study.signature is None, "no signature is typed"
+    assert result.diagram.complete
+    assert result.diagram.loose_ends == ()
+    assert result.info["modules"]["matplotlib"] is ("matplotlib" in sys.modules)
+    assert not [path for path in result.files if path.suffix == ".png"]
+
+
+@pytest.mark.parametrize("name", DIAGRAMS)
+def test_branches_are_connected_up_to_mirror_images(name: str, result_of: Any) -> None:
+    found = result_of(name).diagram
+    graph = nx.Graph(found.graph)
+    for k, branch in enumerate(found.branches):
+        if branch.mirrored:  # an image stands behind its original
+            graph.add_edge(k - 1, k)
+    assert nx.is_connected(graph)
+
+
+@pytest.mark.parametrize("name", DIAGRAMS)
+def test_tables_are_what_is_computed(name: str, result_of: Any) -> None:
+    diagram = result_of(name).diagram
+    rows = make.rows_of(name, diagram)
+    shown = [line.strip("|").split("|") for line in make.tables_in(page(name))[name]]
+    head, _, *lines = [[cell.strip() for cell in cells] for cells in shown]
+    assert head[1] == diagram.parameter
+    assert [[a, c, d] for a, _, c, d in lines] == [[r.event, r.branches, r.says] for r in rows]
+    for cells, row in zip(lines, rows, strict=True):
+        rounding = 0.5 * 10.0**-make.DIGITS
+        assert abs(float(cells[1]) - row.value) <= rounding + row.accuracy
+
+
+def test_the_orbit_of_fig03(result_of: Any) -> None:
+    result = result_of("fig03")
+    shown = "\n".join(make.tables_in(page("fig03"))["fig03"])
+    number = re.compile(r"\d\.\d+")
+    computed = "\n".join(make.table_of("fig03", result))
+    assert number.sub("", shown) == number.sub("", computed)
+    for a, b in zip(number.findall(shown), number.findall(computed), strict=True):
+        assert float(a) == pytest.approx(float(b), abs=1e-9)
+    paper = "x0v+ -> stick -> x+v- -> x0v- -> stick -> x-v+"  # section 3.1, the first structure
+    assert parse_signature(paper, result.orbit.model) == result.orbit.signature
+
+
+@pytest.mark.parametrize("name", DIAGRAMS)
+def test_everything_published_has_its_event(name: str, result_of: Any) -> None:
+    import yaml
+
+    entries = yaml.safe_load((GALLERY / "published.yaml").read_text(encoding="utf-8"))[name]
+    said = "; ".join(row.says for row in make.rows_of(name, result_of(name).diagram))
+    assert all(entry["says"] in said for entry in entries)
+
+
+@pytest.mark.parametrize("name", make.STUDIES)
+def test_figures_of_the_pages_exist(name: str) -> None:
+    figures = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", page(name))
+    assert f"../images/gallery/{name}.png" in figures
+    assert all((GALLERY / figure).is_file() for figure in figures)
+
+
+def test_a_table_is_put_in_its_place() -> None:
+    text = "a\n<!-- events: x -->\n<!-- end -->\nb\n<!-- events: y -->\nold\n<!-- end -->\nc\n"
+    text = make.with_table(text, "x", ["1", "2"])
+    text = make.with_table(text, "y", ["3"])
+    assert make.tables_in(text) == {"x": ["1", "2"], "y": ["3"]}
+    assert re.sub(r"<!--.*?-->\n|\d\n", "", text) == "a\nb\nc\n"
+    with pytest.raises(ValueError, match="no place for the table of z"):
+        make.with_table(text, "z", [])
