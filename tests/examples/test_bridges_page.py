@@ -1,0 +1,56 @@
+"""The page on bridges: its code runs, its table is what the gallery's script computes."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+from types import ModuleType
+
+import matplotlib
+import pytest
+
+matplotlib.use("Agg")
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "bridges.md").read_text()
+
+
+@pytest.fixture(scope="module")
+def script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("bridges_gallery", DOCS / "gallery/bridges.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_code_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    scope: dict[str, object] = {}
+    for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
+        exec(compile(block, "docs/bridges.md", "exec"), scope)
+    shown = capsys.readouterr().out.splitlines()
+    said = re.search(r"# (x-v\+ -> .*)", PAGE)
+    assert said is not None
+    assert shown[0] == said[1]
+    assert shown[-1] == "2 0"
+
+
+def test_table_is_that_of_the_script(script: ModuleType) -> None:
+    rows = re.findall(r"^\| (.*) \|$", script.table(), re.MULTILINE)[1:]
+    assert len(rows) > 10
+    for row in rows:
+        *words, parameter, motion = row.split(" | ")
+        assert f"| {' | '.join(words)} |" in PAGE
+        assert float(parameter) < 1e-10
+        assert float(motion) < 1e-10
+
+
+def test_pictures_are_drawn_and_shown(
+    script: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(script, "IMAGES", tmp_path)
+    for kind in script.FIGURES:
+        script.figure(kind)
+        name = f"bridge_{kind.lower()}.png"
+        assert (tmp_path / name).stat().st_size > 10_000
+        assert f"images/{name}" in PAGE and (DOCS / "images" / name).exists()
