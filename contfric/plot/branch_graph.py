@@ -2,7 +2,7 @@
 
 A branch and its mirror image are one node, so what the drawing shows is the diagram up to the symmetry:
 a bifurcation and its mirror image are one edge. Folds and tangencies join no two branches and are left
-out. Where more than two branches meet, the edges of that bifurcation run between all of them.
+out. Where more than two branches meet, the edge has as many arms, from its middle to each of them.
 
 The nodes stand where springs along the shortest paths would pull them (T. Kamada and S. Kawai,
 Inf. Process. Lett. 31 (1989) 7-15), which needs no random start.
@@ -66,8 +66,8 @@ def plot_branch_graph(diagram: DiagramLike, ax: Axes | None = None) -> Axes:
     joints = _joints(diagram, node_of)
     places = _places(len(branches), joints)
     for joint in joints:
-        for one, other in combinations(joint.nodes, 2):
-            new.plot(*zip(places[one], places[other], strict=True), color=GREY, lw=1.0, zorder=1)
+        for start, end in _lines(joint, places):
+            new.plot(*zip(start, end, strict=True), color=GREY, linewidth=1.0, zorder=1)
     colours = branch_colours(b.name for b in branches if not b.bridge)
     for branch, place in zip(branches, places, strict=True):
         colour = BRIDGE_COLOUR if branch.bridge else colours[branch.name]
@@ -136,18 +136,33 @@ def _lying(points: np.ndarray) -> np.ndarray:
     return np.asarray(turned * np.where(turned[0] > 0.0, -1.0, 1.0))
 
 
+def _lines(joint: _Joint, places: Sequence[_Place]) -> list[tuple[_Place, _Place]]:
+    """Return the lines of an edge: one between two nodes, an arm to each of more."""
+    ends = [places[k] for k in joint.nodes]
+    if len(ends) == 2:
+        return [(ends[0], ends[1])]
+    middle = _middle(joint, places)
+    return [(middle, end) for end in ends]
+
+
+def _middle(joint: _Joint, places: Sequence[_Place]) -> _Place:
+    x, y = np.mean([places[k] for k in joint.nodes], axis=0)
+    return float(x), float(y)
+
+
 def _events(
     ax: Axes, joints: Sequence[_Joint], places: Sequence[_Place], parameter: str
 ) -> list[Anchor]:
     """Mark each bifurcation in the middle of what it joins, and return its label."""
     anchors: list[Anchor] = []
     for index, joint in enumerate(joints):
-        middle = np.mean([places[k] for k in joint.nodes], axis=0)
+        middle = _middle(joint, places)
         twins = [k for k, other in enumerate(joints) if other.nodes == joint.nodes]
-        if len(twins) > 1:  # they share an edge
-            one, other = (np.array(places[k]) for k in joint.nodes[:2])
-            middle = one + (other - one) * (twins.index(index) + 1.0) / (len(twins) + 1.0)
-        draw_event(ax, joint.event, (float(middle[0]), float(middle[1])))
+        if len(twins) > 1:  # they share a line
+            one, other = (places[k] for k in joint.nodes[:2])
+            w = (twins.index(index) + 1.0) / (len(twins) + 1.0)
+            middle = (one[0] + w * (other[0] - one[0]), one[1] + w * (other[1] - one[1]))
+        draw_event(ax, joint.event, middle)
         name = f"{event_label(joint.event.label)}\n{parameter_label(parameter)} = {joint.value:.5g}"
-        anchors.append(Anchor(float(middle[0]), float(middle[1]), name))
+        anchors.append(Anchor(*middle, name))
     return anchors

@@ -462,7 +462,7 @@ def test_branch_graph_has_every_branch_and_every_joint_once(diagram: Any) -> Non
         assert shown.count(f"{event_label(label)}\n$\\Omega$ = {value}") == 1
     assert len(shown) == len(originals) + 4  # and CS_s; folds and tangencies join nothing
     edges = [line for line in ax.lines if line.get_marker() == "None"]
-    assert len(edges) == 3 + 3, "CS_s joins three branches"
+    assert len(edges) == 3 + 3, "CS_s has an arm to each of three branches"
 
 
 def test_branch_graph_of_separate_parts(diagram: Any) -> None:
