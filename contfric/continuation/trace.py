@@ -160,7 +160,10 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     }
     if why in reasons:
         side.end = End(reasons[why])
-        if why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
+        if why in (kernels.STEP, kernels.BROKEN) and _is_at_limit(side.tip.value, settings):
+            upper = side.tip.value > 0.5 * (settings.low + settings.high)
+            side.end = _limit_end(upper, settings)
+        elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
             _stuck_at_vertex(orbit, side, settings)
         return True, step
     if why == kernels.FULL:
@@ -255,7 +258,9 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     reached = after if limit is None else limit[0]
     if np.any(reached.tests[:-EXTRA] < -_VIOLATED):
         side.drop_tip()
-        side.end = End(EndReason.SINGULAR)
+        near = _is_at_limit(side.tip.value, settings)
+        upper = side.tip.value > 0.5 * (settings.low + settings.high)
+        side.end = _limit_end(upper, settings) if near else End(EndReason.SINGULAR)
         return True
     if limit is None:
         return False

@@ -53,14 +53,18 @@ def find_start(study: Study, say: Say) -> Orbit:
 def explore_from(study: Study, orbit: Orbit, task: ExploreTask, say: Say) -> Diagram:
     """Explore; on Ctrl-C the diagram found so far, with ``complete`` False."""
     from contfric.atlas.explore import explore
+    from contfric.atlas.seeds import Seeds
 
+    options = task.options()
+    if task.seeds is not None:
+        options["seeds"] = Seeds(**task.seeds.model_dump())
     return explore(
         orbit,
         task.parameter,
         (task.range[0], task.range[1]),
         stability=study.wants(Want.STABILITY),
         progress=lambda text: say(f"explore: {text}"),
-        **task.options(),
+        **options,
     )
 
 

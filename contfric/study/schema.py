@@ -116,9 +116,18 @@ class ContinueTask(_Task):
     """Follow the branch of the first orbit to its ends."""
 
 
+class SeedsTask(_Part):
+    """Simulations whose attractors start branches that nothing else reaches."""
+
+    values: int = Field(20, ge=1, description="a whole number >= 1: values of the parameter")
+    states: int = Field(3, ge=1, description="a whole number >= 1: initial conditions at each")
+    seed: int = Field(0, ge=0, description="a whole number >= 0: seed of the random ones")
+
+
 class ExploreTask(_Task):
     """Follow all branches that can be reached from the first orbit."""
 
+    seeds: SeedsTask | None = Field(None, description="a mapping with any of values, states, seed")
     bridges: bool | None = Field(
         None,
         description="true or false: whether orbits with holds lead on where the flow jumps",
@@ -167,8 +176,8 @@ class StudyFile(_Part):
     )
     explore: ExploreTask | None = Field(
         None,
-        description="a mapping with parameter and range; also bridges, max_step, max_points, "
-        "max_periods, max_branches",
+        description="a mapping with parameter and range; also bridges, seeds, max_step, "
+        "max_points, max_periods, max_branches",
     )
     continue_: ContinueTask | None = Field(
         None,
