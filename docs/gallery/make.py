@@ -23,7 +23,7 @@ IMAGES = HERE.parent / "images" / "gallery"
 #: Studies of each page: bundled ones by name, those beside this script by their files.
 PAGES: dict[str, tuple[str, ...]] = {
     "fig03": ("fig03",),
-    "fig04": ("fig04", "fig04-9seg"),
+    "fig04": ("fig04",),
     "fig05": ("fig05",),
     "fig06": ("fig06",),
     "fig07": ("fig07",),
