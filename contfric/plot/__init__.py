@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from contfric.plot.branch_graph import plot_branch_graph
     from contfric.plot.diagram import plot_branches, plot_diagram, plot_diagram_row
-    from contfric.plot.graph import plot_diagram_graph, plot_transition_graph
+    from contfric.plot.graph import plot_transition_graph
     from contfric.plot.lyapunov import plot_lyapunov_map
     from contfric.plot.orbit import plot_orbit, plot_orbit_in_time, plot_orbit_panels
     from contfric.plot.save import new_figure, save_figure
@@ -26,7 +26,6 @@ _HOMES = {
     "plot_branch_graph": "contfric.plot.branch_graph",
     "plot_branches": "contfric.plot.diagram",
     "plot_diagram": "contfric.plot.diagram",
-    "plot_diagram_graph": "contfric.plot.graph",
     "plot_diagram_row": "contfric.plot.diagram",
     "plot_lyapunov_map": "contfric.plot.lyapunov",
     "plot_orbit": "contfric.plot.orbit",
@@ -42,7 +41,6 @@ __all__ = [
     "plot_branch_graph",
     "plot_branches",
     "plot_diagram",
-    "plot_diagram_graph",
     "plot_diagram_row",
     "plot_lyapunov_map",
     "plot_orbit",

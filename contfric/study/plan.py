@@ -170,7 +170,7 @@ def _skipped(study: Study) -> Iterator[Skipped]:
     elif task.bridges is False:
         yield Skipped("bridges: branches end where the flow jumps", "switched off (bridges: false)")
     if not study.wants(Want.STABILITY):
-        lost = "" if task is None else ", and BP and PD with them"
+        lost = "" if task is None else ", and PD with them"
         yield Skipped(f"multipliers{lost}", "not wanted (stability)")
     for want, columns in COLUMNS.items():
         if want is not Want.STABILITY and not study.wants(want):

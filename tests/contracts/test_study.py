@@ -212,7 +212,7 @@ def test_plan_says_what_is_skipped(study) -> None:
         "2. explore: every branch that can be reached, Omega from 0.45 to 0.56\n",
         "points.csv, bifurcations.csv",
         "orbit.npz, diagram.npz",
-        "- multipliers, and BP and PD with them: not wanted (stability)",
+        "- multipliers, and PD with them: not wanted (stability)",
         "- columns psi: not wanted (asymmetry)",
         "- matplotlib: no figures",
     ):
