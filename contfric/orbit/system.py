@@ -12,7 +12,7 @@ Crossings of transparent surfaces inside a segment do not matter to the motion; 
 
 A hold (:mod:`contfric.orbit.holds`) has a pin at its start in the place of the exit surface. Its exit
 margin is the acceleration with which it is left, which must not be negative anywhere on the way (HELD);
-one that follows a stick must last (LASTING).
+one that follows a stick must last, and so must that stick, whose end is tangential (LASTING).
 
 Everything here derives from the model's definition; nothing knows what moves.
 """
@@ -47,7 +47,7 @@ class Layout(NamedTuple):
     labels : rows (segment, observable, surfaces that the segment starts and ends on, or -1)
     pins : surface that each hold starts on, shape (N,); -2 after a touch, -1 where there is no hold
     departs : mode in which each hold is left, shape (N,); -1 where there is none
-    lasting : holds that must last: those after a stick, shape (k,)
+    lasting : segments that must last: holds after a stick, and that stick, shape (k,)
     held : all holds, which could be left at any time, shape (k,)
     closure : state matrix of the closure, shape (n, n)
     turn : duration of one turn in periods of the excitation
@@ -200,7 +200,7 @@ def build_system(
             [names.index(held[i].departs) if i in held else -1 for i in range(len(word))],
             dtype=np.int64,
         ),
-        lasting=np.array([hold.segment for hold in holds if hold.after_rest], dtype=np.int64),
+        lasting=np.array([i for i, _ in _lasting(word, holds)], dtype=np.int64),
         held=np.array([hold.segment for hold in holds], dtype=np.int64),
         closure=symmetry.array() if half and symmetry else np.eye(n),
         turn=float(periods * symmetry.fraction) if half and symmetry else float(periods),
@@ -303,10 +303,24 @@ def _margins(
             for i, (_, exit_) in enumerate(word)
         ),
         *(Test(Margin.JOINT, i, names[k]) for i, k, _ in joint),
-        *(Test(Margin.LASTING, h.segment, h.leaves) for h in holds if h.after_rest),
+        *(Test(Margin.LASTING, i, surface) for i, surface in _lasting(word, holds)),
         *(Test(Margin.HELD, h.segment, h.leaves) for h in holds),
     )
     return _rows(interior), _rows(joint), tests
+
+
+def _lasting(word: Word, holds: tuple[Hold, ...]) -> list[tuple[int, str]]:
+    """Segments that no other margin keeps from shrinking through zero, each with the surface that it ends on.
+
+    A hold after a touch of its limit, and the stick up to that touch: where it shrinks to nothing, the
+    margin of the stop before it has a double zero.
+    """
+    return [
+        pair
+        for hold in holds
+        if hold.after_rest
+        for pair in ((hold.segment - 1, word[hold.segment - 1][1]), (hold.segment, hold.leaves))
+    ]
 
 
 def _rows(rows: list[tuple[int, ...]], width: int = 3) -> IntArray:
