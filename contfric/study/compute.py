@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from contfric.atlas.collect import FINAL
 from contfric.atlas.diagram import Diagram, LooseEnd, Node
@@ -10,7 +14,10 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.events import EndReason
 from contfric.orbit.orbit import Orbit
 from contfric.study.read import Study
-from contfric.study.schema import ContinueTask, ExploreTask, Want
+from contfric.study.schema import ContinueTask, ExploreTask, LyapunovTask, Want
+
+if TYPE_CHECKING:
+    from contfric.chaos.map import LyapunovMap
 
 Say = Callable[[str], None]
 
@@ -80,6 +87,25 @@ def continue_from(study: Study, orbit: Orbit, task: ContinueTask, say: Say) -> B
         progress=lambda text: say(f"continue: {text}"),
         **task.options(),
     )
+
+
+def lyapunov_from(study: Study, task: LyapunovTask, tiles: Path, say: Say) -> LyapunovMap:
+    """Compute a map; finished tiles are kept until it is complete, and a killed run goes on from them."""
+    import shutil
+
+    from contfric.chaos.compute import lyapunov_map
+
+    found = lyapunov_map(
+        study.model,
+        {name: np.linspace(low, high, int(n)) for name, (low, high, n) in task.grid.items()},
+        {name: value for name, value in study.params.items() if name not in task.grid},
+        folder=tiles,
+        progress=lambda text: say(f"lyapunov: {text}"),
+        **task.options(),
+    )
+    if found.complete:
+        shutil.rmtree(tiles, ignore_errors=True)
+    return found
 
 
 def one_branch(branch: Branch, bounds: tuple[float, float]) -> Diagram:

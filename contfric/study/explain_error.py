@@ -16,7 +16,9 @@ from contfric.study.schema import (
     Figure,
     FigureKind,
     Format,
+    LyapunovTask,
     Row,
+    SeedsTask,
     Simulated,
     Start,
     StudyFile,
@@ -33,6 +35,8 @@ _PARTS: dict[str, type[BaseModel]] = {
     "start": Start,
     "simulate": Simulated,
     "explore": ExploreTask,
+    "seeds": SeedsTask,
+    "lyapunov": LyapunovTask,
     "continue": ContinueTask,
     "figures": Figure,
 }

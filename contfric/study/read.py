@@ -126,6 +126,7 @@ def _checked(located: LocatedYaml, content: StudyFile) -> Study:
         params = _same_params(located, content, orbit)
     _check_start(located, content, model)
     _check_task(located, content, model, params)
+    _check_grid(located, content, model)
     return Study(
         located.path,
         content,
@@ -238,6 +239,24 @@ def _check_task(
     fault = _range_fault(model, params, task)
     if fault is not None:
         located.fail((key, "range"), fault)
+
+
+def _check_grid(located: LocatedYaml, content: StudyFile, model: Model) -> None:
+    if content.lyapunov is None:
+        return
+    for name, values in content.lyapunov.grid.items():
+        address = ("lyapunov", "grid", name)
+        try:
+            model.index_of(name)
+        except ParameterError as error:
+            located.fail(address, str(error))
+        fits = len(values) == 3 and values[0] < values[1] and values[2] >= 2
+        if not fits or values[2] != int(values[2]):
+            located.fail(
+                address,
+                f"{name} is [low, high, number of values], with low < high and a whole number of at "
+                f"least 2, got {values}",
+            )
 
 
 def _range_fault(

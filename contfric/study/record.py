@@ -10,7 +10,9 @@ from dataclasses import asdict
 from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from contfric.atlas.diagram import Diagram
 from contfric.continuation.branch import Branch
@@ -18,8 +20,12 @@ from contfric.continuation.events import Proposal
 from contfric.orbit.counts import Counts
 from contfric.orbit.orbit import Orbit
 from contfric.results import replacing
+from contfric.study.findings import Findings
 from contfric.study.plan import Plan
 from contfric.study.tables import listed_nodes
+
+if TYPE_CHECKING:
+    from contfric.chaos.map import LyapunovMap
 
 #: Modules that a run loads only if the study needs them.
 WATCHED = (
@@ -45,8 +51,7 @@ def record_of(
     plan: Plan,
     counts: Counts,
     timings: Mapping[str, float],
-    orbit: Orbit,
-    diagram: Diagram | None,
+    found: Findings,
 ) -> dict[str, Any]:
     """Return the record of a run as plain data; status and files are added by the run."""
     return {
@@ -61,14 +66,37 @@ def record_of(
         "module_count": len(sys.modules),
         "timings": {name: round(seconds, 6) for name, seconds in timings.items()},
         "skipped": [asdict(item) for item in plan.skipped],
+        **(_start_entries(found.orbit) if found.orbit is not None else {}),
+        **(_diagram_entries(found.diagram) if found.diagram is not None else {}),
+        **(_map_entries(found.lyapunov) if found.lyapunov is not None else {}),
+    }
+
+
+def _start_entries(orbit: Orbit) -> dict[str, Any]:
+    return {
         "start": {
             "signature": orbit.name,
             "segments": str(orbit.signature),
             "periods": orbit.periods,
             "params": orbit.params,
             "residual": orbit.residual,
-        },
-        **(_diagram_entries(diagram) if diagram is not None else {}),
+        }
+    }
+
+
+def _map_entries(lmap: LyapunovMap) -> dict[str, Any]:
+    return {
+        "lyapunov": {
+            "grid": {
+                name: [float(values[0]), float(values[-1]), len(values)]
+                for name, values in lmap.axes.items()
+            },
+            "params": lmap.params,
+            "starts": lmap.starts,
+            "complete": lmap.complete,
+            "motions": {motion.name.lower(): count for motion, count in lmap.counts().items()},
+            "largest": float(np.nanmax(lmap.values, initial=-np.inf)),
+        }
     }
 
 

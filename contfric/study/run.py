@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from contfric.atlas.diagram import Diagram
 from contfric.continuation.branch import Branch
@@ -21,14 +21,18 @@ from contfric.study.compute import (
     continue_from,
     explore_from,
     find_start,
+    lyapunov_from,
     one_branch,
     was_interrupted,
 )
+from contfric.study.findings import Findings
 from contfric.study.folder import Folder, open_folder
 from contfric.study.plan import (
     BIFURCATIONS,
     BRANCH,
     DIAGRAM,
+    LYAPUNOV,
+    LYAPUNOV_TABLE,
     ORBIT,
     POINTS,
     RECORD,
@@ -39,7 +43,12 @@ from contfric.study.plan import (
 from contfric.study.read import Study, read_study
 from contfric.study.schema import ContinueTask, ExploreTask
 
+if TYPE_CHECKING:
+    from contfric.chaos.map import LyapunovMap
+
 Progress = Callable[[str], None]
+#: Folder of the finished tiles of a map, inside that of the run, until the map is complete.
+_TILES = "lyapunov-tiles"
 _T = TypeVar("_T")
 
 
@@ -62,11 +71,13 @@ class StudyResult:
         The folder of the results.
     status : RunStatus
     orbit : Orbit or None
-        The orbit of the start; None if the run was interrupted before it was found.
+        The orbit of the start; None if nothing needs it, or the run was interrupted before.
     branch : Branch or None
         The branch, if the study continues one.
     diagram : Diagram or None
         The diagram, if the study has a task.
+    lyapunov : LyapunovMap or None
+        The map of Lyapunov exponents, if the study asks for one.
     info : dict
         The content of ``run.json``.
     files : tuple of Path
@@ -79,6 +90,7 @@ class StudyResult:
     orbit: Orbit | None
     branch: Branch | None
     diagram: Diagram | None
+    lyapunov: LyapunovMap | None
     info: dict[str, Any]
     files: tuple[Path, ...]
 
@@ -148,9 +160,7 @@ class _Run:
     folder: Folder
     progress: Progress | None
     status: RunStatus = RunStatus.DONE
-    orbit: Orbit | None = None
-    branch: Branch | None = None
-    diagram: Diagram | None = None
+    found: Findings = field(default_factory=Findings)
     timings: dict[str, float] = field(default_factory=dict)
     written: list[str] = field(default_factory=list)
     failures: list[Exception] = field(default_factory=list)
@@ -172,11 +182,11 @@ class _Run:
         except BaseException as error:
             self._rescue(error)
             raise
-        if self.orbit is None:
+        if self.found.empty:
             self.folder.discard_if_empty()
             return self._result({})
-        self._write_all(self.orbit)
-        record = self._write_record(self.orbit)
+        self._write_all()
+        record = self._write_record()
         result = self._result(record)
         if self.failures:
             raise UnwrittenError(self._failure_text(), result) from self.failures[0]
@@ -187,24 +197,39 @@ class _Run:
         study = self.study
         if study.task is not None:
             compile_continuation()
-        self.orbit = orbit = self._timed(StepName.ORBIT, lambda: find_start(study, self.say))
-        self.say(f"orbit: {orbit.name} over {orbit.periods} period(s)")
-        task = study.task
+        if study.content.needs_orbit:
+            orbit = self._timed(StepName.ORBIT, lambda: find_start(study, self.say))
+            self.found.orbit = orbit
+            self.say(f"orbit: {orbit.name} over {orbit.periods} period(s)")
+            self._follow(orbit)
+        grid = study.content.lyapunov
+        if grid is not None:
+            tiles = self.folder.path / _TILES
+            lmap = self._timed(
+                StepName.LYAPUNOV, lambda: lyapunov_from(study, grid, tiles, self.say)
+            )
+            self.found.lyapunov = lmap
+            if not lmap.complete:
+                self.status = RunStatus.INTERRUPTED
+
+    def _follow(self, orbit: Orbit) -> None:
+        study, task = self.study, self.study.task
         if isinstance(task, ExploreTask):
             found = self._timed(
                 StepName.EXPLORE, lambda: explore_from(study, orbit, task, self.say)
             )
             self._keep(found)
         elif isinstance(task, ContinueTask):
-            self.branch = self._timed(
+            branch = self._timed(
                 StepName.CONTINUE, lambda: continue_from(study, orbit, task, self.say)
             )
-            self._keep(one_branch(self.branch, (task.range[0], task.range[1])))
+            self.found.branch = branch
+            self._keep(one_branch(branch, (task.range[0], task.range[1])))
 
     def _keep(self, found: Diagram) -> None:
-        self.diagram = found if found.branches else None
+        self.found.diagram = found if found.branches else None
         if was_interrupted(found):
-            self.status = RunStatus.INTERRUPTED
+            raise KeyboardInterrupt
 
     def _timed(self, name: StepName, step: Callable[[], _T]) -> _T:
         start = time.perf_counter()
@@ -215,55 +240,57 @@ class _Run:
 
     def _rescue(self, error: BaseException) -> None:
         """Save the orbit if there is one, and let the message say so."""
-        if self.orbit is None:
+        orbit = self.found.orbit
+        if orbit is None:
             self.folder.discard_if_empty()
             return
         path = self.folder.free_name("orbit-of-failed-run", ".npz")
         try:
-            save(self.orbit, path)
+            save(orbit, path)
         except ResultFileError:
             return
         if isinstance(error, ContfricError):
-            error.args = (f"{error} (the orbit {self.orbit.name} found before is in {path})",)
+            error.args = (f"{error} (the orbit {orbit.name} found before is in {path})",)
 
-    def _write_all(self, orbit: Orbit) -> None:
-        from contfric.study.tables import write_bifurcations, write_points
+    def _write_all(self) -> None:
+        found, unfinished = self.found, self.study.task is not None and self.found.diagram is None
+        self._timed(StepName.TABLES, lambda: self._write_tables(unfinished))
+        self._timed(StepName.DATA, self._write_data)
+        if self.study.drawings:
+            self._timed(StepName.FIGURES, lambda: self._draw(found))
+        self.say(f"written to {self.folder.path}")
 
-        folder, diagram = self.folder.path, self.diagram
-        unfinished = self.study.task is not None and diagram is None
-        start = time.perf_counter()
-        if not unfinished:
+    def _write_tables(self, unfinished: bool) -> None:
+        from contfric.study.tables import write_bifurcations, write_motions, write_points
+
+        orbit, diagram, lmap = self.found.orbit, self.found.diagram, self.found.lyapunov
+        if orbit is not None and not unfinished:
             sources = diagram.branches if diagram else (orbit,)
             self._write(POINTS, lambda path: write_points(path, self.study, sources))
         if diagram is not None:
             self._write(BIFURCATIONS, lambda path: write_bifurcations(path, diagram))
-        self.timings[StepName.TABLES.value] = time.perf_counter() - start
-        start = time.perf_counter()
-        self._write(ORBIT, lambda path: save(orbit, path))
-        if self.branch is not None:
-            branch = self.branch
-            self._write(BRANCH, lambda path: save(branch, path))
-        elif diagram is not None:
-            self._write(DIAGRAM, lambda path: save(diagram, path))
-        self.timings[StepName.DATA.value] = time.perf_counter() - start
-        if self.study.drawings and not unfinished:
-            self._timed(StepName.FIGURES, lambda: self._draw(orbit))
-        self.say(f"written to {folder}")
+        if lmap is not None:
+            self._write(LYAPUNOV_TABLE, lambda path: write_motions(path, lmap))
 
-    def _draw(self, orbit: Orbit) -> None:
-        from contfric.study.paint import paint
+    def _write_data(self) -> None:
+        found = self.found
+        whole = None if found.branch is not None else found.diagram  # a branch is its own diagram
+        for name, result in (
+            (ORBIT, found.orbit),
+            (BRANCH, found.branch),
+            (DIAGRAM, whole),
+            (LYAPUNOV, found.lyapunov),
+        ):
+            if result is not None:
+                self._write(name, partial(save, result))
 
-        for drawing in self.study.drawings:
-            self._write(
-                drawing.file,
-                partial(
-                    paint,
-                    drawing=drawing,
-                    orbit=orbit,
-                    diagram=self.diagram,
-                    title=self.study.title,
-                ),
-            )
+    def _draw(self, found: Findings) -> None:
+        from contfric.study.paint import can_be_drawn, paint
+
+        title = self.study.title
+        shown = (d for d in self.study.drawings if can_be_drawn(d.kind, found))
+        for drawing in shown:
+            self._write(drawing.file, partial(paint, drawing=drawing, found=found, title=title))
 
     def _write(self, name: str, write: Callable[[Path], None]) -> None:
         """Write one file; one that fails does not keep the others from being written."""
@@ -278,11 +305,11 @@ class _Run:
         else:
             self.written.append(name)
 
-    def _write_record(self, orbit: Orbit) -> dict[str, Any]:
+    def _write_record(self) -> dict[str, Any]:
         from contfric.study.record import record_of, write_record
 
         work = counts() - self.before
-        record = record_of(self.plan, work, self.timings, orbit, self.diagram)
+        record = record_of(self.plan, work, self.timings, self.found)
         record |= {
             "status": self.status.value,
             "failures": [_one_line(error) for error in self.failures],
@@ -301,9 +328,10 @@ class _Run:
             self.study,
             self.folder.path,
             self.status,
-            self.orbit,
-            self.branch,
-            self.diagram,
+            self.found.orbit,
+            self.found.branch,
+            self.found.diagram,
+            self.found.lyapunov,
             record,
             tuple(self.folder.path / name for name in self.written),
         )

@@ -24,6 +24,7 @@ class FigureKind(str, Enum):
     ORBIT = "orbit"
     TRANSITIONS = "transitions"
     BRANCHES = "branches"
+    LYAPUNOV = "lyapunov"
 
 
 class Row(str, Enum):
@@ -143,11 +144,40 @@ class ExploreTask(_Task):
     )
 
 
+class LyapunovTask(_Part):
+    """Lyapunov exponents on a grid of two parameters."""
+
+    grid: dict[str, list[float]] = Field(
+        min_length=2,
+        max_length=2,
+        description="a mapping of two parameters, each to [low, high, number of values]",
+    )
+    periods: int | None = Field(
+        None, ge=1, description="a whole number >= 1: most periods to average over"
+    )
+    transient: int | None = Field(
+        None, ge=0, description="a whole number >= 0: periods before averaging begins"
+    )
+    tolerance: float | None = Field(
+        None, gt=0.0, description="a number > 0: relative error at which averaging ends"
+    )
+    confirm: int | None = Field(
+        None, ge=0, description="a whole number >= 0: periods that chaos is followed further"
+    )
+    starts: int | None = Field(
+        None, ge=1, description="a whole number >= 1: initial conditions at each point"
+    )
+
+    def options(self) -> dict[str, Any]:
+        """Return what is given beyond the grid, as arguments."""
+        return self.model_dump(exclude={"grid"}, exclude_none=True)
+
+
 class Figure(_Part):
     """One figure."""
 
     kind: Annotated[FigureKind, Field(strict=False)] = Field(
-        description="one of diagram, orbit, transitions, branches"
+        description="one of diagram, orbit, transitions, branches, lyapunov"
     )
     rows: _Rows | None = Field(
         None, description="a list of rows of a diagram: any of x_max, x_min, stops, psi"
@@ -184,6 +214,10 @@ class StudyFile(_Part):
         alias="continue",
         description="a mapping with parameter and range; also max_step, max_points",
     )
+    lyapunov: LyapunovTask | None = Field(
+        None,
+        description="a mapping with grid; also periods, transient, tolerance, confirm, starts",
+    )
     want: _Wants = Field([], description="a list with any of stability, asymmetry, extrema, stops")
     figures: list[Figure] = Field([], description="a list of mappings, each with its kind")
 
@@ -191,6 +225,17 @@ class StudyFile(_Part):
     def task(self) -> ExploreTask | ContinueTask | None:
         """What is done with the first orbit; None if nothing is."""
         return self.explore or self.continue_
+
+    @property
+    def needs_orbit(self) -> bool:
+        """Whether anything is asked for that needs the orbit of the start."""
+        shown = {figure.kind for figure in self.figures}
+        alone = self.lyapunov is not None and self.task is None
+        return (
+            not alone
+            or "start" in self.model_fields_set
+            or bool(shown & {FigureKind.ORBIT, FigureKind.TRANSITIONS})
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Return what the file says, as plain data."""

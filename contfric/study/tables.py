@@ -5,16 +5,20 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contfric.atlas.diagram import Diagram, Node
+from contfric.chaos.status import Motion
 from contfric.continuation.branch import Branch
 from contfric.orbit.orbit import Orbit
 from contfric.results import replacing
 from contfric.study.read import Study
 from contfric.study.schema import Want
+
+if TYPE_CHECKING:
+    from contfric.chaos.map import LyapunovMap
 
 
 def write_points(path: Path, study: Study, sources: Sequence[Branch | Orbit]) -> None:
@@ -75,6 +79,29 @@ def write_bifurcations(path: Path, diagram: Diagram) -> None:
     )
     header = ["kind", "branch", "signature", *names, "stable_before", "stable_after"]
     _write(path, header, rows)
+
+
+def write_motions(path: Path, lmap: LyapunovMap) -> None:
+    """Write one row for each motion of a map of Lyapunov exponents."""
+    (first, across), (second, up) = lmap.axes.items()
+    count = lmap.exponents.shape[-1]
+    names = [motion.name.lower() for motion in Motion]
+    rows = (
+        (
+            across[i].item(),
+            up[j].item(),
+            k + 1,
+            *lmap.exponents[i, j, k].tolist(),
+            lmap.errors[i, j, k].item(),
+            names[lmap.motions[i, j, k]],
+            lmap.periods[i, j, k].item(),
+            lmap.followed[i, j, k].item(),
+        )
+        for i, j, k in np.ndindex(*lmap.motions.shape)
+    )
+    exponents = [f"exponent_{k + 1}" for k in range(count)]
+    tail = ["error", "motion", "periods", "followed"]
+    _write(path, [first, second, "start", *exponents, *tail], rows)
 
 
 def listed_nodes(diagram: Diagram) -> list[Node]:
