@@ -242,9 +242,16 @@ def _check_task(
 
 
 def _check_grid(located: LocatedYaml, content: StudyFile, model: Model) -> None:
-    if content.lyapunov is None:
+    task = content.lyapunov
+    if task is None:
         return
-    for name, values in content.lyapunov.grid.items():
+    if task.state is not None and len(task.state) != len(model.states):
+        located.fail(
+            ("lyapunov", "state"),
+            f"a state of '{model.name}' is {len(model.states)} numbers "
+            f"({', '.join(model.states)}), got {len(task.state)}",
+        )
+    for name, values in task.grid.items():
         address = ("lyapunov", "grid", name)
         try:
             model.index_of(name)

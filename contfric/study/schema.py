@@ -167,6 +167,9 @@ class LyapunovTask(_Part):
     starts: int | None = Field(
         None, ge=1, description="a whole number >= 1: initial conditions at each point"
     )
+    state: list[float] | None = Field(
+        None, description="a list of finite numbers, one for each state: where every motion starts"
+    )
 
     def options(self) -> dict[str, Any]:
         """Return what is given beyond the grid, as arguments."""
@@ -216,7 +219,8 @@ class StudyFile(_Part):
     )
     lyapunov: LyapunovTask | None = Field(
         None,
-        description="a mapping with grid; also periods, transient, tolerance, confirm, starts",
+        description="a mapping with grid; also periods, transient, tolerance, confirm, starts, "
+        "state",
     )
     want: _Wants = Field([], description="a list with any of stability, asymmetry, extrema, stops")
     figures: list[Figure] = Field([], description="a list of mappings, each with its kind")

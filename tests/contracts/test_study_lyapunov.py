@@ -31,6 +31,7 @@ def write(folder: Path, text: str) -> Path:
         ("{grid: {Omga: [0.3, 0.5, 5], S: [0, 1, 2]}}", 3, "did you mean 'Omega'"),
         ("\n  grid:\n    Omega: [0.3, 0.5, 5]\n    S: [0.3, 0.1, 4]", 6, "low < high"),
         ("\n  grid:\n    Omega: [0.3, 0.5, 5.5]\n    S: [0.1, 0.3, 4]", 5, "whole number"),
+        ("{grid: {Omega: [0.3, 0.5, 5], S: [0, 1, 2]}, state: [1]}", 3, "2 numbers"),
         ("{grid: {Omega: [0.3, 0.5, 5], S: [0, 1, 2]}, peroids: 5}", 3, "did you mean 'periods'"),
     ],
 )
