@@ -19,34 +19,58 @@ if TYPE_CHECKING:
 
 def join_sides(behind: CurveSide | None, ahead: CurveSide) -> Curve:
     """Return one curve from the two sides of its start."""
-    problem, points = ahead.problem, list(ahead.points)
-    special, first = list(ahead.special), CurveEnd(CurveEndReason.CLOSED)
+    pieces = _pieces(ahead)
+    first = CurveEnd(CurveEndReason.CLOSED)
     if behind is not None:
-        back = [replace(p, arc=-p.arc) for p in behind.points[:0:-1]]
-        points = [*back, *points]
-        special = [*(replace(s, position=-s.position) for s in behind.special[::-1]), *special]
-        first = behind.end
-        if first.special is not None:
-            first = replace(first, special=special[0])
-    shift = -points[0].arc
-    moved = {id(s): replace(s, position=s.position + shift) for s in special}
+        back = _pieces(behind)
+        first = back[-1].end
+        joined = replace(pieces[0])
+        joined.points = [*(replace(p, arc=-p.arc) for p in back[0].points[:0:-1]), *joined.points]
+        joined.special = [*_turned(back[0].special), *joined.special]
+        pieces = [*(_reversed(piece) for piece in back[:0:-1]), joined, *pieces[1:]]
+    shift = -pieces[0].points[0].arc
+    special = [s for piece in pieces for s in piece.special]
+    moved = tuple(replace(s, position=s.position + shift) for s in special)
+    parts = [part for piece in pieces for part in _parts(piece.problem, _shifted(piece, shift), moved)]
     ends = tuple(
-        end if end.special is None else replace(end, special=moved[id(end.special)])
-        for end in (first, ahead.end)
+        end if end.special is None else replace(end, special=moved[place])
+        for end, place in ((first, 0), (_pieces(ahead)[-1].end, -1))
     )
-    points = [replace(p, arc=p.arc + shift) for p in points]
-    listed = tuple(moved[id(s)] for s in special)
-    parts = _parts(problem, points, listed)
-    return Curve(problem.box.names, problem.vector, parts, listed, (ends[0], ends[1]))
+    problem = ahead.problem
+    return Curve(problem.box.names, problem.vector, tuple(parts), moved, (ends[0], ends[1]))
+
+
+def _pieces(side: CurveSide) -> list[CurveSide]:
+    """Return a side and what it goes on as, in order."""
+    found = [side]
+    while found[-1].following is not None:
+        found.append(found[-1].following)
+    return found
+
+
+def _turned(special: list[SpecialPoint]) -> list[SpecialPoint]:
+    return [replace(s, position=-s.position) for s in special[::-1]]
+
+
+def _reversed(piece: CurveSide) -> CurveSide:
+    turned = replace(piece)
+    turned.points = [replace(p, arc=-p.arc) for p in piece.points[::-1]]
+    turned.special = _turned(piece.special)
+    return turned
+
+
+def _shifted(piece: CurveSide, shift: float) -> list[CurvePoint]:
+    return [replace(p, arc=p.arc + shift) for p in piece.points]
 
 
 def _parts(
     problem: Problem, points: list[CurvePoint], special: tuple[SpecialPoint, ...]
 ) -> tuple[CurvePart, ...]:
     """Cut the points where the kind changes."""
-    cuts = [s.position for s in special if s.kind is CodimTwo.TURNOVER]
     arc = np.array([p.arc for p in points])
-    edges = [0, *(int(np.searchsorted(arc, cut)) for cut in cuts), len(points)]
+    cuts = [s.position for s in special if s.kind is CodimTwo.TURNOVER]
+    inner = [int(np.searchsorted(arc, cut)) for cut in cuts if arc[0] < cut < arc[-1]]
+    edges = [0, *inner, len(points)]
     return tuple(
         _part(problem, points[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a
     )

@@ -13,6 +13,7 @@ from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS
 from contfric.continuation.vertices import passed_vertex
 from contfric.curves.assembly import join_sides
 from contfric.curves.curve import Curve
+from contfric.curves.going_on import goes_on
 from contfric.curves.locating import locate_zero
 from contfric.curves.naming import crossings
 from contfric.curves.points import (
@@ -34,6 +35,8 @@ AT_START = 1e-6
 #: Share of a range within which a curve that gets no farther has come to a physical limit, where
 #: conditions degenerate together.
 _NEAR_LIMIT = 1e-3
+#: Most changes of the signature along one side of a curve: a chain longer than this goes round.
+_MOST_CHANGES = 24
 
 Progress = Callable[[str], None]
 
@@ -50,6 +53,7 @@ class CurveSide:
     end : why it ended
     tip : the last point, with its tangent
     border : the vectors b and c there
+    following : what it goes on as behind its end, where its signature changes
     """
 
     problem: Problem
@@ -57,7 +61,7 @@ class CurveSide:
     border: FloatArray
     special: list[SpecialPoint] = field(default_factory=list)
     end: CurveEnd = field(default_factory=lambda: CurveEnd(CurveEndReason.POINTS))
-    first_step: float = FIRST_STEP
+    following: CurveSide | None = None
 
     @property
     def tip(self) -> CurvePoint:
@@ -170,8 +174,9 @@ def trace_curve_side(
     largest: float,
     max_points: int,
     progress: Progress | None = None,
+    changes: int = _MOST_CHANGES,
 ) -> CurveSide:
-    """Follow a curve from a point along its tangent until it ends."""
+    """Follow a curve from a point along its tangent until it ends, through changes of its signature."""
     side = CurveSide(problem, [start], border.copy())
     step = FIRST_STEP * largest
     while True:
@@ -186,7 +191,17 @@ def trace_curve_side(
             )
             progress(f"{problem.kind.value}: {len(side.points)} points, {where}")
         if finished:
-            return side
+            break
+    special = side.end.special
+    if side.end.reason is CurveEndReason.MEETS and special is not None and changes > 0:
+        on = goes_on(problem, side.tip, special, largest)
+        if on is not None:
+            other, point, border = on
+            point.arc = side.tip.arc
+            side.following = trace_curve_side(
+                other, point, border, largest, max_points, progress, changes - 1
+            )
+    return side
 
 
 def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[bool, float]:
