@@ -17,10 +17,17 @@ if TYPE_CHECKING:
     from contfric.curves.trace import CurveSide
 
 
-def join_sides(behind: CurveSide | None, ahead: CurveSide) -> Curve:
-    """Return one curve from the two sides of its start."""
+def join_sides(
+    behind: CurveSide | None, ahead: CurveSide, first: CurveEnd | None = None
+) -> Curve:
+    """Return one curve from the two sides of its start, or from one that begins at ``first``."""
     pieces = _pieces(ahead)
-    first = CurveEnd(CurveEndReason.CLOSED)
+    place = None if first is None else first.special
+    first = first or CurveEnd(CurveEndReason.CLOSED)
+    if place is not None:
+        pieces[0] = replace(pieces[0])
+        at = replace(place, position=pieces[0].points[0].arc)
+        pieces[0].special = [at, *pieces[0].special]
     if behind is not None:
         back = _pieces(behind)
         first = back[-1].end
@@ -83,6 +90,7 @@ def _part(problem: Problem, points: list[CurvePoint]) -> CurvePart:
         kind = kind_of_margin(problem.system, problem.test, problem.orbit(middle.joints, middle.w))
     return CurvePart(
         kind,
+        problem,
         problem.system,
         problem.test,
         np.array([p.w for p in points]),

@@ -18,6 +18,7 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System, Test
 
 if TYPE_CHECKING:
+    from contfric.curves.problem import Problem
     import pandas as pd
     from matplotlib.axes import Axes
 
@@ -32,6 +33,8 @@ class CurvePart:
     ----------
     kind : Kind
         What happens there: a CS becomes an SS where the load at its stop stands still.
+    problem : Problem or None
+        What its points solve; None for a curve that was read from a file.
     system : System
         The boundary-value problem of the orbits.
     test : Test or None
@@ -46,6 +49,7 @@ class CurvePart:
     """
 
     kind: Kind
+    problem: Problem | None
     system: System
     test: Test | None
     values: FloatArray

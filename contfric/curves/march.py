@@ -198,7 +198,7 @@ def march_curve(  # type: ignore[no-untyped-def]
             miss = plane_distance(zs[row], ws[row], guess, w, scale)
             cosine = plane_product(tzs[row], tw, tzs[k], tws[k], scale)
             angle = math.acos(min(1.0, max(-1.0, cosine)))
-            if (angle > _MOST_ANGLE or miss > _MOST_MISS * step) and step > 4.0 * smallest:
+            if angle > _MOST_ANGLE or miss > _MOST_MISS * step:  # never on another curve
                 step *= 0.5
                 continue
         if fine:

@@ -31,6 +31,7 @@ class CurveEndReason(str, Enum):
     LIMIT = "physical limit of the parameters"
     CLOSED = "the curve is closed"
     MEETS = "another event: beyond it the orbits are not admissible"
+    START = "the curve starts here, at a point of codimension two of another one"
     BIRTH = "the fold merges with the branch point or doubling that it comes from"
     STEP = "the step became too small: Newton does not converge"
     LOST = "what the curve follows does not exist beyond this point"
