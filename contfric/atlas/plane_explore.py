@@ -9,8 +9,8 @@ starts further curves.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -282,39 +282,53 @@ def _follow_special(state: PlaneExploration) -> None:
         special, problem = state.waiting.popleft()
         if special.meets is Kind.T or special.kind in (CodimTwo.CUSP, CodimTwo.R1, CodimTwo.R2):
             continue
-        for start in leaving(special, problem, state.largest):
+        for starts in _paired(leaving(special, problem, state.largest)):
             if state.full:
                 state.complete = False
                 state.notes.append(f"stopped at max_curves = {state.max_curves}")
                 state.waiting.clear()
                 return
-            if state.wants(start[0]):
-                _follow_start(state, start, special)
+            if state.wants(starts[0][0]):
+                _follow_starts(state, starts, special)
 
 
-def _follow_start(state: PlaneExploration, start: Start, special: SpecialPoint) -> None:
-    """Trace one direction of a curve that leaves a point, unless it is known."""
-    problem, point, border = start
-    side = trace_curve_side(problem, point, border, state.largest, MOST_POINTS)
-    tip: CurveSide = side
-    while tip.following is not None:
-        tip = tip.following
-    if tip.tip.arc - side.points[0].arc < _NOWHERE:
+def _paired(starts: Iterable[Start]) -> Iterator[list[Start]]:
+    """Yield the two directions of one curve together."""
+    waiting: list[Start] = []
+    for start in starts:
+        if waiting and not _same_curve(waiting[0][0], start[0]):
+            yield waiting
+            waiting = []
+        waiting.append(start)
+    if waiting:
+        yield waiting
+
+
+def _same_curve(a: Problem, b: Problem) -> bool:
+    return a.system is b.system and a.kind is b.kind and a.test == b.test
+
+
+def _follow_starts(state: PlaneExploration, starts: list[Start], special: SpecialPoint) -> None:
+    """Trace a curve that leaves a point in one or two directions, unless it is known."""
+    sides = []
+    for problem, point, border in starts[:2]:
+        side = trace_curve_side(problem, point, border, state.largest, MOST_POINTS)
+        tip = side
+        while tip.following is not None:
+            tip = tip.following
+        if tip.tip.arc - side.points[0].arc > _NOWHERE:
+            sides.append(side)
+    if not sides or all(
+        is_known(side.problem, _inner(side), state.curves) is not None for side in sides
+    ):
         return
-    if is_known(problem, _inner(side), state.curves) is not None:
+    if len(sides) == 2:
+        state.add(join_sides(sides[1], sides[0]), sides)
         return
-    there = SpecialPoint(
-        special.kind,
-        special.name,
-        special.params,
-        problem.orbit(point.joints, point.w),
-        special.meets,
-        (),
-        0.0,
-        special.located,
-    )
+    problem, start = sides[0].problem, sides[0].points[0]
+    there = replace(special, orbit=problem.orbit(start.joints, start.w), tests=())
     first = CurveEnd(CurveEndReason.START, special=there)
-    state.add(join_sides(None, side, first), [side])
+    state.add(join_sides(None, sides[0], first), sides)
 
 
 def _inner(side: CurveSide) -> CurvePoint:

@@ -8,16 +8,19 @@ sections disagree the region says so.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contfric.atlas.diagram import Diagram
+from contfric.atlas.matching import identity
 from contfric.atlas.plane import Family, Region
 from contfric.curves.curve import Curve
 from contfric.curves.problem import Box
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.system import Word
 
 #: Cells along each side: a cell is finer than a line in a printed figure.
 CELLS = 400
@@ -25,6 +28,21 @@ CELLS = 400
 _LEAST = 12
 #: Points of a branch nearer than this to a wall (cells) may lie on its other side.
 _AWAY = 1.5
+
+
+@dataclass(frozen=True)
+class Living:
+    """Orbits of one word in a region; the name does not count, for T changes it."""
+
+    word: Word
+    half: bool
+    stable: bool
+    name: str = field(compare=False)
+
+    @property
+    def key(self) -> tuple[Word, bool]:
+        """What one name belongs to: the word, and whether the orbits are symmetric."""
+        return self.word, self.half
 
 
 def regions_of(
@@ -37,7 +55,10 @@ def regions_of(
     """Return the regions, largest first, and the number of each cell's (-1 on walls and outside)."""
     from scipy import ndimage
 
-    walls = _walls(box, curves)
+    passed = [cells_of(box, curve) for curve in curves]
+    walls = np.zeros((CELLS, CELLS), dtype=np.int64)
+    for rows, columns in passed:
+        walls[rows, columns] += 1
     inside = _allowed(model, vector, box)
     free = (walls == 0) & inside
     numbers, count = ndimage.label(free)
@@ -58,7 +79,7 @@ def regions_of(
             Region(
                 _centre(box, int(at[0]), int(at[1])),
                 float(np.sum(mask) / mask.size),
-                _bounds(mask, box, curves),
+                _bounds(mask, passed),
                 families,
                 sampled,
                 disputed,
@@ -67,26 +88,16 @@ def regions_of(
     return tuple(regions), cells
 
 
-def _walls(box: Box, curves: Sequence[Curve]) -> NDArray[np.int64]:
-    """Return how many curves pass each cell."""
-    walls = np.zeros((CELLS, CELLS), dtype=np.int64)
-    for curve in curves:
-        rows, columns = cells_of(box, curve)
-        walls[rows, columns] += 1
-    return walls
-
-
 def cells_of(box: Box, curve: Curve) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the cells that a curve passes, without gaps."""
+    """Return the cells that a curve passes, without gaps, each once."""
     found = []
     for part in curve.parts:
         at = (part.values - box.low) / box.widths * CELLS
-        for a, b in zip(at[:-1], at[1:], strict=True):
-            steps = 2 + int(3.0 * np.max(np.abs(b - a)))
-            found.append(a + np.linspace(0.0, 1.0, steps)[:, None] * (b - a))
-        if len(at) == 1:
-            found.append(at)
+        along = np.concatenate([[0.0], np.cumsum(np.max(np.abs(np.diff(at, axis=0)), axis=1))])
+        places = np.linspace(0.0, along[-1], 2 + int(3.0 * along[-1]))
+        found.append(np.column_stack([np.interp(places, along, at[:, k]) for k in (0, 1)]))
     cells = np.clip(np.concatenate(found).astype(np.int64), 0, CELLS - 1)
+    cells = np.unique(cells, axis=0)
     return cells[:, 0], cells[:, 1]
 
 
@@ -110,12 +121,14 @@ def _centre(box: Box, i: int, j: int) -> dict[str, float]:
     return {name: float(value) for name, value in zip(box.names, at, strict=True)}
 
 
-def _bounds(mask: NDArray[np.bool_], box: Box, curves: Sequence[Curve]) -> tuple[int, ...]:
+def _bounds(
+    mask: NDArray[np.bool_], passed: Sequence[tuple[NDArray[np.int64], NDArray[np.int64]]]
+) -> tuple[int, ...]:
     """Return the curves whose cells touch a region."""
     from scipy import ndimage
 
     rim = ndimage.binary_dilation(mask, np.ones((3, 3))) & ~mask
-    return tuple(k for k, curve in enumerate(curves) if np.any(rim[cells_of(box, curve)]))
+    return tuple(k for k, cells in enumerate(passed) if np.any(rim[cells]))
 
 
 def _families(
@@ -126,22 +139,36 @@ def _families(
     count: int,
 ) -> list[tuple[bool, tuple[Family, ...], tuple[Family, ...]]]:
     """Return for each region whether a section passes it, what lives there, and what is disputed."""
-    seen: list[list[set[Family]]] = [[] for _ in range(count)]
+    seen: list[list[set[Living]]] = [[] for _ in range(count)]
     for section in sections:
-        for index, families in _along(box, section, cells, depth):
-            seen[index].append(families)
+        for index, living in _along(box, section, cells, depth):
+            seen[index].append(living)
+    names = _names(one for sets in seen for living in sets for one in living)
     found = []
     for sets in seen:
         every = set().union(*sets) if sets else set()
         common = set.intersection(*sets) if sets else set()
-        found.append((bool(sets), tuple(sorted(every)), tuple(sorted(every - common))))
+        found.append((bool(sets), _named(every, names), _named(every - common, names)))
     return found
+
+
+def _names(orbits: Iterable[Living]) -> dict[tuple[Word, bool], str]:
+    """Return the shortest name of the orbits of each word: T changes labels, and nothing else."""
+    names: dict[tuple[Word, bool], str] = {}
+    for living in orbits:
+        known = names.get(living.key, living.name)
+        names[living.key] = min(known, living.name, key=lambda name: (len(name), name))
+    return names
+
+
+def _named(orbits: set[Living], names: dict[tuple[Word, bool], str]) -> tuple[Family, ...]:
+    return tuple(sorted({Family(names[one.key], one.stable) for one in orbits}))
 
 
 def _along(
     box: Box, section: Diagram, cells: NDArray[np.int64], depth: FloatArray
-) -> list[tuple[int, set[Family]]]:
-    """Return the stretches of a section in regions, each with the families on it."""
+) -> list[tuple[int, set[Living]]]:
+    """Return the stretches of a section in regions, each with the orbits on it."""
     varies = box.names.index(section.parameter)
     fixed = 1 - varies
     value = float(section.branches[0].params[box.names[fixed]][0]) if section.branches else np.nan
@@ -160,15 +187,16 @@ def _along(
     return stretches
 
 
-def _living(box: Box, section: Diagram, varies: int, cell: int) -> set[Family]:
-    """Return the families at the middle of a cell of a section: branches that pass its value."""
+def _living(box: Box, section: Diagram, varies: int, cell: int) -> set[Living]:
+    """Return the orbits at the middle of a cell of a section: of the branches that pass its value."""
     value = box.low[varies] + (cell + 0.5) / CELLS * box.widths[varies]
-    families = set()
+    found = set()
     for branch in section.branches:
         if branch.mirrored or branch.bridge:
             continue
+        word = min(identity(branch[0]))
         below = branch.values - value
         for k in np.flatnonzero(below[:-1] * below[1:] <= 0.0):
             stable = branch.stable is not None and bool(branch.stable[k])
-            families.add(Family(branch[int(k)].name, stable))
-    return families
+            found.add(Living(word, branch.system.half, stable, branch[int(k)].name))
+    return found

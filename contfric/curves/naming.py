@@ -20,6 +20,8 @@ from contfric.orbit.system import Margin, Test
 _COMPLEX = 1e-6
 #: Margins below this at a located point vanish with it: they are of one group.
 _TOGETHER = 1e-8
+#: Arclength within which a tangency belongs to a sliding event: where a stop meets a surface labels change.
+_OF_EVENT = 1e-5
 #: Columns behind the margins and the distances of the labels (``contfric.curves.correct``).
 _BEND, _ONE, _MINUS, _PAIR = range(EXTRA)
 
@@ -43,10 +45,11 @@ def crossings(
         *_labels(problem, before, after, border),
     ]
     found.sort(key=lambda c: c.point.arc)
-    for k, crossing in enumerate(found):
-        if crossing.terminal:
-            return found[: k + 1]
-    return found
+    last = next((k for k, crossing in enumerate(found) if crossing.terminal), None)
+    if last is None:
+        return found
+    end = found[last].point.arc
+    return [c for c in found[: last + 1] if c.terminal or end - c.point.arc > _OF_EVENT]
 
 
 def _margins(
