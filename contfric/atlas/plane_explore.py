@@ -259,7 +259,7 @@ def _follow_bifurcation(state: PlaneExploration, bifurcation: Bifurcation) -> No
         problem = problem_of(bifurcation, state.box)
         if not state.wants(problem):
             return
-        start, border = start_of_curve(problem, bifurcation)
+        problem, start, border = start_of_curve(problem, bifurcation, state.largest)
     except (ParameterError, ConvergenceError) as error:
         state.notes.append(f"{bifurcation.label}: {error}")
         return

@@ -68,7 +68,7 @@ def regions_of(
     cells = np.full(numbers.shape, -1, dtype=np.int64)
     for index, k in enumerate(kept):
         cells[numbers == k] = index
-    depth = ndimage.distance_transform_edt(free)
+    depth = ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]
     lives = _families(box, sections, cells, depth, len(kept))
     regions = []
     for index in range(len(kept)):

@@ -15,7 +15,7 @@ from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, EXTRA
 from contfric.curves.conditions import EXIT, JOINT, SPECTRAL, condition_value
 from contfric.curves.normal_form import cubic_coefficient
 from contfric.orbit.equations import close_chain
-from contfric.orbit.monitor import watch
+from contfric.orbit.monitor import find_turnings, watch
 from contfric.orbit.newton import (
     CHECKS,
     MULTIPLIERS,
@@ -30,6 +30,8 @@ from contfric.orbit.spectrum import multipliers
 #: The extra column that a curve watches where a branch watches the slope of its parameter: the
 #: coefficient of the normal form, or the rate of the load at a stop.
 BEND = 0
+#: A stationary value this near to a surface on which one is pinned is that one.
+_TOUCHES = 1e-6
 #: Newton converges quadratically from the cubic predictor; beyond this the step was too long.
 _MOST_STEPS = 12
 
@@ -195,6 +197,25 @@ def bend_value(functions, second, layout, condition, z, p, which, room):  # type
 
 
 @helper
+def other_touches(functions, layout, row, z, p, room):  # type: ignore[no-untyped-def]
+    """Return an interior margin without the one stationary point that lies on the surface."""
+    i, surface = layout.interior[row, 0], layout.interior[row, 1]
+    sign, turnings, equations = float(layout.interior[row, 2]), room.turnings, room.equations
+    c = layout.observables[surface]
+    found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
+    target = functions[2](surface, p, equations.none, equations.empty)
+    touch, least = -1, np.inf
+    for k in range(found):
+        gap = abs(turnings.values[k] - target)
+        if gap < _TOUCHES and (touch < 0 or gap < abs(turnings.values[touch] - target)):
+            touch = k
+    for k in range(found):
+        if k != touch:
+            least = min(least, sign * (turnings.values[k] - target))
+    return least
+
+
+@helper
 def observe_curve(  # type: ignore[no-untyped-def]
     functions, second, layout, condition, z, p, which, tests, labels, mu, counts, room
 ):
@@ -207,7 +228,10 @@ def observe_curve(  # type: ignore[no-untyped-def]
     tests[at + BEND] = bend_value(functions, second, layout, condition, z, p, which, room)
     finite = watch(functions, layout, z, p, equations, room.turnings, tests, labels)
     for k in range(condition.pinned.shape[0]):
-        tests[condition.pinned[k]] = 1.0
+        row = condition.pinned[k]
+        tests[row] = 1.0
+        if row < layout.interior.shape[0]:
+            tests[row] = other_touches(functions, layout, row, z, p, room)
     distances = at - labels.shape[0]
     for k in range(condition.quiet.shape[0]):
         labels[condition.quiet[k]] = 0

@@ -30,8 +30,11 @@ _SAME_TIME = 1e-6
 _SAME_POINT = 1e-4
 #: Margins this small after the proof still vanish: they belong to the condition.
 _STILL = 1e-10
-#: Length of the step by which a new word is proved, in largest steps.
-_PROOF = 0.01
+#: Lengths of the steps by which a new word is proved, in largest steps. Margins may leave zero with the
+#: square of the distance: the longer one tells them from rounding.
+_PROOFS = (0.1, 0.01)
+#: A segment that lasts less than minus this does not exist.
+_NO_TIME = 1e-9
 
 Start = tuple[Problem, CurvePoint, FloatArray]
 
@@ -156,19 +159,29 @@ def prove(
 
     Margins that vanish at the point but not beside it are watched from there on.
     """
+    for share in _PROOFS:
+        beside = _step_away(problem, start, border, share * largest)
+        if beside is None:
+            continue
+        orbit = problem.orbit(beside.joints, beside.w)
+        margins, pinned = orbit.margins, problem.condition.pinned
+        free = np.array([k for k in pinned if not abs(margins[k]) < _STILL], dtype=np.int64)
+        still = np.setdiff1d(pinned, free)
+        others = np.setdiff1d(np.arange(len(margins)), still)
+        lasts = bool(np.all(orbit.ends[:, 0] - orbit.cycle[:, 0] > -_NO_TIME))
+        if not lasts or not np.all(margins[others] > 0.0):
+            continue
+        if len(free):
+            start.tests[free] = np.maximum(0.0, problem.orbit(start.joints, start.w).margins[free])
+        return replace(problem, condition=problem.condition._replace(pinned=still))
+    return None
+
+
+def _step_away(
+    problem: Problem, start: CurvePoint, border: FloatArray, step: float
+) -> CurvePoint | None:
+    """Return the point a step away from the first one; None if there is none."""
     rows = CurveRows.room_for(problem, 2)
     rows.put(0, start)
-    tests = len(problem.system.tests)
-    step = _PROOF * largest
     _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), step, step, 3e-13)
-    if last != 1:
-        return None
-    margins = problem.orbit(rows.joints[1], rows.values[1]).margins
-    pinned = problem.condition.pinned
-    still = np.array([k for k in pinned if abs(margins[k]) < _STILL], dtype=np.int64)
-    others = np.setdiff1d(np.arange(tests), still)
-    if not np.all(margins[others] > 0.0):
-        return None
-    for k in np.setdiff1d(pinned, still):
-        start.tests[k] = max(0.0, float(problem.orbit(start.joints, start.w).margins[k]))
-    return replace(problem, condition=problem.condition._replace(pinned=still))
+    return rows.point(1) if last == 1 else None

@@ -12,11 +12,14 @@ from contfric.continuation.points import EXTRA, SMALLEST_STEP
 from contfric.curves.problem import Problem, border_of
 from contfric.models.definition import FloatArray
 from contfric.orbit.counts import TALLY
+from contfric.orbit.linear import assembled
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray
 
 #: Points that one call of the march may write: limits of the parameters are looked at after each.
 CHUNK = 128
+#: The first point is the orbit of the bifurcation to this: located events are good to about 1e-6 at worst.
+_SAME_ORBIT = 1e-3
 
 
 @dataclass(eq=False)
@@ -155,12 +158,20 @@ def solve_point(
 
 
 def first_curve_point(problem: Problem, orbit: Orbit) -> tuple[CurvePoint, FloatArray] | None:
-    """Return the first point of a curve with its border, solved with one of the parameters fixed."""
+    """Return the first point of a curve with its border, solved with one of the parameters fixed.
+
+    Where an exit is tangential the orbit may move although neither parameter does: then the point is
+    solved normal to that direction.
+    """
     which, flat = problem.which, np.zeros_like(orbit.joints)
-    for fixed in (0, 1):
+    widths = problem.box.widths
+    directions = [(flat, widths * np.array([1.0, 0.0])), (flat, widths * np.array([0.0, 1.0]))]
+    if problem.test is not None:
+        null = np.linalg.svd(assembled(problem.system, orbit.joints, orbit.vector))[2][-1]
+        directions.append((null.reshape(orbit.joints.shape), np.zeros(2)))
+    for tangent, slope in directions:
         border = border_of(problem, orbit.joints, orbit.vector)
-        slope = problem.box.widths * np.eye(2)[fixed]
-        point = solve_point(problem, orbit.joints, orbit.vector[which], flat, slope, border)
-        if point is not None:
+        point = solve_point(problem, orbit.joints, orbit.vector[which], tangent, slope, border)
+        if point is not None and np.max(np.abs(point.joints - orbit.joints)) < _SAME_ORBIT:
             return point, border
     return None

@@ -13,7 +13,7 @@ from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS
 from contfric.continuation.vertices import passed_vertex
 from contfric.curves.assembly import join_sides
 from contfric.curves.curve import Curve
-from contfric.curves.going_on import goes_on
+from contfric.curves.going_on import Start, goes_on, prove
 from contfric.curves.locating import locate_zero
 from contfric.curves.naming import crossings
 from contfric.curves.points import (
@@ -35,6 +35,8 @@ AT_START = 1e-6
 #: Share of a range within which a curve that gets no farther has come to a physical limit, where
 #: conditions degenerate together.
 _NEAR_LIMIT = 1e-3
+#: A segment that lasts less than minus this does not exist.
+_NO_TIME = 1e-9
 #: Most changes of the signature along one side of a curve: a chain longer than this goes round.
 _MOST_CHANGES = 24
 
@@ -123,7 +125,7 @@ def continue_bifurcation(
     largest = _largest_step(max_step)
     whole_number("max_points", max_points, least=2)
     problem = problem_of(bifurcation, box)
-    start, border = start_of_curve(problem, bifurcation)
+    problem, start, border = start_of_curve(problem, bifurcation, largest)
     ahead = trace_curve_side(problem, start, border, largest, max_points, progress)
     if ahead.end.reason is CurveEndReason.CLOSED:
         return join_sides(None, ahead)
@@ -141,25 +143,33 @@ def _largest_step(max_step: Any) -> float:
     return float(max_step)
 
 
-def start_of_curve(problem: Problem, bifurcation: Bifurcation) -> tuple[CurvePoint, FloatArray]:
-    """Return the first point of a curve.
+def start_of_curve(problem: Problem, bifurcation: Bifurcation, largest: float) -> Start:
+    """Return the problem of a curve, its first point and the border there.
 
     Raises
     ------
     ConvergenceError
-        If Newton fails there, or ends somewhere else.
+        If Newton fails there, ends somewhere else, or no orbit beside it is admissible.
     """
     orbit = problem.orbit(_joints(problem, bifurcation), bifurcation.orbit.vector[problem.which])
     found = first_curve_point(problem, orbit)
     if found is None:
         raise ConvergenceError(f"{bifurcation!r} has no curve with a unique direction", orbit)
-    moved = np.max(np.abs(found[0].w - orbit.vector[problem.which]) / problem.box.widths)
+    point, border = found
+    moved = np.max(np.abs(point.w - orbit.vector[problem.which]) / problem.box.widths)
     if moved > _SAME_START:
         raise ConvergenceError(
             f"the curve found near {bifurcation!r} is {moved:.2g} of the ranges away: it is another one",
             orbit,
         )
-    return found
+    if problem.test is None or problem.kind is Kind.T:
+        return problem, point, border
+    for start in (point, point.reversed()):
+        proved = prove(problem, start, border, largest)
+        if proved is not None:
+            point.tests = start.tests
+            return proved, point, border
+    raise ConvergenceError(f"no orbit on the curve beside {bifurcation!r} is admissible", orbit)
 
 
 def _joints(problem: Problem, bifurcation: Bifurcation) -> FloatArray:
@@ -220,6 +230,13 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
         problem, rows, last - 1, side.points[0], len(side.points) - 1, border, step, largest, 3e-13
     )
     fresh = [rows.point(j) for j in range(last, k + 1)]
+    located = 1 if why == codes.EVENT else 0  # the last point lies behind an event
+    whole = fresh[: len(fresh) - located]
+    gone = next((j for j, p in enumerate(whole) if not _lasts(problem, p)), None)
+    if gone is not None:
+        side.points += fresh[:gone]
+        side.end = CurveEnd(CurveEndReason.LOST)
+        return True, step
     limit = next((j for j, p in enumerate(fresh) if _beyond(problem, p) < 0.0), None)
     vertex = _vertex(side, fresh)
     if vertex is not None and (limit is None or vertex <= limit):
@@ -242,6 +259,11 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
         side.end = _near_limit(problem, side.tip) or CurveEnd(ends[why])
         return True, step
     return False, step
+
+
+def _lasts(problem: Problem, point: CurvePoint) -> bool:
+    """Tell whether no segment of a point ends before it starts."""
+    return bool(np.all(np.diff(point.joints[:, 0]) > -_NO_TIME))
 
 
 def _beyond(problem: Problem, point: CurvePoint) -> float:
