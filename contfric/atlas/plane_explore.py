@@ -165,7 +165,9 @@ def explore_plane(
 
 
 def _result(state: PlaneExploration, orbit: Orbit) -> Plane:
-    regions, cells = regions_of(orbit.model, state.vector, state.box, state.curves, state.sections)
+    regions, cells = regions_of(
+        orbit.model, state.vector, state.box, state.curves, state.sections, state.max_periods
+    )
     return Plane(
         orbit.model,
         state.box.names,
@@ -346,7 +348,7 @@ def _sample_regions(
     tried: set[float] = set()
     while not state.full:
         regions, _ = regions_of(
-            orbit.model, state.vector, state.box, state.curves, state.sections
+            orbit.model, state.vector, state.box, state.curves, state.sections, state.max_periods
         )
         open_ = [r for r in regions if not r.sampled and r.share > _SMALL]
         second = state.box.names[1]

@@ -9,7 +9,7 @@ sections disagree the region says so.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,8 +51,12 @@ def regions_of(
     box: Box,
     curves: Sequence[Curve],
     sections: Sequence[Diagram],
+    max_periods: int,
 ) -> tuple[tuple[Region, ...], NDArray[np.int64]]:
-    """Return the regions, largest first, and the number of each cell's (-1 on walls and outside)."""
+    """Return the regions, largest first, and the number of each cell's (-1 on walls and outside).
+
+    Orbits of more than ``max_periods`` periods, whose curves are not followed, are not listed.
+    """
     from scipy import ndimage
 
     passed = [cells_of(box, curve) for curve in curves]
@@ -69,7 +73,8 @@ def regions_of(
     for index, k in enumerate(kept):
         cells[numbers == k] = index
     depth = ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]
-    lives = _families(box, sections, cells, depth, len(kept))
+    shown = [_short(section, max_periods) for section in sections]
+    lives = _families(box, shown, cells, depth, len(kept))
     regions = []
     for index in range(len(kept)):
         mask = cells == index
@@ -86,6 +91,12 @@ def regions_of(
             )
         )
     return tuple(regions), cells
+
+
+def _short(section: Diagram, max_periods: int) -> Diagram:
+    """Return a section without its longer orbits."""
+    kept = tuple(b for b in section.branches if b.system.periods <= max_periods)
+    return replace(section, branches=kept)
 
 
 def cells_of(box: Box, curve: Curve) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -6,11 +6,12 @@ from collections.abc import Callable
 
 from contfric.atlas.collect import FINAL
 from contfric.atlas.diagram import Diagram, LooseEnd, Node
+from contfric.atlas.plane import Plane
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import EndReason
 from contfric.orbit.orbit import Orbit
 from contfric.study.read import Study
-from contfric.study.schema import ContinueTask, ExploreTask, Want
+from contfric.study.schema import ContinueTask, ExploreTask, PlaneTask, Want
 
 Say = Callable[[str], None]
 
@@ -79,6 +80,24 @@ def continue_from(study: Study, orbit: Orbit, task: ContinueTask, say: Say) -> B
         stability=study.wants(Want.STABILITY),
         progress=lambda text: say(f"continue: {text}"),
         **task.options(),
+    )
+
+
+def plane_from(study: Study, orbit: Orbit, task: PlaneTask, say: Say) -> Plane:
+    """Explore a plane; on Ctrl-C what was found so far, with ``complete`` False."""
+    from contfric.atlas.plane_explore import explore_plane
+    from contfric.atlas.seeds import Seeds
+
+    options = task.options()
+    if task.seeds is not None:
+        options["seeds"] = Seeds(**task.seeds.model_dump())
+    return explore_plane(
+        orbit,
+        (task.parameters[0], task.parameters[1]),
+        {name: (pair[0], pair[1]) for name, pair in task.range.items()},
+        task.sections,
+        progress=lambda text: say(f"plane: {text}"),
+        **options,
     )
 
 

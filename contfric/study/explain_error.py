@@ -16,6 +16,7 @@ from contfric.study.schema import (
     Figure,
     FigureKind,
     Format,
+    PlaneTask,
     Row,
     Simulated,
     Start,
@@ -34,6 +35,7 @@ _PARTS: dict[str, type[BaseModel]] = {
     "simulate": Simulated,
     "explore": ExploreTask,
     "continue": ContinueTask,
+    "plane": PlaneTask,
     "figures": Figure,
 }
 #: Keys whose values are names out of a list.

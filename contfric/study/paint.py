@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from contfric.atlas.diagram import Diagram
+from contfric.atlas.plane import Plane
 from contfric.errors import StudyError
 from contfric.orbit.orbit import Orbit
 from contfric.results import replacing
@@ -17,15 +18,24 @@ _SIZES = {
     FigureKind.ORBIT: (9.0, 6.2, 0.0),
     FigureKind.TRANSITIONS: (7.0, 5.0, 0.0),
     FigureKind.BRANCHES: (9.6, 4.4, 0.0),
+    FigureKind.PLANE: (9.6, 6.0, 0.0),
 }
 
 
-def paint(path: Path, drawing: Drawing, orbit: Orbit, diagram: Diagram | None, title: str) -> None:
+def paint(
+    path: Path,
+    drawing: Drawing,
+    orbit: Orbit,
+    diagram: Diagram | None,
+    title: str,
+    plane: Plane | None = None,
+) -> None:
     """Draw a figure and write it; a diagram carries the study's title."""
     from contfric.plot.branch_graph import plot_branch_graph
     from contfric.plot.diagram import plot_diagram
     from contfric.plot.graph import plot_transition_graph
     from contfric.plot.orbit import plot_orbit_panels
+    from contfric.plot.plane import plot_plane
     from contfric.plot.save import new_figure, save_figure
 
     width, height, row_height = _SIZES[drawing.kind]
@@ -40,6 +50,11 @@ def paint(path: Path, drawing: Drawing, orbit: Orbit, diagram: Diagram | None, t
     elif drawing.kind is FigureKind.BRANCHES:
         assert diagram is not None
         plot_branch_graph(diagram, ax=figure.add_subplot())
+    elif drawing.kind is FigureKind.PLANE:
+        if plane is None:
+            raise StudyError(f"{drawing.file}: there is no plane to draw")
+        figure.suptitle(title)
+        plot_plane(plane, ax=figure.add_subplot())
     elif drawing.kind is FigureKind.ORBIT:
         plot_orbit_panels(orbit, fig=figure)
     else:

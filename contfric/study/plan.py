@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from contfric.study.read import Study
-from contfric.study.schema import ContinueTask, ExploreTask, Want
+from contfric.study.schema import ContinueTask, ExploreTask, PlaneTask, Want
 
 RECORD = "run.json"
 POINTS = "points.csv"
@@ -16,7 +16,22 @@ ORBIT = "orbit.npz"
 BRANCH = "branch.npz"
 DIAGRAM = "diagram.npz"
 #: Files that every run may write, figures apart.
-RESULT_FILES = (RECORD, POINTS, BIFURCATIONS, ORBIT, BRANCH, DIAGRAM)
+PLANE = "plane.npz"
+CURVES = "curves.csv"
+SPECIAL = "special.csv"
+REGIONS = "regions.csv"
+RESULT_FILES = (
+    RECORD,
+    POINTS,
+    BIFURCATIONS,
+    ORBIT,
+    BRANCH,
+    DIAGRAM,
+    PLANE,
+    CURVES,
+    SPECIAL,
+    REGIONS,
+)
 
 
 class StepName(str, Enum):
@@ -25,6 +40,7 @@ class StepName(str, Enum):
     ORBIT = "orbit"
     EXPLORE = "explore"
     CONTINUE = "continue"
+    PLANE = "plane"
     TABLES = "tables"
     DATA = "data"
     FIGURES = "figures"
@@ -95,13 +111,21 @@ def _steps(study: Study) -> Iterator[Step]:
     if task is not None:
         name = StepName.EXPLORE if isinstance(task, ExploreTask) else StepName.CONTINUE
         yield Step(name, _task_text(study, task))
+    plane = study.content.plane
+    if plane is not None:
+        yield Step(StepName.PLANE, _plane_text(plane))
     yield Step(
         StepName.TABLES,
         f"one row a point: {', '.join(['parameters', *table_quantities(study)])}"
-        + ("" if task is None else "; one row a bifurcation"),
-        (POINTS,) if task is None else (POINTS, BIFURCATIONS),
+        + ("" if task is None else "; one row a bifurcation")
+        + ("" if plane is None else "; points of curves, of codimension two, regions"),
+        (
+            *((POINTS,) if task is None else (POINTS, BIFURCATIONS)),
+            *(() if plane is None else (CURVES, SPECIAL, REGIONS)),
+        ),
     )
-    yield Step(StepName.DATA, "all that a restart needs", _data_files(task))
+    files = (*_data_files(task), *(() if plane is None else (PLANE,)))
+    yield Step(StepName.DATA, "all that a restart needs", files)
     if study.drawings:
         shown = [
             f"{d.kind.value} ({', '.join(row.value for row in d.rows)})" if d.rows else d.kind.value
@@ -138,6 +162,12 @@ def _task_text(study: Study, task: ExploreTask | ContinueTask) -> str:
     return text + (", with multipliers" if study.wants(Want.STABILITY) else "")
 
 
+def _plane_text(task: PlaneTask) -> str:
+    where = ", ".join(f"{n} from {r[0]:g} to {r[1]:g}" for n, r in task.range.items())
+    kinds = "" if task.kinds is None else f" of {', '.join(task.kinds)}"
+    return f"every curve{kinds} that can be reached, {where}, and what lives between them"
+
+
 def _data_files(task: ExploreTask | ContinueTask | None) -> tuple[str, ...]:
     if task is None:
         return (ORBIT,)
@@ -164,7 +194,8 @@ def _skipped(study: Study) -> Iterator[Skipped]:
         origin = "a saved orbit" if study.orbit is not None else "a signature"
         yield Skipped("simulation to a steady state", f"the start is {origin}")
     if task is None:
-        yield Skipped("continuation", "neither 'explore' nor 'continue' is given")
+        given = "" if study.content.plane is None else " (sections of the plane apart)"
+        yield Skipped(f"continuation{given}", "neither 'explore' nor 'continue' is given")
     elif isinstance(task, ContinueTask):
         yield Skipped("other branches", "'continue' follows one branch only")
     elif task.bridges is False:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from contfric.atlas.diagram import Diagram
+from contfric.atlas.plane import Plane
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Proposal
 from contfric.orbit.counts import Counts
@@ -47,6 +48,7 @@ def record_of(
     timings: Mapping[str, float],
     orbit: Orbit,
     diagram: Diagram | None,
+    plane: Plane | None = None,
 ) -> dict[str, Any]:
     """Return the record of a run as plain data; status and files are added by the run."""
     return {
@@ -69,6 +71,36 @@ def record_of(
             "residual": orbit.residual,
         },
         **(_diagram_entries(diagram) if diagram is not None else {}),
+        **({"plane": _plane_entries(plane)} if plane is not None else {}),
+    }
+
+
+def _plane_entries(plane: Plane) -> dict[str, Any]:
+    return {
+        "parameters": list(plane.parameters),
+        "complete": plane.complete,
+        "curves": [
+            {
+                "curve": number,
+                "label": curve.label,
+                "points": len(curve),
+                "twin_of": plane.twins[number - 1] + 1,
+                "signatures": [name for _, name in curve.signatures],
+                "ends": [str(end) for end in curve.ends],
+            }
+            for number, curve in enumerate(plane.curves, start=1)
+        ],
+        "special": [{"name": s.name, "params": s.params} for s in plane.special],
+        "regions": [
+            {
+                "point": region.point,
+                "share": region.share,
+                "bounds": [k + 1 for k in region.bounds],
+                "families": [str(f) for f in region.families],
+            }
+            for region in plane.regions
+        ],
+        "notes": list(plane.notes),
     }
 
 

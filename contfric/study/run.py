@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from contfric.atlas.diagram import Diagram
+from contfric.atlas.plane import Plane
 from contfric.continuation.branch import Branch
+from contfric.continuation.events import EndReason
 from contfric.errors import ContfricError, ResultFileError
 from contfric.orbit.counts import Counts, counts
 from contfric.orbit.orbit import Orbit
@@ -22,16 +24,21 @@ from contfric.study.compute import (
     explore_from,
     find_start,
     one_branch,
+    plane_from,
     was_interrupted,
 )
 from contfric.study.folder import Folder, open_folder
 from contfric.study.plan import (
     BIFURCATIONS,
     BRANCH,
+    CURVES,
     DIAGRAM,
     ORBIT,
+    PLANE,
     POINTS,
     RECORD,
+    REGIONS,
+    SPECIAL,
     Plan,
     StepName,
     make_plan,
@@ -67,6 +74,8 @@ class StudyResult:
         The branch, if the study continues one.
     diagram : Diagram or None
         The diagram, if the study has a task.
+    plane : Plane or None
+        The plane, if the study has one.
     info : dict
         The content of ``run.json``.
     files : tuple of Path
@@ -81,6 +90,7 @@ class StudyResult:
     diagram: Diagram | None
     info: dict[str, Any]
     files: tuple[Path, ...]
+    plane: Plane | None = None
 
     def __repr__(self) -> str:
         return f"<StudyResult {self.study.name}: {self.status.value}, in {self.out}>"
@@ -151,6 +161,7 @@ class _Run:
     orbit: Orbit | None = None
     branch: Branch | None = None
     diagram: Diagram | None = None
+    plane: Plane | None = None
     timings: dict[str, float] = field(default_factory=dict)
     written: list[str] = field(default_factory=list)
     failures: list[Exception] = field(default_factory=list)
@@ -200,6 +211,13 @@ class _Run:
                 StepName.CONTINUE, lambda: continue_from(study, orbit, task, self.say)
             )
             self._keep(one_branch(self.branch, (task.range[0], task.range[1])))
+        surface = study.content.plane
+        if surface is not None and self.status is RunStatus.DONE:
+            self.plane = self._timed(
+                StepName.PLANE, lambda: plane_from(study, orbit, surface, self.say)
+            )
+            if EndReason.INTERRUPTED.value in self.plane.notes:
+                self.status = RunStatus.INTERRUPTED
 
     def _keep(self, found: Diagram) -> None:
         self.diagram = found if found.branches else None
@@ -227,7 +245,13 @@ class _Run:
             error.args = (f"{error} (the orbit {self.orbit.name} found before is in {path})",)
 
     def _write_all(self, orbit: Orbit) -> None:
-        from contfric.study.tables import write_bifurcations, write_points
+        from contfric.study.tables import (
+            write_bifurcations,
+            write_curves,
+            write_points,
+            write_regions,
+            write_special,
+        )
 
         folder, diagram = self.folder.path, self.diagram
         unfinished = self.study.task is not None and diagram is None
@@ -237,6 +261,11 @@ class _Run:
             self._write(POINTS, lambda path: write_points(path, self.study, sources))
         if diagram is not None:
             self._write(BIFURCATIONS, lambda path: write_bifurcations(path, diagram))
+        plane = self.plane
+        if plane is not None:
+            self._write(CURVES, lambda path: write_curves(path, plane))
+            self._write(SPECIAL, lambda path: write_special(path, plane))
+            self._write(REGIONS, lambda path: write_regions(path, plane))
         self.timings[StepName.TABLES.value] = time.perf_counter() - start
         start = time.perf_counter()
         self._write(ORBIT, lambda path: save(orbit, path))
@@ -245,6 +274,8 @@ class _Run:
             self._write(BRANCH, lambda path: save(branch, path))
         elif diagram is not None:
             self._write(DIAGRAM, lambda path: save(diagram, path))
+        if plane is not None:
+            self._write(PLANE, lambda path: save(plane, path))
         self.timings[StepName.DATA.value] = time.perf_counter() - start
         if self.study.drawings and not unfinished:
             self._timed(StepName.FIGURES, lambda: self._draw(orbit))
@@ -262,6 +293,7 @@ class _Run:
                     orbit=orbit,
                     diagram=self.diagram,
                     title=self.study.title,
+                    plane=self.plane,
                 ),
             )
 
@@ -282,7 +314,7 @@ class _Run:
         from contfric.study.record import record_of, write_record
 
         work = counts() - self.before
-        record = record_of(self.plan, work, self.timings, orbit, self.diagram)
+        record = record_of(self.plan, work, self.timings, orbit, self.diagram, self.plane)
         record |= {
             "status": self.status.value,
             "failures": [_one_line(error) for error in self.failures],
@@ -306,6 +338,7 @@ class _Run:
             self.diagram,
             record,
             tuple(self.folder.path / name for name in self.written),
+            self.plane,
         )
 
 

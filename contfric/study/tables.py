@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from contfric.atlas.diagram import Diagram, Node
+from contfric.atlas.plane import Plane
 from contfric.continuation.branch import Branch
 from contfric.orbit.orbit import Orbit
 from contfric.results import replacing
@@ -74,6 +75,47 @@ def write_bifurcations(path: Path, diagram: Diagram) -> None:
         for node in listed_nodes(diagram)
     )
     header = ["kind", "branch", "signature", *names, "stable_before", "stable_after"]
+    _write(path, header, rows)
+
+
+def write_curves(path: Path, plane: Plane) -> None:
+    """Write one row for each point of each curve."""
+    names = plane.model.parameter_names
+    rows = (
+        (number, curve.label, kind.value, *values, bool(stable))
+        for number, curve in enumerate(plane.curves, start=1)
+        for kind, stable, *values in zip(
+            curve.kinds, curve.stable, *(curve.params[n].tolist() for n in names), strict=True
+        )
+    )
+    _write(path, ["curve", "label", "kind", *names, "stable"], rows)
+
+
+def write_special(path: Path, plane: Plane) -> None:
+    """Write one row for each point of codimension two."""
+    names = plane.model.parameter_names
+    rows = (
+        (s.name, s.kind.name, s.orbit.name, *(s.params[n] for n in names), s.located)
+        for s in plane.special
+    )
+    _write(path, ["name", "kind", "signature", *names, "located"], rows)
+
+
+def write_regions(path: Path, plane: Plane) -> None:
+    """Write one row for each region: a point inside, what bounds it, what lives there."""
+    rows = (
+        (
+            number,
+            *region.point.values(),
+            region.share,
+            " ".join(sorted({plane.curves[k].label for k in region.bounds})),
+            "; ".join(map(str, region.families)),
+            region.sampled,
+            "; ".join(map(str, region.disputed)),
+        )
+        for number, region in enumerate(plane.regions, start=1)
+    )
+    header = ["region", *plane.parameters, "share", "bounds", "families", "sampled", "disputed"]
     _write(path, header, rows)
 
 
