@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -74,10 +75,21 @@ class Problem:
         """The model that moves."""
         return self.system.model
 
-    @property
+    @cached_property
     def which(self) -> IntArray:
         """Indices of the two parameters."""
         return np.array([self.model.index_of(n) for n in self.box.names], dtype=np.int64)
+
+    def within_limits(self, values: FloatArray) -> FloatArray:
+        """Return the least left-hand side of the model's constraints at points (k, 2) of the plane."""
+        params = self.model.mapping(self.vector)
+        one, other = self.box.names
+        least = np.full(len(values), np.inf)
+        for constraint in self.model.constraints:
+            rest = constraint.value({**params, one: 0.0, other: 0.0})
+            slopes = [constraint.coefficients.get(name, 0.0) for name in (one, other)]
+            least = np.minimum(least, rest + values @ np.array(slopes))
+        return least
 
     def orbit(self, joints: FloatArray, w: FloatArray) -> Orbit:
         """Return a point as an orbit."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS
@@ -231,13 +232,13 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
     )
     fresh = [rows.point(j) for j in range(last, k + 1)]
     located = 1 if why == codes.EVENT else 0  # the last point lies behind an event
-    whole = fresh[: len(fresh) - located]
-    gone = next((j for j, p in enumerate(whole) if not _lasts(problem, p)), None)
+    lasts = np.all(np.diff(rows.joints[last : k + 1 - located, :, 0]) > -_NO_TIME, axis=1)
+    gone = _first(~lasts)
     if gone is not None:
         side.points += fresh[:gone]
         side.end = CurveEnd(CurveEndReason.LOST)
         return True, step
-    limit = next((j for j, p in enumerate(fresh) if _beyond(problem, p) < 0.0), None)
+    limit = _first(problem.within_limits(rows.values[last : k + 1]) < 0.0)
     vertex = _vertex(side, fresh)
     if vertex is not None and (limit is None or vertex <= limit):
         return _end_at_birth(side, fresh, vertex), step
@@ -261,17 +262,15 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
     return False, step
 
 
-def _lasts(problem: Problem, point: CurvePoint) -> bool:
-    """Tell whether no segment of a point ends before it starts."""
-    return bool(np.all(np.diff(point.joints[:, 0]) > -_NO_TIME))
+def _first(flags: NDArray[np.bool_]) -> int | None:
+    """Return the first index that is true; None if none is."""
+    places = np.flatnonzero(flags)
+    return int(places[0]) if len(places) else None
 
 
 def _beyond(problem: Problem, point: CurvePoint) -> float:
     """Return the least value of the model's constraints at a point."""
-    vector = problem.vector.copy()
-    vector[problem.which] = point.w
-    params = problem.model.mapping(vector)
-    return min((c.value(params) for c in problem.model.constraints), default=np.inf)
+    return float(problem.within_limits(point.w[None, :])[0])
 
 
 def _end_at_limit(side: CurveSide, after: CurvePoint) -> bool:
