@@ -67,6 +67,10 @@ period_signature = f8(vector, indices, vector)
 #: rate(mode, c, t, y, p, which, grad): rate of observable c along a mode; ``grad`` (1 + n + len(which))
 #: holds its derivatives with respect to t, y and the parameters ``which``; not filled if empty.
 rate_signature = f8(i8, i8, f8, vector, vector, indices, vector)
+#: second(mode, c, t, y, dt, p, which, direction, jac, room): derivative of flow's ``jac`` in a direction
+#: (1 + n + 1) of (t0, y0, dt); with c >= 0 that of observable c's gradient in a direction of (t, y), in
+#: the first row of ``jac``. ``room`` holds 8 + n numbers. 0 where a flow has none.
+second_signature = i8(i8, i8, f8, vector, f8, vector, indices, vector, matrix, vector)
 
 FlowType = types.FunctionType(flow_signature)
 ObserveType = types.FunctionType(observe_signature)
@@ -75,6 +79,7 @@ TurningType = types.FunctionType(turning_signature)
 HitType = types.FunctionType(hit_signature)
 PeriodType = types.FunctionType(period_signature)
 RateType = types.FunctionType(rate_signature)
+SecondType = types.FunctionType(second_signature)
 
 
 class Kernel:

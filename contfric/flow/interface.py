@@ -1,4 +1,4 @@
-"""What the engine asks of a flow, closed form or integrated: seven compiled functions.
+"""What the engine asks of a flow, closed form or integrated: seven compiled functions and an optional one.
 
 The engine knows nothing else of a model's motion: not how a state is advanced, how many states there
 are, or what the excitation looks like. The types of the seven functions stand in
@@ -25,6 +25,8 @@ class CompiledFlow:
     hit : first time at which an observable takes a level
     period : period of the excitation (0 for an autonomous model), with its gradient
     rate : rate of an observable along a mode, with its gradient
+    second : second derivatives in a direction, for curves in two parameters; without it they are
+        differences of the first ones
     """
 
     flow: Any
@@ -34,10 +36,19 @@ class CompiledFlow:
     hit: Any
     period: Any
     rate: Any
+    second: Any = None
 
     def functions(self) -> tuple[Any, ...]:
         """Return the seven functions as kernels take them."""
         return self._first_class
+
+    @cached_property
+    def second_derivatives(self) -> Any:
+        """Return the eighth function as kernels take it; one that says that there is none by default."""
+        from contfric.compiled import FirstClass
+        from contfric.flow.without import no_second
+
+        return FirstClass(no_second if self.second is None else self.second)
 
     @cached_property
     def _first_class(self) -> tuple[Any, ...]:

@@ -10,11 +10,12 @@ import numpy as np
 
 from contfric.atlas.collect import FINAL
 from contfric.atlas.diagram import Diagram, LooseEnd, Node
+from contfric.atlas.plane import Plane
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import EndReason
 from contfric.orbit.orbit import Orbit
 from contfric.study.read import Study
-from contfric.study.schema import ContinueTask, ExploreTask, LyapunovTask, Want
+from contfric.study.schema import ContinueTask, ExploreTask, LyapunovTask, PlaneTask, Want
 
 if TYPE_CHECKING:
     from contfric.chaos.map import LyapunovMap
@@ -106,6 +107,24 @@ def lyapunov_from(study: Study, task: LyapunovTask, tiles: Path, say: Say) -> Ly
     if found.complete:
         shutil.rmtree(tiles, ignore_errors=True)
     return found
+
+
+def plane_from(study: Study, orbit: Orbit, task: PlaneTask, say: Say) -> Plane:
+    """Explore a plane; on Ctrl-C what was found so far, with ``complete`` False."""
+    from contfric.atlas.plane_explore import explore_plane
+    from contfric.atlas.seeds import Seeds
+
+    options = task.options()
+    if task.seeds is not None:
+        options["seeds"] = Seeds(**task.seeds.model_dump())
+    return explore_plane(
+        orbit,
+        (task.parameters[0], task.parameters[1]),
+        {name: (pair[0], pair[1]) for name, pair in task.range.items()},
+        task.sections,
+        progress=lambda text: say(f"plane: {text}"),
+        **options,
+    )
 
 
 def one_branch(branch: Branch, bounds: tuple[float, float]) -> Diagram:

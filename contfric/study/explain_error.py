@@ -17,6 +17,7 @@ from contfric.study.schema import (
     FigureKind,
     Format,
     LyapunovTask,
+    PlaneTask,
     Row,
     SeedsTask,
     Simulated,
@@ -38,6 +39,7 @@ _PARTS: dict[str, type[BaseModel]] = {
     "seeds": SeedsTask,
     "lyapunov": LyapunovTask,
     "continue": ContinueTask,
+    "plane": PlaneTask,
     "figures": Figure,
 }
 #: Keys whose values are names out of a list.

@@ -10,6 +10,7 @@ from contfric.continuation.branch import Branch
 from contfric.orbit.orbit import Orbit
 
 if TYPE_CHECKING:
+    from contfric.atlas.plane import Plane
     from contfric.chaos.map import LyapunovMap
 
 
@@ -22,12 +23,14 @@ class Findings:
     orbit : the orbit of the start
     branch : the branch, if the study continues one
     diagram : the diagram, if the study has a task in one parameter
+    plane : the curves of a plane of two parameters
     lyapunov : the map of Lyapunov exponents
     """
 
     orbit: Orbit | None = None
     branch: Branch | None = None
     diagram: Diagram | None = None
+    plane: Plane | None = None
     lyapunov: LyapunovMap | None = None
 
     @property

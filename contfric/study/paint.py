@@ -16,6 +16,7 @@ _SIZES = {
     FigureKind.TRANSITIONS: (7.0, 5.0, 0.0),
     FigureKind.BRANCHES: (9.6, 4.4, 0.0),
     FigureKind.LYAPUNOV: (8.0, 5.6, 0.0),
+    FigureKind.PLANE: (9.6, 6.0, 0.0),
 }
 #: Kinds that show a diagram.
 _OF_DIAGRAM = frozenset({FigureKind.DIAGRAM, FigureKind.BRANCHES})
@@ -25,6 +26,8 @@ def can_be_drawn(kind: FigureKind, found: Findings) -> bool:
     """Tell whether a run, perhaps interrupted, has found what a figure shows."""
     if kind is FigureKind.LYAPUNOV:
         return found.lyapunov is not None
+    if kind is FigureKind.PLANE:
+        return found.plane is not None
     return (found.diagram if kind in _OF_DIAGRAM else found.orbit) is not None
 
 
@@ -35,15 +38,20 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
     from contfric.plot.graph import plot_transition_graph
     from contfric.plot.lyapunov import plot_lyapunov_map
     from contfric.plot.orbit import plot_orbit_panels
+    from contfric.plot.plane import plot_plane
     from contfric.plot.save import new_figure, save_figure
 
-    orbit, diagram, lmap = found.orbit, found.diagram, found.lyapunov
+    orbit, diagram, plane, lmap = found.orbit, found.diagram, found.plane, found.lyapunov
     width, height, row_height = _SIZES[drawing.kind]
     figure = new_figure(width, height + row_height * len(drawing.rows))
     if drawing.kind is FigureKind.LYAPUNOV:
         assert lmap is not None
         figure.suptitle(title)
         plot_lyapunov_map(lmap, ax=figure.add_subplot())
+    elif drawing.kind is FigureKind.PLANE:
+        assert plane is not None
+        figure.suptitle(title)
+        plot_plane(plane, ax=figure.add_subplot())
     elif drawing.kind in _OF_DIAGRAM:
         assert diagram is not None
         figure.suptitle(title)

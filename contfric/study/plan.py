@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from contfric.study.read import Study
-from contfric.study.schema import ContinueTask, ExploreTask, LyapunovTask, Want
+from contfric.study.schema import ContinueTask, ExploreTask, LyapunovTask, PlaneTask, Want
 
 RECORD = "run.json"
 POINTS = "points.csv"
@@ -17,8 +17,13 @@ BRANCH = "branch.npz"
 DIAGRAM = "diagram.npz"
 LYAPUNOV = "lyapunov.npz"
 LYAPUNOV_TABLE = "lyapunov.csv"
+PLANE = "plane.npz"
+CURVES = "curves.csv"
+SPECIAL = "special.csv"
+REGIONS = "regions.csv"
+_TABLES = (POINTS, BIFURCATIONS, CURVES, SPECIAL, REGIONS, LYAPUNOV_TABLE)
 #: Files that every run may write, figures apart.
-RESULT_FILES = (RECORD, POINTS, BIFURCATIONS, ORBIT, BRANCH, DIAGRAM, LYAPUNOV, LYAPUNOV_TABLE)
+RESULT_FILES = (RECORD, *_TABLES, ORBIT, BRANCH, DIAGRAM, PLANE, LYAPUNOV)
 
 
 class StepName(str, Enum):
@@ -27,6 +32,7 @@ class StepName(str, Enum):
     ORBIT = "orbit"
     EXPLORE = "explore"
     CONTINUE = "continue"
+    PLANE = "plane"
     LYAPUNOV = "lyapunov"
     TABLES = "tables"
     DATA = "data"
@@ -100,6 +106,8 @@ def _steps(study: Study) -> Iterator[Step]:
     if task is not None:
         name = StepName.EXPLORE if isinstance(task, ExploreTask) else StepName.CONTINUE
         yield Step(name, _task_text(study, task))
+    if study.content.plane is not None:
+        yield Step(StepName.PLANE, _plane_text(study.content.plane))
     if study.content.lyapunov is not None:
         yield Step(StepName.LYAPUNOV, _lyapunov_text(study.content.lyapunov))
     yield Step(StepName.TABLES, _tables_text(study), _table_files(study))
@@ -140,6 +148,12 @@ def _task_text(study: Study, task: ExploreTask | ContinueTask) -> str:
     return text + (", with multipliers" if study.wants(Want.STABILITY) else "")
 
 
+def _plane_text(task: PlaneTask) -> str:
+    where = ", ".join(f"{n} from {r[0]:g} to {r[1]:g}" for n, r in task.range.items())
+    kinds = "" if task.kinds is None else f" of {', '.join(task.kinds)}"
+    return f"every curve{kinds} that can be reached, {where}, and what lives between them"
+
+
 def _lyapunov_text(task: LyapunovTask) -> str:
     sides = (
         f"{name} from {low:g} to {high:g} ({count:g})"
@@ -154,6 +168,8 @@ def _tables_text(study: Study) -> str:
         parts.append(f"one row a point: {', '.join(['parameters', *table_quantities(study)])}")
     if study.task is not None:
         parts.append("one row a bifurcation")
+    if content.plane is not None:
+        parts.append("points of curves, of codimension two, regions")
     if content.lyapunov is not None:
         parts.append("one row a motion of the map")
     return "; ".join(parts)
@@ -164,6 +180,7 @@ def _table_files(study: Study) -> tuple[str, ...]:
     return (
         *((POINTS,) if content.needs_orbit else ()),
         *((BIFURCATIONS,) if study.task is not None else ()),
+        *((CURVES, SPECIAL, REGIONS) if content.plane is not None else ()),
         *((LYAPUNOV_TABLE,) if content.lyapunov is not None else ()),
     )
 
@@ -176,6 +193,7 @@ def _data_files(study: Study) -> tuple[str, ...]:
     return (
         *((ORBIT,) if content.needs_orbit else ()),
         *found,
+        *((PLANE,) if content.plane is not None else ()),
         *((LYAPUNOV,) if content.lyapunov is not None else ()),
     )
 

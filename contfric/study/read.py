@@ -13,6 +13,7 @@ from contfric.errors import (
     ParameterError,
     ResultFileError,
     StudyError,
+    did_you_mean,
 )
 from contfric.models import load_model
 from contfric.models.definition import Model
@@ -127,6 +128,7 @@ def _checked(located: LocatedYaml, content: StudyFile) -> Study:
     _check_start(located, content, model)
     _check_task(located, content, model, params)
     _check_grid(located, content, model)
+    _check_plane(located, content, model)
     return Study(
         located.path,
         content,
@@ -264,6 +266,39 @@ def _check_grid(located: LocatedYaml, content: StudyFile, model: Model) -> None:
                 f"{name} is [low, high, number of values], with low < high and a whole number of at "
                 f"least 2, got {values}",
             )
+
+
+def _check_plane(located: LocatedYaml, content: StudyFile, model: Model) -> None:
+    task = content.plane
+    if task is None:
+        return
+    from contfric.continuation.events import Kind
+    from contfric.curves.problem import box_of
+
+    one, other = task.parameters
+    ranges = {name: (pair[0], pair[-1]) for name, pair in task.range.items()}
+    wrong = next((name for name, pair in task.range.items() if len(pair) != 2), None)
+    if wrong is not None:
+        located.fail(
+            ("plane", "range", wrong), f"the range of '{wrong}' is two numbers [low, high]"
+        )
+    try:
+        box_of(model, (one, other), ranges)
+    except ParameterError as error:
+        located.fail(("plane",), str(error))
+    for name, values in (task.sections or {}).items():
+        if name not in ranges:
+            hint = did_you_mean(name, ranges)
+            located.fail(("plane", "sections"), f"'{name}' is none of the two parameters{hint}")
+        low, high = ranges[name]
+        for value in values:
+            if not low <= value <= high:
+                text = f"the section {name} = {value:g} is outside of its range [{low:g}, {high:g}]"
+                located.fail(("plane", "sections", name), text)
+    known = [kind.value for kind in Kind if kind is not Kind.NS]
+    for kind in task.kinds or []:
+        if kind not in known:
+            located.fail(("plane", "kinds"), f"no curves of '{kind}'{did_you_mean(kind, known)}")
 
 
 def _range_fault(

@@ -10,9 +10,7 @@ from dataclasses import asdict
 from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any
 
 from contfric.atlas.diagram import Diagram
 from contfric.continuation.branch import Branch
@@ -22,10 +20,8 @@ from contfric.orbit.orbit import Orbit
 from contfric.results import replacing
 from contfric.study.findings import Findings
 from contfric.study.plan import Plan
+from contfric.study.record_plane import map_entries, plane_entries
 from contfric.study.tables import listed_nodes
-
-if TYPE_CHECKING:
-    from contfric.chaos.map import LyapunovMap
 
 #: Modules that a run loads only if the study needs them.
 WATCHED = (
@@ -68,7 +64,8 @@ def record_of(
         "skipped": [asdict(item) for item in plan.skipped],
         **(_start_entries(found.orbit) if found.orbit is not None else {}),
         **(_diagram_entries(found.diagram) if found.diagram is not None else {}),
-        **(_map_entries(found.lyapunov) if found.lyapunov is not None else {}),
+        **({"plane": plane_entries(found.plane)} if found.plane is not None else {}),
+        **({"lyapunov": map_entries(found.lyapunov)} if found.lyapunov is not None else {}),
     }
 
 
@@ -80,22 +77,6 @@ def _start_entries(orbit: Orbit) -> dict[str, Any]:
             "periods": orbit.periods,
             "params": orbit.params,
             "residual": orbit.residual,
-        }
-    }
-
-
-def _map_entries(lmap: LyapunovMap) -> dict[str, Any]:
-    return {
-        "lyapunov": {
-            "grid": {
-                name: [float(values[0]), float(values[-1]), len(values)]
-                for name, values in lmap.axes.items()
-            },
-            "params": lmap.params,
-            "starts": lmap.starts,
-            "complete": lmap.complete,
-            "motions": {motion.name.lower(): count for motion, count in lmap.counts().items()},
-            "largest": float(np.nanmax(lmap.values, initial=-np.inf)),
         }
     }
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from contfric.atlas.diagram import Diagram
-from contfric.continuation.branch import Branch
+from contfric.continuation.events import EndReason
 from contfric.errors import ContfricError, ResultFileError
 from contfric.orbit.counts import Counts, counts
 from contfric.orbit.orbit import Orbit
@@ -23,6 +22,7 @@ from contfric.study.compute import (
     find_start,
     lyapunov_from,
     one_branch,
+    plane_from,
     was_interrupted,
 )
 from contfric.study.findings import Findings
@@ -30,80 +30,32 @@ from contfric.study.folder import Folder, open_folder
 from contfric.study.plan import (
     BIFURCATIONS,
     BRANCH,
+    CURVES,
     DIAGRAM,
     LYAPUNOV,
     LYAPUNOV_TABLE,
     ORBIT,
+    PLANE,
     POINTS,
     RECORD,
+    REGIONS,
+    SPECIAL,
     Plan,
     StepName,
     make_plan,
 )
 from contfric.study.read import Study, read_study
+from contfric.study.result import RunStatus, StudyResult, UnwrittenError
 from contfric.study.schema import ContinueTask, ExploreTask
 
 if TYPE_CHECKING:
+    from contfric.atlas.plane import Plane
     from contfric.chaos.map import LyapunovMap
 
 Progress = Callable[[str], None]
 #: Folder of the finished tiles of a map, inside that of the run, until the map is complete.
 _TILES = "lyapunov-tiles"
 _T = TypeVar("_T")
-
-
-class RunStatus(str, Enum):
-    """How a run ended."""
-
-    DONE = "done"
-    INTERRUPTED = "interrupted"
-    UNWRITTEN = "some files could not be written"
-
-
-@dataclass(frozen=True, eq=False)
-class StudyResult:
-    """What a run found and where it is.
-
-    Attributes
-    ----------
-    study : Study
-    out : Path
-        The folder of the results.
-    status : RunStatus
-    orbit : Orbit or None
-        The orbit of the start; None if nothing needs it, or the run was interrupted before.
-    branch : Branch or None
-        The branch, if the study continues one.
-    diagram : Diagram or None
-        The diagram, if the study has a task.
-    lyapunov : LyapunovMap or None
-        The map of Lyapunov exponents, if the study asks for one.
-    info : dict
-        The content of ``run.json``.
-    files : tuple of Path
-        The files written.
-    """
-
-    study: Study
-    out: Path
-    status: RunStatus
-    orbit: Orbit | None
-    branch: Branch | None
-    diagram: Diagram | None
-    lyapunov: LyapunovMap | None
-    info: dict[str, Any]
-    files: tuple[Path, ...]
-
-    def __repr__(self) -> str:
-        return f"<StudyResult {self.study.name}: {self.status.value}, in {self.out}>"
-
-
-class UnwrittenError(ResultFileError):
-    """Some files could not be written; ``result`` holds everything that was computed."""
-
-    def __init__(self, message: str, result: StudyResult) -> None:
-        super().__init__(message)
-        self.result = result
 
 
 def run_study(
@@ -202,6 +154,7 @@ class _Run:
             self.found.orbit = orbit
             self.say(f"orbit: {orbit.name} over {orbit.periods} period(s)")
             self._follow(orbit)
+        self._find_plane()
         grid = study.content.lyapunov
         if grid is not None:
             tiles = self.folder.path / _TILES
@@ -211,6 +164,15 @@ class _Run:
             self.found.lyapunov = lmap
             if not lmap.complete:
                 self.status = RunStatus.INTERRUPTED
+
+    def _find_plane(self) -> None:
+        study, orbit, task = self.study, self.found.orbit, self.study.content.plane
+        if task is None or orbit is None:
+            return
+        plane = self._timed(StepName.PLANE, lambda: plane_from(study, orbit, task, self.say))
+        self.found.plane = plane
+        if EndReason.INTERRUPTED.value in plane.notes:
+            raise KeyboardInterrupt
 
     def _follow(self, orbit: Orbit) -> None:
         study, task = self.study, self.study.task
@@ -261,16 +223,25 @@ class _Run:
         self.say(f"written to {self.folder.path}")
 
     def _write_tables(self, unfinished: bool) -> None:
-        from contfric.study.tables import write_bifurcations, write_motions, write_points
+        from contfric.study.tables import write_bifurcations, write_points
 
-        orbit, diagram, lmap = self.found.orbit, self.found.diagram, self.found.lyapunov
+        orbit, diagram = self.found.orbit, self.found.diagram
         if orbit is not None and not unfinished:
             sources = diagram.branches if diagram else (orbit,)
             self._write(POINTS, lambda path: write_points(path, self.study, sources))
         if diagram is not None:
             self._write(BIFURCATIONS, lambda path: write_bifurcations(path, diagram))
+        self._write_plane_tables(self.found.plane, self.found.lyapunov)
+
+    def _write_plane_tables(self, plane: Plane | None, lmap: LyapunovMap | None) -> None:
+        from contfric.study import tables_plane
+
+        if plane is not None:
+            self._write(CURVES, lambda path: tables_plane.write_curves(path, plane))
+            self._write(SPECIAL, lambda path: tables_plane.write_special(path, plane))
+            self._write(REGIONS, lambda path: tables_plane.write_regions(path, plane))
         if lmap is not None:
-            self._write(LYAPUNOV_TABLE, lambda path: write_motions(path, lmap))
+            self._write(LYAPUNOV_TABLE, lambda path: tables_plane.write_motions(path, lmap))
 
     def _write_data(self) -> None:
         found = self.found
@@ -279,6 +250,7 @@ class _Run:
             (ORBIT, found.orbit),
             (BRANCH, found.branch),
             (DIAGRAM, whole),
+            (PLANE, found.plane),
             (LYAPUNOV, found.lyapunov),
         ):
             if result is not None:
@@ -331,6 +303,7 @@ class _Run:
             self.found.orbit,
             self.found.branch,
             self.found.diagram,
+            self.found.plane,
             self.found.lyapunov,
             record,
             tuple(self.folder.path / name for name in self.written),

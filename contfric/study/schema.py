@@ -25,6 +25,7 @@ class FigureKind(str, Enum):
     TRANSITIONS = "transitions"
     BRANCHES = "branches"
     LYAPUNOV = "lyapunov"
+    PLANE = "plane"
 
 
 class Row(str, Enum):
@@ -176,11 +177,52 @@ class LyapunovTask(_Part):
         return self.model_dump(exclude={"grid"}, exclude_none=True)
 
 
+class PlaneTask(_Part):
+    """Follow the curves of bifurcations in a plane of two parameters."""
+
+    parameters: list[str] = Field(
+        min_length=2, max_length=2, description="the names of two parameters of the model"
+    )
+    range: dict[str, list[float]] = Field(
+        description="a mapping of both parameters to two finite numbers [low, high]"
+    )
+    sections: dict[str, list[float]] | None = Field(
+        None, description="a mapping of one or both parameters to lists of values"
+    )
+    kinds: list[str] | None = Field(
+        None, min_length=1, description="a list with any of SN, BP, PD, CS, SS, AS, GS, T"
+    )
+    seeds: SeedsTask | None = Field(None, description="a mapping with any of values, states, seed")
+    max_step: float | None = Field(
+        None,
+        gt=0.0,
+        le=1.0,
+        description="a number in (0, 1]: largest step, as a share of the ranges",
+    )
+    max_periods: int | None = Field(
+        None,
+        ge=1,
+        le=16,
+        description="a whole number from 1 to 16: longest orbits whose curves count",
+    )
+    max_curves: int | None = Field(
+        None, ge=1, description="a whole number >= 1: most curves to compute"
+    )
+    max_sections: int | None = Field(
+        None, ge=1, description="a whole number >= 1: most sections, those of the study among them"
+    )
+
+    def options(self) -> dict[str, Any]:
+        """Return what is given beyond the plane and its sections, as arguments."""
+        given = {"parameters", "range", "sections", "seeds"}
+        return self.model_dump(exclude=given, exclude_none=True)
+
+
 class Figure(_Part):
     """One figure."""
 
     kind: Annotated[FigureKind, Field(strict=False)] = Field(
-        description="one of diagram, orbit, transitions, branches, lyapunov"
+        description="one of diagram, orbit, transitions, branches, lyapunov, plane"
     )
     rows: _Rows | None = Field(
         None, description="a list of rows of a diagram: any of x_max, x_min, stops, psi"
@@ -222,6 +264,11 @@ class StudyFile(_Part):
         description="a mapping with grid; also periods, transient, tolerance, confirm, starts, "
         "state",
     )
+    plane: PlaneTask | None = Field(
+        None,
+        description="a mapping with parameters and range; also sections, kinds, seeds, max_step, "
+        "max_periods, max_curves, max_sections",
+    )
     want: _Wants = Field([], description="a list with any of stability, asymmetry, extrema, stops")
     figures: list[Figure] = Field([], description="a list of mappings, each with its kind")
 
@@ -234,7 +281,7 @@ class StudyFile(_Part):
     def needs_orbit(self) -> bool:
         """Whether anything is asked for that needs the orbit of the start."""
         shown = {figure.kind for figure in self.figures}
-        alone = self.lyapunov is not None and self.task is None
+        alone = self.lyapunov is not None and self.task is None and self.plane is None
         return (
             not alone
             or "start" in self.model_fields_set

@@ -5,20 +5,16 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from contfric.atlas.diagram import Diagram, Node
-from contfric.chaos.status import Motion
 from contfric.continuation.branch import Branch
 from contfric.orbit.orbit import Orbit
 from contfric.results import replacing
 from contfric.study.read import Study
 from contfric.study.schema import Want
-
-if TYPE_CHECKING:
-    from contfric.chaos.map import LyapunovMap
 
 
 def write_points(path: Path, study: Study, sources: Sequence[Branch | Orbit]) -> None:
@@ -37,7 +33,7 @@ def write_points(path: Path, study: Study, sources: Sequence[Branch | Orbit]) ->
         for number, (source, table) in enumerate(zip(sources, tables, strict=True), start=1)
         for row in _rows(table, header)
     )
-    _write(path, ["branch", "signature", *header], rows)
+    write_table(path, ["branch", "signature", *header], rows)
 
 
 def _rows(table: dict[str, list[Any]], header: list[str]) -> Iterable[tuple[Any, ...]]:
@@ -78,30 +74,7 @@ def write_bifurcations(path: Path, diagram: Diagram) -> None:
         for node in listed_nodes(diagram)
     )
     header = ["kind", "branch", "signature", *names, "stable_before", "stable_after"]
-    _write(path, header, rows)
-
-
-def write_motions(path: Path, lmap: LyapunovMap) -> None:
-    """Write one row for each motion of a map of Lyapunov exponents."""
-    (first, across), (second, up) = lmap.axes.items()
-    count = lmap.exponents.shape[-1]
-    names = [motion.name.lower() for motion in Motion]
-    rows = (
-        (
-            across[i].item(),
-            up[j].item(),
-            k + 1,
-            *lmap.exponents[i, j, k].tolist(),
-            lmap.errors[i, j, k].item(),
-            names[lmap.motions[i, j, k]],
-            lmap.periods[i, j, k].item(),
-            lmap.followed[i, j, k].item(),
-        )
-        for i, j, k in np.ndindex(*lmap.motions.shape)
-    )
-    exponents = [f"exponent_{k + 1}" for k in range(count)]
-    tail = ["error", "motion", "periods", "followed"]
-    _write(path, [first, second, "start", *exponents, *tail], rows)
+    write_table(path, header, rows)
 
 
 def listed_nodes(diagram: Diagram) -> list[Node]:
@@ -114,7 +87,8 @@ def _known(value: bool | None) -> str:
     return "" if value is None else str(value)
 
 
-def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a table as CSV, whole or not at all."""
     with (
         replacing(path) as temporary,
         temporary.open("w", encoding="utf-8", newline="") as file,

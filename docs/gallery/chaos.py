@@ -1,7 +1,7 @@
 """The page on chaos: what the paper says of it, measured; ``make gallery``.
 
-Maps and lines of Lyapunov exponents from the paper's initial state (1 + 0.9 S0, 0). Motions that are chaotic over 600
-periods are followed for 10,000 more, so that chaotic transients are told from chaos.
+Maps and lines of Lyapunov exponents from the paper's initial state (1 + 0.9 S0, 0). Motions that are
+chaotic over 600 periods are followed for 10,000 more, so that chaotic transients are told from chaos.
 """
 
 from __future__ import annotations
@@ -92,7 +92,9 @@ def half() -> list[str]:
         here = (low <= S) & (high > S)
         periods = sorted(set(lmap.periods[0, here, 0].tolist()) - {0})
         count, chaos = int(here.sum()), int(lmap.chaotic[0, here].sum())
-        lines.append(f"| {low:g} to {high:g} | {count} | {chaos} | {', '.join(map(str, periods))} |")
+        lines.append(
+            f"| {low:g} to {high:g} | {count} | {chaos} | {', '.join(map(str, periods))} |"
+        )
     return lines
 
 

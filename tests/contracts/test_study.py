@@ -16,7 +16,7 @@ import contfric as cf
 from contfric.continuation.events import End, EndReason
 from contfric.orbit.counts import counts
 from contfric.study import UnwrittenError, make_plan, read_study, study_names
-from contfric.study.run import RunStatus
+from contfric.study.result import RunStatus
 
 HEAD = "model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\n"
 EXPLORE = "explore: {parameter: Omega, range: [0.45, 0.56]}\n"

@@ -12,7 +12,7 @@ import pytest
 
 import contfric as cf
 from contfric.study import make_plan, read_study
-from contfric.study.run import RunStatus
+from contfric.study.result import RunStatus
 
 HEAD = "model: coulomb\nparams: {S0: 0.4}\n"
 GRID = "lyapunov: {grid: {Omega: [0.3, 0.5, 5], S: [0.05, 0.3, 4]}, periods: 100}\n"
