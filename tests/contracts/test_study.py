@@ -177,7 +177,9 @@ def test_bad_signature_file_is_named_with_its_line(study) -> None:
 
 
 def test_unknown_study(tmp_path) -> None:
-    with pytest.raises(cf.StudyError, match="unknown study 'fig5'; did you mean 'fig05' or 'fig15'"):
+    with pytest.raises(
+        cf.StudyError, match="unknown study 'fig5'; did you mean 'fig05' or 'fig15'"
+    ):
         read_study("fig5")
     (tmp_path / "scene.yaml").write_text("")
     with pytest.raises(cf.StudyError, match=r"no file .*scne\.yaml; did you mean 'scene.yaml'"):
