@@ -16,7 +16,8 @@ PAGE = (Path(__file__).parents[2] / "docs" / "gallery" / "chaos.md").read_text(e
 def motions(omega: object, S: object, S0: float, confirm: int = 3000) -> cf.LyapunovMap:
     grid = {"Omega": np.atleast_1d(np.asarray(omega)), "S": np.atleast_1d(np.asarray(S))}
     state = [1.0 + 0.9 * S0, 0.0]
-    return cf.lyapunov_map("coulomb", grid, {"S0": S0}, state=state, confirm=confirm)
+    fixed = {"S0": S0}
+    return cf.lyapunov_map("coulomb", grid, fixed, state=state, periods=2000, confirm=confirm)
 
 
 def table(name: str) -> list[list[str]]:
