@@ -149,6 +149,6 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
     sign = inside_sign(model, orbit.word[i][0], surface)
     found = _turnings(orbit, i, c)
     if not found:
-        raise NotationError(f"segment {segment + 1} touches {surface} nowhere inside")
+        raise NotationError(f"segment {i + 1} touches {surface} nowhere inside")
     time = min(found, key=lambda pair: sign * (pair[1] - level))[0]
     return joint_within(orbit, i, time)

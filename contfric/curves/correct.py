@@ -14,7 +14,8 @@ from contfric.compiled import helper
 from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, EXTRA
 from contfric.curves.conditions import EXIT, JOINT, SPECTRAL, condition_value
 from contfric.curves.normal_form import cubic_coefficient
-from contfric.orbit.equations import close_chain
+from contfric.orbit.cyclic import finish, next_rows, start_border, take_out
+from contfric.orbit.equations import close_chain, segment_rows
 from contfric.orbit.monitor import find_turnings, watch
 from contfric.orbit.newton import (
     CHECKS,
@@ -23,7 +24,6 @@ from contfric.orbit.newton import (
     correction_size,
     has_settled,
     move,
-    newton_step,
 )
 from contfric.orbit.spectrum import multipliers
 
@@ -110,6 +110,51 @@ def turn_tangent(work, tz, tw, scale):  # type: ignore[no-untyped-def]
 
 
 @helper
+def add_rate(functions, layout, i, after, p, which, grad, rows):  # type: ignore[no-untyped-def]
+    """Add the rate of the exit to the exit's own row.
+
+    Where both vanish this is no other equation. But the exit's row alone says nothing of the time at which
+    an exit is tangential, and no pivot would be left for it.
+    """
+    m, free = after.shape[0], which.shape[0]
+    row, c = 2 * m - 1, layout.observables[layout.exits[i]]
+    rate = functions[6](layout.modes[i], c, after[0], after[1:], p, which, grad)
+    for k in range(m):
+        rows[row, 2 * m + k] += grad[k]
+    for k in range(free):
+        rows[row, 3 * m + k] += grad[m + k]
+    rows[row, 3 * m + free] -= rate
+
+
+@helper
+def curve_step(functions, layout, condition, z, p, which, room):  # type: ignore[no-untyped-def]
+    """Solve the linearised equations at (z, p); return (solved, largest residual).
+
+    As :func:`contfric.orbit.newton.newton_step`, for a condition.
+    """
+    count, m = z.shape
+    work, equations = room.elimination, room.equations
+    rows = work.rows
+    start_border(work.border, room.d, room.e, room.s, m)
+    worst = 0.0
+    for i in range(count):
+        if i > 0:
+            next_rows(rows, work.border, room.d, i, m)
+        after = z[i + 1] if i + 1 < count else equations.last
+        at = 0 if i == 0 else m
+        here = segment_rows(functions, layout, i, at, z[i], after, p, which, equations, rows)
+        if here == np.inf:
+            return False, here
+        if condition.kind == EXIT and i == condition.segment:
+            add_rate(functions, layout, i, after, p, which, equations.grad, rows)
+        worst = max(worst, here)
+        if i > 0 and not take_out(work, i, m):
+            return False, worst
+    pencil = room.pencil
+    return finish(work, equations.close, equations.close_w, pencil[0], pencil[1]), worst
+
+
+@helper
 def settle_curve(  # type: ignore[no-untyped-def]
     functions,
     second,
@@ -138,9 +183,7 @@ def settle_curve(  # type: ignore[no-untyped-def]
             return False
         s[0, 0], s[0, 1] = -off_normal(room, z, p, which), 1.0
         s[1, 0], s[1, 1] = -g, 0.0
-        solved, worst = newton_step(
-            functions, layout, z, p, which, room.d, room.e, s, equations, work, room.pencil
-        )
+        solved, worst = curve_step(functions, layout, condition, z, p, which, room)
         if not solved:
             return False
         size = correction_size(work.z, work.w, z, p, which)
@@ -245,4 +288,6 @@ def observe_curve(  # type: ignore[no-untyped-def]
     if condition.kind == EXIT:  # multipliers are infinite there
         for k in range(CHI_ONE, EXTRA):
             tests[at + k] = 1.0
+        for k in range(mu.shape[0]):
+            mu[k] = np.inf
     return finite
