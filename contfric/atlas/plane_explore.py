@@ -1,7 +1,7 @@
 """Exploration of a plane: from sections to curves, from curves through their points of codimension two.
 
-A section is a one-parameter diagram. Each of its bifurcations starts a curve; each point of codimension two on
-a curve starts those that leave it, until nothing new is found. Then the regions between the curves are
+A section is a one-parameter diagram. Each of its bifurcations starts a curve; each point of codimension
+two on a curve starts those that leave it, until nothing new is found. Then the regions between the curves are
 looked at: where no section has passed a region, one is laid through it, and what it shows that is new
 starts further curves.
 """
@@ -145,9 +145,12 @@ def explore_plane(
     if not isinstance(orbit, Orbit):
         raise ParameterError(f"a plane is explored from an Orbit, got {type(orbit).__name__}")
     box = box_of(orbit.model, parameters, ranges)
-    for name, value in (("max_periods", max_periods), ("max_curves", max_curves)):
-        whole_number(name, value, least=1)
-    whole_number("max_sections", max_sections, least=1)
+    for name, most in (
+        ("max_periods", max_periods),
+        ("max_curves", max_curves),
+        ("max_sections", max_sections),
+    ):
+        whole_number(name, most, least=1)
     wanted = frozenset(Kind(k) for k in kinds)
     largest = LARGEST_STEP if max_step is None else float(max_step)
     state = PlaneExploration(

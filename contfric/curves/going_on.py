@@ -21,7 +21,7 @@ from contfric.curves.special import SpecialPoint
 from contfric.errors import ContfricError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import IntArray, Margin, Test
 
 #: Times of a joint in two words for one motion agree to this (nondimensional): located events are good to
 #: 1e-9 where two of them meet.
@@ -109,7 +109,9 @@ def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation 
     return None
 
 
-def goes_on(problem: Problem, tip: CurvePoint, special: SpecialPoint, largest: float) -> Start | None:
+def goes_on(
+    problem: Problem, tip: CurvePoint, special: SpecialPoint, largest: float
+) -> Start | None:
     """Return where a curve goes on behind a sliding event, in the direction that it has; None if nowhere.
 
     What goes on happens at as many places as before: a curve that is asymmetric does not go on as the
@@ -169,12 +171,20 @@ def prove(
         still = np.setdiff1d(pinned, free)
         others = np.setdiff1d(np.arange(len(margins)), still)
         lasts = bool(np.all(orbit.ends[:, 0] - orbit.cycle[:, 0] > -_NO_TIME))
-        if not lasts or not np.all(margins[others] > 0.0):
+        if not lasts or not np.all(margins[others] > 0.0) or _is_exit(problem, still):
             continue
         if len(free):
             start.tests[free] = np.maximum(0.0, problem.orbit(start.joints, start.w).margins[free])
         return replace(problem, condition=problem.condition._replace(pinned=still))
     return None
+
+
+def _is_exit(problem: Problem, pinned: IntArray) -> bool:
+    """Tell whether a touch inside a segment is nothing but its tangential exit."""
+    test = problem.test
+    if test is None or test.margin is not Margin.INTERIOR:
+        return False
+    return replace(test, margin=Margin.EXIT) in [problem.system.tests[k] for k in pinned]
 
 
 def _step_away(

@@ -132,7 +132,9 @@ def fold_problem(orbit: Orbit, box: Box) -> Problem | None:
     return None
 
 
-def beside(problem: Problem, orbit: Orbit, direction: FloatArray, distance: float) -> tuple[CurvePoint, FloatArray] | None:
+def beside(
+    problem: Problem, orbit: Orbit, direction: FloatArray, distance: float
+) -> tuple[CurvePoint, FloatArray] | None:
     """Solve for a point of a curve a distance away from an orbit along a direction of its joints."""
     border = border_of(problem, orbit.joints, orbit.vector)
     guess = orbit.joints + distance * direction
@@ -147,9 +149,7 @@ def beside(problem: Problem, orbit: Orbit, direction: FloatArray, distance: floa
     return point, border
 
 
-def _tangential_release(
-    special: SpecialPoint, problem: Problem, largest: float
-) -> Iterator[Start]:
+def _tangential_release(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:
     """Yield the AS that begins where the load at a stop stands still: a short stick, left tangentially."""
     assert problem.test is not None
     orbit = special.orbit.as_whole()
@@ -172,7 +172,9 @@ def _tangential_release(
             continue
         longer = np.zeros_like(edited.joints)
         longer[i, 0] = -1.0  # it begins earlier: the release stays where it is
-        own = replace(own, condition=own.condition._replace(pinned=np.array([own.system.tests.index(test)])))
+        own = replace(
+            own, condition=own.condition._replace(pinned=np.array([own.system.tests.index(test)]))
+        )
         for distance in _BESIDE:
             start = beside(own, edited, longer, distance)
             if start is None:

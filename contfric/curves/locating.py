@@ -24,7 +24,9 @@ _NOISE = 2e-15
 Value = Callable[[CurvePoint], float]
 
 
-def between(a: CurvePoint, b: CurvePoint, x: float) -> tuple[FloatArray, ...]:
+def between(
+    a: CurvePoint, b: CurvePoint, x: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return joints, parameters, tangent and slope at a share of a step, by the cubic through both ends."""
     y, length = 1.0 - x, b.arc - a.arc
     ha, hb = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -60,9 +61,7 @@ def _margins(
     located = []
     for k in np.flatnonzero(after.tests[: len(tests)] < 0.0):
         index = int(k)
-        point, fine = locate_zero(
-            problem, before, after, border, lambda p, i=index: min(float(p.tests[i]), 1e3)
-        )
+        point, fine = locate_zero(problem, before, after, border, partial(_test, index))
         located.append((point.arc, index, point, fine))
     if not located:
         return []
@@ -79,8 +78,15 @@ def _margins(
             and kind_of_margin(problem.system, test, orbit) is kind
         )
     )
-    special = _special(problem, point, CodimTwo.MEETS, kind, (tests[first], *_rest(group, tests[first])), fine)
+    special = _special(
+        problem, point, CodimTwo.MEETS, kind, (tests[first], *_rest(group, tests[first])), fine
+    )
     return [Crossing(point, special, True)]
+
+
+def _test(index: int, point: CurvePoint) -> float:
+    """Return one of the watched values; a margin without stationary points is infinite."""
+    return min(float(point.tests[index]), 1e3)
 
 
 def _rest(group: tuple[Test, ...], first: Test) -> tuple[Test, ...]:
@@ -116,9 +122,7 @@ def _smooth(
         a, b = before.tests[index], after.tests[index]
         if not a * b < 0.0:
             continue
-        point, fine = locate_zero(
-            problem, before, after, border, lambda p, i=index: float(p.tests[i])
-        )
+        point, fine = locate_zero(problem, before, after, border, partial(_test, index))
         value = abs(point.tests[index])
         if not math.isfinite(value) or value > 0.5 * min(abs(a), abs(b)):
             continue  # it changes sign through infinity: an exit that becomes tangential
@@ -178,5 +182,3 @@ def _labels(
         special = _special(problem, point, CodimTwo.MEETS, Kind.T, (test,))
         found.append(Crossing(point, special, False))
     return found
-
-

@@ -108,7 +108,8 @@ def box_of(
     ParameterError
         For anything but two different parameters of the model with a finite range each.
     """
-    if isinstance(parameters, str) or len(tuple(parameters)) != 2:
+    names: object = parameters  # whatever the user gave
+    if isinstance(names, str) or len(tuple(parameters)) != 2:
         raise ParameterError(f"a curve needs a pair of parameters, got {parameters!r}")
     one, other = parameters
     for name in (one, other):
@@ -160,7 +161,9 @@ def problem_of(bifurcation: Bifurcation, box: Box) -> Problem:
     if kind is Kind.NS:
         raise ParameterError("curves of NS are not continued: SN, BP, PD, CS, SS, AS, GS and T are")
     if orbit.system.holds:
-        raise ParameterError(f"{bifurcation!r} lies on a bridge: curves of orbits with holds are not")
+        raise ParameterError(
+            f"{bifurcation!r} lies on a bridge: curves of orbits with holds are not"
+        )
     here = np.array([orbit.params[name] for name in box.names])
     if not box.contains(here):
         where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(box.names, here, strict=True))

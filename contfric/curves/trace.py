@@ -338,7 +338,11 @@ def _resolve(side: CurveSide, after: CurvePoint, border: FloatArray) -> bool:
     for crossing in crossings(problem, before, after, side.border):
         if limit is not None and crossing.point.arc > limit.arc:
             break
-        if at_start and crossing.point.arc - side.points[0].arc < AT_START and not crossing.terminal:
+        if (
+            at_start
+            and crossing.point.arc - side.points[0].arc < AT_START
+            and not crossing.terminal
+        ):
             continue
         side.special.append(crossing.special)
         if crossing.terminal:

@@ -253,7 +253,9 @@ def _check_plane(located: LocatedYaml, content: StudyFile, model: Model) -> None
     ranges = {name: (pair[0], pair[-1]) for name, pair in task.range.items()}
     wrong = next((name for name, pair in task.range.items() if len(pair) != 2), None)
     if wrong is not None:
-        located.fail(("plane", "range", wrong), f"the range of '{wrong}' is two numbers [low, high]")
+        located.fail(
+            ("plane", "range", wrong), f"the range of '{wrong}' is two numbers [low, high]"
+        )
     try:
         box_of(model, (one, other), ranges)
     except ParameterError as error:

@@ -161,10 +161,16 @@ class PlaneTask(_Part):
     )
     seeds: SeedsTask | None = Field(None, description="a mapping with any of values, states, seed")
     max_step: float | None = Field(
-        None, gt=0.0, le=1.0, description="a number in (0, 1]: largest step, as a share of the ranges"
+        None,
+        gt=0.0,
+        le=1.0,
+        description="a number in (0, 1]: largest step, as a share of the ranges",
     )
     max_periods: int | None = Field(
-        None, ge=1, le=16, description="a whole number from 1 to 16: longest orbits whose curves count"
+        None,
+        ge=1,
+        le=16,
+        description="a whole number from 1 to 16: longest orbits whose curves count",
     )
     max_curves: int | None = Field(
         None, ge=1, description="a whole number >= 1: most curves to compute"
