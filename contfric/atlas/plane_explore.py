@@ -21,16 +21,27 @@ from contfric.atlas.plane_matching import is_known, twins_of
 from contfric.atlas.plane_regions import regions_of
 from contfric.atlas.seeds import Seeds
 from contfric.continuation.events import Bifurcation, Kind
-from contfric.continuation.points import LARGEST_STEP, MOST_POINTS
+from contfric.continuation.points import MOST_POINTS
 from contfric.curves.assembly import join_sides
 from contfric.curves.curve import Curve
 from contfric.curves.going_on import Start
-from contfric.curves.leaving import leaving
+from contfric.curves.leaving import leaving, other_words
 from contfric.curves.points import CurvePoint
 from contfric.curves.problem import Box, Problem, box_of, problem_of
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
-from contfric.curves.trace import CurveSide, start_of_curve, trace_curve_side
-from contfric.errors import ContfricError, ConvergenceError, ParameterError, whole_number
+from contfric.curves.trace import (
+    CurveSide,
+    largest_step,
+    start_of_curve,
+    trace_curve_side,
+)
+from contfric.errors import (
+    ContfricError,
+    ConvergenceError,
+    ParameterError,
+    did_you_mean,
+    whole_number,
+)
 from contfric.models.definition import FloatArray
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
@@ -61,6 +72,7 @@ class PlaneExploration:
     curves: list[Curve] = field(default_factory=list)
     sections: list[Diagram] = field(default_factory=list)
     waiting: deque[tuple[SpecialPoint, Problem]] = field(default_factory=deque)
+    unread: deque[Curve] = field(default_factory=deque)
     notes: list[str] = field(default_factory=list)
     complete: bool = True
 
@@ -77,6 +89,7 @@ class PlaneExploration:
     def add(self, curve: Curve, sides: Sequence[CurveSide]) -> None:
         """Register a curve, and let what leaves its points of codimension two wait."""
         self.curves.append(curve)
+        self.unread.append(curve)
         self.say(f"curve {len(self.curves)}: {curve!r}")
         for side in sides:
             piece: CurveSide | None = side
@@ -151,8 +164,8 @@ def explore_plane(
         ("max_sections", max_sections),
     ):
         whole_number(name, most, least=1)
-    wanted = frozenset(Kind(k) for k in kinds)
-    largest = LARGEST_STEP if max_step is None else float(max_step)
+    wanted = _kinds(kinds)
+    largest = largest_step(max_step)
     state = PlaneExploration(
         box, orbit.vector.copy(), wanted, max_periods, max_curves, largest, progress
     )
@@ -165,6 +178,15 @@ def explore_plane(
         state.complete = False
         state.notes.append(CurveEndReason.INTERRUPTED.value)
     return _result(state, orbit)
+
+
+def _kinds(kinds: Sequence[str | Kind]) -> frozenset[Kind]:
+    known = [kind.value for kind in Kind if kind is not Kind.NS]
+    names = [kind.value if isinstance(kind, Kind) else str(kind) for kind in kinds]
+    for name in names:
+        if name not in known:
+            raise ParameterError(f"there are no curves of '{name}'{did_you_mean(name, known)}")
+    return frozenset(Kind(name) for name in names)
 
 
 def _result(state: PlaneExploration, orbit: Orbit) -> Plane:
@@ -281,8 +303,18 @@ def _follow_bifurcation(state: PlaneExploration, bifurcation: Bifurcation) -> No
 # --------------------------------------------------------------------- points of codimension two
 
 
+def _follow_words(state: PlaneExploration) -> None:
+    """Follow CS curves in the other words for their motions."""
+    while state.unread:
+        for part in state.unread.popleft().parts:
+            for starts in _paired(other_words(part, state.largest)):
+                if not state.full and state.wants(starts[0][0]):
+                    _follow_starts(state, starts, None)
+
+
 def _follow_special(state: PlaneExploration) -> None:
     """Follow what leaves the points that wait."""
+    _follow_words(state)
     while state.waiting:
         special, problem = state.waiting.popleft()
         if special.meets is Kind.T or special.kind in (CodimTwo.CUSP, CodimTwo.R1, CodimTwo.R2):
@@ -295,6 +327,7 @@ def _follow_special(state: PlaneExploration) -> None:
                 return
             if state.wants(starts[0][0]):
                 _follow_starts(state, starts, special)
+        _follow_words(state)
 
 
 def _paired(starts: Iterable[Start]) -> Iterator[list[Start]]:
@@ -313,7 +346,9 @@ def _same_curve(a: Problem, b: Problem) -> bool:
     return a.system is b.system and a.kind is b.kind and a.test == b.test
 
 
-def _follow_starts(state: PlaneExploration, starts: list[Start], special: SpecialPoint) -> None:
+def _follow_starts(
+    state: PlaneExploration, starts: list[Start], special: SpecialPoint | None
+) -> None:
     """Trace a curve that leaves a point in one or two directions, unless it is known."""
     sides = []
     for problem, point, border in starts[:2]:
@@ -331,6 +366,9 @@ def _follow_starts(state: PlaneExploration, starts: list[Start], special: Specia
         state.add(join_sides(sides[1], sides[0]), sides)
         return
     problem, start = sides[0].problem, sides[0].points[0]
+    if special is None:
+        state.add(join_sides(None, sides[0], CurveEnd(CurveEndReason.START)), sides)
+        return
     there = replace(special, orbit=problem.orbit(start.joints, start.w), tests=())
     first = CurveEnd(CurveEndReason.START, special=there)
     state.add(join_sides(None, sides[0], first), sides)

@@ -29,6 +29,7 @@ from contfric.continuation.candidates import edited_orbit
 from contfric.continuation.events import TERMINAL, Bifurcation, Kind, kind_of_margin
 from contfric.continuation.outcomes import outcome_at
 from contfric.continuation.vertices import symmetric_part, undoubled_part
+from contfric.curves.curve import CurvePart
 from contfric.curves.going_on import Start, prove, starts_of, words_at
 from contfric.curves.points import CurvePoint, solve_point
 from contfric.curves.problem import Box, Problem, border_of, problem_of
@@ -89,6 +90,25 @@ def _words_of_own(special: SpecialPoint, problem: Problem) -> Iterator[Orbit]:
                 both = replace(own, orbit=orbit, meets=meets, tests=(test,))
                 with suppress(ContfricError):
                     yield from words_at(both)
+
+
+def other_words(part: CurvePart, largest: float) -> Iterator[Start]:
+    """Yield the starts of a CS curve in the other words for its motion, from its middle.
+
+    The motion is the same, but its neighbours are others: they have their own folds and doublings there.
+    """
+    problem, k = part.problem, len(part) // 2
+    if part.kind is not Kind.CS or problem is None:
+        return
+    orbit = problem.orbit(part.joints[k], part.values[k])
+    tests = tuple(problem.system.tests[int(row)] for row in problem.condition.pinned)
+    here = SpecialPoint(CodimTwo.MEETS, "", orbit.params, orbit, Kind.CS, tests)
+    for other in words_at(here):
+        for test, value in zip(other.system.tests, other.margins, strict=True):
+            if abs(value) < _VANISHES and kind_of_margin(other.system, test, other) is Kind.CS:
+                event = Bifurcation(Kind.CS, other.params, other, (test,))
+                yield from starts_of(event, problem.box, largest)
+                break
 
 
 def _born(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:

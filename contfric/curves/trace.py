@@ -123,7 +123,7 @@ def continue_bifurcation(
             "branch.bifurcations or diagram.bifurcations"
         )
     box = box_of(bifurcation.orbit.model, parameters, ranges)
-    largest = _largest_step(max_step)
+    largest = largest_step(max_step)
     whole_number("max_points", max_points, least=2)
     problem = problem_of(bifurcation, box)
     problem, start, border = start_of_curve(problem, bifurcation, largest)
@@ -134,7 +134,14 @@ def continue_bifurcation(
     return join_sides(behind, ahead)
 
 
-def _largest_step(max_step: Any) -> float:
+def largest_step(max_step: Any) -> float:
+    """Return the largest step as a share of the ranges.
+
+    Raises
+    ------
+    ParameterError
+        If it is no number in (0, 1].
+    """
     if max_step is None:
         return LARGEST_STEP
     if isinstance(max_step, bool) or not isinstance(max_step, (int, float)):

@@ -185,8 +185,10 @@ def _legend(
         for name, (colour, width) in _LOOKS.items()
         if name in kinds
     ]
-    handles.append(Line2D([], [], color=GREY, linestyle=STABLE, label="stable orbits are bounded"))
-    handles.append(Line2D([], [], color=GREY, linestyle=UNSTABLE, label="unstable ones only"))
+    for style, meaning in ((STABLE, "stable orbits are bounded"), (UNSTABLE, "unstable ones only")):
+        line = Line2D([], [], color=GREY, label=meaning)
+        line.set_linestyle(style)
+        handles.append(line)
     if special:
         ring = Line2D([], [], linestyle="none", marker="o", label="codimension two")
         ring.set(markersize=4.5, markerfacecolor="white", markeredgecolor=BLACK)
