@@ -8,9 +8,8 @@ starts further curves.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,11 +18,11 @@ from contfric.atlas.explore import explore
 from contfric.atlas.plane import Plane
 from contfric.atlas.plane_matching import is_known, twins_of
 from contfric.atlas.plane_regions import regions_of
+from contfric.atlas.plane_state import PlaneExploration, Progress
 from contfric.atlas.seeds import Seeds
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.points import MOST_POINTS
 from contfric.curves.assembly import join_sides
-from contfric.curves.curve import Curve
 from contfric.curves.going_on import Start
 from contfric.curves.leaving import leaving, other_words
 from contfric.curves.points import CurvePoint
@@ -42,11 +41,8 @@ from contfric.errors import (
     did_you_mean,
     whole_number,
 )
-from contfric.models.definition import FloatArray
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
-
-Progress = Callable[[str], None]
 
 #: Kinds of curves that are followed by default: T changes labels, and nothing else.
 KINDS = ("SN", "BP", "PD", "CS", "SS", "AS", "GS")
@@ -56,50 +52,6 @@ _SEEDS = Seeds(values=8, states=2)
 _NOWHERE = 1e-5
 #: A region smaller than this share of the plane gets no section of its own.
 _SMALL = 2e-4
-
-
-@dataclass(eq=False)
-class PlaneExploration:
-    """State of one exploration of a plane."""
-
-    box: Box
-    vector: FloatArray
-    kinds: frozenset[Kind]
-    max_periods: int
-    max_curves: int
-    largest: float
-    progress: Progress | None
-    curves: list[Curve] = field(default_factory=list)
-    sections: list[Diagram] = field(default_factory=list)
-    waiting: deque[tuple[SpecialPoint, Problem]] = field(default_factory=deque)
-    unread: deque[Curve] = field(default_factory=deque)
-    notes: list[str] = field(default_factory=list)
-    complete: bool = True
-
-    def say(self, text: str) -> None:
-        """Report progress."""
-        if self.progress is not None:
-            self.progress(text)
-
-    @property
-    def full(self) -> bool:
-        """Whether no more curves may be computed."""
-        return len(self.curves) >= self.max_curves
-
-    def add(self, curve: Curve, sides: Sequence[CurveSide]) -> None:
-        """Register a curve, and let what leaves its points of codimension two wait."""
-        self.curves.append(curve)
-        self.unread.append(curve)
-        self.say(f"curve {len(self.curves)}: {curve!r}")
-        for side in sides:
-            piece: CurveSide | None = side
-            while piece is not None:
-                self.waiting.extend((special, piece.problem) for special in piece.special)
-                piece = piece.following
-
-    def wants(self, problem: Problem) -> bool:
-        """Tell whether a curve is of the kinds and periods asked for."""
-        return problem.kind in self.kinds and problem.system.periods <= self.max_periods
 
 
 def explore_plane(

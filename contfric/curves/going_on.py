@@ -15,6 +15,7 @@ import numpy as np
 
 from contfric.continuation.candidates import candidates
 from contfric.continuation.events import TERMINAL, Bifurcation, kind_of_margin
+from contfric.continuation.points import EXTRA
 from contfric.curves.points import CurvePoint, CurveRows, first_curve_point, march_rows
 from contfric.curves.problem import Box, Problem, problem_of
 from contfric.curves.special import SpecialPoint
@@ -33,6 +34,8 @@ _STILL = 1e-10
 #: Lengths of the steps by which a new word is proved, in largest steps. Margins may leave zero with the
 #: square of the distance: the longer one tells them from rounding.
 _PROOFS = (0.1, 0.01)
+#: Multipliers and coefficients of a continuum vanish to this: the root of rounding, and a little.
+_MARGINAL = 1e-6
 #: A segment that lasts less than minus this does not exist.
 _NO_TIME = 1e-9
 
@@ -173,10 +176,22 @@ def prove(
         lasts = bool(np.all(orbit.ends[:, 0] - orbit.cycle[:, 0] > -_NO_TIME))
         if not lasts or not np.all(margins[others] > 0.0) or _is_exit(problem, still):
             continue
+        if is_continuum(problem, start) and is_continuum(problem, beside):
+            return None
         if len(free):
             start.tests[free] = np.maximum(0.0, problem.orbit(start.joints, start.w).margins[free])
         return replace(problem, condition=problem.condition._replace(pinned=still))
     return None
+
+
+def is_continuum(problem: Problem, point: CurvePoint) -> bool:
+    """Tell whether orbits are one of a continuum at fixed parameters, as at Omega = 1/2.
+
+    There a multiplier is 1, and along a fold or a branch point the normal form vanishes; all that is watched
+    is rounding. Where it is so at one point only, that is of codimension two.
+    """
+    column = len(point.tests) - EXTRA + (0 if problem.test is None else 1)
+    return bool(abs(point.tests[column]) < _MARGINAL)
 
 
 def _is_exit(problem: Problem, pinned: IntArray) -> bool:

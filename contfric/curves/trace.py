@@ -14,7 +14,7 @@ from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS
 from contfric.continuation.vertices import passed_vertex
 from contfric.curves.assembly import join_sides
 from contfric.curves.curve import Curve
-from contfric.curves.going_on import Start, goes_on, prove
+from contfric.curves.going_on import Start, goes_on, is_continuum, prove
 from contfric.curves.locating import locate_zero
 from contfric.curves.naming import crossings
 from contfric.curves.points import (
@@ -170,14 +170,17 @@ def start_of_curve(problem: Problem, bifurcation: Bifurcation, largest: float) -
             f"the curve found near {bifurcation!r} is {moved:.2g} of the ranges away: it is another one",
             orbit,
         )
-    if problem.test is None or problem.kind is Kind.T:
+    if problem.kind is Kind.T:
         return problem, point, border
     for start in (point, point.reversed()):
         proved = prove(problem, start, border, largest)
         if proved is not None:
             point.tests = start.tests
             return proved, point, border
-    raise ConvergenceError(f"no orbit on the curve beside {bifurcation!r} is admissible", orbit)
+    text = "are a continuum, each marginally stable" if is_continuum(problem, point) else ""
+    raise ConvergenceError(
+        f"the orbits on the curve beside {bifurcation!r} {text or 'are not admissible'}", orbit
+    )
 
 
 def _joints(problem: Problem, bifurcation: Bifurcation) -> FloatArray:

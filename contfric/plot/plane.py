@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -185,10 +186,9 @@ def _legend(
         for name, (colour, width) in _LOOKS.items()
         if name in kinds
     ]
-    for style, meaning in ((STABLE, "stable orbits are bounded"), (UNSTABLE, "unstable ones only")):
-        line = Line2D([], [], color=GREY, label=meaning)
-        line.set_linestyle(style)
-        handles.append(line)
+    styles: dict[str, Any] = {"stable orbits are bounded": STABLE, "unstable ones only": UNSTABLE}
+    for meaning, style in styles.items():
+        handles.append(Line2D([], [], color=GREY, linestyle=style, label=meaning))
     if special:
         ring = Line2D([], [], linestyle="none", marker="o", label="codimension two")
         ring.set(markersize=4.5, markerfacecolor="white", markeredgecolor=BLACK)
