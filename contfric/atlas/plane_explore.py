@@ -20,7 +20,7 @@ from contfric.atlas.plane_matching import is_known, twins_of
 from contfric.atlas.plane_regions import regions_of
 from contfric.atlas.plane_state import PlaneExploration, Progress
 from contfric.atlas.seeds import Seeds
-from contfric.continuation.events import Bifurcation, Kind
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.points import MOST_POINTS
 from contfric.curves.assembly import join_sides
 from contfric.curves.going_on import Start
@@ -50,6 +50,8 @@ KINDS = ("SN", "BP", "PD", "CS", "SS", "AS", "GS")
 _SEEDS = Seeds(values=8, states=2)
 #: A curve shorter than this (relative to the ranges) leaves its start in no direction.
 _NOWHERE = 1e-5
+#: Distance from a physical limit (relative to the ranges) within which it cannot be told from what meets it.
+_AT_LIMIT = 1e-6
 #: A region smaller than this share of the plane gets no section of its own.
 _SMALL = 2e-4
 
@@ -234,6 +236,10 @@ def _follow_bifurcation(state: PlaneExploration, bifurcation: Bifurcation) -> No
     """Continue a bifurcation of a section both ways, unless its curve is known."""
     if state.full or bifurcation.kind not in state.kinds:
         return
+    if bifurcation.accuracy > ACCURACY and bifurcation.kind is not Kind.SS:
+        note = f"{bifurcation!r} is degenerate (located to {bifurcation.accuracy:g} only): not followed"
+        state.notes.append(note)
+        return
     try:
         problem = problem_of(bifurcation, state.box)
         if not state.wants(problem):
@@ -269,6 +275,8 @@ def _follow_special(state: PlaneExploration) -> None:
     _follow_words(state)
     while state.waiting:
         special, problem = state.waiting.popleft()
+        if _is_at_limit(special, problem):
+            continue
         if special.meets is Kind.T or special.kind in (CodimTwo.CUSP, CodimTwo.R1, CodimTwo.R2):
             continue
         for starts in _paired(leaving(special, problem, state.largest)):
@@ -280,6 +288,12 @@ def _follow_special(state: PlaneExploration) -> None:
             if state.wants(starts[0][0]):
                 _follow_starts(state, starts, special)
         _follow_words(state)
+
+
+def _is_at_limit(special: SpecialPoint, problem: Problem) -> bool:
+    """Tell whether a point is at a physical limit (S0 = S), where conditions degenerate together."""
+    here = np.array([[special.params[name] for name in problem.box.names]])
+    return bool(problem.within_limits(here)[0] < _AT_LIMIT * np.min(problem.box.widths))
 
 
 def _paired(starts: Iterable[Start]) -> Iterator[list[Start]]:

@@ -16,6 +16,7 @@ import numpy as np
 from contfric.continuation.candidates import candidates
 from contfric.continuation.events import TERMINAL, Bifurcation, kind_of_margin
 from contfric.continuation.points import EXTRA
+from contfric.curves.naming import MARGINAL
 from contfric.curves.points import CurvePoint, CurveRows, first_curve_point, march_rows
 from contfric.curves.problem import Box, Problem, problem_of
 from contfric.curves.special import SpecialPoint
@@ -34,8 +35,6 @@ _STILL = 1e-10
 #: Lengths of the steps by which a new word is proved, in largest steps. Margins may leave zero with the
 #: square of the distance: the longer one tells them from rounding.
 _PROOFS = (0.1, 0.01)
-#: Multipliers and coefficients of a continuum vanish to this: the root of rounding, and a little.
-_MARGINAL = 1e-6
 #: A segment that lasts less than minus this does not exist.
 _NO_TIME = 1e-9
 
@@ -191,7 +190,7 @@ def is_continuum(problem: Problem, point: CurvePoint) -> bool:
     is rounding. Where it is so at one point only, that is of codimension two.
     """
     column = len(point.tests) - EXTRA + (0 if problem.test is None else 1)
-    return bool(abs(point.tests[column]) < _MARGINAL)
+    return bool(abs(point.tests[column]) < MARGINAL)
 
 
 def _is_exit(problem: Problem, pinned: IntArray) -> bool:

@@ -21,6 +21,9 @@ from contfric.orbit.system import Margin, Test
 _COMPLEX = 1e-6
 #: Margins below this at a located point vanish with it: they are of one group.
 _TOGETHER = 1e-8
+#: Multipliers and coefficients that vanish all along a curve (of a continuum; of orbits that are symmetric
+#: in time, without damping) do so to this, the root of rounding and a little: their signs are rounding.
+MARGINAL = 1e-6
 #: Arclength within which a tangency belongs to a sliding event: where a stop meets a surface labels change.
 _OF_EVENT = 1e-5
 #: Columns behind the margins and the distances of the labels (``contfric.curves.correct``).
@@ -120,7 +123,7 @@ def _smooth(
     for column in (_BEND, _ONE, _MINUS, _PAIR):
         index = base + column
         a, b = before.tests[index], after.tests[index]
-        if not a * b < 0.0:
+        if not a * b < 0.0 or max(abs(a), abs(b)) < MARGINAL:
             continue
         point, fine = locate_zero(problem, before, after, border, partial(_test, index))
         value = abs(point.tests[index])
