@@ -8,7 +8,7 @@ symmetric orbit the breaking of its symmetry). With two fixed vectors b and c
     [ c^T  0 ] [ g ] = [ 1 ],         [ b^T  0 ] [ g ] = [ 1 ],
 
 g is zero exactly where J is singular, and ``dg = -u^T (dJ) v``: the directional second derivatives of the
-segments (A. Griewank and G. W. Reddien, IMA J. Numer. Anal. 4 (1984) 295-303; W. Govaerts, Numerical
+segments (A. Griewank and G. W. Reddien, SIAM J. Numer. Anal. 21 (1984) 176-185; W. Govaerts, Numerical
 Methods for Bifurcations of Dynamical Equilibria, SIAM 2000, chapter 4). b and c follow u and v from point to
 point, so that the bordered matrices stay well conditioned.
 
