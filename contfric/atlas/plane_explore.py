@@ -107,7 +107,7 @@ def explore_plane(
     >>> ranges = {"Omega": (0.52, 0.56), "S": (0.3, 0.39)}
     >>> plane = cf.explore_plane(orbit, ("Omega", "S"), ranges, max_sections=1)
     >>> sorted({curve.label for curve in plane.curves})
-    ['CS_s', 'SN_1a']
+    ['BP_2s', 'CS_s', 'SN_1a']
     """
     if not isinstance(orbit, Orbit):
         raise ParameterError(f"a plane is explored from an Orbit, got {type(orbit).__name__}")

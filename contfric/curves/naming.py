@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from contfric.continuation.events import Kind, kind_of_margin
 from contfric.continuation.points import EXTRA
-from contfric.curves.locating import locate_zero
+from contfric.curves.locating import by_label, by_test, locate
 from contfric.curves.points import CurvePoint
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, SpecialPoint
@@ -64,7 +63,7 @@ def _margins(
     located = []
     for k in np.flatnonzero(after.tests[: len(tests)] < 0.0):
         index = int(k)
-        point, fine = locate_zero(problem, before, after, border, partial(_test, index))
+        point, fine = locate(problem, before, after, border, by_test(index))
         located.append((point.arc, index, point, fine))
     if not located:
         return []
@@ -85,11 +84,6 @@ def _margins(
         problem, point, CodimTwo.MEETS, kind, (tests[first], *_rest(group, tests[first])), fine
     )
     return [Crossing(point, special, True)]
-
-
-def _test(index: int, point: CurvePoint) -> float:
-    """Return one of the watched values; a margin without stationary points is infinite."""
-    return min(float(point.tests[index]), 1e3)
 
 
 def _rest(group: tuple[Test, ...], first: Test) -> tuple[Test, ...]:
@@ -125,7 +119,7 @@ def _smooth(
         a, b = before.tests[index], after.tests[index]
         if not a * b < 0.0 or max(abs(a), abs(b)) < MARGINAL:
             continue
-        point, fine = locate_zero(problem, before, after, border, partial(_test, index))
+        point, fine = locate(problem, before, after, border, by_test(index))
         value = abs(point.tests[index])
         if not math.isfinite(value) or value > 0.5 * min(abs(a), abs(b)):
             continue  # it changes sign through infinity: an exit that becomes tangential
@@ -174,13 +168,7 @@ def _labels(
     found = []
     for k in np.flatnonzero(before.labels != after.labels):
         old = int(before.labels[k])
-        distance = len(problem.system.tests) + int(k)
-
-        def value(p: CurvePoint, k: int = int(k), old: int = old, d: int = distance) -> float:
-            size = max(float(p.tests[d]), 1e-300)
-            return size if int(p.labels[k]) == old else -size
-
-        point, _ = locate_zero(problem, before, after, border, value)
+        point, _ = locate(problem, before, after, border, by_label(int(k), old))
         test = Test(Margin.INTERIOR, int(rows[k][0]), observables[int(rows[k][1])].name)
         special = _special(problem, point, CodimTwo.MEETS, Kind.T, (test,))
         found.append(Crossing(point, special, False))

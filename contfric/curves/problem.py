@@ -43,6 +43,18 @@ class Box:
         """Widths of the ranges, in which arclength is measured."""
         return self.high - self.low
 
+    @property
+    def edges(self) -> FloatArray:
+        """Its sides: rows (a, b, c) with ``a p + b q + c >= 0`` inside, in widths."""
+        rows = []
+        for k in range(2):
+            side = np.eye(2)[k] / self.widths[k]
+            rows += [
+                [*side, -self.low[k] / self.widths[k]],
+                [*-side, self.high[k] / self.widths[k]],
+            ]
+        return np.array(rows)
+
     def contains(self, w: FloatArray, slack: float = 1e-9) -> bool:
         """Tell whether a point lies in the box."""
         room = slack * self.widths
@@ -80,16 +92,26 @@ class Problem:
         """Indices of the two parameters."""
         return np.array([self.model.index_of(n) for n in self.box.names], dtype=np.int64)
 
-    def within_limits(self, values: FloatArray) -> FloatArray:
-        """Return the least left-hand side of the model's constraints at points (k, 2) of the plane."""
+    @cached_property
+    def limits(self) -> FloatArray:
+        """The model's constraints in the plane: rows (a, b, c) with ``a p + b q + c >= 0``."""
         params = self.model.mapping(self.vector)
         one, other = self.box.names
-        least = np.full(len(values), np.inf)
-        for constraint in self.model.constraints:
-            rest = constraint.value({**params, one: 0.0, other: 0.0})
-            slopes = [constraint.coefficients.get(name, 0.0) for name in (one, other)]
-            least = np.minimum(least, rest + values @ np.array(slopes))
-        return least
+        rows = [
+            [
+                constraint.coefficients.get(one, 0.0),
+                constraint.coefficients.get(other, 0.0),
+                constraint.value({**params, one: 0.0, other: 0.0}),
+            ]
+            for constraint in self.model.constraints
+        ]
+        return np.array(rows, dtype=np.float64).reshape(len(rows), 3)
+
+    def within_limits(self, values: FloatArray) -> FloatArray:
+        """Return the least left-hand side of the model's constraints at points (k, 2) of the plane."""
+        if not len(self.limits):
+            return np.full(len(values), np.inf)
+        return np.asarray(np.min(values @ self.limits[:, :2].T + self.limits[:, 2], axis=1))
 
     def orbit(self, joints: FloatArray, w: FloatArray) -> Orbit:
         """Return a point as an orbit."""

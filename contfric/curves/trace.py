@@ -15,7 +15,7 @@ from contfric.continuation.vertices import passed_vertex
 from contfric.curves.assembly import join_sides
 from contfric.curves.curve import Curve
 from contfric.curves.going_on import Start, goes_on, is_continuum, prove
-from contfric.curves.locating import locate_zero
+from contfric.curves.locating import by_place, locate, locate_zero
 from contfric.curves.naming import crossings
 from contfric.curves.points import (
     CHUNK,
@@ -286,9 +286,7 @@ def _beyond(problem: Problem, point: CurvePoint) -> float:
 def _end_at_limit(side: CurveSide, after: CurvePoint) -> bool:
     """End a side where the model's parameters end."""
     problem = side.problem
-    point, _ = locate_zero(
-        problem, side.tip, after, side.border, lambda p: _beyond(problem, p) + 1e-15
-    )
+    point, _ = locate(problem, side.tip, after, side.border, by_place(problem.limits))
     if point is not side.tip:
         side.points.append(point)
     side.end = CurveEnd(CurveEndReason.LIMIT)
@@ -374,10 +372,8 @@ def _range_crossed(side: CurveSide, after: CurvePoint) -> CurvePoint | None:
     if np.all(after.w >= box.low) and np.all(after.w <= box.high):
         return None
 
-    def inside(p: CurvePoint) -> float:
-        return float(np.min(np.minimum(p.w - box.low, box.high - p.w) / box.widths))
-
-    if inside(before) <= 0.0:
+    inside = before.w @ box.edges[:, :2].T + box.edges[:, 2]
+    if np.min(inside) <= 0.0:
         return before
-    point, _ = locate_zero(side.problem, before, after, side.border, inside)
+    point, _ = locate(side.problem, before, after, side.border, by_place(box.edges))
     return point

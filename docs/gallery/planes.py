@@ -1,6 +1,7 @@
 """The planes of the gallery: runs each study, writes its figure and the table of its page.
 
-``planes.md`` has its tables between ``<!-- plane: STUDY -->`` and ``<!-- end -->``; the rest is written by hand.
+``planes.md`` has its tables between ``<!-- plane: STUDY -->`` and ``<!-- end -->``; all else is written
+by hand.
 """
 
 from __future__ import annotations
