@@ -1,16 +1,15 @@
 """Exploration of a plane: from sections to curves, from curves through their points of codimension two.
 
-A section is a one-parameter diagram. Each of its bifurcations starts a curve; each point of codimension two on
-a curve starts those that leave it, until nothing new is found. Then the regions between the curves are
+A section is a one-parameter diagram. Each of its bifurcations starts a curve; each point of codimension
+two on a curve starts those that leave it, until nothing new is found. Then the regions between the curves are
 looked at: where no section has passed a region, one is laid through it, and what it shows that is new
 starts further curves.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,23 +18,31 @@ from contfric.atlas.explore import explore
 from contfric.atlas.plane import Plane
 from contfric.atlas.plane_matching import is_known, twins_of
 from contfric.atlas.plane_regions import regions_of
+from contfric.atlas.plane_state import PlaneExploration, Progress
 from contfric.atlas.seeds import Seeds
-from contfric.continuation.events import Bifurcation, Kind
-from contfric.continuation.points import LARGEST_STEP, MOST_POINTS
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind
+from contfric.continuation.points import MOST_POINTS
 from contfric.curves.assembly import join_sides
-from contfric.curves.curve import Curve
 from contfric.curves.going_on import Start
-from contfric.curves.leaving import leaving
+from contfric.curves.leaving import leaving, other_words
 from contfric.curves.points import CurvePoint
 from contfric.curves.problem import Box, Problem, box_of, problem_of
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
-from contfric.curves.trace import CurveSide, start_of_curve, trace_curve_side
-from contfric.errors import ContfricError, ConvergenceError, ParameterError, whole_number
-from contfric.models.definition import FloatArray
+from contfric.curves.trace import (
+    CurveSide,
+    largest_step,
+    start_of_curve,
+    trace_curve_side,
+)
+from contfric.errors import (
+    ContfricError,
+    ConvergenceError,
+    ParameterError,
+    did_you_mean,
+    whole_number,
+)
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
-
-Progress = Callable[[str], None]
 
 #: Kinds of curves that are followed by default: T changes labels, and nothing else.
 KINDS = ("SN", "BP", "PD", "CS", "SS", "AS", "GS")
@@ -43,50 +50,10 @@ KINDS = ("SN", "BP", "PD", "CS", "SS", "AS", "GS")
 _SEEDS = Seeds(values=8, states=2)
 #: A curve shorter than this (relative to the ranges) leaves its start in no direction.
 _NOWHERE = 1e-5
+#: Distance from a physical limit (relative to the ranges) within which it cannot be told from what meets it.
+_AT_LIMIT = 1e-6
 #: A region smaller than this share of the plane gets no section of its own.
 _SMALL = 2e-4
-
-
-@dataclass(eq=False)
-class PlaneExploration:
-    """State of one exploration of a plane."""
-
-    box: Box
-    vector: FloatArray
-    kinds: frozenset[Kind]
-    max_periods: int
-    max_curves: int
-    largest: float
-    progress: Progress | None
-    curves: list[Curve] = field(default_factory=list)
-    sections: list[Diagram] = field(default_factory=list)
-    waiting: deque[tuple[SpecialPoint, Problem]] = field(default_factory=deque)
-    notes: list[str] = field(default_factory=list)
-    complete: bool = True
-
-    def say(self, text: str) -> None:
-        """Report progress."""
-        if self.progress is not None:
-            self.progress(text)
-
-    @property
-    def full(self) -> bool:
-        """Whether no more curves may be computed."""
-        return len(self.curves) >= self.max_curves
-
-    def add(self, curve: Curve, sides: Sequence[CurveSide]) -> None:
-        """Register a curve, and let what leaves its points of codimension two wait."""
-        self.curves.append(curve)
-        self.say(f"curve {len(self.curves)}: {curve!r}")
-        for side in sides:
-            piece: CurveSide | None = side
-            while piece is not None:
-                self.waiting.extend((special, piece.problem) for special in piece.special)
-                piece = piece.following
-
-    def wants(self, problem: Problem) -> bool:
-        """Tell whether a curve is of the kinds and periods asked for."""
-        return problem.kind in self.kinds and problem.system.periods <= self.max_periods
 
 
 def explore_plane(
@@ -140,16 +107,19 @@ def explore_plane(
     >>> ranges = {"Omega": (0.52, 0.56), "S": (0.3, 0.39)}
     >>> plane = cf.explore_plane(orbit, ("Omega", "S"), ranges, max_sections=1)
     >>> sorted({curve.label for curve in plane.curves})
-    ['CS_s', 'SN_1a']
+    ['BP_2s', 'CS_s', 'SN_1a']
     """
     if not isinstance(orbit, Orbit):
         raise ParameterError(f"a plane is explored from an Orbit, got {type(orbit).__name__}")
     box = box_of(orbit.model, parameters, ranges)
-    for name, value in (("max_periods", max_periods), ("max_curves", max_curves)):
-        whole_number(name, value, least=1)
-    whole_number("max_sections", max_sections, least=1)
-    wanted = frozenset(Kind(k) for k in kinds)
-    largest = LARGEST_STEP if max_step is None else float(max_step)
+    for name, most in (
+        ("max_periods", max_periods),
+        ("max_curves", max_curves),
+        ("max_sections", max_sections),
+    ):
+        whole_number(name, most, least=1)
+    wanted = _kinds(kinds)
+    largest = largest_step(max_step)
     state = PlaneExploration(
         box, orbit.vector.copy(), wanted, max_periods, max_curves, largest, progress
     )
@@ -162,6 +132,15 @@ def explore_plane(
         state.complete = False
         state.notes.append(CurveEndReason.INTERRUPTED.value)
     return _result(state, orbit)
+
+
+def _kinds(kinds: Sequence[str | Kind]) -> frozenset[Kind]:
+    known = [kind.value for kind in Kind if kind is not Kind.NS]
+    names = [kind.value if isinstance(kind, Kind) else str(kind) for kind in kinds]
+    for name in names:
+        if name not in known:
+            raise ParameterError(f"there are no curves of '{name}'{did_you_mean(name, known)}")
+    return frozenset(Kind(name) for name in names)
 
 
 def _result(state: PlaneExploration, orbit: Orbit) -> Plane:
@@ -257,6 +236,10 @@ def _follow_bifurcation(state: PlaneExploration, bifurcation: Bifurcation) -> No
     """Continue a bifurcation of a section both ways, unless its curve is known."""
     if state.full or bifurcation.kind not in state.kinds:
         return
+    if bifurcation.accuracy > ACCURACY and bifurcation.kind is not Kind.SS:
+        note = f"{bifurcation!r} is degenerate (located to {bifurcation.accuracy:g} only): not followed"
+        state.notes.append(note)
+        return
     try:
         problem = problem_of(bifurcation, state.box)
         if not state.wants(problem):
@@ -278,10 +261,22 @@ def _follow_bifurcation(state: PlaneExploration, bifurcation: Bifurcation) -> No
 # --------------------------------------------------------------------- points of codimension two
 
 
+def _follow_words(state: PlaneExploration) -> None:
+    """Follow CS curves in the other words for their motions."""
+    while state.unread:
+        for part in state.unread.popleft().parts:
+            for starts in _paired(other_words(part, state.largest)):
+                if not state.full and state.wants(starts[0][0]):
+                    _follow_starts(state, starts, None)
+
+
 def _follow_special(state: PlaneExploration) -> None:
     """Follow what leaves the points that wait."""
+    _follow_words(state)
     while state.waiting:
         special, problem = state.waiting.popleft()
+        if _is_at_limit(special, problem):
+            continue
         if special.meets is Kind.T or special.kind in (CodimTwo.CUSP, CodimTwo.R1, CodimTwo.R2):
             continue
         for starts in _paired(leaving(special, problem, state.largest)):
@@ -292,6 +287,13 @@ def _follow_special(state: PlaneExploration) -> None:
                 return
             if state.wants(starts[0][0]):
                 _follow_starts(state, starts, special)
+        _follow_words(state)
+
+
+def _is_at_limit(special: SpecialPoint, problem: Problem) -> bool:
+    """Tell whether a point is at a physical limit (S0 = S), where conditions degenerate together."""
+    here = np.array([[special.params[name] for name in problem.box.names]])
+    return bool(problem.within_limits(here)[0] < _AT_LIMIT * np.min(problem.box.widths))
 
 
 def _paired(starts: Iterable[Start]) -> Iterator[list[Start]]:
@@ -310,7 +312,9 @@ def _same_curve(a: Problem, b: Problem) -> bool:
     return a.system is b.system and a.kind is b.kind and a.test == b.test
 
 
-def _follow_starts(state: PlaneExploration, starts: list[Start], special: SpecialPoint) -> None:
+def _follow_starts(
+    state: PlaneExploration, starts: list[Start], special: SpecialPoint | None
+) -> None:
     """Trace a curve that leaves a point in one or two directions, unless it is known."""
     sides = []
     for problem, point, border in starts[:2]:
@@ -328,6 +332,9 @@ def _follow_starts(state: PlaneExploration, starts: list[Start], special: Specia
         state.add(join_sides(sides[1], sides[0]), sides)
         return
     problem, start = sides[0].problem, sides[0].points[0]
+    if special is None:
+        state.add(join_sides(None, sides[0], CurveEnd(CurveEndReason.START)), sides)
+        return
     there = replace(special, orbit=problem.orbit(start.joints, start.w), tests=())
     first = CurveEnd(CurveEndReason.START, special=there)
     state.add(join_sides(None, sides[0], first), sides)

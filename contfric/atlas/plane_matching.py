@@ -25,7 +25,9 @@ def group_of(kind: Kind) -> Kind:
     return Kind.CS if kind is Kind.SS else kind
 
 
-def is_known(problem: Problem, point: CurvePoint, curves: list[Curve], same_word: bool = True) -> int | None:
+def is_known(
+    problem: Problem, point: CurvePoint, curves: list[Curve], same_word: bool = True
+) -> int | None:
     """Return the index of the curve that a point lies on; None if on none.
 
     Without ``same_word`` the motions are compared, whatever their words.
@@ -56,8 +58,8 @@ def _on_part(orbit: Orbit, w: FloatArray, part: CurvePart, problem: Problem) -> 
     scaled = (part.values - w) / widths
     mirror = orbit.model.symmetry is not None
     near = np.hypot(scaled[:, 0], scaled[:, 1]) < _SAME
-    for k in np.flatnonzero(near):
-        there = Orbit(part.system, part.joints[k], orbit.vector, 0.0)
+    for row in np.flatnonzero(near):
+        there = Orbit(part.system, part.joints[row], orbit.vector, 0.0)
         if stops_distance(orbit.stops, there.stops, mirror) < np.sqrt(_SAME):
             return True
     if part.problem is None or len(part) < 2:
@@ -98,7 +100,7 @@ def _solved_there(
     if found is None or np.max(np.abs(found.w - w) / problem.box.widths) > _SAME:
         return False
     there = problem.orbit(found.joints, found.w)
-    return stops_distance(orbit.stops, there.stops, mirror) < np.sqrt(_SAME)
+    return bool(stops_distance(orbit.stops, there.stops, mirror) < np.sqrt(_SAME))
 
 
 def twins_of(curves: list[Curve]) -> tuple[int, ...]:

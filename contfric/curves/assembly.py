@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -17,9 +18,7 @@ if TYPE_CHECKING:
     from contfric.curves.trace import CurveSide
 
 
-def join_sides(
-    behind: CurveSide | None, ahead: CurveSide, first: CurveEnd | None = None
-) -> Curve:
+def join_sides(behind: CurveSide | None, ahead: CurveSide, first: CurveEnd | None = None) -> Curve:
     """Return one curve from the two sides of its start, or from one that begins at ``first``."""
     pieces = _pieces(ahead)
     place = None if first is None else first.special
@@ -38,7 +37,9 @@ def join_sides(
     shift = -pieces[0].points[0].arc
     special = [s for piece in pieces for s in piece.special]
     moved = tuple(replace(s, position=s.position + shift) for s in special)
-    parts = [part for piece in pieces for part in _parts(piece.problem, _shifted(piece, shift), moved)]
+    parts = [
+        part for piece in pieces for part in _parts(piece.problem, _shifted(piece, shift), moved)
+    ]
     ends = tuple(
         end if end.special is None else replace(end, special=moved[place])
         for end, place in ((first, 0), (_pieces(ahead)[-1].end, -1))
@@ -78,9 +79,7 @@ def _parts(
     cuts = [s.position for s in special if s.kind is CodimTwo.TURNOVER]
     inner = [int(np.searchsorted(arc, cut)) for cut in cuts if arc[0] < cut < arc[-1]]
     edges = [0, *inner, len(points)]
-    return tuple(
-        _part(problem, points[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a
-    )
+    return tuple(_part(problem, points[a:b]) for a, b in itertools.pairwise(edges) if b > a)
 
 
 def _part(problem: Problem, points: list[CurvePoint]) -> CurvePart:

@@ -8,7 +8,7 @@ symmetric orbit the breaking of its symmetry). With two fixed vectors b and c
     [ c^T  0 ] [ g ] = [ 1 ],         [ b^T  0 ] [ g ] = [ 1 ],
 
 g is zero exactly where J is singular, and ``dg = -u^T (dJ) v``: the directional second derivatives of the
-segments (A. Griewank and G. W. Reddien, IMA J. Numer. Anal. 4 (1984) 295-303; W. Govaerts, Numerical
+segments (A. Griewank and G. W. Reddien, SIAM J. Numer. Anal. 21 (1984) 176-185; W. Govaerts, Numerical
 Methods for Bifurcations of Dynamical Equilibria, SIAM 2000, chapter 4). b and c follow u and v from point to
 point, so that the bordered matrices stay well conditioned.
 
@@ -192,7 +192,7 @@ def null_vectors(border, sign, room):  # type: ignore[no-untyped-def]
 @helper
 def segment_direction(vectors, i, sign, close, along):  # type: ignore[no-untyped-def]
     """Write the direction of segment i's (t0, y0, duration); return that of its end in ``along`` of m."""
-    count, m = vectors.shape
+    _count, m = vectors.shape
     along[0] = vectors[i, 0]
     for j in range(1, m):
         along[j] = vectors[i, j]
@@ -215,9 +215,7 @@ def end_of(vectors, i, sign, close, j):  # type: ignore[no-untyped-def]
 def bend_flow(functions, second, mode, start, duration, p, which, along, out, bordered, equations):  # type: ignore[no-untyped-def]
     """Write the derivative of the flow's jacobian in a direction."""
     none = min(mode, 0) - 1  # -1, but no literal
-    if second(
-        mode, none, start[0], start[1:], duration, p, which, along, out, bordered.numbers
-    ):
+    if second(mode, none, start[0], start[1:], duration, p, which, along, out, bordered.numbers):
         return
     m = start.shape[0]
     step = _DIFFERENCE
@@ -228,7 +226,14 @@ def bend_flow(functions, second, mode, start, duration, p, which, along, out, bo
             displaced[j] = start[j] + h * along[j]
         jac = out if side == 0 else bordered.plus
         functions[0](
-            mode, displaced[0], displaced[1:], duration + h * along[m], p, which, equations.state, jac
+            mode,
+            displaced[0],
+            displaced[1:],
+            duration + h * along[m],
+            p,
+            which,
+            equations.state,
+            jac,
         )
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):

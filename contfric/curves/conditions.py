@@ -134,9 +134,7 @@ def condition_value(functions, second, layout, condition, z, p, which, border, r
     room.d[1, :, :] = 0.0
     room.e[1, :] = 0.0
     if condition.kind == SPECTRAL:
-        return spectral_value(
-            functions, second, layout, condition.sign, z, p, which, border, room
-        )
+        return spectral_value(functions, second, layout, condition.sign, z, p, which, border, room)
     if condition.kind == INTERIOR:
         return interior_value(functions, layout, condition, z, p, which, room)
     equations = room.equations

@@ -30,8 +30,8 @@ from contfric.orbit.spectrum import multipliers
 #: The extra column that a curve watches where a branch watches the slope of its parameter: the
 #: coefficient of the normal form, or the rate of the load at a stop.
 BEND = 0
-#: A stationary value this near to a surface on which one is pinned is that one.
-_TOUCHES = 1e-6
+#: A stationary value this near to a surface on which one is pinned is that one: it is solved for.
+_TOUCHES = 1e-9
 #: Newton converges quadratically from the cubic predictor; beyond this the step was too long.
 _MOST_STEPS = 12
 
@@ -220,9 +220,7 @@ def follow_border(border, room):  # type: ignore[no-untyped-def]
 def bend_value(functions, second, layout, condition, z, p, which, room):  # type: ignore[no-untyped-def]
     """Return the coefficient or rate whose zero is a point of codimension two; 1 if there is none."""
     if condition.kind == SPECTRAL and condition.sign < 0.0:
-        return cubic_coefficient(
-            functions, second, layout, condition.sign, z, p, which, room
-        )
+        return cubic_coefficient(functions, second, layout, condition.sign, z, p, which, room)
     if condition.kind == SPECTRAL:
         bordered, value = room.bordered, 0.0
         for i in range(z.shape[0]):

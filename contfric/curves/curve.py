@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import operator
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,9 +19,10 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System, Test
 
 if TYPE_CHECKING:
-    from contfric.curves.problem import Problem
     import pandas as pd
     from matplotlib.axes import Axes
+
+    from contfric.curves.problem import Problem
 
 BoolArray = NDArray[np.bool_]
 
@@ -167,7 +169,7 @@ class Curve:
         for part in self.parts:
             changes = np.flatnonzero(np.any(np.diff(part.labels, axis=0) != 0, axis=1)) + 1
             edges = [0, *changes.tolist(), len(part)]
-            for start, stop in zip(edges[:-1], edges[1:], strict=True):
+            for start, stop in itertools.pairwise(edges):
                 name = self[first + (start + stop) // 2].name
                 if not found or found[-1][1] != name:
                     found.append((first + start, name))

@@ -15,13 +15,15 @@ import numpy as np
 
 from contfric.continuation.candidates import candidates
 from contfric.continuation.events import TERMINAL, Bifurcation, kind_of_margin
+from contfric.continuation.points import EXTRA
+from contfric.curves.naming import MARGINAL
 from contfric.curves.points import CurvePoint, CurveRows, first_curve_point, march_rows
 from contfric.curves.problem import Box, Problem, problem_of
 from contfric.curves.special import SpecialPoint
 from contfric.errors import ContfricError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import IntArray, Margin, Test
 
 #: Times of a joint in two words for one motion agree to this (nondimensional): located events are good to
 #: 1e-9 where two of them meet.
@@ -109,7 +111,9 @@ def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation 
     return None
 
 
-def goes_on(problem: Problem, tip: CurvePoint, special: SpecialPoint, largest: float) -> Start | None:
+def goes_on(
+    problem: Problem, tip: CurvePoint, special: SpecialPoint, largest: float
+) -> Start | None:
     """Return where a curve goes on behind a sliding event, in the direction that it has; None if nowhere.
 
     What goes on happens at as many places as before: a curve that is asymmetric does not go on as the
@@ -169,12 +173,32 @@ def prove(
         still = np.setdiff1d(pinned, free)
         others = np.setdiff1d(np.arange(len(margins)), still)
         lasts = bool(np.all(orbit.ends[:, 0] - orbit.cycle[:, 0] > -_NO_TIME))
-        if not lasts or not np.all(margins[others] > 0.0):
+        if not lasts or not np.all(margins[others] > 0.0) or _is_exit(problem, still):
             continue
+        if is_continuum(problem, start) and is_continuum(problem, beside):
+            return None
         if len(free):
             start.tests[free] = np.maximum(0.0, problem.orbit(start.joints, start.w).margins[free])
         return replace(problem, condition=problem.condition._replace(pinned=still))
     return None
+
+
+def is_continuum(problem: Problem, point: CurvePoint) -> bool:
+    """Tell whether orbits are one of a continuum at fixed parameters, as at Omega = 1/2.
+
+    There a multiplier is 1, and along a fold or a branch point the normal form vanishes; all that is watched
+    is rounding. Where it is so at one point only, that is of codimension two.
+    """
+    column = len(point.tests) - EXTRA + (0 if problem.test is None else 1)
+    return bool(abs(point.tests[column]) < MARGINAL)
+
+
+def _is_exit(problem: Problem, pinned: IntArray) -> bool:
+    """Tell whether a touch inside a segment is nothing but its tangential exit."""
+    test = problem.test
+    if test is None or test.margin is not Margin.INTERIOR:
+        return False
+    return replace(test, margin=Margin.EXIT) in [problem.system.tests[k] for k in pinned]
 
 
 def _step_away(

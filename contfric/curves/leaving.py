@@ -29,6 +29,7 @@ from contfric.continuation.candidates import edited_orbit
 from contfric.continuation.events import TERMINAL, Bifurcation, Kind, kind_of_margin
 from contfric.continuation.outcomes import outcome_at
 from contfric.continuation.vertices import symmetric_part, undoubled_part
+from contfric.curves.curve import CurvePart
 from contfric.curves.going_on import Start, prove, starts_of, words_at
 from contfric.curves.points import CurvePoint, solve_point
 from contfric.curves.problem import Box, Problem, border_of, problem_of
@@ -91,6 +92,25 @@ def _words_of_own(special: SpecialPoint, problem: Problem) -> Iterator[Orbit]:
                     yield from words_at(both)
 
 
+def other_words(part: CurvePart, largest: float) -> Iterator[Start]:
+    """Yield the starts of a CS curve in the other words for its motion, from its middle.
+
+    The motion is the same, but its neighbours are others: they have their own folds and doublings there.
+    """
+    problem, k = part.problem, len(part) // 2
+    if part.kind is not Kind.CS or problem is None:
+        return
+    orbit = problem.orbit(part.joints[k], part.values[k])
+    tests = tuple(problem.system.tests[int(row)] for row in problem.condition.pinned)
+    here = SpecialPoint(CodimTwo.MEETS, "", orbit.params, orbit, Kind.CS, tests)
+    for other in words_at(here):
+        for test, value in zip(other.system.tests, other.margins, strict=True):
+            if abs(value) < _VANISHES and kind_of_margin(other.system, test, other) is Kind.CS:
+                event = Bifurcation(Kind.CS, other.params, other, (test,))
+                yield from starts_of(event, problem.box, largest)
+                break
+
+
 def _born(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:
     """Yield the curve of the other side of a degenerate branch point or doubling."""
     if problem.kind is Kind.SN:
@@ -132,7 +152,9 @@ def fold_problem(orbit: Orbit, box: Box) -> Problem | None:
     return None
 
 
-def beside(problem: Problem, orbit: Orbit, direction: FloatArray, distance: float) -> tuple[CurvePoint, FloatArray] | None:
+def beside(
+    problem: Problem, orbit: Orbit, direction: FloatArray, distance: float
+) -> tuple[CurvePoint, FloatArray] | None:
     """Solve for a point of a curve a distance away from an orbit along a direction of its joints."""
     border = border_of(problem, orbit.joints, orbit.vector)
     guess = orbit.joints + distance * direction
@@ -147,9 +169,7 @@ def beside(problem: Problem, orbit: Orbit, direction: FloatArray, distance: floa
     return point, border
 
 
-def _tangential_release(
-    special: SpecialPoint, problem: Problem, largest: float
-) -> Iterator[Start]:
+def _tangential_release(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:
     """Yield the AS that begins where the load at a stop stands still: a short stick, left tangentially."""
     assert problem.test is not None
     orbit = special.orbit.as_whole()
@@ -172,7 +192,9 @@ def _tangential_release(
             continue
         longer = np.zeros_like(edited.joints)
         longer[i, 0] = -1.0  # it begins earlier: the release stays where it is
-        own = replace(own, condition=own.condition._replace(pinned=np.array([own.system.tests.index(test)])))
+        own = replace(
+            own, condition=own.condition._replace(pinned=np.array([own.system.tests.index(test)]))
+        )
         for distance in _BESIDE:
             start = beside(own, edited, longer, distance)
             if start is None:

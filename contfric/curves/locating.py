@@ -7,12 +7,14 @@ them; its watched value decides on which side the place is.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from contfric.curves.points import CurvePoint, solve_point
+from contfric.curves.points import CurvePoint, CurveRows, solve_point
 from contfric.curves.problem import Problem
 from contfric.models.definition import FloatArray
+from contfric.orbit.counts import TALLY
 
 #: Share of a step to which a place is bracketed: the resolution of the arithmetic.
 _RESOLUTION = 4e-16
@@ -24,7 +26,9 @@ _NOISE = 2e-15
 Value = Callable[[CurvePoint], float]
 
 
-def between(a: CurvePoint, b: CurvePoint, x: float) -> tuple[FloatArray, ...]:
+def between(
+    a: CurvePoint, b: CurvePoint, x: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return joints, parameters, tangent and slope at a share of a step, by the cubic through both ends."""
     y, length = 1.0 - x, b.arc - a.arc
     ha, hb = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x)
@@ -77,3 +81,70 @@ def locate_zero(
         if high - low <= _RESOLUTION:
             break
     return best, not lost and abs(value(best)) < 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Sought:
+    """What is sought between two points: a test, a label, or a place in the plane.
+
+    Attributes
+    ----------
+    kind : BY_TEST, BY_LABEL or BY_PARAMETER of the compiled bracket
+    index : column of the tests, or row of the labels
+    target : the label before
+    planes : rows (a, b, c): the least of ``a p + b q + c`` vanishes
+    """
+
+    kind: int
+    index: int = 0
+    target: int = 0
+    planes: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+
+
+def locate(
+    problem: Problem, a: CurvePoint, b: CurvePoint, border: FloatArray, sought: Sought
+) -> tuple[CurvePoint, bool]:
+    """Return the place of a change, and whether it is bracketed to its last digits; compiled."""
+    from contfric.curves.bracket import locate_on_curve
+
+    rows = CurveRows.room_for(problem, 4)
+    rows.put(0, a)
+    rows.put(1, b)
+    status, _ = locate_on_curve(
+        problem.system.functions(),
+        problem.model.flow.second_derivatives,
+        problem.system.layout,
+        problem.condition,
+        problem.vector,
+        problem.which,
+        1.0 / problem.box.widths**2,
+        sought.kind,
+        sought.index,
+        sought.target,
+        np.ascontiguousarray(sought.planes, dtype=np.float64),
+        border.copy(),
+        rows.arrays(),
+        TALLY,
+    )
+    return (a, False) if status < 0 else (rows.point(3), status == 1)
+
+
+def by_test(index: int) -> Sought:
+    """Return the search for the zero of one test."""
+    from contfric.curves.bracket import BY_TEST
+
+    return Sought(BY_TEST, index)
+
+
+def by_label(row: int, before: int) -> Sought:
+    """Return the search for the change of one label."""
+    from contfric.curves.bracket import BY_LABEL
+
+    return Sought(BY_LABEL, row, before)
+
+
+def by_place(planes: FloatArray) -> Sought:
+    """Return the search for where the least of ``a p + b q + c`` vanishes."""
+    from contfric.curves.bracket import BY_PARAMETER
+
+    return Sought(BY_PARAMETER, planes=planes)

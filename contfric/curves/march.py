@@ -26,6 +26,11 @@ from contfric.compiled import (
     vector,
 )
 from contfric.continuation.march import (
+    _GROWTH,
+    _MOST_ANGLE,
+    _MOST_MISS,
+    _UNBOUNDED,
+    _WANTED_ANGLE,
     BROKEN,
     CLOSED,
     EVENT,
@@ -33,11 +38,6 @@ from contfric.continuation.march import (
     OUTSIDE,
     STEP,
     UNBOUNDED,
-    _GROWTH,
-    _MOST_ANGLE,
-    _MOST_MISS,
-    _UNBOUNDED,
-    _WANTED_ANGLE,
 )
 from contfric.continuation.steps import changed, copy_to, dips, largest_state
 from contfric.curves.conditions import SPECTRAL, ConditionType, curve_room
@@ -244,9 +244,7 @@ def march_curve(  # type: ignore[no-untyped-def]
             return EVENT, k, following
         if outside(ws[k], box):
             return OUTSIDE, k, following
-        if taken > 3 and closes(
-            zs[k], ws[k], zs[k - 1], ws[k - 1], start_z, start_w, scale, step
-        ):
+        if taken > 3 and closes(zs[k], ws[k], zs[k - 1], ws[k - 1], start_z, start_w, scale, step):
             return CLOSED, k, following
         if largest_state(zs[k]) > _UNBOUNDED:
             return UNBOUNDED, k, following

@@ -9,7 +9,7 @@ import numpy as np
 
 from contfric.continuation.events import Kind, kind_of_margin
 from contfric.continuation.points import EXTRA
-from contfric.curves.locating import locate_zero
+from contfric.curves.locating import by_label, by_test, locate
 from contfric.curves.points import CurvePoint
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, SpecialPoint
@@ -20,6 +20,9 @@ from contfric.orbit.system import Margin, Test
 _COMPLEX = 1e-6
 #: Margins below this at a located point vanish with it: they are of one group.
 _TOGETHER = 1e-8
+#: Multipliers and coefficients that vanish all along a curve (of a continuum; of orbits that are symmetric
+#: in time, without damping) do so to this, the root of rounding and a little: their signs are rounding.
+MARGINAL = 1e-6
 #: Arclength within which a tangency belongs to a sliding event: where a stop meets a surface labels change.
 _OF_EVENT = 1e-5
 #: Columns behind the margins and the distances of the labels (``contfric.curves.correct``).
@@ -60,9 +63,7 @@ def _margins(
     located = []
     for k in np.flatnonzero(after.tests[: len(tests)] < 0.0):
         index = int(k)
-        point, fine = locate_zero(
-            problem, before, after, border, lambda p, i=index: min(float(p.tests[i]), 1e3)
-        )
+        point, fine = locate(problem, before, after, border, by_test(index))
         located.append((point.arc, index, point, fine))
     if not located:
         return []
@@ -79,7 +80,9 @@ def _margins(
             and kind_of_margin(problem.system, test, orbit) is kind
         )
     )
-    special = _special(problem, point, CodimTwo.MEETS, kind, (tests[first], *_rest(group, tests[first])), fine)
+    special = _special(
+        problem, point, CodimTwo.MEETS, kind, (tests[first], *_rest(group, tests[first])), fine
+    )
     return [Crossing(point, special, True)]
 
 
@@ -114,11 +117,9 @@ def _smooth(
     for column in (_BEND, _ONE, _MINUS, _PAIR):
         index = base + column
         a, b = before.tests[index], after.tests[index]
-        if not a * b < 0.0:
+        if not a * b < 0.0 or max(abs(a), abs(b)) < MARGINAL:
             continue
-        point, fine = locate_zero(
-            problem, before, after, border, lambda p, i=index: float(p.tests[i])
-        )
+        point, fine = locate(problem, before, after, border, by_test(index))
         value = abs(point.tests[index])
         if not math.isfinite(value) or value > 0.5 * min(abs(a), abs(b)):
             continue  # it changes sign through infinity: an exit that becomes tangential
@@ -167,16 +168,8 @@ def _labels(
     found = []
     for k in np.flatnonzero(before.labels != after.labels):
         old = int(before.labels[k])
-        distance = len(problem.system.tests) + int(k)
-
-        def value(p: CurvePoint, k: int = int(k), old: int = old, d: int = distance) -> float:
-            size = max(float(p.tests[d]), 1e-300)
-            return size if int(p.labels[k]) == old else -size
-
-        point, _ = locate_zero(problem, before, after, border, value)
+        point, _ = locate(problem, before, after, border, by_label(int(k), old))
         test = Test(Margin.INTERIOR, int(rows[k][0]), observables[int(rows[k][1])].name)
         special = _special(problem, point, CodimTwo.MEETS, Kind.T, (test,))
         found.append(Crossing(point, special, False))
     return found
-
-

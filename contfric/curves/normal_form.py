@@ -30,7 +30,9 @@ from contfric.curves.bordered import (
 
 
 @helper
-def second_order(functions, second, layout, i, start, after, p, which, sign, others, twist, room, out):  # type: ignore[no-untyped-def]
+def second_order(  # type: ignore[no-untyped-def]
+    functions, second, layout, i, start, after, p, which, sign, others, twist, room, out
+):
     """Write F_i,zz v w (m numbers); w is ``others``, closed by ``twist``."""
     bordered, equations = room.bordered, room.equations
     m = start.shape[0]
@@ -100,7 +102,9 @@ def cubic_coefficient(functions, second, layout, sign, z, p, which, room):  # ty
     total = 0.0
     for i in range(count):
         after = z[i + 1] if i + 1 < count else equations.last
-        second_order(functions, second, layout, i, z[i], after, p, which, sign, v, sign, room, spare)
+        second_order(
+            functions, second, layout, i, z[i], after, p, which, sign, v, sign, room, spare
+        )
         for j in range(m):
             even[i, j] = -spare[j]
     room.z_ref[:, :] = 0.0

@@ -86,7 +86,10 @@ class CurveRows:
     def point(self, k: int) -> CurvePoint:
         """Return one row as a point of its own."""
         return CurvePoint(
-            *(a[k].copy() for a in (self.joints, self.values, self.tangents, self.slopes)),
+            self.joints[k].copy(),
+            self.values[k].copy(),
+            self.tangents[k].copy(),
+            self.slopes[k].copy(),
             self.tests[k].copy(),
             self.labels[k].copy(),
             self.mu[k].copy(),
@@ -151,9 +154,7 @@ def solve_point(
     rows = CurveRows.room_for(problem, 1)
     rows.joints[0], rows.values[0] = joints, w
     rows.tangents[0], rows.slopes[0] = tangent, slope
-    why, _, _ = march_rows(
-        problem, rows, -1, rows.point(0), 0, border, 0.0, 1.0, AT_EVENT
-    )
+    why, _, _ = march_rows(problem, rows, -1, rows.point(0), 0, border, 0.0, 1.0, AT_EVENT)
     return None if why == BROKEN else rows.point(0)
 
 

@@ -43,6 +43,18 @@ class Box:
         """Widths of the ranges, in which arclength is measured."""
         return self.high - self.low
 
+    @property
+    def edges(self) -> FloatArray:
+        """Its sides: rows (a, b, c) with ``a p + b q + c >= 0`` inside, in widths."""
+        rows = []
+        for k in range(2):
+            side = np.eye(2)[k] / self.widths[k]
+            rows += [
+                [*side, -self.low[k] / self.widths[k]],
+                [*-side, self.high[k] / self.widths[k]],
+            ]
+        return np.array(rows)
+
     def contains(self, w: FloatArray, slack: float = 1e-9) -> bool:
         """Tell whether a point lies in the box."""
         room = slack * self.widths
@@ -80,16 +92,26 @@ class Problem:
         """Indices of the two parameters."""
         return np.array([self.model.index_of(n) for n in self.box.names], dtype=np.int64)
 
-    def within_limits(self, values: FloatArray) -> FloatArray:
-        """Return the least left-hand side of the model's constraints at points (k, 2) of the plane."""
+    @cached_property
+    def limits(self) -> FloatArray:
+        """The model's constraints in the plane: rows (a, b, c) with ``a p + b q + c >= 0``."""
         params = self.model.mapping(self.vector)
         one, other = self.box.names
-        least = np.full(len(values), np.inf)
-        for constraint in self.model.constraints:
-            rest = constraint.value({**params, one: 0.0, other: 0.0})
-            slopes = [constraint.coefficients.get(name, 0.0) for name in (one, other)]
-            least = np.minimum(least, rest + values @ np.array(slopes))
-        return least
+        rows = [
+            [
+                constraint.coefficients.get(one, 0.0),
+                constraint.coefficients.get(other, 0.0),
+                constraint.value({**params, one: 0.0, other: 0.0}),
+            ]
+            for constraint in self.model.constraints
+        ]
+        return np.array(rows, dtype=np.float64).reshape(len(rows), 3)
+
+    def within_limits(self, values: FloatArray) -> FloatArray:
+        """Return the least left-hand side of the model's constraints at points (k, 2) of the plane."""
+        if not len(self.limits):
+            return np.full(len(values), np.inf)
+        return np.asarray(np.min(values @ self.limits[:, :2].T + self.limits[:, 2], axis=1))
 
     def orbit(self, joints: FloatArray, w: FloatArray) -> Orbit:
         """Return a point as an orbit."""
@@ -108,7 +130,8 @@ def box_of(
     ParameterError
         For anything but two different parameters of the model with a finite range each.
     """
-    if isinstance(parameters, str) or len(tuple(parameters)) != 2:
+    names: object = parameters  # whatever the user gave
+    if isinstance(names, str) or len(tuple(parameters)) != 2:
         raise ParameterError(f"a curve needs a pair of parameters, got {parameters!r}")
     one, other = parameters
     for name in (one, other):
@@ -160,7 +183,9 @@ def problem_of(bifurcation: Bifurcation, box: Box) -> Problem:
     if kind is Kind.NS:
         raise ParameterError("curves of NS are not continued: SN, BP, PD, CS, SS, AS, GS and T are")
     if orbit.system.holds:
-        raise ParameterError(f"{bifurcation!r} lies on a bridge: curves of orbits with holds are not")
+        raise ParameterError(
+            f"{bifurcation!r} lies on a bridge: curves of orbits with holds are not"
+        )
     here = np.array([orbit.params[name] for name in box.names])
     if not box.contains(here):
         where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(box.names, here, strict=True))

@@ -14,8 +14,8 @@ from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS
 from contfric.continuation.vertices import passed_vertex
 from contfric.curves.assembly import join_sides
 from contfric.curves.curve import Curve
-from contfric.curves.going_on import Start, goes_on, prove
-from contfric.curves.locating import locate_zero
+from contfric.curves.going_on import Start, goes_on, is_continuum, prove
+from contfric.curves.locating import by_place, locate, locate_zero
 from contfric.curves.naming import crossings
 from contfric.curves.points import (
     CHUNK,
@@ -123,7 +123,7 @@ def continue_bifurcation(
             "branch.bifurcations or diagram.bifurcations"
         )
     box = box_of(bifurcation.orbit.model, parameters, ranges)
-    largest = _largest_step(max_step)
+    largest = largest_step(max_step)
     whole_number("max_points", max_points, least=2)
     problem = problem_of(bifurcation, box)
     problem, start, border = start_of_curve(problem, bifurcation, largest)
@@ -134,7 +134,14 @@ def continue_bifurcation(
     return join_sides(behind, ahead)
 
 
-def _largest_step(max_step: Any) -> float:
+def largest_step(max_step: Any) -> float:
+    """Return the largest step as a share of the ranges.
+
+    Raises
+    ------
+    ParameterError
+        If it is no number in (0, 1].
+    """
     if max_step is None:
         return LARGEST_STEP
     if isinstance(max_step, bool) or not isinstance(max_step, (int, float)):
@@ -163,14 +170,17 @@ def start_of_curve(problem: Problem, bifurcation: Bifurcation, largest: float) -
             f"the curve found near {bifurcation!r} is {moved:.2g} of the ranges away: it is another one",
             orbit,
         )
-    if problem.test is None or problem.kind is Kind.T:
+    if problem.kind is Kind.T:
         return problem, point, border
     for start in (point, point.reversed()):
         proved = prove(problem, start, border, largest)
         if proved is not None:
             point.tests = start.tests
             return proved, point, border
-    raise ConvergenceError(f"no orbit on the curve beside {bifurcation!r} is admissible", orbit)
+    text = "are a continuum, each marginally stable" if is_continuum(problem, point) else ""
+    raise ConvergenceError(
+        f"the orbits on the curve beside {bifurcation!r} {text or 'are not admissible'}", orbit
+    )
 
 
 def _joints(problem: Problem, bifurcation: Bifurcation) -> FloatArray:
@@ -276,9 +286,7 @@ def _beyond(problem: Problem, point: CurvePoint) -> float:
 def _end_at_limit(side: CurveSide, after: CurvePoint) -> bool:
     """End a side where the model's parameters end."""
     problem = side.problem
-    point, _ = locate_zero(
-        problem, side.tip, after, side.border, lambda p: _beyond(problem, p) + 1e-15
-    )
+    point, _ = locate(problem, side.tip, after, side.border, by_place(problem.limits))
     if point is not side.tip:
         side.points.append(point)
     side.end = CurveEnd(CurveEndReason.LIMIT)
@@ -338,7 +346,11 @@ def _resolve(side: CurveSide, after: CurvePoint, border: FloatArray) -> bool:
     for crossing in crossings(problem, before, after, side.border):
         if limit is not None and crossing.point.arc > limit.arc:
             break
-        if at_start and crossing.point.arc - side.points[0].arc < AT_START and not crossing.terminal:
+        if (
+            at_start
+            and crossing.point.arc - side.points[0].arc < AT_START
+            and not crossing.terminal
+        ):
             continue
         side.special.append(crossing.special)
         if crossing.terminal:
@@ -360,10 +372,8 @@ def _range_crossed(side: CurveSide, after: CurvePoint) -> CurvePoint | None:
     if np.all(after.w >= box.low) and np.all(after.w <= box.high):
         return None
 
-    def inside(p: CurvePoint) -> float:
-        return float(np.min(np.minimum(p.w - box.low, box.high - p.w) / box.widths))
-
-    if inside(before) <= 0.0:
+    inside = before.w @ box.edges[:, :2].T + box.edges[:, 2]
+    if np.min(inside) <= 0.0:
         return before
-    point, _ = locate_zero(side.problem, before, after, side.border, inside)
+    point, _ = locate(side.problem, before, after, side.border, by_place(box.edges))
     return point

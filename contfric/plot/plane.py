@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -105,7 +107,9 @@ def _draw(
         first = index == twins[index]
         for kind, values, stable in _pieces(curve):
             colour, width = _LOOKS.get(kind, (GREY, 1.0))
-            if stable or first:  # another word for the same motion shows where it is stable, no more
+            if (
+                stable or first
+            ):  # another word for the same motion shows where it is stable, no more
                 style = STABLE if stable else UNSTABLE
                 (line,) = ax.plot(*values.T, color=colour, linewidth=width, linestyle=style)
                 line.set_gid(curve.label)
@@ -130,12 +134,11 @@ def _pieces(curve: CurveLike) -> list[tuple[str, FloatArray, bool]]:
     """Return the stretches of one kind and stability; each reaches to the start of the next one."""
     kinds = [kind.value for kind in curve.kinds]
     values, stable = curve.values, curve.stable
-    change = [k for k in range(1, len(kinds)) if kinds[k] != kinds[k - 1] or stable[k] != stable[k - 1]]
-    edges = [0, *change, len(kinds)]
-    return [
-        (kinds[a], values[a : b + 1], bool(stable[a]))
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
+    change = [
+        k for k in range(1, len(kinds)) if kinds[k] != kinds[k - 1] or stable[k] != stable[k - 1]
     ]
+    edges = [0, *change, len(kinds)]
+    return [(kinds[a], values[a : b + 1], bool(stable[a])) for a, b in itertools.pairwise(edges)]
 
 
 def _place(special: SpecialLike, names: tuple[str, str]) -> tuple[float, float]:
@@ -183,12 +186,12 @@ def _legend(
         for name, (colour, width) in _LOOKS.items()
         if name in kinds
     ]
-    handles.append(Line2D([], [], color=GREY, linestyle=STABLE, label="stable orbits are bounded"))
-    handles.append(Line2D([], [], color=GREY, linestyle=UNSTABLE, label="unstable ones only"))
+    styles: dict[str, Any] = {"stable orbits are bounded": STABLE, "unstable ones only": UNSTABLE}
+    for meaning, style in styles.items():
+        handles.append(Line2D([], [], color=GREY, linestyle=style, label=meaning))
     if special:
-        look = {"marker": "o", "markerfacecolor": "white", "markeredgecolor": BLACK}
-        handles.append(
-            Line2D([], [], linestyle="none", markersize=4.5, label="codimension two", **look)  # type: ignore[arg-type]
-        )
+        ring = Line2D([], [], linestyle="none", marker="o", label="codimension two")
+        ring.set(markersize=4.5, markerfacecolor="white", markeredgecolor=BLACK)
+        handles.append(ring)
     where = BESIDE if outside else {"loc": "best"}
     ax.legend(handles=handles, fontsize=SMALL, frameon=False, **where)

@@ -29,7 +29,9 @@ def pack_curve(curve: Curve, packer: Packer, index: int) -> Header:
     ).reshape(len(listed), 1 + len(curve.model.parameters))
     return {
         "parameters": list(curve.parameters),
-        "parts": [_pack_part(p, packer, f"curve{index}_part{j}") for j, p in enumerate(curve.parts)],
+        "parts": [
+            _pack_part(p, packer, f"curve{index}_part{j}") for j, p in enumerate(curve.parts)
+        ],
         "special": [_pack_special(s, packer) for s in listed],
         "inner": len(curve.special),
         "ends": [
@@ -42,7 +44,11 @@ def pack_curve(curve: Curve, packer: Packer, index: int) -> Header:
 def _pack_part(part: CurvePart, packer: Packer, key: str) -> Header:
     for name in PART_ARRAYS:
         packer.arrays[f"{key}_{name}"] = getattr(part, name)
-    return {"kind": part.kind.value, "system": packer.system(part.system), "test": _plain(part.test)}
+    return {
+        "kind": part.kind.value,
+        "system": packer.system(part.system),
+        "test": _plain(part.test),
+    }
 
 
 def _pack_special(special: SpecialPoint, packer: Packer) -> Header:
@@ -84,7 +90,9 @@ def unpack_curve(header: Header, pool: Unpacker, index: int) -> Curve:
     vector = pool.arrays[f"curve{index}_vector"]
     if vector.shape != (len(pool.model.parameters),) or not parts:
         raise ValueError("arrays do not fit each other")
-    return Curve((one, other), vector, tuple(parts), tuple(special[: header["inner"]]), (ends[0], ends[1]))
+    return Curve(
+        (one, other), vector, tuple(parts), tuple(special[: header["inner"]]), (ends[0], ends[1])
+    )
 
 
 def _unpack_special(header: Header, pool: Unpacker, index: int) -> list[SpecialPoint]:

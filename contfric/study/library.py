@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from contfric.errors import StudyError, did_you_mean
@@ -47,7 +48,9 @@ def study_path(source: str | Path) -> Path:
         if path.is_file():
             return path
     names = study_names()
-    hint = did_you_mean(text, names)
+    # fig5 is fig05, and not fig15, which differs from it by one letter as well
+    padded = re.sub(r"(?<!\d)\d$", lambda digit: f"0{digit.group()}", text)
+    hint = did_you_mean(padded, names)
     raise StudyError(f"unknown study '{text}'{hint}. A file needs its suffix: {text}.yaml")
 
 

@@ -164,9 +164,8 @@ def test_loading_does_not_load_the_engine(branch, tmp_path) -> None:
 
 
 def test_other_objects_are_refused(tmp_path) -> None:
-    with pytest.raises(
-        cf.ResultFileError, match=r"only an Orbit, a Branch, a Diagram or a LyapunovMap .* got dict"
-    ):
+    saved = "only an Orbit, a Branch, a Diagram, a Curve, a Plane or a LyapunovMap"
+    with pytest.raises(cf.ResultFileError, match=rf"{saved} .* got dict"):
         cf.save({}, tmp_path / "x.npz")  # type: ignore[arg-type]
 
 
