@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,14 @@ _LOOKS = {
 #: A plane with more points of codimension two than this does not write their names, one with more curves
 #: does not label them all: the longest only.
 _MOST_NAMES, _MOST_LABELS = 24, 24
+#: Where the legend stands: inside of axes that are given, on white, or below them.
+_INSIDE: Mapping[str, Any] = {"loc": "best", "framealpha": 0.9, "edgecolor": "none"}
+_BELOW: Mapping[str, Any] = {
+    "loc": "upper center",
+    "bbox_to_anchor": (0.5, -0.1),
+    "ncol": 4,
+    "frameon": False,
+}
 #: A point at which a curve is relabelled is marked small and not named.
 _RELABELS = "T"
 
@@ -75,10 +83,14 @@ def plot_curves(
     '$S$'
     """
     points = [s for curve in curves for s in curve.special] if special else []
-    return _draw(axes_or_new(ax), curves, range(len(curves)), points, outside=ax is None)
+    return _draw(
+        axes_or_new(ax), curves, range(len(curves)), points, BESIDE if ax is None else _INSIDE
+    )
 
 
-def plot_plane(plane: PlaneLike, ax: Axes | None = None, *, special: bool = True) -> Axes:
+def plot_plane(
+    plane: PlaneLike, ax: Axes | None = None, *, special: bool = True, legend_below: bool = False
+) -> Axes:
     """Draw the curves of a plane, as Figs. 8 to 11 of the reference.
 
     Parameters
@@ -88,12 +100,15 @@ def plot_plane(plane: PlaneLike, ax: Axes | None = None, *, special: bool = True
         Where to draw; new axes by default.
     special : bool
         Whether to mark and name the points of codimension two.
+    legend_below : bool
+        Whether the legend stands below given axes, and not inside.
     """
     new = axes_or_new(ax)
     new.set_xlim(*plane.ranges[0])
     new.set_ylim(*plane.ranges[1])
     points = plane.special if special else ()
-    return _draw(new, plane.curves, plane.twins, points, outside=ax is None)
+    where = BESIDE if ax is None else _BELOW if legend_below else _INSIDE
+    return _draw(new, plane.curves, plane.twins, points, where)
 
 
 def _draw(
@@ -101,7 +116,7 @@ def _draw(
     curves: Sequence[CurveLike],
     twins: Sequence[int],
     special: Sequence[SpecialLike],
-    outside: bool,
+    legend: Mapping[str, Any],
 ) -> Axes:
     for index, curve in enumerate(curves):
         first = index == twins[index]
@@ -118,10 +133,10 @@ def _draw(
     ax.set_ylabel(parameter_label(names[1]), fontsize=TEXT + 1)
     ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
     _mark(ax, special, names)
-    _legend(ax, curves, special, outside)
+    _legend(ax, curves, special, legend)
     settle(ax)
     shown = [c for k, c in enumerate(curves) if twins[k] == k]
-    shown.sort(key=lambda c: -float(c.arc[-1] - c.arc[0]))
+    shown.sort(key=lambda c: -float(_lengths(ax, c)[-1]))
     anchors = [a for a in (_label_of(ax, c) for c in shown[:_MOST_LABELS]) if a is not None]
     named = [s for s in special if not s.name.endswith(_RELABELS)]
     if len(named) <= _MOST_NAMES:
@@ -164,22 +179,26 @@ def _mark(ax: Axes, special: Sequence[SpecialLike], names: tuple[str, str]) -> N
 
 def _label_of(ax: Axes, curve: CurveLike) -> Anchor | None:
     """Return the label of a curve at the middle of what is seen of it."""
-    values = curve.values
-    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
-    inside = (values[:, 0] >= left) & (values[:, 0] <= right)
-    inside &= (values[:, 1] >= low) & (values[:, 1] <= high)
-    places = np.flatnonzero(inside)
-    if len(places) == 0:
+    values, along = curve.values, _lengths(ax, curve)
+    if along[-1] <= 0.0:
         return None
-    arc = curve.arc[places]
-    middle = places[int(np.searchsorted(arc, 0.5 * (arc[0] + arc[-1])))]
+    middle = int(np.searchsorted(along, 0.5 * along[-1]))
     return Anchor(float(values[middle, 0]), float(values[middle, 1]), event_label(curve.label))
 
 
+def _lengths(ax: Axes, curve: CurveLike) -> FloatArray:
+    """Return how much of a curve is seen up to each of its points, in sizes of the axes."""
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    places = (curve.values - (left, low)) / (right - left, high - low)
+    inside = np.all((places >= 0.0) & (places <= 1.0), axis=1)
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1) * (inside[1:] & inside[:-1])
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
 def _legend(
-    ax: Axes, curves: Sequence[CurveLike], special: Sequence[SpecialLike], outside: bool
+    ax: Axes, curves: Sequence[CurveLike], special: Sequence[SpecialLike], where: Mapping[str, Any]
 ) -> None:
-    """Say what colours and dashes mean: beside new axes, inside given ones."""
+    """Say what colours and dashes mean."""
     kinds = {kind.value: kind for curve in curves for kind in curve.kinds}
     handles = [
         Line2D([], [], color=colour, linewidth=width, label=f"{name}: {kinds[name].meaning}")
@@ -193,5 +212,4 @@ def _legend(
         ring = Line2D([], [], linestyle="none", marker="o", label="codimension two")
         ring.set(markersize=4.5, markerfacecolor="white", markeredgecolor=BLACK)
         handles.append(ring)
-    where = BESIDE if outside else {"loc": "best"}
-    ax.legend(handles=handles, fontsize=SMALL, frameon=False, **where)
+    ax.legend(handles=handles, fontsize=SMALL, **where)

@@ -16,7 +16,7 @@ _SIZES = {
     FigureKind.TRANSITIONS: (7.0, 5.0, 0.0),
     FigureKind.BRANCHES: (9.6, 4.4, 0.0),
     FigureKind.LYAPUNOV: (8.0, 5.6, 0.0),
-    FigureKind.PLANE: (9.6, 6.0, 0.0),
+    FigureKind.PLANE: (9.6, 7.0, 0.0),
 }
 #: Kinds that show a diagram.
 _OF_DIAGRAM = frozenset({FigureKind.DIAGRAM, FigureKind.BRANCHES})
@@ -51,7 +51,10 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
     elif drawing.kind is FigureKind.PLANE:
         assert plane is not None
         figure.suptitle(title)
-        plot_plane(plane, ax=figure.add_subplot())
+        axes = figure.add_subplot()
+        if lmap is not None and tuple(lmap.axes) == plane.parameters:
+            plot_lyapunov_map(lmap, ax=axes)
+        plot_plane(plane, ax=axes, legend_below=True)
     elif drawing.kind in _OF_DIAGRAM:
         assert diagram is not None
         figure.suptitle(title)
