@@ -157,11 +157,16 @@ def starts_of(event: Bifurcation, box: Box, largest: float) -> Iterator[Start]:
 
 
 def prove(
-    problem: Problem, start: CurvePoint, border: FloatArray, largest: float
+    problem: Problem,
+    start: CurvePoint,
+    border: FloatArray,
+    largest: float,
+    born: bool = False,
 ) -> Problem | None:
     """Return a curve's problem if its orbits are admissible a short step away from a point.
 
-    Margins that vanish at the point but not beside it are watched from there on.
+    Margins that vanish at the point but not beside it are watched from there on. ``born`` says that a fold
+    curve begins near the point: there the normal form is small, and tells of no continuum.
     """
     for share in _PROOFS:
         beside = _step_away(problem, start, border, share * largest)
@@ -175,7 +180,7 @@ def prove(
         lasts = bool(np.all(orbit.ends[:, 0] - orbit.cycle[:, 0] > -_NO_TIME))
         if not lasts or not np.all(margins[others] > 0.0) or _is_exit(problem, still):
             continue
-        if is_continuum(problem, start) and is_continuum(problem, beside):
+        if not born and is_continuum(problem, start) and is_continuum(problem, beside):
             return None
         if len(free):
             start.tests[free] = np.maximum(0.0, problem.orbit(start.joints, start.w).margins[free])
