@@ -28,6 +28,8 @@ from contfric.orbit.system import IntArray, Margin, Test
 #: Times of a joint in two words for one motion agree to this (nondimensional): located events are good to
 #: 1e-9 where two of them meet.
 _SAME_TIME = 1e-6
+#: A multiplier that a fold, branch point or doubling keeps in another word is the same to this.
+_SAME_MULTIPLIER = 1e-4
 #: The first point of a curve is the point that it leaves to this (relative to the ranges).
 _SAME_POINT = 1e-4
 #: Margins this small after the proof still vanish: they belong to the condition.
@@ -101,7 +103,10 @@ def words_at(special: SpecialPoint) -> Iterator[Orbit]:
 def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation | None:
     """Return the condition of a curve in another word for the motion at a point; None if it is none."""
     if problem.test is None:
-        return Bifurcation(problem.kind, orbit.params, orbit)
+        if orbit.system.half is not problem.system.half:
+            return None
+        gap = float(np.min(np.abs(orbit.turn_multipliers - problem.condition.sign)))
+        return Bifurcation(problem.kind, orbit.params, orbit) if gap < _SAME_MULTIPLIER else None
     for test in orbit.system.tests:
         if test.margin is not problem.test.margin:
             continue
