@@ -1,8 +1,8 @@
 """What a point of a curve in two parameters costs, march alone and all in all.
 
-Run with ``python benchmarks/curves.py``. Times are of warm kernels, the best of several runs: the march is
-the compiled loop (Newton, tangent, everything that is watched), the curve is the call of a user (start,
-both sides, points of codimension two, the result).
+Run with ``python benchmarks/curves.py``. Processor times of warm kernels, the best of several runs: the
+march is the compiled loop (Newton, tangent, everything that is watched), the curve is the call of a user
+(start, both sides, points of codimension two, the result).
 """
 
 from __future__ import annotations
@@ -33,27 +33,27 @@ def events():
     return found
 
 
-def march_cost(bifurcation, points=400, runs=5):
-    """Microseconds a point of the compiled march."""
+def march_cost(bifurcation, points=60, runs=40):
+    """Microseconds a point of the compiled march; short runs, which no other process interrupts."""
     problem = problem_of(bifurcation, box_of(bifurcation.orbit.model, PLANE, RANGES))
     start, border = first_curve_point(problem, bifurcation.orbit)
     best = float("inf")
     for _ in range(runs):
         rows = CurveRows.room_for(problem, points)
         rows.put(0, start)
-        began = time.perf_counter()
+        began = time.process_time()
         _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), STEP, STEP, 3e-13)
-        best = min(best, (time.perf_counter() - began) / max(last, 1))
+        best = min(best, (time.process_time() - began) / max(last, 1))
     return 1e6 * best, last
 
 
-def curve_cost(bifurcation, max_step, runs=3):
+def curve_cost(bifurcation, max_step, runs=10):
     """Microseconds a point of a whole curve, and its number of points."""
     best, count = float("inf"), 0
     for _ in range(runs):
-        began = time.perf_counter()
+        began = time.process_time()
         curve = cf.continue_bifurcation(bifurcation, PLANE, RANGES, max_step=max_step)
-        best = min(best, time.perf_counter() - began)
+        best = min(best, time.process_time() - began)
         count = len(curve)
     return 1e6 * best / count, count
 

@@ -28,6 +28,8 @@ from contfric.orbit.system import IntArray, Margin, Test
 #: Times of a joint in two words for one motion agree to this (nondimensional): located events are good to
 #: 1e-9 where two of them meet.
 _SAME_TIME = 1e-6
+#: A multiplier that a fold, branch point or doubling keeps in another word is the same to this.
+_SAME_MULTIPLIER = 1e-4
 #: The first point of a curve is the point that it leaves to this (relative to the ranges).
 _SAME_POINT = 1e-4
 #: Margins this small after the proof still vanish: they belong to the condition.
@@ -101,7 +103,10 @@ def words_at(special: SpecialPoint) -> Iterator[Orbit]:
 def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation | None:
     """Return the condition of a curve in another word for the motion at a point; None if it is none."""
     if problem.test is None:
-        return Bifurcation(problem.kind, orbit.params, orbit)
+        if orbit.system.half is not problem.system.half:
+            return None
+        gap = float(np.min(np.abs(orbit.turn_multipliers - problem.condition.sign)))
+        return Bifurcation(problem.kind, orbit.params, orbit) if gap < _SAME_MULTIPLIER else None
     for test in orbit.system.tests:
         if test.margin is not problem.test.margin:
             continue
@@ -157,11 +162,16 @@ def starts_of(event: Bifurcation, box: Box, largest: float) -> Iterator[Start]:
 
 
 def prove(
-    problem: Problem, start: CurvePoint, border: FloatArray, largest: float
+    problem: Problem,
+    start: CurvePoint,
+    border: FloatArray,
+    largest: float,
+    born: bool = False,
 ) -> Problem | None:
     """Return a curve's problem if its orbits are admissible a short step away from a point.
 
-    Margins that vanish at the point but not beside it are watched from there on.
+    Margins that vanish at the point but not beside it are watched from there on. ``born`` says that a fold
+    curve begins near the point: there the normal form is small, and tells of no continuum.
     """
     for share in _PROOFS:
         beside = _step_away(problem, start, border, share * largest)
@@ -175,7 +185,7 @@ def prove(
         lasts = bool(np.all(orbit.ends[:, 0] - orbit.cycle[:, 0] > -_NO_TIME))
         if not lasts or not np.all(margins[others] > 0.0) or _is_exit(problem, still):
             continue
-        if is_continuum(problem, start) and is_continuum(problem, beside):
+        if not born and is_continuum(problem, start) and is_continuum(problem, beside):
             return None
         if len(free):
             start.tests[free] = np.maximum(0.0, problem.orbit(start.joints, start.w).margins[free])

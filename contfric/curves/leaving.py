@@ -130,7 +130,7 @@ def _born(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[S
         start = beside(fold, whole, phi, distance)
         if start is not None:
             point, border = start
-            proved = prove(fold, point, border, largest)
+            proved = prove(fold, point, border, largest, born=True)
             if proved is not None:
                 yield proved, point, border
                 return
