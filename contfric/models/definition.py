@@ -212,6 +212,11 @@ class Model:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
+    def directions(self) -> int:
+        """Number of multipliers of an orbit: one less than states without excitation (a shift in time)."""
+        return len(self.states) - int(self.autonomous)
+
+    @property
     def defaults(self) -> dict[str, float]:
         """A fresh mapping of every parameter to its default value."""
         return {p.name: p.default for p in self.parameters}
@@ -270,11 +275,16 @@ class Model:
                     found[domain.name, reset.surface] = behind
         return found
 
+    def changed_by(self, reset: Reset, surface: str) -> bool:
+        """Return whether a reset may change the sign at a surface."""
+        observable = self.surface_by_name[surface].observable
+        if reset.changes:
+            return observable in reset.changes
+        return observable != self.surface_by_name[reset.surface].observable
+
     def _domains_behind(self, domain: Domain, reset: Reset) -> tuple[str, ...]:
         """Return the domains that a reset can map to: they differ in what it changes."""
-        own = self.surface_by_name[reset.surface].observable
-        changed = reset.changes or tuple(o.name for o in self.observables if o.name != own)
-        fixed = {s.name for s in self.surfaces if s.observable not in changed}
+        fixed = {s.name for s in self.surfaces if not self.changed_by(reset, s.name)}
         return tuple(
             d.name
             for d in self.domains
