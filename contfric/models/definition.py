@@ -267,7 +267,9 @@ class Model:
     @cached_property
     def targets(self) -> dict[tuple[str, str], tuple[str, ...]]:
         """Every domain that can follow each (domain, surface): one, but for a reset."""
-        found = {key: (target,) for key, target in self.transitions.items()}
+        found: dict[tuple[str, str], tuple[str, ...]] = {
+            key: (target,) for key, target in self.transitions.items()
+        }
         for domain in self.domains:
             for reset in self.resets:
                 behind = self._domains_behind(domain, reset)
