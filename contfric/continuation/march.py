@@ -227,7 +227,10 @@ def march(  # type: ignore[no-untyped-def]
         chord = apart(zs[k], ws[k], zs[k - 1], ws[k - 1], scale)
         arc[k] = arc[k - 1] + chord * (1.0 + angle * angle / 24.0)
         factor = min(_GROWTH, max(0.4, _WANTED_ANGLE / max(angle, 1e-6)))
-        following = min(largest * (1.0 + largest_state(zs[k])), step * factor)
+        size = largest_state(zs[k])
+        if layout.turn == 0.0:  # the duration is one of the unknowns
+            size = max(size, -zs[k, 0, 0])
+        following = min(largest * (1.0 + size), step * factor)
         why = arrival(zs, ws, tzs, tws, tests, labels, k, start, taken, step, low, high, scale)
         if why != FULL:
             return why, k, following
