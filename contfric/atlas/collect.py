@@ -15,7 +15,10 @@ from contfric.models.definition import Model
 _FOLLOWED = frozenset(EndReason[name] for name in ("CS", "SS", "AS", "GS", "BP", "PD"))
 #: Ends that need no follower.
 FINAL = frozenset(
-    {EndReason.RANGE, EndReason.LIMIT, EndReason.CLOSED, EndReason.UNBOUNDED, EndReason.REST}
+    {
+        EndReason[name]
+        for name in ("RANGE", "LIMIT", "CLOSED", "UNBOUNDED", "REST", "PERIOD", "POINT")
+    }
 )
 
 

@@ -322,7 +322,9 @@ class Orbit:
         """Domain in which a segment begins behind a reset."""
         begin, model = self.begins[i], self.model
         signs = signs_at(model, float(begin[0]), begin[1:].copy(), self.vector)
-        across = self.word[i - 1][1]  # the joint lies on it to rounding, on the side of every domain
+        across = self.word[i - 1][
+            1
+        ]  # the joint lies on it to rounding, on the side of every domain
         own = [d for d in model.domains if d.mode == self.word[i][0]]
         fitting = [d for d in own if all(d.signs[s] * signs[s] >= 0 for s in signs if s != across)]
         return (fitting or own)[0].name

@@ -26,7 +26,9 @@ class SimulationEnd(str, Enum):
     IMPOSSIBLE = "events follow each other at once, and time does not go on"
     INFINITE = "the motion grew beyond all numbers"
     QUIET = "the motion meets no surface any more: it has come to an equilibrium, or never changes"
-    CHATTER = "impacts follow each other faster and faster (chatter): infinitely many in finite time"
+    CHATTER = (
+        "impacts follow each other faster and faster (chatter): infinitely many in finite time"
+    )
 
 
 class Tables(NamedTuple):
@@ -188,14 +190,17 @@ def _matches(signs: object, surfaces: list[str], skipped: int, code: int) -> boo
     )
 
 
-def signs_at(model: Model, t: float, y: FloatArray, vector: FloatArray) -> dict[str, int]:
-    """Return the sign of (observable - level) for every surface at a state."""
+def signs_at(
+    model: Model, t: float, y: FloatArray, vector: FloatArray, within: float = 0.0
+) -> dict[str, int]:
+    """Return the sign of (observable - level) for every surface at a state; 0 within a distance."""
     flow, none, empty = model.flow, np.empty(0, dtype=np.int64), np.empty(0)
     names = [o.name for o in model.observables]
     signs = {}
     for k, surface in enumerate(model.surfaces):
         value = flow.observe(names.index(surface.observable), t, y, vector, none, empty)
-        signs[surface.name] = int(np.sign(value - flow.level(k, vector, none, empty)))
+        apart = value - flow.level(k, vector, none, empty)
+        signs[surface.name] = 0 if abs(apart) <= within else int(np.sign(apart))
     return signs
 
 
@@ -231,12 +236,11 @@ def _side_of_rates(
         if signs[surface.name] != 0 or not model.cuts(surface.name):
             return True
         c, mode = observables.index(surface.observable), modes.index(domain.mode)
-        return domain.signs[surface.name] * flow.rate(mode, c, t, y, vector, none, empty) > 0.0
+        rate = float(flow.rate(mode, c, t, y, vector, none, empty))
+        return domain.signs[surface.name] * rate > 0.0
 
     beside = [
-        d
-        for d in model.domains
-        if all(sign in (0, d.signs[name]) for name, sign in signs.items())
+        d for d in model.domains if all(sign in (0, d.signs[name]) for name, sign in signs.items())
     ]
     return next((d.name for d in beside if all(enters(d, s) for s in model.surfaces)), None)
 
