@@ -15,7 +15,7 @@ import numpy as np
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration, Progress
-from contfric.atlas.matching import same_event
+from contfric.atlas.matching import SAME_STOPS, part_distance
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, candidates, directions, wider_candidates
@@ -83,7 +83,8 @@ def _follow_flow(state: Exploration, event: Event) -> None:
     for found in walked(orbit.as_whole(), shifts):
         guess = replace(found, vector=orbit.vector)
         branch = _through(state, guess)
-        if branch is None or not any(_meets(end, event, settings) for end in branch.ends):
+        ends = [] if branch is None else [e for e in branch.ends if _meets(e, event, settings)]
+        if branch is None or not ends:
             why = f"no orbit of {show(guess.word)} meets the event"
             state.judge(event, reason, Verdict.REFUSED, why=why)
         elif (known := state.known(branch[len(branch) // 2])) is not None:
@@ -91,14 +92,22 @@ def _follow_flow(state: Exploration, event: Event) -> None:
         else:
             state.judge(event, reason, Verdict.ACCEPTED, len(state.branches))
             state.add_from(branch, event)
+            for end in ends:
+                state.merge(event, end)
 
 
 def _meets(end: End, event: Event, settings: Settings) -> bool:
-    """Tell whether a branch ends at an event, by whatever name it calls it."""
-    if end.bifurcation is None or end.bifurcation.kind not in TERMINAL:
+    """Tell whether a branch ends at an event, by whatever name it calls it.
+
+    A stop that comes in there is one of the new orbit only.
+    """
+    a, b = end.bifurcation, event.bifurcation
+    if a is None or a.kind not in TERMINAL:
         return False
-    renamed = replace(end.bifurcation, kind=event.bifurcation.kind)
-    return same_event(renamed, event.bifurcation, settings.parameter, settings.width)
+    gap = abs(a.params[settings.parameter] - b.params[settings.parameter])
+    if gap > max(a.accuracy, b.accuracy) * settings.width:
+        return False
+    return part_distance(a.orbit.stops, b.orbit.stops) < SAME_STOPS
 
 
 def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:

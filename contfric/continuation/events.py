@@ -8,7 +8,7 @@ margin     where                                   kind
 interior   segment that stays on a surface         AS: the stick touches its limit inside
 interior   other segment, surface that switches    GS: the slide touches rest inside
 interior   surface with the same field behind      T
-interior   surface with a reset                    GS: a grazing impact
+any        surface with a reset                    GS: a grazing impact
 exit       as the interior of the same segment     AS, GS or T: the exit becomes tangential
 joint      the state at a stop meets a surface     CS if it leaves the stick there (distance to
                                                    the limit grows outward), SS if it enters it;
@@ -231,9 +231,9 @@ def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
         return kind_of_hold(hold, test)
     if test.margin is Margin.ENTRY:
         return Kind.CS
+    if test.surface in model.reset_by_surface:
+        return Kind.GS
     if test.margin is not Margin.JOINT:
-        if test.surface in model.reset_by_surface:
-            return Kind.GS
         if model.mode_by_name[mode].sliding:
             return Kind.AS
         return Kind.T if inside_sign(model, mode, test.surface) == 0 else Kind.GS

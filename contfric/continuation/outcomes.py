@@ -119,6 +119,8 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
         return _hold_ends(orbit, place)
     if place.margin is Margin.ENTRY:
         raise NotationError(f"another mode follows the impact before segment {place.segment + 1}")
+    if place.margin is Margin.JOINT and place.surface in orbit.model.reset_by_surface:
+        raise NotationError(f"the wall {place.surface} is met where segment {place.segment + 1} ends")
     if kind is Kind.CS:
         reason = f"swap stick and reversal at stop {place.segment + 1}, at {place.surface}"
         edit = swap_edit(orbit.word, {place.segment: place.surface}, orbit.model)

@@ -95,19 +95,10 @@ def _one_turn(orbit: Orbit, vector: FloatArray, state: FloatArray) -> Orbit | No
 
 
 def _end_of_turn(orbit: Orbit, trajectory: Trajectory, start: float, unit: float) -> int | None:
-    """Return the number of events of one turn: those until the segment that it started in is met again.
-
-    Of the events before which that mode was entered, the one nearest in time to a whole turn.
-    """
-    model = orbit.model
+    """Return the number of events of one turn; None if the motion is in another mode after it."""
+    model, word = orbit.model, trajectory.word
     clock = trajectory.times + trajectory.cycles * unit * (not model.autonomous)
-    word = trajectory.word
-    if len(word) < 2:
-        return None
+    count = int(np.searchsorted(clock, start + orbit.period))
     i, _ = _middle(orbit)
-    arrives = float(orbit.cycle[i, 0]) + orbit.period
-    entered = [k for k in range(1, len(word)) if word[k][0] == orbit.word[i][0]]
-    if trajectory.last[3] == orbit.word[i][0]:
-        entered.append(len(word))
-    near = [k for k in entered if abs(clock[k - 1] - arrives) < (_LONGER - 1.0) * orbit.period]
-    return min(near, key=lambda k: abs(clock[k - 1] - arrives), default=None)
+    mode = word[count][0] if count < len(word) else trajectory.last[3]
+    return count if count > 0 and mode == orbit.word[i][0] else None

@@ -15,7 +15,7 @@ from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.simulation import signs_at
-from contfric.orbit.stops import displacements
+from contfric.orbit.stops import displacements, stopping_segments
 from contfric.orbit.system import Margin, System, Word, build_system
 from contfric.orbit.words import decode, end_domain, half_of, mirror_pairs, passed_domains, whole_of
 from contfric.signature import Signature
@@ -353,11 +353,10 @@ class Orbit:
 
     @cached_property
     def stops(self) -> FloatArray:
-        """Displacements at the stops in the order of the orbit, shape (stops,)."""
+        """Displacements at the stops and impacts in the order of the orbit, shape (stops,)."""
         if not self.model.surface_by_name[self.model.stop_surface].switching:
             return displacements(self, self.model.stop_surface)
-        at = [i for i, (_, exit_) in enumerate(self.word) if exit_ == self.model.stop_surface]
-        return self.ends[at, 1]
+        return self.ends[stopping_segments(self.model, self.word), 1]
 
     @property
     def x_max(self) -> float:

@@ -45,7 +45,7 @@ from contfric.models.definition import (
 
 ZETA, S, S0, V, F, OMEGA, WALL, E, A = range(9)
 #: Modes: x' below the belt's speed, above it, and at rest on it.
-SLOWER, FASTER, STICK = range(3)
+SLOWER, FASTER, STICK, FREE, STICK_BACK = range(5)
 _STEP = 0.05
 _TINY = 1e-40
 
@@ -55,7 +55,9 @@ def moved(mode, t0, x0, v0, d, zeta, s, v_belt, f, omega):
     """Return (x, x') after a duration, from complex numbers."""
     if mode == STICK:
         return x0 + v_belt * d, v_belt
-    b = s if mode == SLOWER else -s
+    if mode == STICK_BACK:
+        return x0 - v_belt * d, -v_belt
+    b = 0.0 * s if mode == FREE else (s if mode == SLOWER else -s)
     w = cmath.sqrt(1.0 - zeta * zeta)
     grown = cmath.exp(-zeta * d)
     c, q = cmath.cos(w * d), cmath.sin(w * d) / w
@@ -123,8 +125,8 @@ def value(c, t, x, v, p):
 @helper
 def slope(mode, c, t, x, v, p):
     acc = 0.0
-    if mode != STICK:
-        b = p[S] if mode == SLOWER else -p[S]
+    if mode != STICK and mode != STICK_BACK:
+        b = 0.0 if mode == FREE else (p[S] if mode == SLOWER else -p[S])
         acc = b + p[F] * math.cos(p[OMEGA] * t) - 2.0 * p[ZETA] * v - x
     sine = math.sin(p[OMEGA] * t)
     if c == 0:
@@ -214,8 +216,10 @@ def hit(mode, c, target, on, t0, y0, dt_max, p, y1):
     qa = quantity(mode, c, 0, target, t0, y0, a, p)
     ra = quantity(mode, c, 1, target, t0, y0, a, p)
     if on:  # it leaves the belt's speed to its own side, anything else to that of its rate
-        on_belt = c == 1 and mode != STICK and p[V] > 0.0 and target == p[V]
+        on_belt = c == 1 and mode != STICK and p[V] > 0.0 and abs(target) == p[V]
         towards = (-1.0 if mode == SLOWER else 1.0) if on_belt else ra
+        if on_belt and mode == FREE:
+            towards = -target
         qa = math.copysign(max(abs(qa), 1e-300), towards)
     found = -1.0
     while a < dt_max:
@@ -241,7 +245,8 @@ def hit(mode, c, target, on, t0, y0, dt_max, p, y1):
 
 @kernel(turning_signature)
 def turning(mode, c, t0, y0, dt, p, times, values):
-    if dt <= 0.0 or mode == STICK and (c == 1 or (p[F] == 0.0 and c == 0)):
+    rests = mode == STICK or mode == STICK_BACK
+    if dt <= 0.0 or (rests and (c == 1 or (p[F] == 0.0 and c == 0))):
         return 0
     count, a, first = 0, 1e-9, 1e-9
     ra = quantity(mode, c, 1, 0.0, t0, y0, a, p)
@@ -318,6 +323,16 @@ def zero_level(k, p, which, grad):
     return 0.0
 
 
+@kernel(level_signature)
+def dead_band_level(k, p, which, grad):
+    """Levels of the load, S, 0 and -S, and of x', V, 0 and -V."""
+    of = S if k < 3 else V
+    sign = 1.0 - (k % 3)
+    for j in range(grad.shape[0]):
+        grad[j] = sign if which[j] == of else 0.0
+    return sign * p[of]
+
+
 PARAMETERS = (
     Parameter("zeta", 0.0, "damping ratio"),
     Parameter("S", 0.3, "kinetic friction"),
@@ -385,6 +400,73 @@ belt = Model(
     symmetry=None,
     stop_surface="rest",
     flow_factory=_belt_flow,
+    spread=_spread,
+    autonomous=True,
+)
+
+
+def _dead_band_domains() -> tuple[Domain, ...]:
+    loads = {"3": (1, 1, 1), "2": (-1, 1, 1), "1": (-1, -1, 1), "0": (-1, -1, -1)}
+    speeds = {
+        "fast": ("fast", (1, 1, 1)),
+        "rise": ("free", (-1, 1, 1)),
+        "fall": ("free", (-1, -1, 1)),
+        "slow": ("slow", (-1, -1, -1)),
+    }
+    names = ("U+", "U0", "U-", "V+", "V0", "V-")
+    found = [
+        Domain(f"{name}{u}", mode, dict(zip(names, (*load, *speed), strict=True)))
+        for name, (mode, speed) in speeds.items()
+        for u, load in loads.items()
+    ]
+    rests = (
+        Domain("stick+", "stick+", dict(zip(names, (*loads["1"], 0, 1, 1), strict=True))),
+        Domain("stick-", "stick-", dict(zip(names, (*loads["2"], -1, -1, 0), strict=True))),
+    )
+    return (*found, *rests)
+
+
+def _dead_band_flow() -> CompiledFlow:
+    return CompiledFlow(flow, observe, dead_band_level, turning, hit, no_period, rate)
+
+
+#: Self-excited oscillator with a dead band, ``x'' + 2 zeta x' + x = -S M(x'/V)``, zeta < 0.
+dead_band = Model(
+    name="dead-band-of-tests",
+    title="self-excited oscillator with a dead band",
+    states=("x", "v"),
+    parameters=PARAMETERS,
+    constraints=(Constraint("V > 0", {"V": 1.0}, strict=True),),
+    observables=OBSERVABLES,
+    surfaces=(
+        Surface("U+", "u", "S"),
+        Surface("U0", "u", "0"),
+        Surface("U-", "u", "-S"),
+        Surface("V+", "v", "V", switching=True),
+        Surface("V0", "v", "0"),
+        Surface("V-", "v", "-V", switching=True),
+    ),
+    modes=(
+        Mode("slow", 2),
+        Mode("fast", 2),
+        Mode("stick+", 1, sliding=True),
+        Mode("free", 2),
+        Mode("stick-", 1, sliding=True),
+    ),
+    domains=_dead_band_domains(),
+    departures=(
+        Departure({"V+": 0, "U0": 1}, {"V+": -1}),
+        Departure({"V+": 0, "U-": -1}, {"V+": 1}),
+        Departure({"V-": 0, "U0": -1}, {"V-": 1}),
+        Departure({"V-": 0, "U+": 1}, {"V-": -1}),
+    ),
+    symmetry=Symmetry(
+        ((-1.0, 0.0), (0.0, -1.0)),
+        0.5,
+        {"U+": "U-", "U0": "U0", "U-": "U+", "V+": "V-", "V0": "V0", "V-": "V+"},
+    ),
+    stop_surface="V0",
+    flow_factory=_dead_band_flow,
     spread=_spread,
     autonomous=True,
 )
@@ -459,4 +541,4 @@ impact = Model(
     resets=(Reset("wall", "x' -> wall' - e (x' - wall')", changes=("v",)),),
 )
 
-__all__ = ["Symmetry", "belt", "impact"]
+__all__ = ["belt", "dead_band", "impact"]
