@@ -175,6 +175,7 @@ def _stops_tangentially(orbit: Orbit, place: Test) -> Outcome:
     """GS: a stop without acceleration."""
     word, i = orbit.word, place.segment
     j = (i + 1) % len(word)
+    _rest_mode(orbit, i, word[i][1])
     if not orbit.model.mode_by_name[word[j][0]].sliding:
         raise NotationError(f"the tangential stop of segment {i + 1} is followed by no stick")
     _check_inside(orbit, word[j][0], orbit.ends[i])
@@ -355,7 +356,7 @@ def _rest_mode(orbit: Orbit, i: int, surface: str) -> str:
             continue
         if model.mode_by_name[model.domain_by_name[target].mode].sliding:
             return model.domain_by_name[target].mode
-    raise NotationError(
+    raise NoJump(
         f"mode '{orbit.word[i][0]}' of model '{model.name}' never comes to rest on {surface}"
     )
 

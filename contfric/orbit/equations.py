@@ -53,8 +53,8 @@ from contfric.orbit.holds import NO_PIN, TOUCH_PIN
 from contfric.orbit.system import Layout
 
 #: Where a segment that begins on its exit surface is shorter than this (nondimensional), its exit row is
-#: divided by the duration: five points of Gauss are exact to rounding there (d^10 f^(10) / 5e32), and the row as it
-#: stands is well conditioned beyond.
+#: divided by the duration: five points of Gauss are exact to rounding there (d^10 f^(10) / 5e32), and the
+#: row as it stands is well conditioned beyond.
 _SHORT = 0.1
 #: Abscissas and weights of Gauss and Legendre on (0, 1), five points.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
