@@ -29,7 +29,6 @@ from contfric.orbit.equations import FunctionsType, LayoutType, close_chain
 from contfric.orbit.monitor import (
     count_margins,
     crossings,
-    entry_margin,
     find_turnings,
     held_margin,
     interior_margin,
@@ -83,9 +82,6 @@ def margin_value(functions, layout, index, z, p, room):  # type: ignore[no-untyp
     if index < layout.joint.shape[0]:
         return joint_margin(functions, layout, index, z, p, room.equations)
     index -= layout.joint.shape[0]
-    if index < layout.after.shape[0]:
-        return entry_margin(functions, layout, index, z, p, room.equations)
-    index -= layout.after.shape[0]
     if index < layout.lasting.shape[0]:
         return lasting_margin(layout, index, z, room.equations)
     index -= layout.lasting.shape[0]

@@ -18,9 +18,9 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.equations import (
     FunctionsType,
     LayoutType,
-    begin_at,
     close_chain,
     equation_room,
+    leap,
     segment_rows,
 )
 from contfric.orbit.holds import NO_PIN
@@ -59,9 +59,12 @@ def find_turnings(functions, layout, i, c, z, p, room, turnings):  # type: ignor
     duration = after[0] - z[i, 0]
     if duration <= 0.0:
         return 0
-    begin_at(functions, layout, i, z[i], p, room.none, room.nothing, room)
+    begin = z[i, 1:]
+    if layout.begins[i] > 1:
+        leap(functions, layout, i, z[i], p, room.none, room)
+        begin = room.behind[z.shape[1] - 1, : z.shape[1] - 1]
     return functions[3](
-        layout.modes[i], c, z[i, 0], room.begin, duration, p, turnings.times, turnings.values
+        layout.modes[i], c, z[i, 0], begin, duration, p, turnings.times, turnings.values
     )
 
 
@@ -93,23 +96,26 @@ def interior_margin(functions, layout, k, found, z, p, room, turnings):  # type:
 
 
 @helper
+def start_value(functions, layout, i, c, z, p, room):  # type: ignore[no-untyped-def]
+    """Return observable c where segment i begins."""
+    begin = z[i, 1:]
+    if layout.begins[i] > 1:
+        leap(functions, layout, i, z[i], p, room.none, room)
+        begin = room.behind[z.shape[1] - 1, : z.shape[1] - 1]
+    return functions[1](c, z[i, 0], begin, p, room.none, room.empty)
+
+
+@helper
 def joint_margin(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
     """Return joint margin k."""
     i, surface = layout.joint[k, 0], layout.joint[k, 1]
     after = z[i + 1] if i + 1 < z.shape[0] else room.last
     c = layout.observables[surface]
-    value = functions[1](c, after[0], after[1:], p, room.none, room.empty)
+    if layout.joint[k, 3] == 1:  # where the segment begins, behind a reset
+        value = start_value(functions, layout, i, c, z, p, room)
+    else:
+        value = functions[1](c, after[0], after[1:], p, room.none, room.empty)
     return layout.joint[k, 2] * (value - functions[2](surface, p, room.none, room.empty))
-
-
-@helper
-def entry_margin(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
-    """Return entry margin k: the side on which a segment begins behind a reset."""
-    i, surface = layout.after[k, 0], layout.after[k, 1]
-    c = layout.observables[surface]
-    begin_at(functions, layout, i, z[i], p, room.none, room.nothing, room)
-    value = functions[1](c, z[i, 0], room.begin, p, room.none, room.empty)
-    return layout.after[k, 2] * (value - functions[2](surface, p, room.none, room.empty))
 
 
 @helper
@@ -135,9 +141,6 @@ def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-un
     for k in range(layout.joint.shape[0]):
         out[at + k] = joint_margin(functions, layout, k, z, p, room)
     at += layout.joint.shape[0]
-    for k in range(layout.after.shape[0]):
-        out[at + k] = entry_margin(functions, layout, k, z, p, room)
-    at += layout.after.shape[0]
     for k in range(layout.lasting.shape[0]):
         out[at + k] = lasting_margin(layout, k, z, room)
     at += layout.lasting.shape[0]
@@ -190,7 +193,6 @@ def count_margins(layout):  # type: ignore[no-untyped-def]
         layout.interior.shape[0]
         + layout.exits.shape[0]
         + layout.joint.shape[0]
-        + layout.after.shape[0]
         + layout.lasting.shape[0]
         + layout.held.shape[0]
     )
@@ -209,8 +211,7 @@ def ends_of(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
     if on >= 0:
         first = functions[2](on, p, room.none, room.empty)
     else:
-        begin_at(functions, layout, i, z[i], p, room.none, room.nothing, room)
-        first = functions[1](c, z[i, 0], room.begin, p, room.none, room.empty)
+        first = start_value(functions, layout, i, c, z, p, room)
     if to >= 0:
         return first, functions[2](to, p, room.none, room.empty)
     return first, functions[1](c, after[0], after[1:], p, room.none, room.empty)
