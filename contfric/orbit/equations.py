@@ -50,7 +50,7 @@ from contfric.compiled import (
 )
 from contfric.models.definition import FloatArray
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN
-from contfric.orbit.system import Layout
+from contfric.orbit.system import PLAIN, RETURNS, Layout
 
 #: Where a segment that begins on its exit surface is shorter than this (nondimensional), its exit row is
 #: divided by the duration: five points of Gauss are exact to rounding there (d^10 f^(10) / 5e32), and the
@@ -80,7 +80,6 @@ LayoutType = types.NamedTuple(
         matrix,
         f8,
         i8,
-        indices,
     ],
     Layout,
 )
@@ -164,7 +163,7 @@ def leap(functions, layout, i, start, p, which, room):  # type: ignore[no-untype
 
     Only for a segment that has one: elsewhere its joint is where it begins.
     """
-    n, surface = start.shape[0] - 1, (layout.begins[i] >> 1) - 1
+    n, surface = start.shape[0] - 1, ((PLAIN - layout.departs[i]) >> 1) - 1
     behind = room.behind
     functions[7](surface, start[0], start[1:], p, which, behind[n, :n], behind[:n])
 
@@ -231,7 +230,7 @@ def mean_rate_row(functions, layout, i, at, start, duration, p, which, room, row
     for k in range(_NODES.shape[0]):
         share, weight = _NODES[k], _WEIGHTS[k]
         time = share * duration
-        if layout.begins[i] > 1:
+        if layout.departs[i] < RETURNS:
             functions[0](mode, start[0], room.behind[n, :n], time, p, which, state, jac)
             behind_reset(jac, room.behind, grad, n)
         else:
@@ -268,11 +267,11 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
     n, free, width = state.shape[0], which.shape[0], rows.shape[1]
     m = n + 1
     begin = start[1:]
-    if layout.begins[i] > 1:
+    if layout.departs[i] < RETURNS:
         leap(functions, layout, i, start, p, which, room)
         begin = room.behind[n, :n]
     functions[0](layout.modes[i], start[0], begin, after[0] - start[0], p, which, state, jac)
-    if layout.begins[i] > 1:
+    if layout.departs[i] < RETURNS:
         behind_reset(jac, room.behind, grad, n)
     worst = 0.0
     for j in range(n):
@@ -305,7 +304,7 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
     for k in range(3 * m + free + 1, width):
         rows[row, k] = 0.0
     duration = after[0] - start[0]
-    if abs(duration) < _SHORT and layout.begins[i] & 1 == 1:
+    if abs(duration) < _SHORT and (PLAIN - layout.departs[i]) & 1 == 1 and layout.departs[i] < 0:
         worst += mean_rate_row(functions, layout, i, at, start, duration, p, which, room, rows)
         return worst if math.isfinite(worst) else np.inf
     for k in range(m):
@@ -327,7 +326,7 @@ def mismatch(functions, layout, z, p, room):  # type: ignore[no-untyped-def]
         after = z[i + 1] if i + 1 < count else room.last
         duration = after[0] - z[i, 0]
         begin = z[i, 1:]
-        if layout.begins[i] > 1:
+        if layout.departs[i] < RETURNS:
             leap(functions, layout, i, z[i], p, none, room)
             begin = room.behind[m - 1, : m - 1]
         functions[0](layout.modes[i], z[i, 0], begin, duration, p, none, state, room.nothing)

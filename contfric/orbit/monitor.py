@@ -25,6 +25,7 @@ from contfric.orbit.equations import (
 )
 from contfric.orbit.holds import NO_PIN
 from contfric.orbit.newton import CHECKS
+from contfric.orbit.system import RETURNS
 
 #: Most interior stationary points of one observable in one segment; beyond it the orbit is reported
 #: as not finite. A stick of 30 excitation periods has 180 of them with a third harmonic.
@@ -53,16 +54,26 @@ def turning_room():  # type: ignore[no-untyped-def]
 
 
 @helper
-def find_turnings(functions, layout, i, c, z, p, room, turnings):  # type: ignore[no-untyped-def]
+def find_turnings(functions, layout, i, c, z, p, last, turnings):  # type: ignore[no-untyped-def]
     """Fill the stationary points of observable c in segment i; return their number, -1 if too many."""
-    after = z[i + 1] if i + 1 < z.shape[0] else room.last
+    after = z[i + 1] if i + 1 < z.shape[0] else last
     duration = after[0] - z[i, 0]
     if duration <= 0.0:
         return 0
-    begin = z[i, 1:]
-    if layout.begins[i] > 1:
-        leap(functions, layout, i, z[i], p, room.none, room)
-        begin = room.behind[z.shape[1] - 1, : z.shape[1] - 1]
+    return functions[3](
+        layout.modes[i], c, z[i, 0], z[i, 1:], duration, p, turnings.times, turnings.values
+    )
+
+
+@helper
+def find_behind(functions, layout, i, c, z, p, room, turnings):  # type: ignore[no-untyped-def]
+    """Do the same for a segment behind a reset."""
+    after, n = z[i + 1] if i + 1 < z.shape[0] else room.last, z.shape[1] - 1
+    duration = after[0] - z[i, 0]
+    if duration <= 0.0:
+        return 0
+    leap(functions, layout, i, z[i], p, room.none, room)
+    begin = room.behind[n, :n]
     return functions[3](
         layout.modes[i], c, z[i, 0], begin, duration, p, turnings.times, turnings.values
     )
@@ -97,12 +108,10 @@ def interior_margin(functions, layout, k, found, z, p, room, turnings):  # type:
 
 @helper
 def start_value(functions, layout, i, c, z, p, room):  # type: ignore[no-untyped-def]
-    """Return observable c where segment i begins."""
-    begin = z[i, 1:]
-    if layout.begins[i] > 1:
-        leap(functions, layout, i, z[i], p, room.none, room)
-        begin = room.behind[z.shape[1] - 1, : z.shape[1] - 1]
-    return functions[1](c, z[i, 0], begin, p, room.none, room.empty)
+    """Return observable c where segment i begins, behind its reset."""
+    n = z.shape[1] - 1
+    leap(functions, layout, i, z[i], p, room.none, room)
+    return functions[1](c, z[i, 0], room.behind[n, :n], p, room.none, room.empty)
 
 
 @helper
@@ -130,7 +139,10 @@ def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-un
     for k in range(interior.shape[0]):
         i, c = interior[k, 0], observables[interior[k, 1]]
         if i != segment or c != watched:  # surfaces of one observable share its stationary points
-            found = find_turnings(functions, layout, i, c, z, p, room, turnings)
+            if layout.departs[i] < RETURNS:
+                found = find_behind(functions, layout, i, c, z, p, room, turnings)
+            else:
+                found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
             segment, watched = i, c
         out[k] = interior_margin(functions, layout, k, found, z, p, room, turnings)
     at = interior.shape[0]
@@ -171,7 +183,7 @@ def held_margin(functions, layout, k, z, p, room, turnings):  # type: ignore[no-
         if layout.interior[row, 0] != i or c == watched:
             continue
         watched = c
-        found = find_turnings(functions, layout, i, c, z, p, room, turnings)
+        found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
         for j in range(found):
             time = turnings.times[j]
             if time < first or time > duration - first:
@@ -211,7 +223,9 @@ def ends_of(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
     if on >= 0:
         first = functions[2](on, p, room.none, room.empty)
     else:
-        first = start_value(functions, layout, i, c, z, p, room)
+        first = functions[1](c, z[i, 0], z[i, 1:], p, room.none, room.empty)
+        if layout.departs[i] < RETURNS:
+            first = start_value(functions, layout, i, c, z, p, room)
     if to >= 0:
         return first, functions[2](to, p, room.none, room.empty)
     return first, functions[1](c, after[0], after[1:], p, room.none, room.empty)
@@ -236,7 +250,10 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
         layout.labels[k, 2],
         layout.labels[k, 3],
     )
-    found = find_turnings(functions, layout, i, c, z, p, room, turnings)
+    if layout.departs[i] < RETURNS:
+        found = find_behind(functions, layout, i, c, z, p, room, turnings)
+    else:
+        found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
     if found < 0:
         return -1, np.inf
     value, final = ends_of(functions, layout, k, z, p, room)

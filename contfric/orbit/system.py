@@ -35,6 +35,10 @@ from contfric.signature.holds import is_hold, mirror_exit
 IntArray = NDArray[np.int64]
 
 
+#: In the array of departures: a segment that begins as any, and one that begins on its exit surface.
+PLAIN, RETURNS = -1, -2
+
+
 class Layout(NamedTuple):
     """A boundary-value problem as arrays, as the compiled engine takes it.
 
@@ -48,14 +52,14 @@ class Layout(NamedTuple):
         margins, at its beginning (1)
     labels : rows (segment, observable, surfaces that the segment starts and ends on, or -1)
     pins : surface that each hold starts on, shape (N,); -2 after a touch, -1 where there is no hold
-    departs : mode in which each hold is left, shape (N,); -1 where there is none
+    departs : mode in which each hold is left, shape (N,). Where there is no hold it says how the segment
+        begins: PLAIN, or as far below that as bit 0 if it begins on its exit surface (RETURNS), so that it
+        may shrink to nothing, and above it the surface of the reset that it begins behind, plus one
     lasting : holds that must last: those after a stick, shape (k,)
     held : all holds, which could be left at any time, shape (k,)
     closure : state matrix of the closure, shape (n, n)
     turn : duration of one turn in periods of the excitation; 0 of an autonomous model
     rank : number of independent directions that survive one turn
-    begins : how each segment begins, shape (N,): bit 0 if on its exit surface, so that it may shrink to
-        nothing; above it the surface of the reset that it begins behind, plus one
     """
 
     modes: IntArray
@@ -72,7 +76,6 @@ class Layout(NamedTuple):
     closure: FloatArray
     turn: float
     rank: int
-    begins: IntArray
 
 
 class Margin(str, Enum):
@@ -206,17 +209,13 @@ def build_system(
         joint=joint,
         labels=_label_rows(model, word, half, bool(domains), holds),
         pins=np.array([_pin(held.get(i), surfaces) for i in range(len(word))], dtype=np.int64),
-        departs=np.array(
-            [names.index(held[i].departs) if i in held else -1 for i in range(len(word))],
-            dtype=np.int64,
-        ),
+        departs=_departs(model, word, exits, entered, half, held),
         lasting=np.array([hold.segment for hold in holds if hold.after_rest], dtype=np.int64),
         held=np.array([hold.segment for hold in holds], dtype=np.int64),
         closure=symmetry.array() if half and symmetry else np.eye(n),
         turn=_turn(model, periods, half),
         # a shift in time is no disturbance of an autonomous orbit
         rank=min(model.mode_by_name[mode].rank for mode, _ in word) - int(model.autonomous),
-        begins=_begins(model, word, exits, entered, half),
     )
     return System(model, word, periods, half, layout, tests, domains, holds)
 
@@ -229,15 +228,25 @@ def first_entry(model: Model, word: Word, half: bool) -> str:
     return mirror_exit(word[-1][1], inverse)
 
 
-def _begins(model: Model, word: Word, exits: list[str], entered: list[str], half: bool) -> IntArray:
-    """How each segment begins, as a layout has it."""
+def _departs(
+    model: Model,
+    word: Word,
+    exits: list[str],
+    entered: list[str],
+    half: bool,
+    held: dict[int, Hold],
+) -> IntArray:
+    """How holds are left, and other segments begin, as a layout has it."""
+    names = [mode.name for mode in model.modes]
     modes = [mode for mode, _ in word]
     before = [mirror_mode(model)[modes[-1]] if half else modes[-1], *modes[:-1]]
     resets = {
         s.name: k + 1 for k, s in enumerate(model.surfaces) if s.name in model.reset_by_surface
     }
     rows = zip(modes, before, exits, entered, strict=True)
-    found = [2 * resets.get(row[3], 0) + _returns(model, *row) for row in rows]
+    found = [PLAIN - 2 * resets.get(row[3], 0) - _returns(model, *row) for row in rows]
+    for i, hold in held.items():
+        found[i] = names.index(hold.departs)
     return np.array(found, dtype=np.int64)
 
 
