@@ -84,6 +84,15 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
     """
     tests = here.system.tests
     test = tests[first]
+    if test.margin is Margin.ENTRY:  # an impact without speed: it is grazed
+        grazed = [
+            k
+            for k, other in enumerate(tests)
+            if other.margin is Margin.EXIT
+            and other.segment == (test.segment - 1) % here.system.segments
+            and abs(point.tests[k]) < _NEARLY_REACHED
+        ]
+        return grazed[0] if grazed else first
     if test.margin is not Margin.EXIT or hold_of_test(test, here) is not None:
         return first
     i = test.segment
