@@ -65,10 +65,14 @@ def follow(state: Exploration, event: Event) -> None:
 
 
 def _follow_sliding(state: Exploration, event: Event) -> None:
-    accepted = [_judge(state, event, c) for c in candidates(event.bifurcation)]
-    if not any(accepted):
-        accepted = [_judge(state, event, c) for c in wider_candidates(event.bifurcation)]
-    if not any(accepted):
+    accepted = jumps = False
+    for proposed in (candidates, wider_candidates):
+        for candidate in proposed(event.bifurcation):
+            jumps = jumps or candidate.has_hold
+            accepted = _judge(state, event, candidate) or accepted
+        if accepted:
+            return
+    if not jumps:  # else motions beside the event are not near what follows it
         _follow_flow(state, event)
 
 

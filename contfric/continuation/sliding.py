@@ -96,7 +96,8 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
     if test.margin is not Margin.EXIT or hold_of_test(test, here) is not None:
         return first
     i = test.segment
-    if here.ends[i, 0] - here.cycle[i, 0] > _VANISHED * here.period:
+    rests = here.model.mode_by_name[here.word[i][0]].sliding
+    if rests or here.ends[i, 0] - here.cycle[i, 0] > _VANISHED * here.period:
         return first
     before = (i - 1) % here.system.segments
     at_stop = [

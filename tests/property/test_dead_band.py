@@ -1,7 +1,7 @@
 """Two switching surfaces, each with its own sliding: a self-excited oscillator with a dead band.
 
-``x'' + 2 zeta x' + x = -S M(x'/V)`` with zeta < 0, M = sgn beyond the band and 0 within: autonomous, symmetric,
-and nowhere with a jump of the flow (a system of Filippov).
+``x'' + 2 zeta x' + x = -S M(x'/V)`` with zeta < 0, M = sgn beyond the band and 0 within: autonomous,
+symmetric, and nowhere with a jump of the flow (a system of Filippov).
 """
 
 from __future__ import annotations
