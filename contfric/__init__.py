@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from contfric.atlas.census_result import Census
     from contfric.atlas.diagram import Diagram
     from contfric.atlas.explore import explore
+    from contfric.atlas.plane import Plane
+    from contfric.atlas.plane_explore import explore_plane
     from contfric.atlas.seeds import Seeds
     from contfric.chaos.compute import lyapunov_map
     from contfric.chaos.exponents import LyapunovExponents, lyapunov_exponent
@@ -28,6 +30,9 @@ if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
     from contfric.continuation.events import Bifurcation, EndReason, Kind
     from contfric.continuation.trace import continue_orbit
+    from contfric.curves.curve import Curve
+    from contfric.curves.special import CodimTwo
+    from contfric.curves.trace import continue_bifurcation
     from contfric.errors import (
         AperiodicError,
         ContfricError,
@@ -52,6 +57,8 @@ _HOMES = {
     "Bifurcation": "contfric.continuation.events",
     "Branch": "contfric.continuation.branch",
     "Census": "contfric.atlas.census_result",
+    "CodimTwo": "contfric.curves.special",
+    "Curve": "contfric.curves.curve",
     "ContfricError": "contfric.errors",
     "ConvergenceError": "contfric.errors",
     "Diagram": "contfric.atlas.diagram",
@@ -63,6 +70,7 @@ _HOMES = {
     "Motion": "contfric.chaos.status",
     "NotationError": "contfric.errors",
     "Orbit": "contfric.orbit.orbit",
+    "Plane": "contfric.atlas.plane",
     "ParameterError": "contfric.errors",
     "ResultFileError": "contfric.errors",
     "Seeds": "contfric.atlas.seeds",
@@ -70,8 +78,10 @@ _HOMES = {
     "Signature": "contfric.signature",
     "StudyError": "contfric.errors",
     "census": "contfric.atlas.census",
+    "continue_bifurcation": "contfric.curves.trace",
     "continue_orbit": "contfric.continuation.trace",
     "explore": "contfric.atlas.explore",
+    "explore_plane": "contfric.atlas.plane_explore",
     "find_orbit": "contfric.orbit.find",
     "load": "contfric.results",
     "load_model": "contfric.models",
@@ -93,8 +103,10 @@ __all__ = [
     "Bifurcation",
     "Branch",
     "Census",
+    "CodimTwo",
     "ContfricError",
     "ConvergenceError",
+    "Curve",
     "Diagram",
     "EndReason",
     "Kind",
@@ -105,6 +117,7 @@ __all__ = [
     "NotationError",
     "Orbit",
     "ParameterError",
+    "Plane",
     "ResultFileError",
     "Seeds",
     "Signature",
@@ -112,8 +125,10 @@ __all__ = [
     "Window",
     "__version__",
     "census",
+    "continue_bifurcation",
     "continue_orbit",
     "explore",
+    "explore_plane",
     "find_orbit",
     "load",
     "load_model",

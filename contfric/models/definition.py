@@ -173,6 +173,9 @@ class Model:
     autonomous : bool
         Whether there is no excitation: the flow's ``period`` returns 0, the period of an orbit is found
         with it, and ``periods`` of a simulation are units of time.
+    filippov : bool
+        Whether rest is left without acceleration everywhere (static and kinetic limit agree), so that the
+        flow never jumps: slides may then shrink to nothing, and are solved for accordingly.
     """
 
     name: str
@@ -192,6 +195,7 @@ class Model:
     references: tuple[str, ...] = ()
     resets: tuple[Reset, ...] = ()
     autonomous: bool = False
+    filippov: bool = False
 
     def __post_init__(self) -> None:
         for reset in self.resets:

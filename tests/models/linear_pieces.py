@@ -472,6 +472,7 @@ dead_band = Model(
     flow_factory=_dead_band_flow,
     spread=_spread,
     autonomous=True,
+    filippov=True,
 )
 
 
