@@ -104,7 +104,7 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
 
 
 def _grazed_wall(here: Orbit, point: Point, first: int) -> int:
-    """Return the margin of an impact that has no speed any more, if a speed that vanishes at it is met first."""
+    """Return the margin of an impact that has no speed any more, if its own speed is what vanishes first."""
     tests = here.system.tests
     met = tests[first].segment - (tests[first].margin is Margin.ENTRY)
     for k, other in enumerate(tests):
