@@ -18,6 +18,10 @@ perturbation is ``dy - f dt`` with f the field before or behind the switch; the 
 the saltation matrix of P. C. Mueller, Chaos, Solitons & Fractals 5 (1995) 1671-1681, which is contained
 here.) The direction of the flow, ``(1, f)``, is mapped to zero: n directions are left of 1 + n.
 
+A reset R behind the joint maps the perturbation once more, ``(dt, R_t dt + R_y dy)``: the tangent map of an
+impact, with its saltation. The time of an autonomous model is no coordinate: a shift in time is mapped to
+itself, with the exponent 0, and moves no state. It is left out (dt = 0), and n - 1 directions are left.
+
 A stick forgets the velocity and passes fewer directions than a slide: the rank of the mode says how many.
 ``docs/lyapunov.md`` has the derivation at length, and what happens at jumps of the return map.
 """
@@ -38,7 +42,9 @@ from contfric.orbit.trajectory import (
     IMPOSSIBLE,
     INFINITE,
     MOST_AT_ONCE,
+    NO_FLIGHT,
     NO_TIME,
+    QUIET,
     SLIDE_PERIODS,
     TOO_LARGE,
     StateRoom,
@@ -59,7 +65,8 @@ class Walk(NamedTuple):
     y, start : state, and start (t, y) of the segment, shapes (n,) and (1 + n,)
     jac, grad : derivatives of the segment's flow and of the observable at its end
     end, image : room for a state and for the image of a perturbation, shape (n,)
-    at_once : number of events in a row that followed each other at once, shape (1,)
+    at_once : number of events in a row that followed each other at once, and 1 if the model is
+        autonomous, plus 2 if it has resets, shape (2,)
     """
 
     y: FloatArray
@@ -81,7 +88,7 @@ def new_walk(n):  # type: ignore[no-untyped-def]
         np.empty(1 + n),
         np.empty(n),
         np.empty(n),
-        np.zeros(1, dtype=np.int64),
+        np.zeros(2, dtype=np.int64),
     )
 
 
@@ -106,12 +113,14 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
     for j in range(y.shape[0]):
         walk.start[1 + j] = y[j]
     duration, turns = 0.0, 0
-    longest = (HOLD_PERIODS if tables.sliding[mode] else SLIDE_PERIODS) * period
+    at_most = NO_FLIGHT if walk.at_once[1] & 2 != 0 else NO_TIME
+    longest = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * period
     while True:
         tau, surface = first_hit(functions, tables, mode, on, t, y, p, longest, room)
-        if surface < 0:  # a slide that is never left would be an error
+        if surface < 0:  # a slide that is never left would be an error, if there is an excitation
+            quiet = QUIET if walk.at_once[1] & 1 != 0 else IMPOSSIBLE
             held = tables.sliding[mode] != 0
-            return HELD if held else IMPOSSIBLE, surface, mode, duration, turns, t
+            return HELD if held else quiet, surface, mode, duration, turns, t
         copy_state(room.after, y)
         t, duration = t + tau, duration + tau
         while t >= period:
@@ -120,14 +129,19 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
         for j in range(y.shape[0]):
             if not abs(y[j]) < TOO_LARGE:
                 return INFINITE, surface, mode, duration, turns, t
-        walk.at_once[0] = walk.at_once[0] + 1 if tau <= NO_TIME * period else 0
+        walk.at_once[0] = walk.at_once[0] + 1 if tau <= at_most * period else 0
         if walk.at_once[0] > MOST_AT_ONCE:
             return IMPOSSIBLE, surface, mode, duration, turns, t
+        reset = tables.bounds[mode, surface] == 2
+        if reset:  # the state before it stays where the hit has left it
+            functions[7](surface, t, room.after, p, room.none, y, room.nothing)
         code = sign_code(functions, observables, surface, t, y, p, room.none, room.empty)
         count = observables.shape[0]
         following = tables.following[(mode * count + surface) * (1 << count) + code]
         if following >= 0:
             return ARRIVED, surface, following, duration, turns, t
+        if reset:
+            return IMPOSSIBLE, surface, mode, duration, turns, t
         on = 1 << surface
 
 
@@ -137,11 +151,37 @@ def differentiate(functions, observable, mode, duration, t, p, walk, none):  # t
     n = walk.y.shape[0]
     jac, grad, start = walk.jac, walk.grad, walk.start
     functions[0](mode, start[0], start[1:], duration, p, none, walk.end, jac)
-    functions[1](observable, t, walk.y, p, none, grad)
+    met = walk.end if walk.at_once[1] & 2 != 0 else walk.y  # before a reset
+    functions[1](observable, t, met, p, none, grad)
     rate = grad[0]
     for k in range(n):
         rate += grad[1 + k] * jac[k, 1 + n]
     return rate
+
+
+@helper
+def behind(functions, surface, t, p, frame, count, walk, room, reset):  # type: ignore[no-untyped-def]
+    """Carry the first rows of a frame behind a joint: over its reset, and without time if there is none."""
+    if reset:
+        functions[7](surface, t, room.after, p, room.none, walk.end, walk.jac)
+        leap(frame, count, walk.jac, walk.image)
+    if walk.at_once[1] & 1 != 0:
+        for i in range(count):
+            frame[i, 0] = 0.0
+
+
+@helper
+def leap(frame, count, reset, image):  # type: ignore[no-untyped-def]
+    """Replace the first rows of a frame by their images under the derivative of a reset."""
+    n = image.shape[0]
+    for i in range(count):
+        for j in range(n):
+            value = 0.0
+            for k in range(n + 1):
+                value += reset[j, k] * frame[i, k]
+            image[j] = value
+        for j in range(n):
+            frame[i, 1 + j] = image[j]
 
 
 @helper

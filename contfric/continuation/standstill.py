@@ -71,24 +71,29 @@ def _crossing(rate: Callable[[float], float], a: float, b: float) -> float:
 
 def _departure_rate(orbit: Orbit, i: int, departs: str) -> Callable[[float], float]:
     """Return the acceleration with which a rest would be left, as a function of time."""
-    model = orbit.model
-    rest = next(d for d in model.domains if d.mode == orbit.word[i][0])
-    leaves = next(name for name, sign in rest.signs.items() if sign == 0)
-    sign = model.domain_by_name[mode_domains(model, departs)[0]].signs[leaves]
-    mode = [m.name for m in model.modes].index(departs)
-    c = [o.name for o in model.observables].index(model.surface_by_name[leaves].observable)
 
     def rate(time: float) -> float:
-        y = joint_within(orbit, i, time)[1:].copy()
-        return sign * float(model.flow.rate(mode, c, time, y, orbit.vector, _NONE, _EMPTY))
+        return leaving_rate(orbit, orbit.word[i][0], departs, joint_within(orbit, i, time))
 
     return rate
+
+
+def leaving_rate(orbit: Orbit, mode: str, departs: str, joint: FloatArray) -> float:
+    """Return the acceleration with which a mode of rest is left into a departing mode at a joint."""
+    model = orbit.model
+    rest = next(d for d in model.domains if d.mode == mode)
+    leaves = next(name for name, sign in rest.signs.items() if sign == 0)
+    sign = model.domain_by_name[mode_domains(model, departs)[0]].signs[leaves]
+    number = [m.name for m in model.modes].index(departs)
+    c = [o.name for o in model.observables].index(model.surface_by_name[leaves].observable)
+    time, y = float(joint[0]), np.array(joint[1:])
+    return sign * float(model.flow.rate(number, c, time, y, orbit.vector, _NONE, _EMPTY))
 
 
 def joint_within(orbit: Orbit, i: int, time: float) -> FloatArray:
     """Return the joint (t, y) of a segment of the whole orbit at a time inside it."""
     modes = [m.name for m in orbit.model.modes]
-    start, out = orbit.cycle[i], np.empty(len(orbit.model.states))
+    start, out = orbit.begins[i], np.empty(len(orbit.model.states))
     orbit.model.flow.flow(
         modes.index(orbit.word[i][0]),
         float(start[0]),
@@ -105,7 +110,7 @@ def joint_within(orbit: Orbit, i: int, time: float) -> FloatArray:
 def _turnings(orbit: Orbit, i: int, c: int) -> list[tuple[float, float]]:
     """Return times and values of the stationary points of observable c along a segment."""
     modes = [m.name for m in orbit.model.modes]
-    start, end = orbit.cycle[i], float(orbit.ends[i, 0])
+    start, end = orbit.begins[i], float(orbit.ends[i, 0])
     times, values = np.empty(512), np.empty(512)
     found = orbit.model.flow.turning(
         modes.index(orbit.word[i][0]),

@@ -10,6 +10,7 @@ from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.locate import belongs_to, locate_events
+from contfric.continuation.outcomes import end_message
 from contfric.continuation.points import (
     EXTRA,
     FIRST_STEP,
@@ -37,6 +38,12 @@ _VIOLATED = 1e-9
 #: Points this near to a vertex (arclength) are left out: the system is singular there, and they are good
 #: to about 1e-4 only. The branch that leaves starts at twice the distance.
 _CROWD = 5e-4
+
+#: A turn this much longer than at the start, along a parameter whose share of the tangent is below this,
+#: comes to an equilibrium.
+_LONGER, _STANDS = 1.5, 1e-6
+#: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
+_NO_SIZE = 1e-5
 
 #: Beside an event at which Newton fails steps are shortened by this factor, down to this length.
 _SHORTER, _NEAREST = 8.0, 1e-8
@@ -158,6 +165,7 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         kernels.BROKEN: EndReason.BROKEN,
         kernels.CLOSED: EndReason.CLOSED,
         kernels.UNBOUNDED: EndReason.UNBOUNDED,
+        kernels.ENDLESS: EndReason.PERIOD,
     }
     if why in reasons:
         side.end = End(reasons[why])
@@ -166,6 +174,8 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
             side.end = _limit_end(upper, settings)
         elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
             _stuck_at_vertex(orbit, side, settings)
+        if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and _slows_down(side, settings):
+            side.end = End(EndReason.PERIOD)
         return True, step
     if why == kernels.FULL:
         return _end_of_holds(orbit, side, settings, step < _CRAWLS), step
@@ -208,6 +218,30 @@ def _end_at_vertex(
     side.end = End(EndReason[bifurcation.kind.name], bifurcation=bifurcation)
 
 
+def _slows_down(side: Side, settings: Settings) -> bool:
+    """Tell whether a side has run along one value of the parameter while only its period grew.
+
+    Beside a homoclinic orbit the period grows as the logarithm of the distance of the parameter, and
+    Newton fails when that distance is rounding.
+    """
+    if not side.autonomous:
+        return False
+    tip, first = side.tip, side.first
+    return bool(
+        abs(tip.slope) < _STANDS * settings.width
+        and tip.joints[0, 0] < _LONGER * first.joints[0, 0]
+    )
+
+
+def _is_point(orbit: Orbit) -> bool:
+    """Tell whether an autonomous orbit has shrunk to a point."""
+    if not orbit.model.autonomous:
+        return False
+    states = orbit.joints[:, 1:]
+    size = np.max(np.abs(states - states[0])) + np.max(np.abs(orbit.ends[-1, 1:] - states[0]))
+    return bool(size < _NO_SIZE * (1.0 + np.max(np.abs(states))))
+
+
 def _end_of_holds(orbit: Orbit, side: Side, settings: Settings, stuck: bool) -> bool:
     """End a side that is stuck just before several holds end at once; True if that is so."""
     reached = nearly_reached(orbit, side.tip, settings) if stuck else None
@@ -244,6 +278,10 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
                 after.labels
             )  # where a stop lies on a surface its label is arbitrary
             continue
+        if bifurcation.kind in TERMINAL and _is_point(bifurcation.orbit):
+            side.put_tip(point)
+            side.end = End(EndReason.POINT)
+            return True
         ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, orbit)
         if ends is None:
             side.bifurcations.append(bifurcation)
@@ -254,7 +292,8 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             side.put_tip(at_vertex(point, bifurcation.orbit, active))
         else:
             side.put_tip(point)
-        side.end = End(ends, bifurcation=None if point.lost else bifurcation)
+        message = end_message(bifurcation) if ends.name == bifurcation.kind.name else ""
+        side.end = End(ends, message, None if point.lost else bifurcation)
         return True
     reached = after if limit is None else limit[0]
     if np.any(reached.tests[:-EXTRA] < -_VIOLATED):

@@ -7,7 +7,10 @@ from importlib.metadata import entry_points
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import Model
 
-__all__ = ["Model", "load_model", "model_names"]
+__all__ = ["DEFAULT_MODEL", "Model", "load_model", "model_names"]
+
+#: The model of the command line where none is named.
+DEFAULT_MODEL = "coulomb"
 
 
 def model_names() -> list[str]:

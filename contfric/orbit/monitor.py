@@ -20,10 +20,12 @@ from contfric.orbit.equations import (
     LayoutType,
     close_chain,
     equation_room,
+    leap,
     segment_rows,
 )
 from contfric.orbit.holds import NO_PIN
 from contfric.orbit.newton import CHECKS
+from contfric.orbit.system import RETURNS
 
 #: Most interior stationary points of one observable in one segment; beyond it the orbit is reported
 #: as not finite. A stick of 30 excitation periods has 180 of them with a third harmonic.
@@ -64,6 +66,20 @@ def find_turnings(functions, layout, i, c, z, p, last, turnings):  # type: ignor
 
 
 @helper
+def find_behind(functions, layout, i, c, z, p, room, turnings):  # type: ignore[no-untyped-def]
+    """Do the same for a segment behind a reset."""
+    after, n = z[i + 1] if i + 1 < z.shape[0] else room.last, z.shape[1] - 1
+    duration = after[0] - z[i, 0]
+    if duration <= 0.0:
+        return 0
+    leap(functions, layout, i, z[i], p, room.none, room)
+    begin = room.behind[n, :n]
+    return functions[3](
+        layout.modes[i], c, z[i, 0], begin, duration, p, turnings.times, turnings.values
+    )
+
+
+@helper
 def least_distance(found, sign, target, turnings, first, last):  # type: ignore[no-untyped-def]
     """Return the smallest distance of the stationary points from first to last to a level; or inf."""
     if found < 0:
@@ -91,18 +107,29 @@ def interior_margin(functions, layout, k, found, z, p, room, turnings):  # type:
 
 
 @helper
+def start_value(functions, layout, i, c, z, p, room):  # type: ignore[no-untyped-def]
+    """Return observable c where segment i begins, behind its reset."""
+    n = z.shape[1] - 1
+    leap(functions, layout, i, z[i], p, room.none, room)
+    return functions[1](c, z[i, 0], room.behind[n, :n], p, room.none, room.empty)
+
+
+@helper
 def joint_margin(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
     """Return joint margin k."""
     i, surface = layout.joint[k, 0], layout.joint[k, 1]
     after = z[i + 1] if i + 1 < z.shape[0] else room.last
     c = layout.observables[surface]
-    value = functions[1](c, after[0], after[1:], p, room.none, room.empty)
+    if layout.joint[k, 3] == 1:  # where the segment begins, behind a reset
+        value = start_value(functions, layout, i, c, z, p, room)
+    else:
+        value = functions[1](c, after[0], after[1:], p, room.none, room.empty)
     return layout.joint[k, 2] * (value - functions[2](surface, p, room.none, room.empty))
 
 
 @helper
 def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-untyped-def]
-    """Fill the margins in the order interior, exit, joint, lasting, held.
+    """Fill the margins in the order interior, exit, joint, entry, lasting, held.
 
     An interior margin is infinite without stationary points, that of a tangential exit always. The
     closure and the rates at the exits are in ``room``.
@@ -112,7 +139,10 @@ def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-un
     for k in range(interior.shape[0]):
         i, c = interior[k, 0], observables[interior[k, 1]]
         if i != segment or c != watched:  # surfaces of one observable share its stationary points
-            found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
+            if layout.departs[i] < RETURNS:
+                found = find_behind(functions, layout, i, c, z, p, room, turnings)
+            else:
+                found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
             segment, watched = i, c
         out[k] = interior_margin(functions, layout, k, found, z, p, room, turnings)
     at = interior.shape[0]
@@ -194,6 +224,8 @@ def ends_of(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
         first = functions[2](on, p, room.none, room.empty)
     else:
         first = functions[1](c, z[i, 0], z[i, 1:], p, room.none, room.empty)
+        if layout.departs[i] < RETURNS:
+            first = start_value(functions, layout, i, c, z, p, room)
     if to >= 0:
         return first, functions[2](to, p, room.none, room.empty)
     return first, functions[1](c, after[0], after[1:], p, room.none, room.empty)
@@ -218,7 +250,10 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
         layout.labels[k, 2],
         layout.labels[k, 3],
     )
-    found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
+    if layout.departs[i] < RETURNS:
+        found = find_behind(functions, layout, i, c, z, p, room, turnings)
+    else:
+        found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
     if found < 0:
         return -1, np.inf
     value, final = ends_of(functions, layout, k, z, p, room)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models import load_model
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.orbit.counts import TALLY
 from contfric.orbit.system import IntArray, mode_bounds
 
@@ -25,6 +25,10 @@ class SimulationEnd(str, Enum):
     HELD = "the mass stays at rest for ever: nothing releases it"
     IMPOSSIBLE = "events follow each other at once, and time does not go on"
     INFINITE = "the motion grew beyond all numbers"
+    QUIET = "the motion meets no surface any more: it has come to an equilibrium, or never changes"
+    CHATTER = (
+        "impacts follow each other faster and faster (chatter): infinitely many in finite time"
+    )
 
 
 class Tables(NamedTuple):
@@ -33,9 +37,9 @@ class Tables(NamedTuple):
     Attributes
     ----------
     observables : observable of each surface
-    bounds : whether a surface bounds a mode, shape (modes, surfaces)
+    bounds : whether a surface bounds a mode, shape (modes, surfaces); 2 if it has a reset
     following : mode after (mode, surface, signs of the other surfaces as bits); -1 if there is none
-    sliding : whether a mode slides on a surface
+    sliding : whether a mode slides on a surface; 2 if it may do so for long, without excitation
     lies_on : surfaces that a mode moves on, as bits
     """
 
@@ -122,7 +126,7 @@ def tables(model: Model) -> Tables:
     bounds = np.zeros((len(modes), len(surfaces)), dtype=np.int64)
     for mode, names in mode_bounds(model).items():
         for name in names:
-            bounds[modes.index(mode), surfaces.index(name)] = 1
+            bounds[modes.index(mode), surfaces.index(name)] = 1 + (name in model.reset_by_surface)
     codes = 1 << len(surfaces)
     following = np.full(len(modes) * len(surfaces) * codes, -1, dtype=np.int64)
     for (name, surface), target in model.transitions.items():
@@ -133,11 +137,23 @@ def tables(model: Model) -> Tables:
                 continue
             row = (modes.index(domain.mode) * len(surfaces) + k) * codes + code
             following[row] = modes.index(model.domain_by_name[target].mode)
+    for (name, surface), targets in model.targets.items():
+        if surface not in model.reset_by_surface:
+            continue
+        k, source = surfaces.index(surface), modes.index(model.domain_by_name[name].mode)
+        for code in range(codes):
+            for behind in map(model.domain_by_name.__getitem__, targets):
+                # behind a reset the signs of the mapped state tell the domain
+                if not code >> k & 1 and _matches(behind.signs, surfaces, k, code):
+                    row = (source * len(surfaces) + k) * codes + code
+                    following[row] = modes.index(behind.mode)
     return Tables(
         np.array([observables.index(s.observable) for s in model.surfaces], dtype=np.int64),
         bounds,
         following,
-        np.array([int(m.sliding) for m in model.modes], dtype=np.int64),
+        np.array(
+            [int(m.sliding) * (1 + int(model.autonomous)) for m in model.modes], dtype=np.int64
+        ),
         np.array([_surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
     )
 
@@ -160,14 +176,17 @@ def _matches(signs: object, surfaces: list[str], skipped: int, code: int) -> boo
     )
 
 
-def signs_at(model: Model, t: float, y: FloatArray, vector: FloatArray) -> dict[str, int]:
-    """Return the sign of (observable - level) for every surface at a state."""
+def signs_at(
+    model: Model, t: float, y: FloatArray, vector: FloatArray, within: float = 0.0
+) -> dict[str, int]:
+    """Return the sign of (observable - level) for every surface at a state; 0 within a distance."""
     flow, none, empty = model.flow, np.empty(0, dtype=np.int64), np.empty(0)
     names = [o.name for o in model.observables]
     signs = {}
     for k, surface in enumerate(model.surfaces):
         value = flow.observe(names.index(surface.observable), t, y, vector, none, empty)
-        signs[surface.name] = int(np.sign(value - flow.level(k, vector, none, empty)))
+        apart = value - flow.level(k, vector, none, empty)
+        signs[surface.name] = 0 if abs(apart) <= within else int(np.sign(apart))
     return signs
 
 
@@ -176,7 +195,7 @@ def start_of(
 ) -> tuple[int, int]:
     """Return (mode, surfaces that the start lies on and leaves, as bits) of an initial state."""
     signs = signs_at(model, t, y, vector)
-    name = domain or model.domain_at(signs)
+    name = domain or model.domain_at(signs) or _side_of_rates(model, t, y, vector, signs)
     if name is None or name not in model.domain_by_name:
         if domain is not None:
             raise ParameterError(
@@ -187,6 +206,29 @@ def start_of(
     surfaces = [s.name for s in model.surfaces]
     on = sum(1 << surfaces.index(k) for k in mode_bounds(model)[mode] if signs[k] == 0)
     return [m.name for m in model.modes].index(mode), on
+
+
+def _side_of_rates(
+    model: Model, t: float, y: FloatArray, vector: FloatArray, signs: dict[str, int]
+) -> str | None:
+    """Return the domain that a state on some surfaces goes on into: those that its rates lead to.
+
+    Any side of a transparent surface will do.
+    """
+    flow, none, empty = model.flow, np.empty(0, dtype=np.int64), np.empty(0)
+    observables, modes = [o.name for o in model.observables], [m.name for m in model.modes]
+
+    def enters(domain: Domain, surface: Surface) -> bool:
+        if signs[surface.name] != 0 or not model.cuts(surface.name):
+            return True
+        c, mode = observables.index(surface.observable), modes.index(domain.mode)
+        rate = float(flow.rate(mode, c, t, y, vector, none, empty))
+        return domain.signs[surface.name] * rate > 0.0
+
+    beside = [
+        d for d in model.domains if all(sign in (0, d.signs[name]) for name, sign in signs.items())
+    ]
+    return next((d.name for d in beside if all(enters(d, s) for s in model.surfaces)), None)
 
 
 def simulate(
@@ -286,13 +328,26 @@ def run(
     )
 
 
+#: Displacements that a start is looked for at where the region is one-sided, in half-widths of the model.
+_PLACES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
+
+
+def displaced(model: Model, vector: FloatArray) -> FloatArray:
+    """Return the initial state by default: displaced from rest, on the right side of walls."""
+    half_width: FloatArray = model.spread(model.mapping(vector))
+    y = np.zeros(len(model.states))
+    for place in _PLACES if model.resets else _PLACES[:1]:
+        y[0] = place * half_width[0]
+        signs = signs_at(model, 0.0, y, vector)
+        if model.domain_at(signs) or _side_of_rates(model, 0.0, y, vector, signs):
+            break
+    return y
+
+
 def _checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> FloatArray:
     if state is None:
         # away from rest, so that symmetric and asymmetric attractors can both be reached
-        half_width: FloatArray = model.spread(model.mapping(vector))
-        y = np.zeros(len(model.states))
-        y[0] = half_width[0]
-        return y
+        return displaced(model, vector)
     y = np.array(state, dtype=np.float64)
     if y.shape != (len(model.states),) or not np.all(np.isfinite(y)):
         raise ParameterError(

@@ -6,7 +6,8 @@ admissible) are
 
 * interior: between its joints a segment does not cross a surface that bounds its mode,
 * exit: it meets its exit surface from inside, with a rate that does not vanish,
-* joint: where it exits, the other observables are in the domain that the signature names.
+* joint: where it exits, the other observables are in the domain that the signature names,
+* entry: where it begins behind a reset, the observables that the reset changes are in its mode.
 
 Crossings of transparent surfaces inside a segment do not matter to the motion; they label it.
 
@@ -28,8 +29,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.begins import PLAIN, RETURNS, departures, entry_rows, first_entry
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN, Hold, holds_of
-from contfric.signature.holds import is_hold, mirror_exit
+from contfric.orbit.structure import (
+    exit_domains,
+    inside_sign,
+    mirror_mode,
+    mode_bounds,
+    mode_domains,
+)
+from contfric.signature.holds import is_hold
+
+__all__ = [
+    "PLAIN",
+    "RETURNS",
+    "IntArray",
+    "Layout",
+    "Margin",
+    "System",
+    "Test",
+    "Word",
+    "build_system",
+    "exit_domains",
+    "inside_sign",
+    "mirror_mode",
+    "mode_bounds",
+    "mode_domains",
+]
 
 IntArray = NDArray[np.int64]
 
@@ -43,14 +69,17 @@ class Layout(NamedTuple):
     observables : observable of each surface, shape (surfaces,)
     exit_signs : sign of the rate at which each exit is met (a hold is left), shape (N,); 0 if tangential
     interior : rows (segment, surface, sign) of the interior margins
-    joint : rows (segment, surface, sign) of the joint margins, at the segment's end
+    joint : rows (segment, surface, sign, 0) of the joint margins, at the segment's end, and of the entry
+        margins, at its beginning (1)
     labels : rows (segment, observable, surfaces that the segment starts and ends on, or -1)
     pins : surface that each hold starts on, shape (N,); -2 after a touch, -1 where there is no hold
-    departs : mode in which each hold is left, shape (N,); -1 where there is none
+    departs : mode in which each hold is left, shape (N,). Where there is no hold it says how the segment
+        begins: PLAIN, or as far below that as bit 0 if it begins on its exit surface (RETURNS), so that it
+        may shrink to nothing, and above it the surface of the reset that it begins behind, plus one
     lasting : segments that must last: holds after a stick, and that stick, shape (k,)
     held : all holds, which could be left at any time, shape (k,)
     closure : state matrix of the closure, shape (n, n)
-    turn : duration of one turn in periods of the excitation
+    turn : duration of one turn in periods of the excitation; 0 of an autonomous model
     rank : number of independent directions that survive one turn
     """
 
@@ -76,6 +105,7 @@ class Margin(str, Enum):
     INTERIOR = "interior"
     EXIT = "exit"
     JOINT = "joint"
+    ENTRY = "entry"
     LASTING = "lasting"
     HELD = "held"
 
@@ -122,41 +152,6 @@ class System:
 
 
 @cache
-def mode_bounds(model: Model) -> dict[str, tuple[str, ...]]:
-    """Surfaces that bound each mode: those through which a transition changes the mode."""
-    bounds: dict[str, set[str]] = {mode.name: set() for mode in model.modes}
-    for (name, surface), target in model.transitions.items():
-        mode = model.domain_by_name[name].mode
-        if model.domain_by_name[target].mode != mode:
-            bounds[mode].add(surface)
-    return {
-        mode: tuple(s.name for s in model.surfaces if s.name in found)
-        for mode, found in bounds.items()
-    }
-
-
-def mode_domains(model: Model, mode: str) -> list[str]:
-    """Return the domains of one mode."""
-    return [d.name for d in model.domains if d.mode == mode]
-
-
-def inside_sign(model: Model, mode: str, surface: str) -> int:
-    """Return the sign of (observable - level) inside a mode, 0 if the mode lies on both sides."""
-    signs = {model.domain_by_name[d].signs[surface] for d in mode_domains(model, mode)}
-    return signs.pop() if len(signs) == 1 else 0
-
-
-def exit_domains(model: Model, mode: str, surface: str, following: str) -> list[str]:
-    """Return the domains of a mode from which a surface leads into the following mode."""
-    return [
-        name
-        for name in mode_domains(model, mode)
-        if (target := model.transitions.get((name, surface)))
-        and model.domain_by_name[target].mode == following
-    ]
-
-
-@cache
 def build_system(
     model: Model, word: Word, periods: int, half: bool = False, domains: tuple[str, ...] = ()
 ) -> System:
@@ -180,7 +175,9 @@ def build_system(
         _segment_domains(model, mode, exit_, _leads_to(i, after, holds), domains[i : i + 1])
         for i, ((mode, exit_), after) in enumerate(zip(word, following, strict=True))
     ]
-    interior, joint, tests = _margins(model, word, inside, bool(domains), holds)
+    entered = [first_entry(model, word, half), *(exit_ for _, exit_ in word[:-1])]
+    entries = entry_rows(model, word, entered, domains)
+    interior, joint, tests = _margins(model, word, inside, bool(domains), holds, entries)
     exits = [_exit_surface(i, exit_, holds) for i, (_, exit_) in enumerate(word)]
     held = {hold.segment: hold for hold in holds}
     symmetry = model.symmetry
@@ -196,29 +193,27 @@ def build_system(
         joint=joint,
         labels=_label_rows(model, word, half, bool(domains), holds),
         pins=np.array([_pin(held.get(i), surfaces) for i in range(len(word))], dtype=np.int64),
-        departs=np.array(
-            [names.index(held[i].departs) if i in held else -1 for i in range(len(word))],
-            dtype=np.int64,
-        ),
+        departs=departures(model, word, exits, entered, half, held),
         lasting=np.array([i for i, _ in _lasting(word, holds)], dtype=np.int64),
         held=np.array([hold.segment for hold in holds], dtype=np.int64),
         closure=symmetry.array() if half and symmetry else np.eye(n),
-        turn=float(periods * symmetry.fraction) if half and symmetry else float(periods),
-        rank=min(model.mode_by_name[mode].rank for mode, _ in word),
+        turn=_turn(model, periods, half),
+        # a shift in time is no disturbance of an autonomous orbit
+        rank=min(model.mode_by_name[mode].rank for mode, _ in word) - int(model.autonomous),
     )
     return System(model, word, periods, half, layout, tests, domains, holds)
+
+
+def _turn(model: Model, periods: int, half: bool) -> float:
+    if model.autonomous:
+        return 0.0
+    return float(periods * (model.symmetry.fraction if half and model.symmetry else 1.0))
 
 
 def _mode_after(model: Model, word: Word, half: bool) -> str:
     if not half:
         return word[0][0]
     return mirror_mode(model)[word[0][0]]
-
-
-@cache
-def mirror_mode(model: Model) -> dict[str, str]:
-    """Image of each mode under the symmetry."""
-    return {d.mode: model.domain_by_name[model.mirror_domain[d.name]].mode for d in model.domains}
 
 
 def _segment_domains(
@@ -275,7 +270,12 @@ def _surface_observables(model: Model) -> IntArray:
 
 
 def _margins(
-    model: Model, word: Word, inside: list[list[str]], full: bool, holds: tuple[Hold, ...]
+    model: Model,
+    word: Word,
+    inside: list[list[str]],
+    full: bool,
+    holds: tuple[Hold, ...],
+    entries: list[tuple[int, ...]],
 ) -> tuple[IntArray, IntArray, tuple[Test, ...]]:
     names = [s.name for s in model.surfaces]
     interior: list[tuple[int, ...]] = []
@@ -295,18 +295,19 @@ def _margins(
             if surface == exit_ or pinned or len(signs) != 1:
                 continue
             if (sign := signs.pop()) != 0:
-                joint.append((i, names.index(surface), sign))
+                joint.append((i, names.index(surface), sign, 0))
     tests = (
         *(Test(Margin.INTERIOR, i, names[k]) for i, k, _ in interior),
         *(
             Test(Margin.EXIT, i, _exit_surface(i, exit_, holds))
             for i, (_, exit_) in enumerate(word)
         ),
-        *(Test(Margin.JOINT, i, names[k]) for i, k, _ in joint),
+        *(Test(Margin.JOINT, i, names[k]) for i, k, *_ in joint),
+        *(Test(Margin.ENTRY, i, names[k]) for i, k, *_ in entries),
         *(Test(Margin.LASTING, i, surface) for i, surface in _lasting(word, holds)),
         *(Test(Margin.HELD, h.segment, h.leaves) for h in holds),
     )
-    return _rows(interior), _rows(joint), tests
+    return _rows(interior), _rows([*joint, *entries], 4), tests
 
 
 def _lasting(word: Word, holds: tuple[Hold, ...]) -> list[tuple[int, str]]:
@@ -334,13 +335,10 @@ def _label_rows(
     if full:
         return _rows([], 4)
     surfaces = [s.name for s in model.surfaces]
-    first_entry = word[-1][1]
-    if half and model.symmetry:
-        inverse = {image: name for name, image in model.symmetry.surfaces.items()}
-        first_entry = mirror_exit(first_entry, inverse)
+    first = first_entry(model, word, half)
     rows: list[tuple[int, ...]] = []
     for i, (mode, _) in enumerate(word):
-        entry = word[i - 1][1] if i else first_entry
+        entry = word[i - 1][1] if i else first
         for c, observable in enumerate(model.observables):
             clear = [
                 s.name

@@ -36,13 +36,17 @@ class StateRoom(NamedTuple):
 
 
 #: How a simulation ended.
-ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE = range(5)
-#: A sliding mode that is not left within this many periods is never left; a slide gets far more.
+ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE, QUIET, CHATTER = range(7)
+#: A sliding mode that is not left within this many periods of the excitation is never left; a slide, and
+#: any mode of an autonomous model, gets far more (periods, or units of time).
 HOLD_PERIODS, SLIDE_PERIODS = 1.001, 1e4
 
 #: Events within this share of a period follow each other at once; more of them in a row than this do
 #: not come to an end (a stop, a release and a reversal may fall together, twice).
 NO_TIME, MOST_AT_ONCE = 1e-12, 16
+#: The same where impacts chatter: a mass that bounces to less than rounding of its displacement (1e-16)
+#: is in flight for the root of that, and never for less.
+NO_FLIGHT = 1e-7
 #: A state this large grows for ever (negative damping, or resonance without any): its square is still
 #: far from overflow, and its events are still exact.
 TOO_LARGE = 1e100
@@ -91,6 +95,12 @@ def first_hit(functions, tables, mode, on, t, y, p, longest, room):  # type: ign
 
 
 @helper
+def never_left(tables, mode):  # type: ignore[no-untyped-def]
+    """Return how a motion ends in a mode that it never leaves."""
+    return HELD if tables.sliding[mode] != 0 else QUIET
+
+
+@helper
 def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: ignore[no-untyped-def]
     """Follow a trajectory; see :func:`simulate`."""
     observables, following = tables.observables, tables.following
@@ -102,16 +112,19 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
         cycle = int(math.floor(t / period))
         t -= cycle * period
     first_cycle, first_time = cycle, t
-    event, at_once = 0, 0
+    event, at_once, struck, at_most = 0, 0, False, NO_TIME
+    for k in range(observables.shape[0]):
+        if tables.bounds[mode, k] == 2:  # a wall bounds every mode
+            at_most = NO_FLIGHT
     while event < joints.shape[0]:
         left = (periods - (cycle - first_cycle)) * unit - (t - first_time)
         if period <= 0.0:
             left = periods - (t - first_time)
-        allowance = (HOLD_PERIODS if tables.sliding[mode] else SLIDE_PERIODS) * unit
+        allowance = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * unit
         tau, surface = first_hit(functions, tables, mode, on, t, y, p, min(left, allowance), room)
         if surface < 0:
             if left > allowance:
-                return HELD, event, mode, cycle, t
+                return never_left(tables, mode), event, mode, cycle, t
             functions[0](mode, t, y, left, p, none, after, room.nothing)
             copy_state(after, y)
             t += left
@@ -128,21 +141,29 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
         for j in range(y.shape[0]):
             if not abs(y[j]) < TOO_LARGE:
                 return INFINITE, event, mode, cycle, t
+        reset = tables.bounds[mode, surface] == 2
+        if reset:  # rows keep the state before it, as the joints of orbits do
+            copy_state(y, rows.states[event])
+            functions[7](surface, t, rows.states[event], p, none, y, room.nothing)
         code = sign_code(functions, observables, surface, t, y, p, none, empty)
         target = following[
             (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code
         ]
-        at_once = at_once + 1 if tau <= NO_TIME * unit else 0
+        at_once = at_once + 1 if tau <= at_most * unit else 0
+        struck = reset or (struck and at_once > 0)
         if at_once > MOST_AT_ONCE:
-            return IMPOSSIBLE, event, mode, cycle, t
+            return (CHATTER if struck else IMPOSSIBLE), event, mode, cycle, t
         on = 1 << surface
+        if reset and target < 0:
+            return IMPOSSIBLE, event, mode, cycle, t
         if target < 0:
             continue  # nothing leads there: the surface is touched and left to the same side
         joints[event, 0] = mode
         joints[event, 1] = surface
         rows.cycles[event] = cycle
         rows.times[event] = t
-        copy_state(y, rows.states[event])
+        if not reset:
+            copy_state(y, rows.states[event])
         on |= tables.lies_on[mode]
         mode = target
         event += 1
