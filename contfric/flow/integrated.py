@@ -9,12 +9,18 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.bundle import Bundle
 from contfric.flow.dop853 import STAGES
+from contfric.flow.radau import IMPLICIT_STAGES
+from contfric.flow.stiffness import automatic, automatic_probe, implicit, implicit_probe
 from contfric.flow.stepping import explicit, explicit_probe, first_step, next_step, settle
 from contfric.flow.variations import begin, make_room
 
 
-def integrated_motion(field, observe, rate, period, scale, relative=1e-12, absolute=1e-12, stiff=False):
-    return Bundle(field=field, observe=observe, rate=rate, period=period, scale=scale, relative=relative, absolute=absolute, attempt=explicit, probe=explicit_probe, implicit=0)
+METHODS = {"explicit": (explicit, explicit_probe, 0), "implicit": (implicit, implicit_probe, IMPLICIT_STAGES), "automatic": (automatic, automatic_probe, IMPLICIT_STAGES)}
+
+
+def integrated_motion(field, observe, rate, period, scale, relative=1e-12, absolute=1e-12, method="explicit"):
+    attempt, probe, implicit = METHODS[method]
+    return Bundle(field=field, observe=observe, rate=rate, period=period, scale=scale, relative=relative, absolute=absolute, attempt=attempt, probe=probe, implicit=implicit)
 
 
 @helper
