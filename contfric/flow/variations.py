@@ -115,7 +115,7 @@ def begin(motion, y0, p, which, room):  # type: ignore[no-untyped-def]
 
 
 #: Deepest bisection of a step in the search of roots: down to the resolution of time.
-DEPTH = 64
+DEPTH = 32
 #: Numbers that the step control remembers.
 CONTROLS = 10
 
