@@ -50,7 +50,7 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.bundle import Bundle
 from contfric.flow.crossing import all_turnings, first_hit
-from contfric.flow.dop853 import STAGES
+from contfric.flow.dop853 import POWER, STAGES
 from contfric.flow.radau import IMPLICIT_STAGES
 from contfric.flow.stepping import explicit, explicit_probe, first_step, next_step, settle
 from contfric.flow.stiffness import automatic, automatic_probe, implicit, implicit_probe
@@ -112,6 +112,7 @@ def integrated_motion(
         attempt=attempt,
         probe=probe,
         stages=stages,
+        looseness=(float(relative) / 1e-12) ** (1.0 / POWER),
     )
 
 

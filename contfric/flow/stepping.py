@@ -24,8 +24,8 @@ from contfric.flow.variations import slope
 
 #: What the control remembers: the next step (positive), the last error, the power of the step with which
 #: the error falls, the kind of the method (0 explicit, 1 implicit), steps tried so far, whether the
-#: Jacobian is that of the start, the last implicit step (0: none), steps at the limit of stability, how many
-#: of them are borne, steps since the method changed.
+#: Jacobian is that of the start, the last implicit step (0: none), steps held back by stiffness, how patiently
+#: that is borne, steps since the method changed.
 NEXT, BEFORE, FALLS, KIND, TRIED, FRESH, REMEMBERED, LIMITED, PATIENCE, SINCE = range(10)
 
 #: Most steps tried in one segment. A segment takes 1 to 1e4 of them; one that takes more is stiffer than its
