@@ -47,7 +47,7 @@ class BundleType(types.Opaque):  # type: ignore[misc]
 register_model(BundleType)(models.OpaqueModel)
 
 
-@typeof_impl.register(Bundle)
+@typeof_impl.register(Bundle)  # type: ignore[untyped-decorator]
 def _typeof(bundle: Bundle, context: Any) -> BundleType:
     return BundleType(bundle)
 
@@ -65,12 +65,12 @@ class _Members(AttributeTemplate):  # type: ignore[misc]
         return _number(member) or types.Dispatcher(member)
 
 
-@lower_constant(BundleType)
+@lower_constant(BundleType)  # type: ignore[untyped-decorator]
 def _no_value(context: Any, builder: Any, bundle: BundleType, value: Bundle) -> Any:
     return context.get_dummy_value()
 
 
-@lower_getattr_generic(BundleType)
+@lower_getattr_generic(BundleType)  # type: ignore[untyped-decorator]
 def _member(context: Any, builder: Any, bundle: BundleType, value: Any, name: str) -> Any:
     member = bundle.bundle.members[name]
     number = _number(member)

@@ -121,7 +121,12 @@ def first_in_step(motion, mode, c, target, sign, multiple, t, a, h, left, right,
     q, q1, q2 = left
     depth, probes = 1, 0
     while depth > 0:
-        b, r, r1, r2 = nodes[depth - 1, 0], nodes[depth - 1, 1], nodes[depth - 1, 2], nodes[depth - 1, 3]
+        b, r, r1, r2 = (
+            nodes[depth - 1, 0],
+            nodes[depth - 1, 1],
+            nodes[depth - 1, 2],
+            nodes[depth - 1, 3],
+        )
         length = b - a
         ends = coefficients(sign * q, sign * q1, sign * q2, sign * r, sign * r1, sign * r2, length)
         outcome, low, high, here = scan_values(ends, error_of(ends), multiple)
@@ -250,7 +255,12 @@ def turnings_in_step(motion, mode, c, t, h, done, span, left, right, p, room, co
     a, q, q1, q2 = 0.0, left[0], left[1], left[2]
     depth, probes = 1, 0
     while depth > 0:
-        b, r, r1, r2 = nodes[depth - 1, 0], nodes[depth - 1, 1], nodes[depth - 1, 2], nodes[depth - 1, 3]
+        b, r, r1, r2 = (
+            nodes[depth - 1, 0],
+            nodes[depth - 1, 1],
+            nodes[depth - 1, 2],
+            nodes[depth - 1, 3],
+        )
         length = b - a
         ends = coefficients(q, q1, q2, r, r1, r2, length)
         at_start = a == 0.0 and done == 0.0 and abs(q1) <= AT_START * (1.0 + abs(q2))

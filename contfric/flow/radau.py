@@ -27,7 +27,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from contfric.compiled import helper
-from contfric.models.definition import FloatArray
+from contfric.flow.variations import FloatArray
 
 #: Number of stages: of 3, 5 and 7 the fastest at a tolerance of 1e-12 (docs/integration.md).
 IMPLICIT_STAGES = 7
@@ -227,7 +227,9 @@ def solve_stages(motion, mode, t, h, p, which, room):  # type: ignore[no-untyped
             if not math.isfinite(size):
                 return False
             share = size / before  # 0 at the first correction
-            if size <= _LEFT or (iteration > 0 and share < 1.0 and size * share <= _LEFT * (1.0 - share)):
+            if size <= _LEFT or (
+                iteration > 0 and share < 1.0 and size * share <= _LEFT * (1.0 - share)
+            ):
                 return True
             if share > _SLOW:
                 if size <= _ROUNDING:

@@ -32,7 +32,7 @@ from contfric.flow.stepping import (
 )
 
 #: Explicit steps above this over the spectral radius may be held back by what decays; at a tolerance of 1e-12.
-_HELD_BACK = 0.25
+_HELD_BACK = 0.17
 #: Implicit steps below this over the spectral radius do not pay; at a tolerance of 1e-12.
 _MILD = 1.0
 #: How many explicit steps in a row are held back before an implicit one is tried, how much longer that one is, how many

@@ -18,9 +18,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contfric.compiled import allocating_helper, helper
-from contfric.models.definition import FloatArray
+
+FloatArray = NDArray[np.float64]
 
 
 class Room(NamedTuple):
