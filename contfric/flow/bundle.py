@@ -1,9 +1,9 @@
 """Helpers handed to helpers, in a way that numba can cache.
 
-A compiled function that takes another one as an argument is specialised for it, but numba then stores the
-address of the Python object with the code, and such code is not cached on disk. A bundle carries its
-helpers (and constants) in its *type*: it has no value at run time, so nothing is stored, and the calls are
-resolved, and inlined where that pays, when the kernel is compiled.
+A compiled function that takes another one as an argument is specialised for it, but numba then stores
+the address of the Python object with the code, and such code is not cached on disk. A bundle carries its
+helpers (and constants) in its *type*: it has no value at run time, so nothing is stored, and the calls
+are resolved, and inlined where that pays, when the kernel is compiled.
 """
 
 from __future__ import annotations

@@ -94,7 +94,8 @@ _ROWS = {
         10: 0.6433927460157636,
     },
 }
-#: Weights of the stages, those of the estimate of order 5, and of the solution that is compared at order 3.
+#: Weights of the stages, those of the estimate of order 5, and of the solution that is compared at order
+#: 3.
 _WEIGHTS = {
     0: 0.054293734116568765,
     5: 4.450312892752409,

@@ -1,14 +1,15 @@
 """Which method where: explicit, implicit, or whichever is cheaper at the place.
 
-The spectral radius of the field's Jacobian, ``rho = |J^8|^(1/8)`` in the scales of the states, is known at
-the start of each step. What oscillates with rho is resolved by explicit steps of 0.15/rho at a tolerance of 1e-12. Where
-something decays with rho that no longer moves by itself (it is slaved to the others), accuracy would allow far
-longer steps; but long before the limit of stability (6/rho) the stages lose their order, and steps stay at 0.2/rho
-to 3/rho. An implicit step costs about as much as seven explicit ones. So
+The spectral radius of the field's Jacobian, ``rho = |J^8|^(1/8)`` in the scales of the states, is known
+at the start of each step. What oscillates with rho is resolved by explicit steps of 0.15/rho at a
+tolerance of 1e-12. Where something decays with rho that no longer moves by itself (it is slaved to the
+others), accuracy would allow far longer steps; but long before the limit of stability (6/rho) the stages
+lose their order, and steps stay at 0.2/rho to 3/rho. An implicit step costs about as much as seven
+explicit ones. So
 
 * explicit steps that stay above 0.25/rho for a while are followed by implicit ones;
-* implicit steps that do not become longer than 1/rho are followed by explicit ones, and the next trial waits four
-  times as long.
+* implicit steps that do not become longer than 1/rho are followed by explicit ones, and the next trial
+  waits four times as long.
 
 All these lengths grow with the tolerance like the steps, with its eighth root.
 """
@@ -31,12 +32,13 @@ from contfric.flow.stepping import (
     explicit_probe,
 )
 
-#: Explicit steps above this over the spectral radius may be held back by what decays; at a tolerance of 1e-12.
+#: Explicit steps above this over the spectral radius may be held back by what decays; at a tolerance of
+#: 1e-12.
 _HELD_BACK = 0.17
 #: Implicit steps below this over the spectral radius do not pay; at a tolerance of 1e-12.
 _MILD = 1.0
-#: How many explicit steps in a row are held back before an implicit one is tried, how much longer that one is, how many
-#: steps it gets to grow, and by how much patience grows after a trial that did not pay.
+#: How many explicit steps in a row are held back before an implicit one is tried, how much longer that
+#: one is, how many steps it gets to grow, and by how much patience grows after a trial that did not pay.
 _PATIENCE, _LONGER, _TRIALS, _GROWTH = 5.0, 4.0, 4.0, 4.0
 
 

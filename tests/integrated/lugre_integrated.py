@@ -1,8 +1,9 @@
 """A mass with LuGre friction as a flow by numerical integration.
 
 Equations 7 to 9 of the article: ``x'' + x = cos(Omega t) - F``, ``F = sigma0 z + sigma1 z' + c v`` and
-``z' = v - sigma0 |v| z / g(v)``, ``g = S + (S0 - S) exp(-|v| / vS)`` (alpha = 1). The field has a kink at v = 0:
-mode 0 moves with v > 0, mode 1 with v < 0, and each is smooth beyond. Observables: 0 is v, 1 is z.
+``z' = v - sigma0 |v| z / g(v)``, ``g = S + (S0 - S) exp(-|v| / vS)`` (alpha = 1). The field has a kink
+at v = 0: mode 0 moves with v > 0, mode 1 with v < 0, and each is smooth beyond. Observables: 0 is v, 1
+is z.
 """
 
 from __future__ import annotations

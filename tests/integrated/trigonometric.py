@@ -1,7 +1,7 @@
 """A point at rest that is watched by a trigonometric sum: what an observable can be at its worst.
 
-``q(t, y) = y + p_0 + sum_k p_(2k-1) cos(k t) + p_(2k) sin(k t)``, k = 1 to 4; mode 0 holds y, mode 1 lets it
-decay.
+``q(t, y) = y + p_0 + sum_k p_(2k-1) cos(k t) + p_(2k) sin(k t)``, k = 1 to 4; mode 0 holds y, mode 1
+lets it decay.
 """
 
 from __future__ import annotations
