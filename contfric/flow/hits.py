@@ -136,6 +136,10 @@ def first_hit(motion, mode, c, target, on, t0, y0, dt_max, p, room, y1):  # type
         write(y0, y1)
         return 0.0
     sign, multiple = leaving(left, on)
+    side = motion.side(mode, c) if on else 0.0
+    if sign * side < 0.0:  # it leaves the level to where the mode does not live
+        write(y0, y1)
+        return 0.0
     done = 0.0
     while done < dt_max:
         t = t0 + done
@@ -149,6 +153,9 @@ def first_hit(motion, mode, c, target, on, t0, y0, dt_max, p, room, y1):  # type
                 begins = _FLAT * h
                 left = probed(motion, mode, c, target, t, begins, p, room)
                 sign = 1.0 if left[0] > 0.0 else -1.0
+                if sign * side < 0.0:
+                    write(y0, y1)
+                    return 0.0
             at = first_in_step(
                 motion, mode, c, target, sign, multiple, t, begins, h, left, right, p, room
             )
