@@ -34,7 +34,7 @@ _FLAT = 0.125
 
 @helper
 def refine_hit(motion, mode, c, target, sign, t, h, low, high, at, p, room):  # type: ignore[no-untyped-def]
-    """Return the root in a bracket behind which the observable changes sign; the state is in ``room.trial``."""
+    """Return the root in a bracket; the state there is in ``room.trial``."""
     n = room.scales.shape[0]
     for _ in range(100):  # bisection alone needs 60
         q, q1, _ = probed(motion, mode, c, target, t, at, p, room)

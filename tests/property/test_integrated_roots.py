@@ -1,7 +1,7 @@
 """First roots and stationary points of observables that are as wild as they can be, grazing ones above all.
 
-A trigonometric sum of four harmonics is watched from a state at rest. Its stationary points are eigenvalues (of the
-companion matrix); between two of them there is at most one root.
+A trigonometric sum of four harmonics is watched from a state at rest. Its stationary points are
+eigenvalues (of the companion matrix); between two of them there is at most one root.
 """
 
 from __future__ import annotations
@@ -46,8 +46,9 @@ def stationary(a):
 
 def first_root(a, nodes, values):
     """First sign change between stationary points, bisected."""
-    for low, high, before, after in zip(nodes, nodes[1:], values, values[1:], strict=False):
-        if before * after < 0.0:
+    for i, before in enumerate(values[:-1]):
+        if before * values[i + 1] < 0.0:
+            low, high = nodes[i], nodes[i + 1]
             for _ in range(60):
                 middle = 0.5 * (low + high)
                 inside = sums(a, np.array([middle]))[0][0] * before > 0.0
