@@ -30,7 +30,7 @@ from contfric.compiled import helper
 from contfric.flow.collocation import collocation_matrix, radau_nodes, values_at_start
 from contfric.flow.elimination import lu, lu_solve
 
-#: Number of stages: of 3, 5 and 7 the fastest at a tolerance of 1e-12 (docs/integration.md).
+#: Number of stages: seven are faster than five from tolerances of 1e-9 on (docs/integration.md).
 IMPLICIT_STAGES = 7
 #: Most iterations of Newton's method with one matrix, and most matrices in a step.
 _ITERATIONS, _MATRICES = 8, 3
