@@ -65,7 +65,12 @@ def start_search(motion, mode, c, target, t0, y0, left, p, room):  # type: ignor
     """Begin the integration of state and observable; return the node at the start."""
     n = y0.shape[0]
     begin(motion, y0, p, room.none, room)
-    room.start[n] = motion.observe(c, t0, y0, p, room.none, room.empty)
+    room.start[n] = motion.observe(c, t0, y0, p, room.none, room.grad)
+    size = 0.0
+    for j in range(n):
+        size += abs(room.grad[1 + j]) * room.scales[j]
+    # what depends on time alone has the scale 1
+    room.allowed[n] = motion.absolute * (size if size > 0.0 else 1.0)
     first_step(motion, mode, c, t0, left, p, room.none, room)
     return node(motion, mode, c, target, t0, room.start, room.slopes[0], p, room)
 

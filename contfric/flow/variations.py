@@ -102,8 +102,6 @@ def begin(motion, y0, p, which, room):  # type: ignore[no-untyped-def]
         room.start[i] = y0[i]
         room.scales[i] = motion.scale(i, p)
         allowed[i] = motion.absolute * room.scales[i]
-    if columns == 0 and allowed.shape[0] > n:
-        allowed[n] = motion.absolute
     for i in range(n if columns > 0 else 0):
         for j in range(columns):
             k = n + i * columns + j

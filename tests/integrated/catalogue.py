@@ -5,8 +5,7 @@ that move by themselves. Observables: 0 is x, 1 is x', 2 is a trigonometric sum 
 
     q(t, y) = x + a_0 + sum_k a_(2k-1) cos(k t) + a_(2k) sin(k t),      k = 1 to 4,
 
-which is all that an observable can be. Parameters: mu, the scale of the states (with ``relative = 0`` it
-is the absolute tolerance), a_0 to a_8.
+which is all that an observable can be. Parameters: mu, the absolute tolerance, a_0 to a_8.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from contfric.flow.integrated import (
     integrated_turning,
 )
 
-MU, SCALE, FIRST = 0, 1, 2
+MU, TOLERANCE, FIRST = 0, 1, 2
 OSCILLATOR, REST = range(2)
 HARMONICS = 4
 
@@ -101,14 +100,11 @@ def period_of(p, which, grad):
 
 @helper
 def scale_of(i, p):
-    return p[SCALE]
+    return p[TOLERANCE]
 
 
+#: The scale of the states is the tolerance, so that one kernel serves all tolerances.
 MOTION = integrated_motion(
-    field=field, observe=value_of, rate=rate_of, period=period_of, scale=scale_of
-)
-#: With the scale as the tolerance, so that one kernel serves all tolerances.
-BY_SCALE = integrated_motion(
     field=field,
     observe=value_of,
     rate=rate_of,
@@ -122,11 +118,6 @@ BY_SCALE = integrated_motion(
 @kernel(flow_signature)
 def flow(mode, t0, y0, dt, p, which, y1, jac):
     integrated_flow(MOTION, mode, t0, y0, dt, p, which, y1, jac)
-
-
-@kernel(flow_signature)
-def flow_by_scale(mode, t0, y0, dt, p, which, y1, jac):
-    integrated_flow(BY_SCALE, mode, t0, y0, dt, p, which, y1, jac)
 
 
 @kernel(hit_signature)

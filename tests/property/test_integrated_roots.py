@@ -80,7 +80,7 @@ def test_first_root_and_stationary_points(rest, offset, grazes, which, miss, t0,
     every = (turn[None, :] + 2.0 * math.pi * np.arange(-1, 4)[:, None]).ravel()
     assume(min(np.abs(every - t0).min(), np.abs(every - t0 - dt).min()) > 1e-6)
     inside = np.sort(every[(every > t0) & (every < t0 + dt)])
-    p = np.array([0.0, 1.0, *a])
+    p = np.array([0.0, 1e-12, *a])
 
     times, values = np.empty(64), np.empty(64)
     n = turning(REST, SUM, t0, np.zeros(2), dt, p, times, values)
