@@ -11,7 +11,7 @@ from contfric.errors import NotationError, ParameterError, did_you_mean
 from contfric.models import Model, load_model
 from contfric.signature.library import SUFFIXES, signature_path
 from contfric.signature.notation import Signature, split_segments, walk_fault
-from contfric.signature.yaml_lines import Address, LocatedYaml, read_yaml
+from contfric.yaml_lines import Address, LocatedYaml, read_yaml
 
 SignatureLike: TypeAlias = str | Path | Signature
 

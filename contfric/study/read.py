@@ -18,7 +18,7 @@ from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.signature import Signature, load_signature
-from contfric.signature.yaml_lines import LocatedYaml, read_yaml
+from contfric.yaml_lines import LocatedYaml, read_yaml
 from contfric.study.drawings import Drawing, drawings_of
 from contfric.study.explain_error import fail_with
 from contfric.study.library import SUFFIXES, study_path
