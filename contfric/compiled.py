@@ -67,6 +67,9 @@ period_signature = f8(vector, indices, vector)
 #: rate(mode, c, t, y, p, which, grad): rate of observable c along a mode; ``grad`` (1 + n + len(which))
 #: holds its derivatives with respect to t, y and the parameters ``which``; not filled if empty.
 rate_signature = f8(i8, i8, f8, vector, vector, indices, vector)
+#: reset(k, t, y, p, which, y1, jac): state behind the reset at surface k; ``jac`` (n, 1 + n + len(which))
+#: holds its derivatives with respect to t, y and the parameters ``which``; not filled if it is empty.
+reset_signature = types.void(i8, f8, vector, vector, indices, vector, matrix)
 
 FlowType = types.FunctionType(flow_signature)
 ObserveType = types.FunctionType(observe_signature)
@@ -75,6 +78,7 @@ TurningType = types.FunctionType(turning_signature)
 HitType = types.FunctionType(hit_signature)
 PeriodType = types.FunctionType(period_signature)
 RateType = types.FunctionType(rate_signature)
+ResetType = types.FunctionType(reset_signature)
 
 
 class Kernel:

@@ -34,12 +34,10 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.system import IntArray
 from contfric.orbit.trajectory import (
     HELD,
-    HOLD_PERIODS,
     IMPOSSIBLE,
     INFINITE,
     MOST_AT_ONCE,
     NO_TIME,
-    SLIDE_PERIODS,
     TOO_LARGE,
     StateRoom,
     copy_state,
@@ -106,7 +104,7 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
     for j in range(y.shape[0]):
         walk.start[1 + j] = y[j]
     duration, turns = 0.0, 0
-    longest = (HOLD_PERIODS if tables.sliding[mode] else SLIDE_PERIODS) * period
+    longest = tables.longest[mode] * period
     while True:
         tau, surface = first_hit(functions, tables, mode, on, t, y, p, longest, room)
         if surface < 0:  # a slide that is never left would be an error

@@ -78,7 +78,7 @@ def _branch(
         columns["joints"],
         columns["arc"],
         columns["labels"],
-        columns["mu"] if settings.stability else None,
+        columns["mu"][:, : orbit.model.directions] if settings.stability else None,
         listed,
         ends,
     )

@@ -29,6 +29,7 @@ from contfric.orbit.equations import FunctionsType, LayoutType, close_chain
 from contfric.orbit.monitor import (
     count_margins,
     crossings,
+    entry_margin,
     find_turnings,
     held_margin,
     interior_margin,
@@ -73,7 +74,7 @@ def margin_value(functions, layout, index, z, p, room):  # type: ignore[no-untyp
     if index < first:
         i, c = layout.interior[index, 0], layout.observables[layout.interior[index, 1]]
         equations, turnings = room.equations, room.turnings
-        found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
+        found = find_turnings(functions, layout, i, c, z, p, equations, turnings)
         return interior_margin(functions, layout, index, found, z, p, equations, turnings)
     if index < first + count:
         sign = layout.exit_signs[index - first]
@@ -82,6 +83,9 @@ def margin_value(functions, layout, index, z, p, room):  # type: ignore[no-untyp
     if index < layout.joint.shape[0]:
         return joint_margin(functions, layout, index, z, p, room.equations)
     index -= layout.joint.shape[0]
+    if index < layout.after.shape[0]:
+        return entry_margin(functions, layout, index, z, p, room.equations)
+    index -= layout.after.shape[0]
     if index < layout.lasting.shape[0]:
         return lasting_margin(layout, index, z, room.equations)
     index -= layout.lasting.shape[0]

@@ -45,7 +45,8 @@ class Branch:
     labels : ndarray, shape (k, labels)
         Codes of the transparent surfaces crossed; they change at T.
     turn_multipliers : ndarray or None, shape (k, n)
-        Multipliers of one turn; None if stability was not asked for.
+        Multipliers of one turn, of an autonomous model without the trivial 1, shape (k, n - 1); None if
+        stability was not asked for.
     bifurcations : tuple of Bifurcation
         In the order of the branch.
     ends : (End, End)
@@ -90,6 +91,11 @@ class Branch:
         columns = {n: np.full(len(self), v) for n, v in self.model.mapping(self.vector).items()}
         columns[self.parameter] = self.values
         return columns
+
+    @property
+    def period(self) -> FloatArray:
+        """Duration of the orbit at each point, shape (k,)."""
+        return np.array([orbit.period for orbit in self])
 
     @cached_property
     def name(self) -> str:
@@ -139,6 +145,8 @@ class Branch:
     def stops(self) -> FloatArray:
         """Displacements at the stops, shape (k, stops)."""
         surface = self.model.stop_surface
+        if not self.model.surface_by_name[surface].switching:
+            return _padded([orbit.stops for orbit in self])
         x = self.joints[:, :, 1]
         closed = self.joints[:, 0, 1:] @ self.system.layout.closure.T
         ends = np.concatenate([x[:, 1:], closed[:, :1]], axis=1)
@@ -152,12 +160,12 @@ class Branch:
     @property
     def x_max(self) -> FloatArray:
         """Largest displacement at each point, shape (k,)."""
-        return np.asarray(self.stops.max(axis=1))
+        return np.asarray(np.nanmax(self.stops, axis=1, initial=-np.inf))
 
     @property
     def x_min(self) -> FloatArray:
         """Smallest displacement at each point, shape (k,)."""
-        return np.asarray(self.stops.min(axis=1))
+        return np.asarray(np.nanmin(self.stops, axis=1, initial=np.inf))
 
     @property
     def asymmetry(self) -> FloatArray:
@@ -186,6 +194,8 @@ class Branch:
 
     def _period_shift(self) -> FloatArray:
         assert self.model.symmetry is not None
+        if self.model.autonomous:
+            return np.zeros(len(self))
         fraction = self.model.symmetry.fraction
         return np.array([fraction * orbit.period / orbit.periods for orbit in self])
 
@@ -198,6 +208,8 @@ class Branch:
         import pandas as pd
 
         columns: dict[str, Any] = dict(self.params)
+        if self.model.autonomous:
+            columns["period"] = self.period
         columns |= {"x_max": self.x_max, "x_min": self.x_min, "psi": self.asymmetry}
         columns |= {f"stop_{k + 1}": x for k, x in enumerate(self.stops.T)}
         if self.stable is not None:
@@ -216,6 +228,14 @@ class Branch:
             f"<Branch {self.name}: {len(self)} points, {self.parameter} in [{low:.6g}, {high:.6g}], "
             f"ends {self.ends[0].reason.name} and {self.ends[1].reason.name}>"
         )
+
+
+def _padded(rows: list[FloatArray]) -> FloatArray:
+    """Return rows of different lengths as one array, filled up with nan."""
+    found = np.full((len(rows), max(map(len, rows), default=0)), np.nan)
+    for row, values in zip(found, rows, strict=True):
+        row[: len(values)] = values
+    return found
 
 
 def _mirrored_labels(labels: IntArray, model: Model) -> IntArray:

@@ -19,6 +19,7 @@ from contfric.continuation.events import Bifurcation, Kind, kind_of_margin
 from contfric.continuation.outcomes import Origin, Outcome, RestsForEver, outcome_at, places_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
+from contfric.orbit.clock import clocked
 from contfric.orbit.holds import with_holds_behind
 from contfric.orbit.linear import tangent_of
 from contfric.orbit.orbit import Orbit, Status
@@ -165,6 +166,7 @@ def edited_orbit(orbit: Orbit, outcomes: list[Outcome]) -> tuple[Orbit, FloatArr
     away[:, 0] = [speeds.get(origin, 0.0) for origin in origins]
     _, away = _rotated(word, away, 0.0)
     word, cycle = _rotated(word, np.array(starts), orbit.period)
+    cycle = clocked(orbit.model, cycle, float(cycle[0, 0]) + orbit.period)
     moves = away if speeds else None
     try:
         system = build_system(orbit.model, word, orbit.periods)
@@ -216,6 +218,7 @@ def _copy(orbit: Orbit, first: int, after: int, turns: int) -> Orbit:
     places = range(first, after if after > first else after + count)
     word = tuple(orbit.word[i % count] for i in places)
     cycle = np.array([orbit.cycle[i % count] for i in places])
+    cycle = clocked(orbit.model, cycle, float(cycle[0, 0]) + orbit.period / turns)
     system = build_system(orbit.model, word, orbit.periods // turns)
     copy = Orbit(system, cycle, orbit.vector.copy(), np.inf, Status.CONVERGED)
     return _on_half(copy, word)
@@ -226,7 +229,8 @@ def _on_half(orbit: Orbit, word: Word) -> Orbit:
     if half is None or orbit.mirror_distance > _SAME_MOTION:
         return orbit
     part = build_system(orbit.model, half, orbit.periods, half=True)
-    return replace(orbit, system=part, joints=orbit.joints[: len(half)])
+    joints = clocked(orbit.model, orbit.joints[: len(half)], float(orbit.joints[len(half), 0]))
+    return replace(orbit, system=part, joints=joints)
 
 
 def _rotated(word: Word, joints: FloatArray, period: float) -> tuple[Word, FloatArray]:

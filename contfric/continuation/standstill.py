@@ -87,7 +87,7 @@ def _departure_rate(orbit: Orbit, i: int, departs: str) -> Callable[[float], flo
 def joint_within(orbit: Orbit, i: int, time: float) -> FloatArray:
     """Return the joint (t, y) of a segment of the whole orbit at a time inside it."""
     modes = [m.name for m in orbit.model.modes]
-    start, out = orbit.cycle[i], np.empty(len(orbit.model.states))
+    start, out = orbit.begins[i], np.empty(len(orbit.model.states))
     orbit.model.flow.flow(
         modes.index(orbit.word[i][0]),
         float(start[0]),
@@ -104,7 +104,7 @@ def joint_within(orbit: Orbit, i: int, time: float) -> FloatArray:
 def _turnings(orbit: Orbit, i: int, c: int) -> list[tuple[float, float]]:
     """Return times and values of the stationary points of observable c along a segment."""
     modes = [m.name for m in orbit.model.modes]
-    start, end = orbit.cycle[i], float(orbit.ends[i, 0])
+    start, end = orbit.begins[i], float(orbit.ends[i, 0])
     times, values = np.empty(512), np.empty(512)
     found = orbit.model.flow.turning(
         modes.index(orbit.word[i][0]),

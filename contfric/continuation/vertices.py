@@ -13,6 +13,7 @@ import numpy as np
 
 from contfric.continuation.points import Point
 from contfric.models.definition import FloatArray
+from contfric.orbit.clock import clocked
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
@@ -45,6 +46,7 @@ def symmetric_part(orbit: Orbit, active: int) -> Orbit | None:
     if np.max(np.abs(image - orbit.joints[:n])) > _NEARLY:
         return None
     middle = 0.5 * (image + orbit.joints[:n])
+    middle = clocked(orbit.model, middle, float(middle[0, 0]) + 0.5 * orbit.period)
     part = build_system(orbit.model, half, system.periods, half=True)
     return _vertex(replace(orbit, system=part, joints=middle), active)
 
@@ -60,7 +62,9 @@ def undoubled_part(orbit: Orbit, active: int) -> Orbit | None:
     if np.max(np.abs(image - orbit.joints[:n])) > _NEARLY:
         return None
     part = build_system(orbit.model, system.word[:n], system.periods // 2)
-    return _vertex(replace(orbit, system=part, joints=0.5 * (image + orbit.joints[:n])), active)
+    middle = 0.5 * (image + orbit.joints[:n])
+    middle = clocked(orbit.model, middle, float(middle[0, 0]) + 0.5 * orbit.period)
+    return _vertex(replace(orbit, system=part, joints=middle), active)
 
 
 def passed_vertex(system: System, joints: FloatArray) -> tuple[int, float] | None:
@@ -135,6 +139,7 @@ def _opening(orbit: Orbit) -> float:
     """
     p, q = pencil_of_turn(orbit.system, orbit.joints, orbit.vector)
     close = np.eye(len(p))
+    close[0, 0] = 0.0 if orbit.model.autonomous else 1.0  # a turn may take another time
     close[1:, 1:] = orbit.system.layout.closure
     left = p - q @ close
     values = np.linalg.svd(left, compute_uv=False)

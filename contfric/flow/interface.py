@@ -1,7 +1,7 @@
-"""What the engine asks of a flow, closed form or integrated: seven compiled functions.
+"""What the engine asks of a flow, closed form or integrated: a few compiled functions.
 
 The engine knows nothing else of a model's motion: not how a state is advanced, how many states there
-are, or what the excitation looks like. The types of the seven functions stand in
+are, or what the excitation looks like. The types of the functions stand in
 :mod:`contfric.compiled`.
 """
 
@@ -25,6 +25,7 @@ class CompiledFlow:
     hit : first time at which an observable takes a level
     period : period of the excitation (0 for an autonomous model), with its gradient
     rate : rate of an observable along a mode, with its gradient
+    reset : state behind the reset at a surface, with its derivatives; None if the model has no resets
     """
 
     flow: Any
@@ -34,14 +35,16 @@ class CompiledFlow:
     hit: Any
     period: Any
     rate: Any
+    reset: Any = None
 
     def functions(self) -> tuple[Any, ...]:
-        """Return the seven functions as kernels take them."""
+        """Return the functions as kernels take them."""
         return self._first_class
 
     @cached_property
     def _first_class(self) -> tuple[Any, ...]:
         from contfric.compiled import FirstClass
+        from contfric.flow.resets import no_reset
 
         order = (
             self.flow,
@@ -51,5 +54,6 @@ class CompiledFlow:
             self.hit,
             self.period,
             self.rate,
+            self.reset or no_reset,
         )
         return tuple(FirstClass(kernel) for kernel in order)

@@ -7,10 +7,17 @@ simulation, the boundary-value problem, admissibility and the drawings.
 * A **surface** is a level set of an observable: ``F+`` is ``u = S0``.
 * A **mode** is one smooth vector field; a **domain** is the part of a mode between surfaces.
 * A **transition** leads from a domain through a surface into the next domain.
+* A **reset** maps the state where it meets a surface: an impact.
 
-Transitions are derived from the signs of the domains (:meth:`Model.transitions`): crossing a
+Transitions are derived from the signs of the domains (:attr:`Model.transitions`): crossing a
 transparent surface flips its sign; at a switching surface the motion stays on the surface if a
-domain exists there (a stick), and otherwise leaves it as the model's departures say.
+domain exists there (a stick), leaves it as the model's departures say if one of them does, and
+otherwise goes through to the other side. Behind a reset the signs of the mapped state decide, so that
+several domains can follow (:attr:`Model.targets`).
+
+Motion is cut at switching surfaces and at resets, and only there: each has a mode of its own on each
+side. An orbit needs one such joint at least. A model whose cycles may be smooth therefore declares the
+surface of its stops (``v = 0``) as switching, with two modes of the same field: it serves as the section.
 """
 
 from __future__ import annotations
@@ -65,7 +72,10 @@ class Observable:
 
 @dataclass(frozen=True)
 class Surface:
-    """A level set of an observable; ``switching`` if the vector field changes across it."""
+    """A level set of an observable; ``switching`` if motion is cut there, as the field changes.
+
+    A switching surface has another mode on each side (their fields may agree: a section).
+    """
 
     name: str
     observable: str
@@ -105,9 +115,30 @@ class Departure:
 
 
 @dataclass(frozen=True)
+class Reset:
+    """A map of the state where it meets a surface, ``y+ = R(t, y; p)``: an impact on a wall.
+
+    The region is one-sided: before and behind the reset the state is on the same side of the surface,
+    and it never passes. The flow has the map (:data:`contfric.compiled.reset_signature`).
+
+    Attributes
+    ----------
+    surface : the surface, not switching
+    formula : the map, for the reader
+    changes : observables whose values the map changes, by default all but that of the surface; the
+        domains that can follow are those that differ in the signs of these
+    """
+
+    surface: str
+    formula: str
+    changes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Symmetry:
     """The map ``(t, y) -> (t + fraction * T, matrix @ y)`` that takes solutions to solutions.
 
+    Of an autonomous model it is a map of states only, and the fraction means nothing.
     ``surfaces`` names the image of each surface; the sign of (observable - level) is reversed.
     """
 
@@ -137,6 +168,11 @@ class Model:
     spread : callable
         ``spread(params)`` returns the half-width of the region that starts are drawn from,
         shape (n,), nondimensional.
+    resets : tuple of Reset
+        Surfaces at which the state is mapped.
+    autonomous : bool
+        Whether there is no excitation: the flow's ``period`` returns 0, the period of an orbit is found
+        with it, and ``periods`` of a simulation are units of time.
     """
 
     name: str
@@ -154,6 +190,17 @@ class Model:
     flow_factory: Callable[[], CompiledFlow] = field(repr=False)
     spread: Callable[[Mapping[str, float]], FloatArray] = field(repr=False)
     references: tuple[str, ...] = ()
+    resets: tuple[Reset, ...] = ()
+    autonomous: bool = False
+
+    def __post_init__(self) -> None:
+        for reset in self.resets:
+            surface = next((s for s in self.surfaces if s.name == reset.surface), None)
+            if surface is None or surface.switching:
+                raise ParameterError(
+                    f"model '{self.name}': the reset at '{reset.surface}' needs a surface of that "
+                    "name that is not switching (the state is mapped there, and stays on its side)"
+                )
 
     @cached_property
     def flow(self) -> CompiledFlow:
@@ -163,6 +210,11 @@ class Model:
     def __getstate__(self) -> dict[str, Any]:
         # what is derived, compiled code above all, belongs to this process
         return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @property
+    def directions(self) -> int:
+        """Number of multipliers of an orbit: one less than states without excitation (a shift in time)."""
+        return len(self.states) - int(self.autonomous)
 
     @property
     def defaults(self) -> dict[str, float]:
@@ -190,8 +242,20 @@ class Model:
         return {s.name: s for s in self.surfaces}
 
     @cached_property
+    def reset_by_surface(self) -> dict[str, Reset]:
+        """Resets by the names of their surfaces."""
+        return {r.surface: r for r in self.resets}
+
+    def cuts(self, surface: str) -> bool:
+        """Return whether motion is cut at a surface: it is switching, or has a reset."""
+        return self.surface_by_name[surface].switching or surface in self.reset_by_surface
+
+    @cached_property
     def transitions(self) -> dict[tuple[str, str], str]:
-        """Next domain for each possible (domain, surface); what is absent cannot happen."""
+        """Next domain for each possible (domain, surface); what is absent cannot happen.
+
+        Resets are left out: what follows one depends on the state (:attr:`targets`).
+        """
         found: dict[tuple[str, str], str] = {}
         for domain in self.domains:
             for surface in self.surfaces:
@@ -200,13 +264,45 @@ class Model:
                     found[domain.name, surface.name] = target
         return found
 
+    @cached_property
+    def targets(self) -> dict[tuple[str, str], tuple[str, ...]]:
+        """Every domain that can follow each (domain, surface): one, but for a reset."""
+        found: dict[tuple[str, str], tuple[str, ...]] = {
+            key: (target,) for key, target in self.transitions.items()
+        }
+        for domain in self.domains:
+            for reset in self.resets:
+                behind = self._domains_behind(domain, reset)
+                if behind and domain.signs[reset.surface] != 0:
+                    found[domain.name, reset.surface] = behind
+        return found
+
+    def changed_by(self, reset: Reset, surface: str) -> bool:
+        """Return whether a reset may change the sign at a surface."""
+        observable = self.surface_by_name[surface].observable
+        if reset.changes:
+            return observable in reset.changes
+        return observable != self.surface_by_name[reset.surface].observable
+
+    def _domains_behind(self, domain: Domain, reset: Reset) -> tuple[str, ...]:
+        """Return the domains that a reset can map to: they differ in what it changes."""
+        fixed = {s.name for s in self.surfaces if not self.changed_by(reset, s.name)}
+        return tuple(
+            d.name
+            for d in self.domains
+            if all(d.signs[s] == domain.signs[s] for s in fixed)
+            and all(d.signs[s.name] != 0 for s in self.surfaces if s.name not in fixed)
+        )
+
     def _next_domain(self, domain: Domain, surface: Surface) -> str | None:
         sign = domain.signs[surface.name]
-        if sign == 0:
+        if sign == 0 or surface.name in self.reset_by_surface:
             return None
-        signs = dict(domain.signs)
-        signs[surface.name] = 0 if surface.switching else -sign
-        return self.domain_at(signs)
+        if not surface.switching:
+            return self.domain_at({**domain.signs, surface.name: -sign})
+        resting = self.domain_at({**domain.signs, surface.name: 0})
+        through = {**domain.signs, surface.name: -sign}
+        return resting if resting is not None else self._domain_with(through)
 
     def _resolve_at_rest(self, signs: Mapping[str, int]) -> str | None:
         staying = self._domain_with(signs)

@@ -6,6 +6,14 @@ of ``z_0``)::
     phi(mode_i; t_i, y_i, t_{i+1} - t_i; p) - y_{i+1} = 0        (n rows)
     observable(z_{i+1}; p) - level(p) = 0                        (1 row)
 
+A segment that follows a reset at its entry starts at the image ``R(t_i, y_i; p)`` of the joint, which is
+the state before the reset: phi is that of the image, and its derivatives follow by the chain rule. The
+joints of an impacting orbit are so the states at which the wall is met.
+
+The closure of z_0 is ``z_N = (t_0 + turn * period, K y_0)``. An autonomous model has no period, and any
+shift of an orbit in time is one too: there the end of the turn is pinned, ``z_N = (0, K y_0)``, and t_0,
+minus its duration, is found with the rest. (The last exit surface is the section: it fixes the phase.)
+
 The last row of a hold is its pin, a condition on ``z_i``: the observable of a surface less its level, or
 the rate of the exit before it. A slide that leaves a hold may shrink to nothing, where its exit row
 would be singular. It is divided by the duration there: with v on the level at ``z_i``,
@@ -27,6 +35,7 @@ from contfric.compiled import (
     ObserveType,
     PeriodType,
     RateType,
+    ResetType,
     TurningType,
     allocating_helper,
     f8,
@@ -51,7 +60,7 @@ _NODES, _WEIGHTS = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
 
 #: Type of the model's functions and of a layout, as kernels take them.
 FunctionsType = types.Tuple(
-    (FlowType, ObserveType, LevelType, TurningType, HitType, PeriodType, RateType)
+    (FlowType, ObserveType, LevelType, TurningType, HitType, PeriodType, RateType, ResetType)
 )
 LayoutType = types.NamedTuple(
     [
@@ -69,6 +78,8 @@ LayoutType = types.NamedTuple(
         matrix,
         f8,
         i8,
+        indices,
+        table,
     ],
     Layout,
 )
@@ -80,6 +91,8 @@ class Room(NamedTuple):
     Attributes
     ----------
     state, jac : end of a segment with its derivatives, shapes (n,) and (n, 2 + n + q)
+    begin, reset : where the segment begins, behind a reset if there is one, with the derivatives of the
+        reset, shapes (n,) and (n, 1 + n + q)
     grad, level_grad : gradients of an observable and of a level, shapes (1 + n + q,) and (q,)
     rates : rate of the exit's observable at the end of each segment, shape (N,)
     last, close, close_w : closure of z_0 with its matrices, shapes (m,), (m, m) and (m, q)
@@ -88,6 +101,8 @@ class Room(NamedTuple):
 
     state: FloatArray
     jac: FloatArray
+    begin: FloatArray
+    reset: FloatArray
     grad: FloatArray
     level_grad: FloatArray
     rates: FloatArray
@@ -106,6 +121,8 @@ def equation_room(count, m, free):  # type: ignore[no-untyped-def]
     return Room(
         np.empty(n),
         np.empty((n, 2 + n + free)),
+        np.empty(n),
+        np.empty((n, 1 + n + free)),
         np.empty(1 + n + free),
         np.empty(free),
         np.empty(count),
@@ -123,13 +140,15 @@ def close_chain(functions, layout, z, p, which, room):  # type: ignore[no-untype
     """Write the closure of z_0, and its matrices on z_0 and on the parameters."""
     last, close, close_w, grad = room.last, room.close, room.close_w, room.level_grad
     n, free = layout.closure.shape[0], which.shape[0]
-    period = functions[5](p, which, grad)
-    last[0] = z[0, 0] + layout.turn * period
     for k in range(free):
-        close_w[0, k] = layout.turn * grad[k]
-        for i in range(n):
-            close_w[1 + i, k] = 0.0
-    close[0, 0] = 1.0
+        for i in range(1 + n):
+            close_w[i, k] = 0.0
+    if layout.turn == 0.0:  # autonomous: the turn ends at time 0
+        last[0], close[0, 0] = 0.0, 0.0
+    else:
+        last[0], close[0, 0] = z[0, 0] + layout.turn * functions[5](p, which, grad), 1.0
+        for k in range(free):
+            close_w[0, k] = layout.turn * grad[k]
     for i in range(n):
         close[0, 1 + i] = 0.0
         close[1 + i, 0] = 0.0
@@ -138,6 +157,32 @@ def close_chain(functions, layout, z, p, which, room):  # type: ignore[no-untype
             value += layout.closure[i, j] * z[0, 1 + j]
             close[1 + i, 1 + j] = layout.closure[i, j]
         last[1 + i] = value
+
+
+@helper
+def begin_at(functions, layout, i, start, p, which, jac, room):  # type: ignore[no-untyped-def]
+    """Write the state in which segment i begins: that of its joint, or its image behind a reset."""
+    entry = layout.entries[i]
+    if entry >= 0:
+        functions[7](entry, start[0], start[1:], p, which, room.begin, jac)
+        return
+    for j in range(room.begin.shape[0]):
+        room.begin[j] = start[1 + j]
+
+
+@helper
+def behind_reset(jac, reset, row, n):  # type: ignore[no-untyped-def]
+    """Make the derivatives of a flow behind a reset those with respect to the joint before it."""
+    for j in range(n):
+        for k in range(n):
+            row[k] = jac[j, 1 + k]
+            jac[j, 1 + k] = 0.0
+        for k in range(n):
+            jac[j, 0] += row[k] * reset[k, 0]
+            for a in range(n):
+                jac[j, 1 + a] += row[k] * reset[k, 1 + a]
+            for a in range(n + 1, reset.shape[1]):
+                jac[j, 1 + a] += row[k] * reset[k, a]
 
 
 @helper
@@ -219,7 +264,10 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
     state, jac, grad, level_grad = room.state, room.jac, room.grad, room.level_grad
     n, free, width = state.shape[0], which.shape[0], rows.shape[1]
     m = n + 1
-    functions[0](layout.modes[i], start[0], start[1:], after[0] - start[0], p, which, state, jac)
+    begin_at(functions, layout, i, start, p, which, room.reset, room)
+    functions[0](layout.modes[i], start[0], room.begin, after[0] - start[0], p, which, state, jac)
+    if layout.entries[i] >= 0:
+        behind_reset(jac, room.reset, grad, n)
     worst = 0.0
     for j in range(n):
         row = m + j
@@ -272,7 +320,8 @@ def mismatch(functions, layout, z, p, room):  # type: ignore[no-untyped-def]
     for i in range(count):
         after = z[i + 1] if i + 1 < count else room.last
         duration = after[0] - z[i, 0]
-        functions[0](layout.modes[i], z[i, 0], z[i, 1:], duration, p, none, state, room.nothing)
+        begin_at(functions, layout, i, z[i], p, none, room.nothing, room)
+        functions[0](layout.modes[i], z[i, 0], room.begin, duration, p, none, state, room.nothing)
         if layout.pins[i] != NO_PIN:
             here = abs(pin_value(functions, layout, i, z[i], p, none, empty))
         else:

@@ -10,14 +10,18 @@ from numpy.typing import ArrayLike
 from contfric.errors import AperiodicError, ConvergenceError, whole_number
 from contfric.models import load_model
 from contfric.models.definition import Model
+from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
 from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
 from contfric.orbit.solve import settle
 from contfric.orbit.system import build_system
+from contfric.signature.cyclic import primitive_length
 
 #: Longest period that is looked for, in periods of the excitation.
 MOST_PERIODS = 64
+#: Most events of a cycle that is looked for: 64 periods of an orbit with 32 joints.
+_MOST_EVENTS = 2048
 #: A return nearer than this (nondimensional) is worth a Newton solve.
 _NEAR = 1e-2
 #: A return nearer than this is periodic to the resolution of a simulation.
@@ -101,7 +105,7 @@ def _wanted(orbit: Orbit, periods: int | None) -> Orbit:
 
 
 def _check_motion(trajectory: Trajectory) -> None:
-    if trajectory.end in (SimulationEnd.HELD, SimulationEnd.INFINITE, SimulationEnd.IMPOSSIBLE):
+    if trajectory.end not in (SimulationEnd.EVENTS, SimulationEnd.TIME):
         raise ConvergenceError(
             f"no periodic orbit: {trajectory.end.value}. Choose other parameters or another start",
             trajectory,
@@ -183,7 +187,9 @@ def recurrences(trajectory: Trajectory) -> Iterator[tuple[int, int, float]]:
         if period > 0.0:
             extra = round(slip / period)
             turns, slip = turns + extra, slip - extra * period
-        if turns > MOST_PERIODS:
+        if model.autonomous:  # any time may pass
+            turns, slip = 1, 0.0
+        if turns > MOST_PERIODS or lag > _MOST_EVENTS:
             return
         gap = float(np.max(np.abs(trajectory.states[-1] - trajectory.states[-1 - lag])))
         mismatch = gap + abs(slip)
@@ -204,6 +210,9 @@ def _orbit_of_lag(trajectory: Trajectory, lag: int, turns: int) -> Orbit | None:
         [trajectory.times[first:-1] + cycles * period, trajectory.states[first:-1]]
     )
     word = trajectory.word[first + 1 :]
+    if model.autonomous:
+        turns = len(word) // primitive_length(word)
+        joints = clocked(model, joints, float(trajectory.times[-1]))
     try:
         system = build_system(model, word, turns)
     except ValueError:

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray
+from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import polish
 from contfric.orbit.system import build_system
@@ -19,12 +21,19 @@ from contfric.signature import crossing
 def full_form(orbit: Orbit) -> Orbit:
     """Return the orbit solved with one segment for each domain that it visits.
 
+    Raises
+    ------
+    ParameterError
+        If the model has resets: the full form is a check of transparent surfaces.
+
     Examples
     --------
     >>> import contfric as cf
     >>> full_form(cf.find_orbit("coulomb", {"Omega": 0.5})).system.segments
     6
     """
+    if orbit.model.resets:
+        raise ParameterError(f"model '{orbit.model.name}' has resets: there is no full form")
     whole = orbit.as_whole()
     domains = whole.signature.segments
     joints: list[FloatArray] = []
@@ -45,7 +54,8 @@ def full_form(orbit: Orbit) -> Orbit:
             place = _crossing_point(whole, mode, surface, place, entry)
             entry = surface
     system = build_system(whole.model, tuple(word), whole.periods, domains=domains)
-    guess = Orbit(system, np.array(joints), whole.vector.copy(), np.inf, Status.NOT_CONVERGED)
+    start = clocked(whole.model, np.array(joints), float(joints[0][0]) + whole.period)
+    guess = Orbit(system, start, whole.vector.copy(), np.inf, Status.NOT_CONVERGED)
     return polish(guess, damped=False)
 
 

@@ -18,6 +18,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.equations import (
     FunctionsType,
     LayoutType,
+    begin_at,
     close_chain,
     equation_room,
     segment_rows,
@@ -52,14 +53,15 @@ def turning_room():  # type: ignore[no-untyped-def]
 
 
 @helper
-def find_turnings(functions, layout, i, c, z, p, last, turnings):  # type: ignore[no-untyped-def]
+def find_turnings(functions, layout, i, c, z, p, room, turnings):  # type: ignore[no-untyped-def]
     """Fill the stationary points of observable c in segment i; return their number, -1 if too many."""
-    after = z[i + 1] if i + 1 < z.shape[0] else last
+    after = z[i + 1] if i + 1 < z.shape[0] else room.last
     duration = after[0] - z[i, 0]
     if duration <= 0.0:
         return 0
+    begin_at(functions, layout, i, z[i], p, room.none, room.nothing, room)
     return functions[3](
-        layout.modes[i], c, z[i, 0], z[i, 1:], duration, p, turnings.times, turnings.values
+        layout.modes[i], c, z[i, 0], room.begin, duration, p, turnings.times, turnings.values
     )
 
 
@@ -101,8 +103,18 @@ def joint_margin(functions, layout, k, z, p, room):  # type: ignore[no-untyped-d
 
 
 @helper
+def entry_margin(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
+    """Return entry margin k: the side on which a segment begins behind a reset."""
+    i, surface = layout.after[k, 0], layout.after[k, 1]
+    c = layout.observables[surface]
+    begin_at(functions, layout, i, z[i], p, room.none, room.nothing, room)
+    value = functions[1](c, z[i, 0], room.begin, p, room.none, room.empty)
+    return layout.after[k, 2] * (value - functions[2](surface, p, room.none, room.empty))
+
+
+@helper
 def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-untyped-def]
-    """Fill the margins in the order interior, exit, joint, lasting, held.
+    """Fill the margins in the order interior, exit, joint, entry, lasting, held.
 
     An interior margin is infinite without stationary points, that of a tangential exit always. The
     closure and the rates at the exits are in ``room``.
@@ -112,7 +124,7 @@ def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-un
     for k in range(interior.shape[0]):
         i, c = interior[k, 0], observables[interior[k, 1]]
         if i != segment or c != watched:  # surfaces of one observable share its stationary points
-            found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
+            found = find_turnings(functions, layout, i, c, z, p, room, turnings)
             segment, watched = i, c
         out[k] = interior_margin(functions, layout, k, found, z, p, room, turnings)
     at = interior.shape[0]
@@ -123,6 +135,9 @@ def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-un
     for k in range(layout.joint.shape[0]):
         out[at + k] = joint_margin(functions, layout, k, z, p, room)
     at += layout.joint.shape[0]
+    for k in range(layout.after.shape[0]):
+        out[at + k] = entry_margin(functions, layout, k, z, p, room)
+    at += layout.after.shape[0]
     for k in range(layout.lasting.shape[0]):
         out[at + k] = lasting_margin(layout, k, z, room)
     at += layout.lasting.shape[0]
@@ -153,7 +168,7 @@ def held_margin(functions, layout, k, z, p, room, turnings):  # type: ignore[no-
         if layout.interior[row, 0] != i or c == watched:
             continue
         watched = c
-        found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
+        found = find_turnings(functions, layout, i, c, z, p, room, turnings)
         for j in range(found):
             time = turnings.times[j]
             if time < first or time > duration - first:
@@ -175,6 +190,7 @@ def count_margins(layout):  # type: ignore[no-untyped-def]
         layout.interior.shape[0]
         + layout.exits.shape[0]
         + layout.joint.shape[0]
+        + layout.after.shape[0]
         + layout.lasting.shape[0]
         + layout.held.shape[0]
     )
@@ -193,7 +209,8 @@ def ends_of(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
     if on >= 0:
         first = functions[2](on, p, room.none, room.empty)
     else:
-        first = functions[1](c, z[i, 0], z[i, 1:], p, room.none, room.empty)
+        begin_at(functions, layout, i, z[i], p, room.none, room.nothing, room)
+        first = functions[1](c, z[i, 0], room.begin, p, room.none, room.empty)
     if to >= 0:
         return first, functions[2](to, p, room.none, room.empty)
     return first, functions[1](c, after[0], after[1:], p, room.none, room.empty)
@@ -218,7 +235,7 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
         layout.labels[k, 2],
         layout.labels[k, 3],
     )
-    found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
+    found = find_turnings(functions, layout, i, c, z, p, room, turnings)
     if found < 0:
         return -1, np.inf
     value, final = ends_of(functions, layout, k, z, p, room)

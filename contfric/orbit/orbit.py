@@ -11,13 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.simulation import signs_at
+from contfric.orbit.stops import displacements
 from contfric.orbit.system import Margin, System, Word, build_system
 from contfric.orbit.words import decode, end_domain, half_of, mirror_pairs, passed_domains, whole_of
 from contfric.signature import Signature
-from contfric.signature.holds import TOUCH, domain_after, is_hold, mirror_exit
+from contfric.signature.holds import TOUCH, domain_after, is_hold
+from contfric.signature.impacts import impact_at, mirror_name
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,7 +83,7 @@ class Orbit:
 
     @property
     def periods(self) -> int:
-        """Number of excitation periods of the orbit."""
+        """Number of excitation periods of the orbit; without excitation, how often its word repeats."""
         return self.system.periods
 
     @property
@@ -91,6 +94,8 @@ class Orbit:
     @cached_property
     def turn(self) -> float:
         """Duration of one turn (half the orbit if it is solved on its half)."""
+        if self.model.autonomous:  # a turn ends at time 0
+            return -float(self.joints[0, 0])
         none = np.empty(0, dtype=np.int64)
         period = self.model.flow.period(self.vector, none, np.empty(0))
         return float(self.system.layout.turn * period)
@@ -112,10 +117,10 @@ class Orbit:
         """Joints of the whole orbit, shape (segments, 1 + n)."""
         if not self.system.half:
             return self.joints
-        other = self.joints.copy()
-        other[:, 0] += self.turn
+        other, first = self.joints.copy(), clocked(self.model, self.joints, self.turn)
+        other[:, 0] = first[:, 0] + self.turn
         other[:, 1:] = self.joints[:, 1:] @ self.system.layout.closure.T
-        return np.vstack([self.joints, other])
+        return np.vstack([first, other])
 
     @cached_property
     def ends(self) -> FloatArray:
@@ -123,6 +128,25 @@ class Orbit:
         ends = np.roll(self.cycle, -1, axis=0)
         ends[-1, 0] += self.period
         return ends
+
+    @cached_property
+    def begins(self) -> FloatArray:
+        """Start time and state of each segment of the whole orbit: its joints, behind resets.
+
+        Shape (segments, 1 + n).
+        """
+        resets, names = self.model.reset_by_surface, [s.name for s in self.model.surfaces]
+        if not resets:
+            return self.cycle
+        begins = self.cycle.copy()
+        none, nothing = np.empty(0, dtype=np.int64), np.empty((0, 0))
+        for i, (time, *state) in enumerate(self.cycle):
+            entry, out = self.word[i - 1][1], np.empty(len(state))
+            if entry in resets:
+                at = names.index(entry), float(time), np.array(state)
+                self.model.flow.reset(*at, self.vector, none, out, nothing)
+                begins[i, 1:] = out
+        return begins
 
     def as_whole(self) -> Orbit:
         """Return the same orbit as a problem on its whole cycle."""
@@ -137,7 +161,8 @@ class Orbit:
         if half is None or not self.symmetric:
             return self
         system = build_system(self.model, half, self.periods, half=True)
-        return replace(self, system=system, joints=self.joints[: len(half)])
+        joints = clocked(self.model, self.joints[: len(half)], float(self.joints[len(half), 0]))
+        return replace(self, system=system, joints=joints)
 
     def doubled(self) -> Orbit:
         """Return the orbit run through twice, as one of twice the period."""
@@ -145,7 +170,8 @@ class Orbit:
         second = whole.joints.copy()
         second[:, 0] += whole.period
         system = build_system(self.model, whole.word * 2, self.periods * 2)
-        return replace(whole, system=system, joints=np.vstack([whole.joints, second]))
+        joints = clocked(self.model, np.vstack([whole.joints, second]), whole.period)
+        return replace(whole, system=system, joints=joints)
 
     def mirror(self) -> Orbit:
         """Return the mirror image under the model's symmetry (an orbit of the same parameters)."""
@@ -153,7 +179,8 @@ class Orbit:
         if symmetry is None:
             raise ValueError(f"model '{self.model.name}' has no symmetry")
         joints = self.joints.copy()
-        joints[:, 0] += symmetry.fraction * self.period / self.periods
+        if not self.model.autonomous:
+            joints[:, 0] += symmetry.fraction * self.period / self.periods
         joints[:, 1:] = self.joints[:, 1:] @ symmetry.array().T
         word = mirror_pairs(self.model, self.system.word)
         system = build_system(self.model, word, self.periods, self.system.half)
@@ -195,19 +222,22 @@ class Orbit:
 
     @cached_property
     def turn_multipliers(self) -> ComplexArray:
-        """Multipliers of one turn, largest first, shape (n,)."""
+        """Multipliers of one turn, largest first, shape (n,); of an autonomous model without the trivial 1.
+
+        Then the shape is (n - 1,).
+        """
         from contfric.orbit.spectrum import stability
 
         mu = np.full(len(self.model.states), np.inf, dtype=np.complex128)
         if self.system.holds:  # the least disturbance ends a hold: it is no flow
-            return mu
+            return mu[: self.model.directions]
         pencil = pencil_of_turn(self.system, self.joints, self.vector)
         stability(self.system.layout, pencil, mu, TALLY)
-        return mu
+        return mu[: self.model.directions]
 
     @property
     def multipliers(self) -> ComplexArray:
-        """Floquet multipliers of the whole orbit, largest first, shape (n,)."""
+        """Floquet multipliers of the whole orbit, as those of one turn."""
         mu = self.turn_multipliers
         return mu**2 if self.system.half and not self.system.holds else mu
 
@@ -274,15 +304,28 @@ class Orbit:
                 continue
             if is_hold(entry):
                 start = str(domain_after(model, word[i - 1][0], word[i][0]))
+            elif entry in model.reset_by_surface:
+                start = self._domain_behind(i)
             else:
                 start = model.transitions[ends[i - 1], entry]
             domains += passed_domains(model, start, ends[i], passed)
+            if word[i][1] in model.reset_by_surface:
+                domains.append(impact_at(word[i][1]))
         if system.half:
             assert model.symmetry is not None
             image = {**model.symmetry.surfaces, **model.mirror_domain}
-            domains += [mirror_exit(d, image) if is_hold(d) else image[d] for d in domains]
+            domains += [mirror_name(d, image) for d in domains]
         plain = Signature(model, tuple(domains), self.periods, symmetric=self.symmetric)
         return replace(plain, name=plain.auto_name(self.symmetric))
+
+    def _domain_behind(self, i: int) -> str:
+        """Domain in which a segment begins behind a reset."""
+        begin, model = self.begins[i], self.model
+        signs = signs_at(model, float(begin[0]), begin[1:].copy(), self.vector)
+        across = self.word[i - 1][1]  # the joint lies on it to rounding, on the side of every domain
+        own = [d for d in model.domains if d.mode == self.word[i][0]]
+        fitting = [d for d in own if all(d.signs[s] * signs[s] >= 0 for s in signs if s != across)]
+        return (fitting or own)[0].name
 
     def _end_domains(self) -> list[str]:
         """Domain in which each segment of the whole orbit ends."""
@@ -309,18 +352,20 @@ class Orbit:
     @cached_property
     def stops(self) -> FloatArray:
         """Displacements at the stops in the order of the orbit, shape (stops,)."""
+        if not self.model.surface_by_name[self.model.stop_surface].switching:
+            return displacements(self, self.model.stop_surface)
         at = [i for i, (_, exit_) in enumerate(self.word) if exit_ == self.model.stop_surface]
         return self.ends[at, 1]
 
     @property
     def x_max(self) -> float:
         """Largest displacement, x k / F_0."""
-        return float(self.stops.max())
+        return float(self.stops.max(initial=-np.inf))
 
     @property
     def x_min(self) -> float:
         """Smallest displacement, x k / F_0."""
-        return float(self.stops.min())
+        return float(self.stops.min(initial=np.inf))
 
     @property
     def asymmetry(self) -> float:
@@ -340,7 +385,7 @@ class Orbit:
         self.model.flow.flow(
             modes.index(self.word[i][0]),
             float(self.cycle[i, 0]),
-            self.cycle[i, 1:].copy(),
+            self.begins[i, 1:].copy(),
             duration,
             self.vector,
             np.empty(0, dtype=np.int64),

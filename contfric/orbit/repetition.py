@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import build_system
 
@@ -34,5 +35,6 @@ def shortest(orbit: Orbit) -> Orbit:
         step[:, 0] -= whole.period / turns
         if np.max(np.abs(step)) < _SAME * (1.0 + np.max(np.abs(joints))):
             system = build_system(whole.model, word[:part], whole.periods // turns)
-            return replace(whole, system=system, joints=joints[:part])
+            first = clocked(whole.model, joints[:part], float(joints[part, 0]))
+            return replace(whole, system=system, joints=first)
     return orbit

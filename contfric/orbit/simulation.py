@@ -25,6 +25,8 @@ class SimulationEnd(str, Enum):
     HELD = "the mass stays at rest for ever: nothing releases it"
     IMPOSSIBLE = "events follow each other at once, and time does not go on"
     INFINITE = "the motion grew beyond all numbers"
+    QUIET = "the motion meets no surface any more: it has come to an equilibrium, or never changes"
+    CHATTER = "impacts follow each other faster and faster (chatter): infinitely many in finite time"
 
 
 class Tables(NamedTuple):
@@ -37,6 +39,8 @@ class Tables(NamedTuple):
     following : mode after (mode, surface, signs of the other surfaces as bits); -1 if there is none
     sliding : whether a mode slides on a surface
     lies_on : surfaces that a mode moves on, as bits
+    resets : whether a surface has a reset
+    longest : units of time (periods of the excitation) after which a mode is never left
     """
 
     observables: IntArray
@@ -44,6 +48,8 @@ class Tables(NamedTuple):
     following: IntArray
     sliding: IntArray
     lies_on: IntArray
+    resets: IntArray
+    longest: FloatArray
 
 
 class EventRows(NamedTuple):
@@ -113,6 +119,11 @@ class Trajectory:
         return tuple((modes[m], surfaces[k]) for m, k in zip(self.modes, self.exits, strict=True))
 
 
+#: A sliding mode that is not left within this many periods of the excitation is never left; a slide, and
+#: any mode of an autonomous model, gets far more (periods, or units of time).
+HOLD_PERIODS, SLIDE_PERIODS = 1.001, 1e4
+
+
 @cache
 def tables(model: Model) -> Tables:
     """Return the transition tables of a model."""
@@ -133,12 +144,29 @@ def tables(model: Model) -> Tables:
                 continue
             row = (modes.index(domain.mode) * len(surfaces) + k) * codes + code
             following[row] = modes.index(model.domain_by_name[target].mode)
+    for (name, surface), targets in model.targets.items():
+        if surface not in model.reset_by_surface:
+            continue
+        k, source = surfaces.index(surface), modes.index(model.domain_by_name[name].mode)
+        for code in range(codes):
+            for behind in map(model.domain_by_name.__getitem__, targets):
+                # behind a reset the signs of the mapped state tell the domain
+                if not code >> k & 1 and _matches(behind.signs, surfaces, k, code):
+                    row = (source * len(surfaces) + k) * codes + code
+                    following[row] = modes.index(behind.mode)
     return Tables(
         np.array([observables.index(s.observable) for s in model.surfaces], dtype=np.int64),
         bounds,
         following,
         np.array([int(m.sliding) for m in model.modes], dtype=np.int64),
         np.array([_surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
+        np.array([int(s.name in model.reset_by_surface) for s in model.surfaces], dtype=np.int64),
+        np.array(
+            [
+                HOLD_PERIODS if m.sliding and not model.autonomous else SLIDE_PERIODS
+                for m in model.modes
+            ]
+        ),
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from contfric.errors import ConvergenceError
 from contfric.models import load_model
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.simulation import Trajectory, run, start_of
@@ -22,6 +23,9 @@ from contfric.signature import Signature, reduced_word
 STARTS = 600
 #: Longest Newton correction from a start that may be far: a third of the natural scale of the states.
 TRUST = 0.3
+#: Units of time that a stretch of an autonomous model may take: far more than a cycle, and few enough
+#: where it settles.
+_LONGEST = 300.0
 #: Candidates of the smallest mismatch that are handed to Newton.
 CANDIDATES = 40
 
@@ -153,13 +157,16 @@ def _matching_stretches(
     spread = model.spread(model.mapping(vector))
     period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0))) or 10.0
     turn = system.layout.turn
+    length, events = 2.0 + 2.0 * turn, 40 * (1 + int(turn))
+    if model.autonomous:
+        length, events = _LONGEST, 4 * system.segments + 40
     for _ in range(starts):
         y = rng.uniform(-1.0, 1.0, spread.shape) * spread
         if rng.random() < 0.5:
             y[1:] = 0.0  # at rest: the start of a stick or of a slide
         time = rng.uniform(0.0, period)
         mode, on = start_of(model, time, y, vector, None)
-        trajectory = run(model, vector, mode, on, time, y, 2.0 + 2.0 * turn, 40 * (1 + int(turn)))
+        trajectory = run(model, vector, mode, on, time, y, length, events)
         yield from stretches(trajectory, system, period)
 
 
@@ -174,10 +181,12 @@ def stretches(
     for i in range(1, len(word) - count + 1):
         if word[i : i + count] != system.word:
             continue
-        joints = points[i - 1 : i - 1 + count].copy()
+        joints = clocked(system.model, points[i - 1 : i - 1 + count].copy(), points[i - 1 + count, 0])
         gap = points[i - 1 + count, 1:] - joints[0, 1:] @ closure.T
-        slip = points[i - 1 + count, 0] - joints[0, 0] - turn
-        joints[:, 0] -= np.floor(joints[0, 0] / period) * period
+        slip = 0.0
+        if not system.model.autonomous:
+            slip = points[i - 1 + count, 0] - joints[0, 0] - turn
+            joints[:, 0] -= np.floor(joints[0, 0] / period) * period
         yield float(np.max(np.abs(gap)) + abs(slip)), joints
 
 

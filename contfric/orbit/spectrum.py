@@ -3,6 +3,10 @@
 They are the eigenvalues of the linear map M of one turn on ``z_0 = (t_0, y_0)``. It has one eigenvalue
 0 for the direction off the section, and one more for each direction that a stick takes away; those
 are exactly zero, and the characteristic polynomial of the others is cut off there.
+
+Of an autonomous model a shift in time is mapped to itself: M is block triangular with a 1 for dt_0, the
+trivial multiplier, and the map of the states in the section. Its first column is made zero, which takes
+the trivial multiplier away exactly, and leaves one direction less.
 """
 
 from __future__ import annotations
@@ -130,7 +134,14 @@ def spectral_room(m):  # type: ignore[no-untyped-def]
 def multipliers(rank, pencil, close, out, room):  # type: ignore[no-untyped-def]
     """Write the multipliers of one turn from its pencil; return (chi(1), chi(-1))."""
     n = out.shape[0]
-    if not turn_map(pencil[0], pencil[1], close, room.left, room.turn):
+    timeless = close[0, 0] == 0.0  # autonomous: the closure forgets the time, the turn does not
+    close[0, 0] = 1.0
+    solved = turn_map(pencil[0], pencil[1], close, room.left, room.turn)
+    if timeless:
+        close[0, 0] = 0.0
+        for k in range(n + 1):
+            room.turn[k, 0] = 0.0
+    if not solved:
         for k in range(n):
             out[k] = np.inf
         return np.nan, np.nan
@@ -146,5 +157,6 @@ def stability(layout, pencil, mu, counts):  # type: ignore[no-untyped-def]
     for i in range(m):
         for j in range(m):
             inner = i > 0 and j > 0
-            close[i, j] = layout.closure[i - 1, j - 1] if inner else (1.0 if i == j else 0.0)
+            close[i, j] = layout.closure[i - 1, j - 1] if inner else 0.0
+    close[0, 0] = 0.0 if layout.turn == 0.0 else 1.0
     return multipliers(layout.rank, pencil, close, mu, spectral_room(m))

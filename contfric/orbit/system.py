@@ -6,7 +6,8 @@ admissible) are
 
 * interior: between its joints a segment does not cross a surface that bounds its mode,
 * exit: it meets its exit surface from inside, with a rate that does not vanish,
-* joint: where it exits, the other observables are in the domain that the signature names.
+* joint: where it exits, the other observables are in the domain that the signature names,
+* entry: where it begins behind a reset, the observables that the reset changes are in its mode.
 
 Crossings of transparent surfaces inside a segment do not matter to the motion; they label it.
 
@@ -50,8 +51,10 @@ class Layout(NamedTuple):
     lasting : holds that must last: those after a stick, shape (k,)
     held : all holds, which could be left at any time, shape (k,)
     closure : state matrix of the closure, shape (n, n)
-    turn : duration of one turn in periods of the excitation
+    turn : duration of one turn in periods of the excitation; 0 of an autonomous model
     rank : number of independent directions that survive one turn
+    entries : surface of the reset that each segment begins behind, shape (N,); -1 where there is none
+    after : rows (segment, surface, sign) of the entry margins
     """
 
     modes: IntArray
@@ -68,6 +71,8 @@ class Layout(NamedTuple):
     closure: FloatArray
     turn: float
     rank: int
+    entries: IntArray
+    after: IntArray
 
 
 class Margin(str, Enum):
@@ -76,6 +81,7 @@ class Margin(str, Enum):
     INTERIOR = "interior"
     EXIT = "exit"
     JOINT = "joint"
+    ENTRY = "entry"
     LASTING = "lasting"
     HELD = "held"
 
@@ -123,11 +129,11 @@ class System:
 
 @cache
 def mode_bounds(model: Model) -> dict[str, tuple[str, ...]]:
-    """Surfaces that bound each mode: those through which a transition changes the mode."""
+    """Surfaces that bound each mode: resets, and those through which a transition changes the mode."""
     bounds: dict[str, set[str]] = {mode.name: set() for mode in model.modes}
-    for (name, surface), target in model.transitions.items():
+    for (name, surface), targets in model.targets.items():
         mode = model.domain_by_name[name].mode
-        if model.domain_by_name[target].mode != mode:
+        if surface in model.reset_by_surface or model.domain_by_name[targets[0]].mode != mode:
             bounds[mode].add(surface)
     return {
         mode: tuple(s.name for s in model.surfaces if s.name in found)
@@ -151,8 +157,10 @@ def exit_domains(model: Model, mode: str, surface: str, following: str) -> list[
     return [
         name
         for name in mode_domains(model, mode)
-        if (target := model.transitions.get((name, surface)))
-        and model.domain_by_name[target].mode == following
+        if any(
+            model.domain_by_name[target].mode == following
+            for target in model.targets.get((name, surface), ())
+        )
     ]
 
 
@@ -181,6 +189,11 @@ def build_system(
         for i, ((mode, exit_), after) in enumerate(zip(word, following, strict=True))
     ]
     interior, joint, tests = _margins(model, word, inside, bool(domains), holds)
+    entered = [first_entry(model, word, half), *(exit_ for _, exit_ in word[:-1])]
+    after = _entry_rows(model, word, entered, domains)
+    behind = len(tests) - len(held_tests(holds))
+    entries = tuple(Test(Margin.ENTRY, i, surfaces[k]) for i, k, _ in after)
+    tests = (*tests[:behind], *entries, *tests[behind:])
     exits = [_exit_surface(i, exit_, holds) for i, (_, exit_) in enumerate(word)]
     held = {hold.segment: hold for hold in holds}
     symmetry = model.symmetry
@@ -203,10 +216,57 @@ def build_system(
         lasting=np.array([hold.segment for hold in holds if hold.after_rest], dtype=np.int64),
         held=np.array([hold.segment for hold in holds], dtype=np.int64),
         closure=symmetry.array() if half and symmetry else np.eye(n),
-        turn=float(periods * symmetry.fraction) if half and symmetry else float(periods),
-        rank=min(model.mode_by_name[mode].rank for mode, _ in word),
+        turn=_turn(model, periods, half),
+        # a shift in time is no disturbance of an autonomous orbit
+        rank=min(model.mode_by_name[mode].rank for mode, _ in word) - int(model.autonomous),
+        entries=np.array(
+            [surfaces.index(s) if s in model.reset_by_surface else -1 for s in entered],
+            dtype=np.int64,
+        ),
+        after=after,
     )
     return System(model, word, periods, half, layout, tests, domains, holds)
+
+
+def first_entry(model: Model, word: Word, half: bool) -> str:
+    """Return the surface through which the first segment of a turn is entered."""
+    if not half or model.symmetry is None:
+        return word[-1][1]
+    inverse = {image: name for name, image in model.symmetry.surfaces.items()}
+    return mirror_exit(word[-1][1], inverse)
+
+
+def _turn(model: Model, periods: int, half: bool) -> float:
+    if model.autonomous:
+        return 0.0
+    return float(periods * (model.symmetry.fraction if half and model.symmetry else 1.0))
+
+
+def _entry_rows(
+    model: Model, word: Word, entered: list[str], domains: tuple[str, ...]
+) -> IntArray:
+    """Rows of the entry margins: surfaces that a reset may lead across, and that bound the mode behind it."""
+    rows: list[tuple[int, ...]] = []
+    for i, surface in enumerate(entered):
+        reset = model.reset_by_surface.get(surface)
+        if reset is None:
+            continue
+        for k, other in enumerate(model.surfaces):
+            signs = {
+                model.domain_by_name[d].signs[other.name]
+                for d in (domains[i : i + 1] or mode_domains(model, word[i][0]))
+            }
+            if model.changed_by(reset, other.name) and len(signs) == 1:
+                rows.append((i, k, signs.pop()))
+    return _rows(rows)
+
+
+def held_tests(holds: tuple[Hold, ...]) -> tuple[Test, ...]:
+    """Return the tests of holds, which stand behind all others."""
+    return (
+        *(Test(Margin.LASTING, h.segment, h.leaves) for h in holds if h.after_rest),
+        *(Test(Margin.HELD, h.segment, h.leaves) for h in holds),
+    )
 
 
 def _mode_after(model: Model, word: Word, half: bool) -> str:
@@ -303,8 +363,7 @@ def _margins(
             for i, (_, exit_) in enumerate(word)
         ),
         *(Test(Margin.JOINT, i, names[k]) for i, k, _ in joint),
-        *(Test(Margin.LASTING, h.segment, h.leaves) for h in holds if h.after_rest),
-        *(Test(Margin.HELD, h.segment, h.leaves) for h in holds),
+        *held_tests(holds),
     )
     return _rows(interior), _rows(joint), tests
 
@@ -320,13 +379,10 @@ def _label_rows(
     if full:
         return _rows([], 4)
     surfaces = [s.name for s in model.surfaces]
-    first_entry = word[-1][1]
-    if half and model.symmetry:
-        inverse = {image: name for name, image in model.symmetry.surfaces.items()}
-        first_entry = mirror_exit(first_entry, inverse)
+    first = first_entry(model, word, half)
     rows: list[tuple[int, ...]] = []
     for i, (mode, _) in enumerate(word):
-        entry = word[i - 1][1] if i else first_entry
+        entry = word[i - 1][1] if i else first
         for c, observable in enumerate(model.observables):
             clear = [
                 s.name

@@ -21,7 +21,7 @@ from contfric.orbit.simulation import EventRows, Tables
 from contfric.orbit.system import IntArray
 
 #: Types of the model's tables and of the rows of events, as kernels take them.
-TablesType = types.NamedTuple([indices, table, indices, indices, indices], Tables)
+TablesType = types.NamedTuple([indices, table, indices, indices, indices, indices, vector], Tables)
 RowsType = types.NamedTuple([table, indices, vector, matrix], EventRows)
 
 
@@ -36,9 +36,7 @@ class StateRoom(NamedTuple):
 
 
 #: How a simulation ended.
-ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE = range(5)
-#: A sliding mode that is not left within this many periods is never left; a slide gets far more.
-HOLD_PERIODS, SLIDE_PERIODS = 1.001, 1e4
+ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE, QUIET, CHATTER = range(7)
 
 #: Events within this share of a period follow each other at once; more of them in a row than this do
 #: not come to an end (a stop, a release and a reversal may fall together, twice).
@@ -91,6 +89,12 @@ def first_hit(functions, tables, mode, on, t, y, p, longest, room):  # type: ign
 
 
 @helper
+def never_left(tables, mode):  # type: ignore[no-untyped-def]
+    """Return how a motion ends in a mode that it never leaves."""
+    return HELD if tables.sliding[mode] != 0 else QUIET
+
+
+@helper
 def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: ignore[no-untyped-def]
     """Follow a trajectory; see :func:`simulate`."""
     observables, following = tables.observables, tables.following
@@ -107,11 +111,11 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
         left = (periods - (cycle - first_cycle)) * unit - (t - first_time)
         if period <= 0.0:
             left = periods - (t - first_time)
-        allowance = (HOLD_PERIODS if tables.sliding[mode] else SLIDE_PERIODS) * unit
+        allowance = tables.longest[mode] * unit
         tau, surface = first_hit(functions, tables, mode, on, t, y, p, min(left, allowance), room)
         if surface < 0:
             if left > allowance:
-                return HELD, event, mode, cycle, t
+                return never_left(tables, mode), event, mode, cycle, t
             functions[0](mode, t, y, left, p, none, after, room.nothing)
             copy_state(after, y)
             t += left
@@ -128,21 +132,28 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
         for j in range(y.shape[0]):
             if not abs(y[j]) < TOO_LARGE:
                 return INFINITE, event, mode, cycle, t
+        reset = tables.resets[surface] != 0
+        if reset:  # rows keep the state before it, as the joints of orbits do
+            copy_state(y, rows.states[event])
+            functions[7](surface, t, rows.states[event], p, none, y, room.nothing)
         code = sign_code(functions, observables, surface, t, y, p, none, empty)
         target = following[
             (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code
         ]
         at_once = at_once + 1 if tau <= NO_TIME * unit else 0
         if at_once > MOST_AT_ONCE:
-            return IMPOSSIBLE, event, mode, cycle, t
+            return (CHATTER if reset else IMPOSSIBLE), event, mode, cycle, t
         on = 1 << surface
+        if reset and target < 0:
+            return IMPOSSIBLE, event, mode, cycle, t
         if target < 0:
             continue  # nothing leads there: the surface is touched and left to the same side
         joints[event, 0] = mode
         joints[event, 1] = surface
         rows.cycles[event] = cycle
         rows.times[event] = t
-        copy_state(y, rows.states[event])
+        if not reset:
+            copy_state(y, rows.states[event])
         on |= tables.lies_on[mode]
         mode = target
         event += 1

@@ -249,8 +249,9 @@ def entered(
     entries: Iterable[str], surface: str, model: Model, mode: str, next_mode: str
 ) -> set[str]:
     """Return the domains of the next mode that a segment can lead to from its entries."""
-    targets = (model.transitions.get((d, surface)) for d in _within(entries, model, mode))
-    return {t for t in targets if t is not None and model.domain_by_name[t].mode == next_mode}
+    inside = _within(entries, model, mode)
+    targets = {t for d in inside for t in model.targets.get((d, surface), ())}
+    return {t for t in targets if model.domain_by_name[t].mode == next_mode}
 
 
 def _within(entries: Iterable[str], model: Model, mode: str) -> set[str]:

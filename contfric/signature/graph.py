@@ -31,13 +31,14 @@ def transition_graph(model: Model) -> nx.MultiDiGraph[str]:
     graph: nx.MultiDiGraph[str] = nx.MultiDiGraph(model=model.name)
     for domain in model.domains:
         graph.add_node(domain.name, mode=domain.mode, label=domain.label or domain.name)
-    for (source, surface), target in model.transitions.items():
-        graph.add_edge(source, target, key=surface, surface=surface)
+    for (source, surface), targets in model.targets.items():
+        for target in targets:
+            graph.add_edge(source, target, key=surface, surface=surface)
     return graph
 
 
 def successors(model: Model, domain: str) -> dict[str, str]:
-    """Return the next domain for each surface through which a domain can be left.
+    """Return the next domain for each surface through which a domain can be left; resets are left out.
 
     Raises
     ------

@@ -15,7 +15,15 @@ from contfric.errors import NotationError
 from contfric.models import Model
 from contfric.signature.cyclic import least_rotation, rotated
 from contfric.signature.graph import crossing, successors, unknown_domain
-from contfric.signature.holds import TOUCH, hold_at, hold_fault, is_hold, mirror_exit, surface_into
+from contfric.signature.holds import TOUCH, hold_at, hold_fault, is_hold, surface_into
+from contfric.signature.impacts import (
+    impact_at,
+    impact_fault,
+    is_event,
+    is_impact,
+    mirror_name,
+    struck_surface,
+)
 
 #: Number of segments that a name leaves unsaid: that of the four typical orbits of the reference.
 TYPICAL_SEGMENTS = 6
@@ -35,7 +43,8 @@ class Signature:
     model : Model
         The model; compared by its name.
     segments : tuple of str
-        Names of the domains in the order of the visit; the last leads back to the first.
+        Names of the domains in the order of the visit; the last leads back to the first. Between two
+        of them may stand a hold (``hold@F+``) or an impact (``impact@wall``).
     periods : int
         Number of periods of the excitation.
     symmetric : bool or None
@@ -102,12 +111,13 @@ class Signature:
         """The least rotation of the segments, by the order of the domains in the model."""
         names = [domain.name for domain in self.model.domains]
         holds = [TOUCH, *(hold_at(surface.name) for surface in self.model.surfaces)]
-        order = {name: i for i, name in enumerate([*names, *holds])}
+        impacts = map(impact_at, self.model.reset_by_surface)
+        order = {name: i for i, name in enumerate([*names, *holds, *impacts])}
         return rotated(self.segments, least_rotation([order[s] for s in self.segments]))
 
     @cached_property
     def surfaces(self) -> tuple[str, ...]:
-        """The surface that ends each segment; a hold's own name, as it ends at a free time."""
+        """The surface that ends each segment; the own name of a hold, and of an impact."""
         found = (_exit(self.model, self.segments, i) for i in range(len(self.segments)))
         return tuple(surface for surface in found if surface is not None)
 
@@ -115,13 +125,18 @@ class Signature:
     def stops(self) -> int:
         """Number of sticks: segments of a sliding mode."""
         return sum(
-            is_sliding(self.model, segment) for segment in self.segments if not is_hold(segment)
+            is_sliding(self.model, segment) for segment in self.segments if not is_event(segment)
         )
 
     @property
     def holds(self) -> int:
         """Number of holds; an orbit with one lies on a bridge."""
         return sum(is_hold(segment) for segment in self.segments)
+
+    @property
+    def impacts(self) -> int:
+        """Number of impacts."""
+        return sum(is_impact(segment) for segment in self.segments)
 
     @cached_property
     def is_mirror_symmetric(self) -> bool:
@@ -174,8 +189,9 @@ class Signature:
             Whether the orbit is symmetric; the segments alone do not tell.
         """
         name = f"{self.stops}{'s' if symmetric else 'a'}"
-        count = len(self.segments) - self.holds
+        count = len(self.segments) - self.holds - self.impacts
         name = name if count == TYPICAL_SEGMENTS else f"{name}, {count}seg"
+        name = f"{name}, {self.impacts}imp" if self.impacts else name
         return f"{name}, {self.holds}hold" if self.holds else name
 
 
@@ -231,7 +247,7 @@ def walk_fault(model: Model, segments: Sequence[str]) -> Fault | None:
     if not segments:
         return Fault(0, "a signature needs segments, got none")
     for index, segment in enumerate(segments):
-        if segment not in model.domain_by_name and not is_hold(segment):
+        if segment not in model.domain_by_name and not is_event(segment):
             return Fault(index, f"segment {index + 1}: {_not_a_domain(model, segment)}")
     if len(segments) == 1:
         return Fault(0, f"the single segment '{segments[0]}' is no closed walk: it never ends")
@@ -241,8 +257,12 @@ def walk_fault(model: Model, segments: Sequence[str]) -> Fault | None:
             fault = hold_fault(model, segments, index)
             if fault is not None:
                 return Fault(index, f"segment {index + 1}: {fault}")
+        elif is_impact(segments[index]):
+            fault = impact_fault(model, segments, index)
+            if fault is not None:
+                return Fault(index, f"segment {index + 1}: {fault}")
         elif (
-            not is_hold(segments[following])
+            not is_event(segments[following])
             and crossing(model, segments[index], segments[following]) is None
         ):
             return Fault(following, _impossible(model, segments, index, following))
@@ -287,15 +307,16 @@ def _mirrored(model: Model, segments: Iterable[str]) -> tuple[str, ...]:
     if model.symmetry is None:
         raise NotationError(f"model '{model.name}' has no symmetry: there is no mirror image")
     surfaces = model.symmetry.surfaces
-    return tuple(
-        mirror_exit(s, surfaces) if is_hold(s) else model.mirror_domain[s] for s in segments
-    )
+    images = {**surfaces, **model.mirror_domain}
+    return tuple(mirror_name(s, images) if is_event(s) else images[s] for s in segments)
 
 
 def _exit(model: Model, segments: Sequence[str], index: int) -> str | None:
     following = (index + 1) % len(segments)
-    if is_hold(segments[index]):
+    if is_event(segments[index]):
         return segments[index]
     if is_hold(segments[following]):
         return surface_into(model, segments, index)
+    if is_impact(segments[following]):
+        return struck_surface(segments[following])
     return crossing(model, segments[index], segments[following])

@@ -15,6 +15,7 @@ from contfric.errors import NotationError
 from contfric.models import Model
 from contfric.signature.cyclic import least_rotation, primitive_length, rotated
 from contfric.signature.holds import TOUCH, hold_at, is_hold, known_hold, mirror_exit, mode_of
+from contfric.signature.impacts import is_impact
 from contfric.signature.notation import Signature
 
 #: Stands for the surface at the end of a segment that is the whole orbit and has no end. None of
@@ -117,7 +118,7 @@ def mirror_word(word: ReducedWord, model: Model) -> ReducedWord:
 
 def fuses(model: Model, mode: str, surface: str, next_mode: str) -> bool:
     """Return whether the field is the same on both sides of a joint."""
-    return mode == next_mode and not model.surface_by_name[surface].switching
+    return mode == next_mode and not model.cuts(surface)
 
 
 def _key(pair: ReducedPair, model: Model) -> tuple[int, int]:
@@ -131,7 +132,9 @@ def _key(pair: ReducedPair, model: Model) -> tuple[int, int]:
 
 def _fused(signature: Signature) -> tuple[ReducedSegment, ...]:
     """Fuse the segments; the first piece starts at the first joint that does not fuse."""
-    model, names, surfaces = signature.model, signature.canonical, _canonical_surfaces(signature)
+    model = signature.model
+    pairs = zip(signature.canonical, _canonical_surfaces(signature), strict=True)
+    names, surfaces = zip(*(pair for pair in pairs if not is_impact(pair[0])), strict=True)
     modes = [mode_of(model, names, i) for i in range(len(names))]
     count = len(names)
     after = rotated(tuple(modes), 1)

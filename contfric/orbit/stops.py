@@ -1,0 +1,48 @@
+"""Stops of a model whose motion is not cut there: where the displacement is stationary inside segments."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contfric.models.definition import FloatArray
+
+if TYPE_CHECKING:
+    from contfric.orbit.orbit import Orbit
+
+#: Most stops of one segment that are looked for: a segment with more would be no segment.
+_MOST = 1000
+
+
+def displacements(orbit: Orbit, surface: str) -> FloatArray:
+    """Return the displacement wherever an orbit crosses a surface, in order, shape (crossings,).
+
+    Inside its segments and at its joints; by the first roots of the flow.
+    """
+    model, flow = orbit.model, orbit.model.flow
+    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
+    k = [s.name for s in model.surfaces].index(surface)
+    c = [o.name for o in model.observables].index(model.surfaces[k].observable)
+    level = flow.level(k, orbit.vector, none, empty)
+    modes = [m.name for m in model.modes]
+    found: list[float] = []
+    for i, (mode, exit_) in enumerate(orbit.word):
+        if exit_ == surface:
+            found.append(float(orbit.ends[i, 1]))
+            continue
+        if model.mode_by_name[mode].sliding and exit_ in model.surface_by_name:
+            lies = {d.signs[surface] for d in model.domains if d.mode == mode}
+            if lies == {0}:
+                continue  # it rests there
+        start, end = float(orbit.begins[i, 0]), float(orbit.ends[i, 0])
+        state, out, on = orbit.begins[i, 1:].copy(), np.empty(len(model.states)), False
+        for _ in range(_MOST):
+            tau = flow.hit(
+                modes.index(mode), c, level, on, start, state, end - start, orbit.vector, out
+            )
+            if tau < 0.0:
+                break
+            found.append(float(out[0]))
+            start, state, on = start + tau, out.copy(), True
+    return np.array(found)

@@ -1,0 +1,71 @@
+"""Impacts in a signature: the reset between two domains.
+
+``free+ -> impact@wall -> free-``
+    the motion in ``free+`` meets the surface ``wall``, where its state is mapped, and goes on in
+    ``free-``.
+
+An impact takes no time, and is no segment. It is written because the domains beside it do not tell: both
+may be the same, or joined by another surface as well. In a reduced word it is the exit of the segment
+before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from contfric.models import Model
+from contfric.signature.holds import is_hold, mirror_exit
+
+_IMPACT = "impact@"
+
+
+def impact_at(surface: str) -> str:
+    """Return the name of the impact on a surface.
+
+    Examples
+    --------
+    >>> impact_at("wall")
+    'impact@wall'
+    """
+    return f"{_IMPACT}{surface}"
+
+
+def is_impact(name: str) -> bool:
+    """Return whether a name in a signature is that of an impact."""
+    return name.startswith(_IMPACT)
+
+
+def struck_surface(impact: str) -> str:
+    """Return the surface that an impact is on."""
+    return impact.removeprefix(_IMPACT)
+
+
+def is_event(name: str) -> bool:
+    """Return whether a name in a signature is that of no domain: a hold or an impact."""
+    return is_hold(name) or is_impact(name)
+
+
+def mirror_name(name: str, images: Mapping[str, str]) -> str:
+    """Return the mirror image of a name in a signature, from those of domains and surfaces."""
+    if is_impact(name):
+        return impact_at(images[struck_surface(name)])
+    return mirror_exit(name, images)
+
+
+def impact_fault(model: Model, segments: Sequence[str], index: int) -> str | None:
+    """Return what is wrong with the impact at a place of a walk; None if nothing is."""
+    impact = segments[index]
+    surface = struck_surface(impact)
+    if surface not in model.reset_by_surface:
+        valid = ", ".join(map(impact_at, model.reset_by_surface)) or "none"
+        return f"model '{model.name}' has no '{impact}'; its impacts are: {valid}"
+    before, after = segments[index - 1], segments[(index + 1) % len(segments)]
+    if before not in model.domain_by_name or after not in model.domain_by_name:
+        return f"'{impact}' must stand between two domains"
+    possible = model.targets.get((before, surface), ())
+    if after not in possible:
+        return (
+            f"'{impact}' cannot lead from {before} to {after}; behind it can come: "
+            f"{', '.join(possible) or 'nothing'}"
+        )
+    return None
