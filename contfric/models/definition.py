@@ -50,16 +50,17 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Constraint:
-    """A linear inequality ``sum(c * p) >= 0`` (``> 0`` if strict) that parameters must obey."""
+    """A linear inequality ``constant + sum(c * p) >= 0`` (``> 0`` if strict) that parameters obey."""
 
     text: str
     coefficients: Mapping[str, float]
     strict: bool = False
     meaning: str = ""
+    constant: float = 0.0
 
     def value(self, params: Mapping[str, float]) -> float:
         """Return the left-hand side of the inequality."""
-        return sum(c * params[name] for name, c in self.coefficients.items())
+        return self.constant + sum(c * params[name] for name, c in self.coefficients.items())
 
 
 @dataclass(frozen=True)
@@ -173,6 +174,9 @@ class Model:
     autonomous : bool
         Whether there is no excitation: the flow's ``period`` returns 0, the period of an orbit is found
         with it, and ``periods`` of a simulation are units of time.
+    definition : str
+        Text from which the model can be built anywhere (:mod:`contfric.models.description`); empty if
+        it is known by its name only.
     """
 
     name: str
@@ -192,6 +196,7 @@ class Model:
     references: tuple[str, ...] = ()
     resets: tuple[Reset, ...] = ()
     autonomous: bool = False
+    definition: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
         for reset in self.resets:

@@ -1,0 +1,172 @@
+"""A description evaluated at points, in numbers of any kind: what needs no compiled code."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Generic, TypeVar
+
+from contfric.models.description import Description
+from contfric.models.grammar import FLOATS, PERIOD, TIME, Algebra, parse
+
+T = TypeVar("T")
+
+#: Points that sides and identities are judged by: enough that a coincidence is no explanation.
+_TRIES, _STEPS = 400, 30
+#: A state is on a surface where the observable differs by less than this, relative to 1.
+_ON = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluator(Generic[T]):
+    """Fields, observables and levels of a description in an algebra."""
+
+    description: Description
+    algebra: Algebra[T]
+
+    @cached_property
+    def _trees(self) -> dict[str, object]:
+        return {}
+
+    def value(
+        self, text: str, params: Mapping[str, T], t: T | None = None, y: Sequence[T] = (), **more: T
+    ) -> T:
+        """Return the value of any expression; ``more`` are names that the model does not have."""
+        values = dict(params) | more
+        if t is not None:
+            values[TIME] = t
+        values.update(zip(self.description.states, y, strict=False))
+        tree = self._tree(text)
+        return self.description.names.scope(self.algebra, values).evaluate(tree)  # type: ignore[arg-type]
+
+    def _tree(self, text: str) -> object:
+        if text not in self._trees:
+            self._trees[text] = parse(text)
+        return self._trees[text]
+
+    def observable(self, name: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> T:
+        """Return the value of an observable."""
+        formula = next(o.formula for o in self.description.observables if o.name == name)
+        return self.value(formula, params, t, y)
+
+    def height(self, surface: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> T:
+        """Return (observable - level) of a surface."""
+        s = next(s for s in self.description.surfaces if s.name == surface)
+        above = self.observable(s.observable, params, t, y)
+        return above - self.value(s.level, params)  # type: ignore[operator,no-any-return]
+
+    def field(self, mode: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> list[T]:
+        """Return the rates of all states in a mode."""
+        rates = next(m.field for m in self.description.modes if m.name == mode)
+        return [self.value(rate, params, t, y) for rate in rates]
+
+    def period(self, params: Mapping[str, T]) -> T | None:
+        """Return the period of the excitation, None if there is none."""
+        text = self.description.period
+        return self.value(text, params) if text else None
+
+    def image(
+        self, params: Mapping[str, T], t: T, y: Sequence[T], period: T
+    ) -> tuple[T, list[T]]:
+        """Return time and state under the declared symmetry."""
+        images = self.description.symmetry or {}
+        states = self.description.states
+        found = [self.value(images.get(s, s), params, t, y, **{PERIOD: period}) for s in states]
+        return self.value(images.get(TIME, TIME), params, t, y, **{PERIOD: period}), found
+
+
+def floats(description: Description) -> Evaluator[float]:
+    """Return the description in ordinary numbers; what has no value is nan or an ArithmeticError."""
+    return Evaluator(description, FLOATS)
+
+
+def defaults(description: Description) -> dict[str, float]:
+    """Return the default of every parameter."""
+    return {p.name: p.default for p in description.parameters}
+
+
+@dataclass(frozen=True, eq=False)
+class Sampler:
+    """Random states in the region where motion takes place, always the same for the same seed."""
+
+    evaluator: Evaluator[float]
+    params: Mapping[str, float]
+    seed: int = 1
+
+    @cached_property
+    def widths(self) -> list[float]:
+        """Half-widths of the region: twice those that starts are drawn from."""
+        spread = self.evaluator.description.spread
+        found = [abs(self.evaluator.value(text, self.params)) for text in spread]
+        return [2.0 * w if 0.0 < w < math.inf else 2.0 for w in found]
+
+    def states(self, count: int) -> Iterator[tuple[float, list[float]]]:
+        """Yield times and states."""
+        draw = random.Random(self.seed)
+        span = self.evaluator.period(self.params) or 10.0
+        for _ in range(count):
+            yield draw.uniform(0.0, span), [draw.uniform(-w, w) for w in self.widths]
+
+    def on(
+        self, surface: str, sides: Mapping[str, int], most: int
+    ) -> Iterator[tuple[float, list[float]]]:
+        """Yield up to ``most`` times and states on a surface, on the given sides of others."""
+        found = 0
+        for t, y in self.states(_TRIES):
+            landed = self.landed(surface, t, y)
+            if landed is None or self.sides(t, landed, sides) != dict(sides):
+                continue
+            yield t, landed
+            found += 1
+            if found == most:
+                return
+
+    def sides(self, t: float, y: Sequence[float], surfaces: Mapping[str, int]) -> dict[str, int]:
+        """Return the sides of some surfaces that a state is on."""
+        found = {}
+        for name in surfaces:
+            above = self.evaluator.height(name, self.params, t, y)
+            found[name] = 0 if abs(above) <= _ON else 1 if above > 0 else -1
+        return found
+
+    def landed(self, surface: str, t: float, y: Sequence[float]) -> list[float] | None:
+        """Return a state on a surface near a state: Newton's method along the gradient."""
+        state = list(y)
+        for _ in range(_STEPS):
+            try:
+                above = self.evaluator.height(surface, self.params, t, state)
+                slope = self.gradient(surface, t, state)
+            except ArithmeticError:
+                return None
+            if abs(above) <= _ON:
+                return state
+            square = sum(g * g for g in slope)
+            if not 0.0 < square < math.inf or not abs(above) < math.inf:
+                return None
+            state = [s - above * g / square for s, g in zip(state, slope, strict=True)]
+        return None
+
+    def gradient(self, surface: str, t: float, y: Sequence[float]) -> list[float]:
+        """Return the gradient of an observable in the state, by differences."""
+        found, step = [], 6e-6  # cube root of the rounding error: central differences
+        for i in range(len(y)):
+            ahead, behind = list(y), list(y)
+            ahead[i] += step
+            behind[i] -= step
+            up = self.evaluator.height(surface, self.params, t, ahead)
+            down = self.evaluator.height(surface, self.params, t, behind)
+            found.append((up - down) / (2 * step))
+        return found
+
+    def rate(self, mode: str, surface: str, t: float, y: Sequence[float]) -> float:
+        """Return the rate at which a mode moves away from a surface, upwards."""
+        step = 6e-6
+        velocity = self.evaluator.field(mode, self.params, t, y)
+        ahead = [a + step * v for a, v in zip(y, velocity, strict=True)]
+        behind = [a - step * v for a, v in zip(y, velocity, strict=True)]
+        up = self.evaluator.height(surface, self.params, t + step, ahead)
+        down = self.evaluator.height(surface, self.params, t - step, behind)
+        return (up - down) / (2 * step)

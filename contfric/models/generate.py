@@ -1,0 +1,313 @@
+"""The compiled functions of a described model, written as a module of Python for numba.
+
+Each function comes from formulas and their exact derivatives; the rate of an observable along a mode,
+``o_t + o_y . f``, has the second derivatives of the observable in its gradient. What the user wrote never
+stands in the module: names are replaced by ``t``, ``y0 ...`` and ``p0 ...``.
+
+This module imports sympy; it is loaded when a model is built for the first time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import sympy
+
+from contfric.errors import ModelError
+from contfric.models.code import SLOPES, VALUES, Lines, Output, write_block
+from contfric.models.description import Description
+from contfric.models.entries import Address, EntryError
+from contfric.models.formulas import FORMULAS, formula, resolved
+from contfric.models.grammar import TIME, parse
+
+_HEAD = '''"""Compiled functions of a model, generated from its definition; not to be edited.
+
+Digest of the sources that it was generated with: {digest}
+"""
+
+import math
+
+import numpy as np
+
+from contfric.compiled import (
+    allocating_helper,
+    flow_signature,
+    helper,
+    hit_signature,
+    kernel,
+    level_signature,
+    observe_signature,
+    period_signature,
+    rate_signature,
+    reset_signature,
+    turning_signature,
+)
+from contfric.flow.interface import CompiledFlow
+
+
+@helper
+def sign(x):
+    return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
+
+
+@helper
+def power_log(base, exponent):
+    return base**exponent * math.log(base) if base != 0.0 else 0.0
+
+'''
+
+_KERNELS = '''
+@kernel(observe_signature)
+def observe(c, t, y, p, which, grad):
+    return observe_at(c, t, y, p, which, grad)
+
+
+@kernel(rate_signature)
+def rate(mode, c, t, y, p, which, grad):
+    return rate_at(mode, c, t, y, p, which, grad)
+
+
+@kernel(level_signature)
+def level(k, p, which, grad):
+    return level_at(k, p, which, grad)
+
+
+@kernel(period_signature)
+def period(p, which, grad):
+    return period_at(p, which, grad)
+
+
+@kernel(reset_signature)
+def reset(k, t, y, p, which, y1, jac):
+    reset_at(k, t, y, p, which, y1, jac)
+
+'''
+
+
+class Formulas:
+    """The formulas of a description, in the symbols t, y0 ... and p0 ..."""
+
+    def __init__(self, description: Description) -> None:
+        self.description = description
+        self.t = sympy.Symbol("t")
+        self.y = sympy.symbols(f"y:{len(description.states)}")
+        self.p = sympy.symbols(f"p:{len(description.parameters)}")
+        names = [TIME, *description.states, *(p.name for p in description.parameters)]
+        values = dict(zip(names, (self.t, *self.y, *self.p), strict=True))
+        self._scope = description.names.scope(FORMULAS, values)
+
+    def read(self, address: Address, text: str) -> Any:
+        """Return one expression as a formula."""
+        try:
+            return formula(parse(text), self._scope)
+        except EntryError:
+            raise
+        except ModelError as error:
+            raise EntryError(address, str(error)) from None
+
+    def observables(self) -> list[Any]:
+        """Return the formula of each observable."""
+        return [self.read(("observables", o.name), o.formula) for o in self.description.observables]
+
+    def levels(self) -> list[Any]:
+        """Return the level of each surface, in the order of the description."""
+        return [
+            self.read(("surfaces", s.name, "level"), s.level) for s in self.description.surfaces
+        ]
+
+    def period(self) -> Any:
+        """Return the period, 0 if there is none."""
+        return self.read(("period",), self.description.period or "0")
+
+    def fields(self) -> list[list[Any]]:
+        """Return the field of each mode, without the kinks that the mode does not see."""
+        observables = {
+            o.name: f
+            for o, f in zip(self.description.observables, self.observables(), strict=True)
+        }
+        found = []
+        for mode in self.description.modes:
+            signs = {}
+            for surface, level in zip(self.description.surfaces, self.levels(), strict=True):
+                side = mode.sides.get(surface.name, 0)
+                above = observables[surface.observable] - level
+                if side != 0 and not above.is_number:
+                    signs[above] = side
+            found.append(
+                [
+                    resolved(self.read(("modes", mode.name, "field", state), rate), signs)
+                    for state, rate in zip(self.description.states, mode.field, strict=True)
+                ]
+            )
+        return found
+
+    def rates(self) -> list[list[Any]]:
+        """Return the rate of each observable along each mode."""
+        return [
+            [
+                sympy.expand_mul(o.diff(self.t))
+                + sum(o.diff(s) * f for s, f in zip(self.y, field, strict=True))
+                for o in self.observables()
+            ]
+            for field in self.fields()
+        ]
+
+    def resets(self) -> list[list[Any]]:
+        """Return the map of the state at each surface."""
+        found = []
+        for surface in self.description.surfaces:
+            texts = self.description.resets.get(surface.name, {})
+            found.append(
+                [
+                    self.read(("resets", surface.name, state), texts.get(state, state))
+                    for state in self.description.states
+                ]
+            )
+        return found
+
+
+def module_source(description: Description, order: Sequence[str], digest: str) -> str:
+    """Return the module of a model.
+
+    Parameters
+    ----------
+    order : names of the surfaces in the order of the engine
+    digest : of the sources that the module depends on
+    """
+    formulas = Formulas(description)
+    names = [s.name for s in description.surfaces]
+    code = Lines()
+    code.add(_HEAD.format(digest=digest))
+    writer = _Writer(code, formulas)
+    writer.vectors("field", "mode", "out", formulas.fields())
+    writer.scalars("observe_at(c, t, y, p, which, grad)", "c", formulas.observables())
+    writer.rates(formulas.rates())
+    levels, resets = formulas.levels(), formulas.resets()
+    writer.of_parameters(
+        "level_at(k, p, which, grad)", "k", [levels[names.index(n)] for n in order]
+    )
+    writer.of_parameters("period_at(p, which, grad)", None, [formulas.period()])
+    writer.vectors("reset_at", "k", "y1", [resets[names.index(n)] for n in order])
+    code.add(_KERNELS)
+    from contfric.models.motion import MOTION
+
+    constant = [
+        [rate == 0 for rate in (sympy.simplify(r) if not r.is_Atom else r for r in rates)]
+        for rates in formulas.rates()
+    ]
+    code.add(MOTION.replace("@NEVER@", _never(constant)).replace("@N@", str(len(formulas.y))))
+    return str(code)
+
+
+def _never(constant: list[list[bool]]) -> str:
+    """Return the condition that an observable does not change along a mode."""
+    pairs = [f"(mode == {m} and c == {c})" for m, row in enumerate(constant) for c, _ in _true(row)]
+    return " or ".join(pairs) or "False"
+
+
+def _true(row: list[bool]) -> list[tuple[int, bool]]:
+    return [(i, holds) for i, holds in enumerate(row) if holds]
+
+
+class _Writer:
+    """Writes the functions of a model."""
+
+    def __init__(self, code: Lines, formulas: Formulas) -> None:
+        self.code, self.f = code, formulas
+
+    def vectors(self, name: str, index: str, target: str, rows: list[list[Any]]) -> None:
+        """Write a vector function of state, one block for each index."""
+        state = "t, y" if name == "field" else "t, y"
+        self._define(f"{name}({index}, {state}, p, which, {target}, jac)")
+        n = len(self.f.y)
+
+        def outputs(row: list[Any]) -> list[Output]:
+            found = [Output(VALUES, f"{target}[{i}]", e) for i, e in enumerate(row)]
+            for i, e in enumerate(row):
+                found += [
+                    Output(SLOPES, f"jac[{i}, {j}]", e.diff(s))
+                    for j, s in enumerate((self.f.t, *self.f.y))
+                ]
+                found += [
+                    Output(k, f"jac[{i}, {1 + n} + k]", e.diff(s)) for k, s in enumerate(self.f.p)
+                ]
+            return _without_idle(found)
+
+        columns = [f"jac[{i}, {1 + n} + k] = 0.0" for i in range(n)]
+        self._blocks(index, [outputs(row) for row in rows], "jac", columns, None)
+
+    def scalars(self, head: str, index: str, values: list[Any]) -> None:
+        """Write a scalar function of state with its gradient."""
+        self._define(head)
+        n = len(self.f.y)
+        self._blocks(
+            index, [self._gradient(e) for e in values], "grad", [f"grad[{1 + n} + k] = 0.0"], "value"
+        )
+
+    def rates(self, rows: list[list[Any]]) -> None:
+        """Write the rates of all observables along all modes."""
+        self._define("rate_at(mode, c, t, y, p, which, grad)")
+        n, count = len(self.f.y), len(rows[0])
+        blocks = [self._gradient(e) for row in rows for e in row]
+        self.code.lines.insert(-1 if False else len(self.code.lines), "")
+        self._blocks(
+            f"mode * {count} + c", blocks, "grad", [f"grad[{1 + n} + k] = 0.0"], "value"
+        )
+
+    def _gradient(self, e: Any) -> list[Output]:
+        n = len(self.f.y)
+        found = [Output(VALUES, "value", e)]
+        found += [
+            Output(SLOPES, f"grad[{j}]", e.diff(s)) for j, s in enumerate((self.f.t, *self.f.y))
+        ]
+        found += [Output(k, f"grad[{1 + n} + k]", e.diff(s)) for k, s in enumerate(self.f.p)]
+        return _without_idle(found)
+
+    def of_parameters(self, head: str, index: str | None, values: list[Any]) -> None:
+        """Write a scalar function of the parameters alone."""
+        self._define(head, state=False)
+        blocks = [
+            _without_idle(
+                [
+                    Output(VALUES, "value", e),
+                    *(Output(k, "grad[k]", e.diff(s)) for k, s in enumerate(self.f.p)),
+                ]
+            )
+            for e in values
+        ]
+        self._blocks(index, blocks, "grad", ["grad[k] = 0.0"], "value")
+
+    def _define(self, head: str, state: bool = True) -> None:
+        self.code.add("", "@helper")
+        self.code.open(f"def {head}:")
+        self.code.add(*(f"p{i} = p[{i}]" for i in range(len(self.f.p))))
+        if state:
+            self.code.add(*(f"y{i} = y[{i}]" for i in range(len(self.f.y))))
+
+    def _blocks(
+        self,
+        index: str | None,
+        blocks: list[list[Output]],
+        room: str,
+        columns: list[str],
+        result: str | None,
+    ) -> None:
+        """Write one block for each index; the last one stands for all that are left."""
+        for i, outputs in enumerate(blocks):
+            last = i == len(blocks) - 1
+            if not last:
+                self.code.open(f"if {index} == {i}:")
+            write_block(self.code, outputs, room, columns, result)
+            if not last:
+                self.code.close()
+        self.code.close()
+
+
+def _without_idle(outputs: list[Output]) -> list[Output]:
+    """Leave out the parameters that nothing depends on."""
+    busy = {o.section for o in outputs if o.section >= 0 and o.expression != 0}
+    return [o for o in outputs if o.section < 0 or o.section in busy]
+
+
+Render = Callable[[Description, Sequence[str], str], str]
