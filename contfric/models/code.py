@@ -137,7 +137,7 @@ def write_block(
     code.close()
     code.add(*slopes)
     if columns:
-        code.open("for k in range(which.shape[0]):")
+        code.open("for j in range(which.shape[0]):")
         _write_parameters(code, own, section, columns)
         code.close()
     code.add(back)
@@ -148,7 +148,7 @@ def _write_parameters(code: Lines, own: list[int], section: Any, columns: Sequen
         code.add(*columns)
         return
     for index, parameter in enumerate(own):
-        code.open(f"{'if' if index == 0 else 'elif'} which[k] == {parameter}:")
+        code.open(f"{'if' if index == 0 else 'elif'} which[j] == {parameter}:")
         code.add(*section(parameter))
         code.close()
     code.open("else:")

@@ -2,14 +2,14 @@
 
 Each function comes from formulas and their exact derivatives; the rate of an observable along a mode,
 ``o_t + o_y . f``, has the second derivatives of the observable in its gradient. What the user wrote never
-stands in the module: names are replaced by ``t``, ``y0 ...`` and ``p0 ...``.
+stands in the module: names are replaced by ``t``, ``s0 ...`` (states) and ``p0 ...``.
 
 This module imports sympy; it is loaded when a model is built for the first time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import sympy
@@ -28,10 +28,7 @@ Digest of the sources that it was generated with: {digest}
 
 import math
 
-import numpy as np
-
 from contfric.compiled import (
-    allocating_helper,
     flow_signature,
     helper,
     hit_signature,
@@ -86,12 +83,12 @@ def reset(k, t, y, p, which, y1, jac):
 
 
 class Formulas:
-    """The formulas of a description, in the symbols t, y0 ... and p0 ..."""
+    """The formulas of a description, in the symbols t, s0 ... and p0 ..."""
 
     def __init__(self, description: Description) -> None:
         self.description = description
         self.t = sympy.Symbol("t")
-        self.y = sympy.symbols(f"y:{len(description.states)}")
+        self.y = sympy.symbols(f"s:{len(description.states)}")
         self.p = sympy.symbols(f"p:{len(description.parameters)}")
         names = [TIME, *description.states, *(p.name for p in description.parameters)]
         values = dict(zip(names, (self.t, *self.y, *self.p), strict=True))
@@ -218,75 +215,67 @@ class _Writer:
 
     def vectors(self, name: str, index: str, target: str, rows: list[list[Any]]) -> None:
         """Write a vector function of state, one block for each index."""
-        state = "t, y" if name == "field" else "t, y"
-        self._define(f"{name}({index}, {state}, p, which, {target}, jac)")
         n = len(self.f.y)
 
         def outputs(row: list[Any]) -> list[Output]:
             found = [Output(VALUES, f"{target}[{i}]", e) for i, e in enumerate(row)]
             for i, e in enumerate(row):
                 found += [
-                    Output(SLOPES, f"jac[{i}, {j}]", e.diff(s))
-                    for j, s in enumerate((self.f.t, *self.f.y))
+                    Output(SLOPES, f"jac[{i}, {m}]", e.diff(s))
+                    for m, s in enumerate((self.f.t, *self.f.y))
                 ]
                 found += [
-                    Output(k, f"jac[{i}, {1 + n} + k]", e.diff(s)) for k, s in enumerate(self.f.p)
+                    Output(k, f"jac[{i}, {1 + n} + j]", e.diff(s)) for k, s in enumerate(self.f.p)
                 ]
             return _without_idle(found)
 
-        columns = [f"jac[{i}, {1 + n} + k] = 0.0" for i in range(n)]
-        self._blocks(index, [outputs(row) for row in rows], "jac", columns, None)
+        columns = [f"jac[{i}, {1 + n} + j] = 0.0" for i in range(n)]
+        head = f"{name}({index}, t, y, p, which, {target}, jac)"
+        self._blocks(head, index, [outputs(row) for row in rows], "jac", columns, None)
 
     def scalars(self, head: str, index: str, values: list[Any]) -> None:
         """Write a scalar function of state with its gradient."""
-        self._define(head)
-        n = len(self.f.y)
-        self._blocks(
-            index, [self._gradient(e) for e in values], "grad", [f"grad[{1 + n} + k] = 0.0"], "value"
-        )
+        idle = [f"grad[{1 + len(self.f.y)} + j] = 0.0"]
+        self._blocks(head, index, [self._gradient(e) for e in values], "grad", idle, "value")
 
     def rates(self, rows: list[list[Any]]) -> None:
         """Write the rates of all observables along all modes."""
-        self._define("rate_at(mode, c, t, y, p, which, grad)")
-        n, count = len(self.f.y), len(rows[0])
-        blocks = [self._gradient(e) for row in rows for e in row]
-        self.code.lines.insert(-1 if False else len(self.code.lines), "")
-        self._blocks(
-            f"mode * {count} + c", blocks, "grad", [f"grad[{1 + n} + k] = 0.0"], "value"
-        )
+        flat = [e for row in rows for e in row]
+        self.scalars("rate_at(mode, c, t, y, p, which, grad)", f"mode * {len(rows[0])} + c", flat)
 
     def _gradient(self, e: Any) -> list[Output]:
         n = len(self.f.y)
         found = [Output(VALUES, "value", e)]
         found += [
-            Output(SLOPES, f"grad[{j}]", e.diff(s)) for j, s in enumerate((self.f.t, *self.f.y))
+            Output(SLOPES, f"grad[{m}]", e.diff(s)) for m, s in enumerate((self.f.t, *self.f.y))
         ]
-        found += [Output(k, f"grad[{1 + n} + k]", e.diff(s)) for k, s in enumerate(self.f.p)]
+        found += [Output(k, f"grad[{1 + n} + j]", e.diff(s)) for k, s in enumerate(self.f.p)]
         return _without_idle(found)
 
     def of_parameters(self, head: str, index: str | None, values: list[Any]) -> None:
         """Write a scalar function of the parameters alone."""
-        self._define(head, state=False)
         blocks = [
             _without_idle(
                 [
                     Output(VALUES, "value", e),
-                    *(Output(k, "grad[k]", e.diff(s)) for k, s in enumerate(self.f.p)),
+                    *(Output(k, "grad[j]", e.diff(s)) for k, s in enumerate(self.f.p)),
                 ]
             )
             for e in values
         ]
-        self._blocks(index, blocks, "grad", ["grad[k] = 0.0"], "value")
+        self._blocks(head, index, blocks, "grad", ["grad[j] = 0.0"], "value")
 
-    def _define(self, head: str, state: bool = True) -> None:
+    def _define(self, head: str, blocks: list[list[Output]]) -> None:
+        """Write the head of a function, and take what its formulas need out of the arrays."""
         self.code.add("", "@helper")
         self.code.open(f"def {head}:")
-        self.code.add(*(f"p{i} = p[{i}]" for i in range(len(self.f.p))))
-        if state:
-            self.code.add(*(f"y{i} = y[{i}]" for i in range(len(self.f.y))))
+        used = {s for outputs in blocks for o in outputs for s in o.expression.free_symbols}
+        self.code.add(*(f"{s} = y[{i}]" for i, s in enumerate(self.f.y) if s in used))
+        self.code.add(*(f"{s} = p[{i}]" for i, s in enumerate(self.f.p) if s in used))
 
     def _blocks(
         self,
+        head: str,
         index: str | None,
         blocks: list[list[Output]],
         room: str,
@@ -294,6 +283,7 @@ class _Writer:
         result: str | None,
     ) -> None:
         """Write one block for each index; the last one stands for all that are left."""
+        self._define(head, blocks)
         for i, outputs in enumerate(blocks):
             last = i == len(blocks) - 1
             if not last:
@@ -308,6 +298,3 @@ def _without_idle(outputs: list[Output]) -> list[Output]:
     """Leave out the parameters that nothing depends on."""
     busy = {o.section for o in outputs if o.section >= 0 and o.expression != 0}
     return [o for o in outputs if o.section < 0 or o.section in busy]
-
-
-Render = Callable[[Description, Sequence[str], str], str]
