@@ -48,7 +48,7 @@ def describe(data: Mapping[str, Any]) -> Description:
     EntryError
         For the first mistake, with the address of its entry.
     """
-    top = Part(data)
+    top = Part({str(key): value for key, value in data.items()})
     top.only(KEYS)
     states = _states(top)
     parameters = _parameters(top)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NoReturn, TypeAlias
+from typing import Any, NoReturn
 
 from contfric.errors import ModelError, did_you_mean
-
-#: Where an entry is: keys and list indices from the top.
-Address: TypeAlias = tuple[str | int, ...]
+from contfric.yaml_lines import Address, comma_hint
 
 #: How a side of a surface can be written.
 SIDES = {
@@ -42,7 +40,8 @@ class Part:
         known = tuple(valid)
         for key in self.data:
             if key not in known:
-                self.fail(key, f"unknown key '{key}'{did_you_mean(str(key), known)}")
+                hint = comma_hint(key) or did_you_mean(key, known)
+                self.fail(key, f"unknown key '{key}'{hint}")
 
     def needs(self, key: str, wanted: str) -> Any:
         """Return an entry that must be there."""

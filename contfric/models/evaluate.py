@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic, TypeVar
@@ -18,6 +18,8 @@ T = TypeVar("T")
 _TRIES, _STEPS = 400, 30
 #: A state is on a surface where the observable differs by less than this, relative to 1.
 _ON = 1e-12
+#: Central differences: the cube root of the rounding error.
+_DIFFERENCE = 6e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +119,14 @@ class Sampler:
         found = 0
         for t, y in self.states(_TRIES):
             landed = self.landed(surface, t, y)
-            if landed is None or self.sides(t, landed, sides) != dict(sides):
+            if landed is None or self.sides(*landed, sides) != dict(sides):
                 continue
-            yield t, landed
+            yield landed
             found += 1
             if found == most:
                 return
 
-    def sides(self, t: float, y: Sequence[float], surfaces: Mapping[str, int]) -> dict[str, int]:
+    def sides(self, t: float, y: Sequence[float], surfaces: Iterable[str]) -> dict[str, int]:
         """Return the sides of some surfaces that a state is on."""
         found = {}
         for name in surfaces:
@@ -132,8 +134,13 @@ class Sampler:
             found[name] = 0 if abs(above) <= _ON else 1 if above > 0 else -1
         return found
 
-    def landed(self, surface: str, t: float, y: Sequence[float]) -> list[float] | None:
-        """Return a state on a surface near a state: Newton's method along the gradient."""
+    def landed(
+        self, surface: str, t: float, y: Sequence[float]
+    ) -> tuple[float, list[float]] | None:
+        """Return a time and state on a surface, near others: Newton's method along the gradient.
+
+        The time moves only if the surface does not depend on the state.
+        """
         state = list(y)
         for _ in range(_STEPS):
             try:
@@ -142,31 +149,30 @@ class Sampler:
             except ArithmeticError:
                 return None
             if abs(above) <= _ON:
-                return state
+                return t, state
+            if any(slope[1:]):
+                slope[0] = 0.0
             square = sum(g * g for g in slope)
             if not 0.0 < square < math.inf or not abs(above) < math.inf:
                 return None
-            state = [s - above * g / square for s, g in zip(state, slope, strict=True)]
+            t -= above * slope[0] / square
+            state = [s - above * g / square for s, g in zip(state, slope[1:], strict=True)]
         return None
 
     def gradient(self, surface: str, t: float, y: Sequence[float]) -> list[float]:
-        """Return the gradient of an observable in the state, by differences."""
-        found, step = [], 6e-6  # cube root of the rounding error: central differences
-        for i in range(len(y)):
-            ahead, behind = list(y), list(y)
-            ahead[i] += step
-            behind[i] -= step
-            up = self.evaluator.height(surface, self.params, t, ahead)
-            down = self.evaluator.height(surface, self.params, t, behind)
-            found.append((up - down) / (2 * step))
+        """Return the derivatives of an observable by time and state, by differences."""
+        found, point = [], [t, *y]
+        for i in range(len(point)):
+            ahead, behind = list(point), list(point)
+            ahead[i] += _DIFFERENCE
+            behind[i] -= _DIFFERENCE
+            up = self.evaluator.height(surface, self.params, ahead[0], ahead[1:])
+            down = self.evaluator.height(surface, self.params, behind[0], behind[1:])
+            found.append((up - down) / (2 * _DIFFERENCE))
         return found
 
     def rate(self, mode: str, surface: str, t: float, y: Sequence[float]) -> float:
         """Return the rate at which a mode moves away from a surface, upwards."""
-        step = 6e-6
-        velocity = self.evaluator.field(mode, self.params, t, y)
-        ahead = [a + step * v for a, v in zip(y, velocity, strict=True)]
-        behind = [a - step * v for a, v in zip(y, velocity, strict=True)]
-        up = self.evaluator.height(surface, self.params, t + step, ahead)
-        down = self.evaluator.height(surface, self.params, t - step, behind)
-        return (up - down) / (2 * step)
+        velocity = [1.0, *self.evaluator.field(mode, self.params, t, y)]
+        slope = self.gradient(surface, t, y)
+        return sum(g * v for g, v in zip(slope, velocity, strict=True))
