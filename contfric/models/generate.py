@@ -75,6 +75,11 @@ def period(p, which, grad):
     return period_at(p, which, grad)
 
 
+@kernel(reset_signature)  # the same types
+def field_of(mode, t, y, p, which, out, jac):
+    field(mode, t, y, p, which, out, jac)
+
+
 @kernel(reset_signature)
 def reset(k, t, y, p, which, y1, jac):
     reset_at(k, t, y, p, which, y1, jac)
