@@ -15,7 +15,10 @@ from contfric.models.definition import Model
 _FOLLOWED = frozenset(EndReason[name] for name in ("CS", "SS", "AS", "GS", "BP", "PD"))
 #: Ends that need no follower.
 FINAL = frozenset(
-    {EndReason.RANGE, EndReason.LIMIT, EndReason.CLOSED, EndReason.UNBOUNDED, EndReason.REST}
+    {
+        EndReason[name]
+        for name in ("RANGE", "LIMIT", "CLOSED", "UNBOUNDED", "REST", "PERIOD", "POINT")
+    }
 )
 
 
@@ -85,6 +88,7 @@ def _with_proposals(model: Model, computed: list[Branch], events: list[Event]) -
         place[i] = count
         count += 1 if branch.symmetric or model.symmetry is None else 2
     changed: dict[int, Bifurcation] = {}
+    rests = {id(member) for event in events if event.rests for member in event.members}
     for event in events:
         proposals = tuple(
             p if p.branch is None else replace(p, branch=place[p.branch]) for p in event.proposals
@@ -92,7 +96,7 @@ def _with_proposals(model: Model, computed: list[Branch], events: list[Event]) -
         for member in event.members:
             changed[id(member)] = replace(member, proposals=proposals)
         event.bifurcation = changed[id(event.bifurcation)]
-    rests = {id(member) for event in events if event.rests for member in event.members}
+        event.members = [changed[id(member)] for member in event.members]
     return [_renewed(branch, changed, rests) for branch in computed]
 
 
@@ -131,8 +135,10 @@ def _is_followed(events: list[Event], settings: Settings, index: int, end: End) 
     if end.reason not in _FOLLOWED or end.bifurcation is None:
         return False
     for event in events:
-        if index in event.branches and same_event(
-            event.bifurcation, end.bifurcation, settings.parameter, settings.width
+        member = any(b is end.bifurcation for b in event.members)
+        if index in event.branches and (
+            member
+            or same_event(event.bifurcation, end.bifurcation, settings.parameter, settings.width)
         ):
             through = event.bifurcation.symmetric and any(
                 p.verdict is Verdict.KNOWN for p in event.proposals

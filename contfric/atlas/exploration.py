@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from contfric.atlas.collect import Event
 from contfric.atlas.matching import identity, on_branch, same_event, stops_distance
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation, EndReason, Kind, Proposal, Verdict
+from contfric.continuation.events import Bifurcation, End, EndReason, Kind, Proposal, Verdict
 from contfric.continuation.points import Settings
 from contfric.orbit.orbit import Orbit
 
@@ -87,6 +87,19 @@ class Exploration:
             self.judge(event, "go on behind the event", Verdict.REFUSED, why=why)
         elif bifurcation.kind not in _PASSED:
             self.waiting.append(event)
+
+    def merge(self, event: Event, end: End) -> None:
+        """Make what a branch calls the end at an event a member of it, if it is an event of its own yet."""
+        for other in self.events:
+            if other is event or not any(member is end.bifurcation for member in other.members):
+                continue
+            event.members += other.members
+            event.branches += [i for i in other.branches if i not in event.branches]
+            event.proposals += other.proposals
+            self.events.remove(other)
+            if other in self.waiting:
+                self.waiting.remove(other)
+            return
 
     def known(self, orbit: Orbit) -> int | None:
         """Return the branch, of those already traced, that an orbit lies on; None if there is none."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration, Progress
+from contfric.atlas.matching import SAME_STOPS, part_distance
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, candidates, directions, wider_candidates
@@ -31,13 +32,17 @@ from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import NEARER, leave_branch_point, settings_value
 from contfric.continuation.trace import continue_orbit, trace_side
+from contfric.continuation.walked import walked
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish
+from contfric.signature.edits import show
 
 #: First step away from an event, in largest steps: the new word is proved close to it.
 _NEAR_EVENT = 0.01
+#: Where an orbit beside an event is looked for, relative to the range.
+_SHARES = (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6)
 #: A branch that gets no farther than this (arclength) from the event it starts at has left it in the
 #: direction in which it is not admissible.
 _NOWHERE = 1e-7
@@ -62,8 +67,47 @@ def follow(state: Exploration, event: Event) -> None:
 def _follow_sliding(state: Exploration, event: Event) -> None:
     accepted = [_judge(state, event, c) for c in candidates(event.bifurcation)]
     if not any(accepted):
-        for candidate in wider_candidates(event.bifurcation):
-            _judge(state, event, candidate)
+        accepted = [_judge(state, event, c) for c in wider_candidates(event.bifurcation)]
+    if not any(accepted):
+        _follow_flow(state, event)
+
+
+def _follow_flow(state: Exploration, event: Event) -> None:
+    """Try the words that motions beside an event walk."""
+    orbit, settings = event.bifurcation.orbit, state.settings
+    if orbit.system.holds:
+        return
+    active = orbit.model.index_of(settings.parameter)
+    shifts = tuple((active, share * settings.width) for share in _SHARES)
+    reason = "the word that the flow walks beside the event"
+    for found in walked(orbit.as_whole(), shifts):
+        guess = replace(found, vector=orbit.vector)
+        branch = _through(state, guess)
+        ends = [] if branch is None else [e for e in branch.ends if _meets(e, event, settings)]
+        if branch is None or not ends:
+            why = f"no orbit of {show(guess.word)} meets the event"
+            state.judge(event, reason, Verdict.REFUSED, why=why)
+        elif (known := state.known(branch[len(branch) // 2])) is not None:
+            state.judge(event, reason, Verdict.KNOWN, known)
+        else:
+            state.judge(event, reason, Verdict.ACCEPTED, len(state.branches))
+            state.add_from(branch, event)
+            for end in ends:
+                state.merge(event, end)
+
+
+def _meets(end: End, event: Event, settings: Settings) -> bool:
+    """Tell whether a branch ends at an event, by whatever name it calls it.
+
+    A stop that comes in there is one of the new orbit only.
+    """
+    a, b = end.bifurcation, event.bifurcation
+    if a is None or a.kind not in TERMINAL:
+        return False
+    gap = abs(a.params[settings.parameter] - b.params[settings.parameter])
+    if gap > max(a.accuracy, b.accuracy) * settings.width:
+        return False
+    return part_distance(a.orbit.stops, b.orbit.stops) < SAME_STOPS
 
 
 def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:
@@ -241,7 +285,7 @@ def _through(state: Exploration, orbit: Orbit) -> Branch | None:
     settings = state.settings
     value = settings_value(orbit, settings)
     active = orbit.model.index_of(settings.parameter)
-    for share in (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6):
+    for share in _SHARES:
         beside = value + share * settings.width
         if not settings.low <= beside <= settings.high:
             continue

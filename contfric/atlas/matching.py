@@ -13,7 +13,7 @@ from contfric.orbit.words import mirror_pairs
 from contfric.signature import ReducedWord, canonical_word
 
 #: Events whose parameters agree to their accuracy and whose stops agree to this are one.
-_SAME_STOPS = 1e-4
+SAME_STOPS = 1e-4
 #: Orbits solved at the same parameter are one if their stops agree to this.
 _SAME_ORBIT = 1e-8
 
@@ -29,8 +29,24 @@ def identity(orbit: Orbit) -> frozenset[ReducedWord]:
 
 def distance(a: FloatArray, b: FloatArray) -> float:
     """Return the Hausdorff distance of two sets of numbers."""
+    if not len(a) or not len(b):  # no stops at all: alike, or not at all
+        return 0.0 if len(a) == len(b) else np.inf
     gaps = np.abs(a[:, None] - b[None, :])
     return float(max(gaps.min(axis=1).max(), gaps.min(axis=0).max()))
+
+
+def part_distance(a: FloatArray, b: FloatArray) -> float:
+    """Return how far the one of two sets of numbers that is nearer to be a part of the other is from it.
+
+    Examples
+    --------
+    >>> part_distance(np.array([0.0, 1.0]), np.array([0.0, 1.0, 5.0]))
+    0.0
+    """
+    if not len(a) or not len(b):
+        return 0.0
+    gaps = np.abs(a[:, None] - b[None, :])
+    return float(min(gaps.min(axis=1).max(), gaps.min(axis=0).max()))
 
 
 def stops_distance(a: FloatArray, b: FloatArray, mirror: bool) -> float:
@@ -45,7 +61,7 @@ def same_event(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> 
     if abs(a.params[parameter] - b.params[parameter]) > max(a.accuracy, b.accuracy) * width:
         return False
     mirror = a.orbit.model.symmetry is not None
-    return stops_distance(a.orbit.stops, b.orbit.stops, mirror) < _SAME_STOPS
+    return stops_distance(a.orbit.stops, b.orbit.stops, mirror) < SAME_STOPS
 
 
 def on_branch(orbit: Orbit, branch: Branch) -> bool:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from contfric.continuation.events import Bifurcation, End
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.stops import stopping_segments
 from contfric.orbit.system import IntArray, System, build_system
 from contfric.orbit.words import decode, encode, mirror_pairs
 
@@ -143,14 +144,14 @@ class Branch:
 
     @cached_property
     def stops(self) -> FloatArray:
-        """Displacements at the stops, shape (k, stops)."""
+        """Displacements at the stops and impacts, shape (k, stops); filled up with nan where fewer."""
         surface = self.model.stop_surface
         if not self.model.surface_by_name[surface].switching:
             return _padded([orbit.stops for orbit in self])
         x = self.joints[:, :, 1]
         closed = self.joints[:, 0, 1:] @ self.system.layout.closure.T
         ends = np.concatenate([x[:, 1:], closed[:, :1]], axis=1)
-        at = [i for i, (_, exit_) in enumerate(self.system.word) if exit_ == surface]
+        at = stopping_segments(self.model, self.system.word)
         if not self.system.half:
             return ends[:, at]
         mirrored = (self.joints[:, :, 1:] @ self.system.layout.closure.T)[:, :, 0]

@@ -8,9 +8,13 @@ margin     where                                   kind
 interior   segment that stays on a surface         AS: the stick touches its limit inside
 interior   other segment, surface that switches    GS: the slide touches rest inside
 interior   surface with the same field behind      T
+any        surface with a reset                    GS: a grazing impact
 exit       as the interior of the same segment     AS, GS or T: the exit becomes tangential
 joint      the state at a stop meets a surface     CS if it leaves the stick there (distance to
-                                                   the limit grows outward), SS if it enters it
+                                                   the limit grows outward), SS if it enters it;
+                                                   CS where there is no rest
+entry      behind a reset the state is on another  CS: another mode follows
+           surface
 =========  ======================================  ==========================================
 
 For CS and SS the sign of the observable's rate at the stop decides: rest is left if the state moves
@@ -25,6 +29,7 @@ from functools import cached_property
 
 import numpy as np
 
+from contfric.models.definition import Domain
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, System, Test, inside_sign
@@ -81,6 +86,8 @@ class EndReason(str, Enum):
     AS = "adding-sliding: the flow jumps"
     GS = "grazing-sliding: the flow jumps"
     REST = "the mass stays at rest for ever beyond this point"
+    PERIOD = "the period grows without bound: the orbit comes to an equilibrium (homoclinic), or slows down"
+    POINT = "the orbit shrinks to a point: an equilibrium that begins to oscillate (Hopf)"
     BP = "the orbit has become symmetric: its mirror branch goes on from here"
     PD = "the doubled orbit meets the orbit of half its period"
     CLOSED = "the branch is a closed curve"
@@ -222,6 +229,10 @@ def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
     hold = hold_of_test(test, orbit)
     if hold is not None:
         return kind_of_hold(hold, test)
+    if test.margin is Margin.ENTRY:
+        return Kind.CS
+    if test.surface in model.reset_by_surface:
+        return Kind.GS
     if test.margin is not Margin.JOINT:
         if model.mode_by_name[mode].sliding:
             return Kind.AS
@@ -256,10 +267,29 @@ def kind_of_hold(hold: Hold, test: Test) -> Kind:
     return Kind.AS if hold.after_rest else Kind.GS
 
 
-def outward_rate(system: System, test: Test, orbit: Orbit) -> float:
-    """Rate at which a state that rests at the joint would leave the region where it can rest."""
+def resting_domain(system: System, test: Test) -> Domain | None:
+    """Return the domain of rest that a joint is beside, bounded by the surface of a test; None if none."""
     model = system.model
-    resting = next(d for d in model.domains if model.mode_by_name[d.mode].sliding)
+    mode, exit_ = system.word[test.segment]
+    resting = [
+        d
+        for d in model.domains
+        if model.mode_by_name[d.mode].sliding and d.signs[test.surface] != 0
+    ]
+    own = [d for d in resting if d.mode == mode]
+    beside = [d for d in resting if d.signs.get(exit_) == 0]
+    return next(iter([*own, *beside]), None)
+
+
+def outward_rate(system: System, test: Test, orbit: Orbit) -> float:
+    """Rate at which a state that rests at the joint would leave the region where it can rest.
+
+    Infinite where there is no rest.
+    """
+    model = system.model
+    resting = resting_domain(system, test)
+    if resting is None:
+        return np.inf
     end = orbit.ends[test.segment]
     rest_mode = [m.name for m in model.modes].index(resting.mode)
     return -resting.signs[test.surface] * rate_along(orbit, rest_mode, test.surface, end)

@@ -37,7 +37,7 @@ from contfric.continuation.steps import (
 from contfric.orbit.equations import FunctionsType, LayoutType
 
 #: Why a march stopped.
-FULL, EVENT, OUTSIDE, STEP, CLOSED, BROKEN, UNBOUNDED = range(7)
+FULL, EVENT, OUTSIDE, STEP, CLOSED, BROKEN, UNBOUNDED, ENDLESS = range(8)
 
 #: Angle between consecutive tangents (rad): wanted, and the most that is accepted. At the wanted
 #: angle a branch is smooth to the eye; beyond the other one, the step may change branches.
@@ -48,6 +48,8 @@ _GROWTH = 2.5
 _MOST_MISS = 0.3
 #: A state this large (nondimensional) is on its way to infinity: resonance without damping.
 _UNBOUNDED = 1e6
+#: A turn this long (nondimensional) of an autonomous model is on its way to an infinite one.
+_ENDLESS = 1e4
 
 
 @helper
@@ -81,7 +83,9 @@ def predict(zs, ws, tzs, tws, arc, k, step):  # type: ignore[no-untyped-def]
 
 
 @helper
-def arrival(zs, ws, tzs, tws, tests, labels, k, start, taken, step, low, high, scale):  # type: ignore[no-untyped-def]
+def arrival(  # type: ignore[no-untyped-def]
+    zs, ws, tzs, tws, tests, labels, k, start, taken, step, low, high, scale, autonomous
+):
     """Return why the march stops at row k, or FULL if it goes on."""
     if changed(tests[k - 1], tests[k], labels[k - 1], labels[k]):
         return EVENT
@@ -102,6 +106,8 @@ def arrival(zs, ws, tzs, tws, tests, labels, k, start, taken, step, low, high, s
         return CLOSED
     if largest_state(zs[k]) > _UNBOUNDED:
         return UNBOUNDED
+    if autonomous and -zs[k, 0, 0] > _ENDLESS:
+        return ENDLESS
     return FULL
 
 
@@ -227,8 +233,14 @@ def march(  # type: ignore[no-untyped-def]
         chord = apart(zs[k], ws[k], zs[k - 1], ws[k - 1], scale)
         arc[k] = arc[k - 1] + chord * (1.0 + angle * angle / 24.0)
         factor = min(_GROWTH, max(0.4, _WANTED_ANGLE / max(angle, 1e-6)))
-        following = min(largest * (1.0 + largest_state(zs[k])), step * factor)
-        why = arrival(zs, ws, tzs, tws, tests, labels, k, start, taken, step, low, high, scale)
+        size = largest_state(zs[k])
+        if layout.turn == 0.0:  # the duration is one of the unknowns
+            size = max(size, -zs[k, 0, 0])
+        following = min(largest * (1.0 + size), step * factor)
+        autonomous = layout.turn == 0.0
+        why = arrival(
+            zs, ws, tzs, tws, tests, labels, k, start, taken, step, low, high, scale, autonomous
+        )
         if why != FULL:
             return why, k, following
         step = following

@@ -9,6 +9,8 @@ event, at the place                    outcome
 CS, the state at a stop meets F        swap stick and reversal (a stick of length zero)
 SS, followed by a reversal             insert a hold of length zero, pinned to F
 SS, followed by a stick                the stick becomes a hold pinned to F
+GS, an impact is grazed inside         split it there: an impact of speed zero
+GS, an impact has no speed any more    drop it: the segment goes on
 AS, a stick is released tangentially   insert a hold of length zero behind it
 AS, a stick touches F inside           split it there: a hold goes on
 GS, a slide touches rest inside        split it there: insert a hold of length zero
@@ -22,6 +24,10 @@ a hold can just not be left inside     split it there: a slide and a second hold
 
 Where a stick becomes a hold, the hold lasts to the release, unless before that it cannot be left any
 more: there it ends, with a slide of length zero, and the rest of the stick follows.
+
+Nothing can be held where rest is left without acceleration (static and kinetic limit agree, as in a system
+of Filippov): there, and where nothing else is known, :mod:`contfric.continuation.walked` lets the flow
+itself say what follows.
 """
 
 from __future__ import annotations
@@ -30,16 +36,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from contfric.continuation.events import Bifurcation, Kind, hold_of_test
-from contfric.continuation.standstill import first_standstill, touch_of
+from contfric.continuation.standstill import first_standstill, leaving_rate, touch_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.simulation import signs_at
 from contfric.orbit.system import Margin, Test
 from contfric.signature.edits import Edit, drop, insert, split, swap_edit
 from contfric.signature.holds import TOUCH, hold_at, is_hold, release_mode
 
 #: A hold this short has no length: an event is located to about 1e-12, at a tangency to its root.
 NO_LENGTH = 1e-6
+#: Rest that is left with less than this acceleration, or lies nearer than this to the boundary of its
+#: region (nondimensional), has no jump: far above rounding, far below any difference of two limits.
+NO_JUMP = 1e-9
 #: A slide between two holds vanishes with a double zero: it is located to the root of that.
 NEARLY_NO_LENGTH = 1e-3
 
@@ -107,12 +117,18 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
     mode, exit_ = orbit.word[place.segment]
     if is_hold(exit_):
         return _hold_ends(orbit, place)
+    if place.margin is Margin.ENTRY:
+        raise NotationError(f"another mode follows the impact before segment {place.segment + 1}")
+    if place.margin is Margin.JOINT and place.surface in orbit.model.reset_by_surface:
+        raise NotationError(f"the wall {place.surface} is met where segment {place.segment + 1} ends")
     if kind is Kind.CS:
         reason = f"swap stick and reversal at stop {place.segment + 1}, at {place.surface}"
         edit = swap_edit(orbit.word, {place.segment: place.surface}, orbit.model)
         return Outcome(edit, {(place.segment, 0): orbit.ends[place.segment]}, reason)
     if kind is Kind.SS:
         return _stop_on_surface(orbit, place)
+    if place.surface in orbit.model.reset_by_surface:
+        return _grazing_impact(orbit, place)
     rests = orbit.model.mode_by_name[mode].sliding
     if place.margin is Margin.EXIT:
         return _released_tangentially(orbit, place) if rests else _stops_tangentially(orbit, place)
@@ -123,9 +139,10 @@ def _stop_on_surface(orbit: Orbit, place: Test) -> Outcome:
     """SS: the stop is on a surface, and the load falls."""
     model, word, i = orbit.model, orbit.word, place.segment
     j = (i + 1) % len(word)
+    rest = _rest_mode(orbit, i, word[i][1])
+    _check_held(orbit, rest, release_mode(model, rest, place.surface), orbit.ends[i])
     if model.mode_by_name[word[j][0]].sliding:
         return _stick_becomes_hold(orbit, j, hold_at(place.surface), place.surface)
-    rest = _rest_mode(orbit, i)
     edit = insert(i, (rest, hold_at(place.surface)))
     reason = f"hold at stop {i + 1}, on {place.surface}, instead of the reversal"
     return Outcome(edit, {(i, 0): orbit.ends[i]}, reason)
@@ -137,13 +154,15 @@ def _stops_tangentially(orbit: Orbit, place: Test) -> Outcome:
     j = (i + 1) % len(word)
     if not orbit.model.mode_by_name[word[j][0]].sliding:
         raise NotationError(f"the tangential stop of segment {i + 1} is followed by no stick")
+    _check_inside(orbit, word[j][0], orbit.ends[i])
     return _stick_becomes_hold(orbit, j, TOUCH, None)
 
 
 def _released_tangentially(orbit: Orbit, place: Test) -> Outcome:
     """AS: a stick is released where its load just reaches the limit."""
-    i = place.segment
-    edit = insert(i, (orbit.word[i][0], TOUCH))
+    i, (mode, exit_) = place.segment, orbit.word[place.segment]
+    _check_held(orbit, mode, release_mode(orbit.model, mode, exit_), orbit.ends[i])
+    edit = insert(i, (mode, TOUCH))
     reason = f"hold behind the tangential release of stick {i + 1} at {orbit.word[i][1]}"
     return Outcome(edit, {(i, 0): orbit.ends[i]}, reason)
 
@@ -155,6 +174,7 @@ def _limit_touched(orbit: Orbit, place: Test) -> Outcome:
     j = (i + 1) % len(word)
     touch = touch_of(orbit, i, place.surface)
     departs = release_mode(model, mode, place.surface)
+    _check_held(orbit, mode, departs, touch)
     reason = f"hold behind the touch of {place.surface} in stick {i + 1}"
     still = first_standstill(orbit, i, touch[0], str(departs))
     if still is not None:
@@ -174,7 +194,9 @@ def _rest_touched(orbit: Orbit, place: Test) -> Outcome:
     i = place.segment
     mode, exit_ = orbit.word[i]
     touch = touch_of(orbit, i, place.surface)
-    edit = split(i, place.surface, (_rest_mode(orbit, i), TOUCH), (mode, exit_))
+    rest = _rest_mode(orbit, i, place.surface)
+    _check_inside(orbit, rest, touch)
+    edit = split(i, place.surface, (rest, TOUCH), (mode, exit_))
     reason = f"hold at the touch of rest in slide {i + 1}"
     return Outcome(edit, {(i, 0): touch, (i, 1): touch}, reason, {(i, 1): 1.0})
 
@@ -268,19 +290,51 @@ def _same_way(orbit: Orbit, mode: str, exit_: str, departs: str | None) -> None:
         raise NotationError(f"the stick is released at {exit_} into '{released}', not '{departs}'")
 
 
-def _rest_mode(orbit: Orbit, i: int) -> str:
-    """Return the mode of rest that a slide comes to at its end, or at a touch of rest."""
+def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
+    """GS at a reset: an impact of speed zero comes in, or goes."""
+    word, i = orbit.word, place.segment
+    mode, exit_ = word[i]
+    if place.margin is Margin.INTERIOR:
+        edit = split(i, place.surface, (mode, exit_))
+        reason = f"impact at the touch of {place.surface} in segment {i + 1}"
+        return Outcome(edit, {(i, 0): touch_of(orbit, i, place.surface)}, reason)
+    behind = (i + 1) % len(word)
+    if word[behind][0] != mode or len(word) < 2:
+        raise NotationError(
+            f"the impact behind segment {i + 1} changes the mode: it cannot be left out"
+        )
+    edit = Edit(frozenset({behind}), {i: word[behind][1]})
+    return Outcome(edit, {}, f"no impact on {place.surface} behind segment {i + 1}")
+
+
+def _check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:
+    """Check that rest would be left with an acceleration: only then can it be held."""
+    if departs is not None and not leaving_rate(orbit, rest, departs, joint) > NO_JUMP:
+        raise NotationError(f"'{rest}' is left without acceleration: nothing can be held there")
+
+
+def _check_inside(orbit: Orbit, rest: str, joint: FloatArray) -> None:
+    """Check that a state lies inside the region of a rest, not on its boundary."""
+    model = orbit.model
+    place = signs_at(model, float(joint[0]), joint[1:].copy(), orbit.vector, within=NO_JUMP)
+    for domain in (d for d in model.domains if d.mode == rest):
+        if all(place[s] == sign for s, sign in domain.signs.items() if sign != 0):
+            return
+    raise NotationError(f"'{rest}' begins on the boundary of its region: nothing can be held there")
+
+
+def _rest_mode(orbit: Orbit, i: int, surface: str) -> str:
+    """Return the mode of rest on a surface that a slide comes to at its end, or at a touch of it."""
     model = orbit.model
     for domain in model.domains:
-        if domain.mode != orbit.word[i][0]:
+        target = model.transitions.get((domain.name, surface))
+        if domain.mode != orbit.word[i][0] or target is None:
             continue
-        for surface in model.surfaces:
-            target = (
-                model.transitions.get((domain.name, surface.name)) if surface.switching else None
-            )
-            if target and model.mode_by_name[model.domain_by_name[target].mode].sliding:
-                return model.domain_by_name[target].mode
-    raise NotationError(f"mode '{orbit.word[i][0]}' of model '{model.name}' never comes to rest")
+        if model.mode_by_name[model.domain_by_name[target].mode].sliding:
+            return model.domain_by_name[target].mode
+    raise NotationError(
+        f"mode '{orbit.word[i][0]}' of model '{model.name}' never comes to rest on {surface}"
+    )
 
 
 def _leaves(orbit: Orbit, mode: str) -> str:

@@ -142,6 +142,7 @@ class Side:
     rows, last : the points at work, and the row of the last one
     count : points so far
     at_event : whether the first point is at a sliding event
+    autonomous : whether the duration of a turn is one of the unknowns
     largest : longest step, where the settings' would leap over what is near
     """
 
@@ -156,11 +157,13 @@ class Side:
     bifurcations: list[Bifurcation] = field(default_factory=list)
     _kept: Columns = field(default_factory=lambda: Columns({}))
     _fresh: int = 0
+    autonomous: bool = False
 
     @classmethod
     def starting(cls, point: Point, system: System, end: End, stability: bool) -> Side:
         """Return a side that consists of its first point."""
         side = cls(point, end, kept(stability), Rows.room_for(system, CHUNK))
+        side.autonomous = system.model.autonomous
         side.rows.put(0, point)
         return side
 

@@ -70,18 +70,23 @@ def _crossing(rate: Callable[[float], float], a: float, b: float) -> float:
 
 def _departure_rate(orbit: Orbit, i: int, departs: str) -> Callable[[float], float]:
     """Return the acceleration with which a rest would be left, as a function of time."""
-    model = orbit.model
-    rest = next(d for d in model.domains if d.mode == orbit.word[i][0])
-    leaves = next(name for name, sign in rest.signs.items() if sign == 0)
-    sign = model.domain_by_name[mode_domains(model, departs)[0]].signs[leaves]
-    mode = [m.name for m in model.modes].index(departs)
-    c = [o.name for o in model.observables].index(model.surface_by_name[leaves].observable)
 
     def rate(time: float) -> float:
-        y = joint_within(orbit, i, time)[1:].copy()
-        return sign * float(model.flow.rate(mode, c, time, y, orbit.vector, _NONE, _EMPTY))
+        return leaving_rate(orbit, orbit.word[i][0], departs, joint_within(orbit, i, time))
 
     return rate
+
+
+def leaving_rate(orbit: Orbit, mode: str, departs: str, joint: FloatArray) -> float:
+    """Return the acceleration with which a mode of rest is left into a departing mode at a joint."""
+    model = orbit.model
+    rest = next(d for d in model.domains if d.mode == mode)
+    leaves = next(name for name, sign in rest.signs.items() if sign == 0)
+    sign = model.domain_by_name[mode_domains(model, departs)[0]].signs[leaves]
+    number = [m.name for m in model.modes].index(departs)
+    c = [o.name for o in model.observables].index(model.surface_by_name[leaves].observable)
+    time, y = float(joint[0]), np.array(joint[1:])
+    return sign * float(model.flow.rate(number, c, time, y, orbit.vector, _NONE, _EMPTY))
 
 
 def joint_within(orbit: Orbit, i: int, time: float) -> FloatArray:

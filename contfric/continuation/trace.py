@@ -38,6 +38,12 @@ _VIOLATED = 1e-9
 #: to about 1e-4 only. The branch that leaves starts at twice the distance.
 _CROWD = 5e-4
 
+#: A turn this much longer than at the start, along a parameter whose share of the tangent is below this,
+#: comes to an equilibrium.
+_LONGER, _STANDS = 1.5, 1e-6
+#: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
+_NO_SIZE = 1e-5
+
 #: Beside an event at which Newton fails steps are shortened by this factor, down to this length.
 _SHORTER, _NEAREST = 8.0, 1e-8
 #: A step this short after hundreds of points (arclength) gets nowhere.
@@ -157,6 +163,7 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         kernels.BROKEN: EndReason.BROKEN,
         kernels.CLOSED: EndReason.CLOSED,
         kernels.UNBOUNDED: EndReason.UNBOUNDED,
+        kernels.ENDLESS: EndReason.PERIOD,
     }
     if why in reasons:
         side.end = End(reasons[why])
@@ -165,6 +172,8 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
             side.end = _limit_end(upper, settings)
         elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
             _stuck_at_vertex(orbit, side, settings)
+        if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and _slows_down(side, settings):
+            side.end = End(EndReason.PERIOD)
         return True, step
     if why == kernels.FULL:
         return _end_of_holds(orbit, side, settings, step < _CRAWLS), step
@@ -207,6 +216,30 @@ def _end_at_vertex(
     side.end = End(EndReason[bifurcation.kind.name], bifurcation=bifurcation)
 
 
+def _slows_down(side: Side, settings: Settings) -> bool:
+    """Tell whether a side has run along one value of the parameter while only its period grew.
+
+    Beside a homoclinic orbit the period grows as the logarithm of the distance of the parameter, and
+    Newton fails when that distance is rounding.
+    """
+    if not side.autonomous:
+        return False
+    tip, first = side.tip, side.first
+    return bool(
+        abs(tip.slope) < _STANDS * settings.width
+        and tip.joints[0, 0] < _LONGER * first.joints[0, 0]
+    )
+
+
+def _is_point(orbit: Orbit) -> bool:
+    """Tell whether an autonomous orbit has shrunk to a point."""
+    if not orbit.model.autonomous:
+        return False
+    states = orbit.joints[:, 1:]
+    size = np.max(np.abs(states - states[0])) + np.max(np.abs(orbit.ends[-1, 1:] - states[0]))
+    return bool(size < _NO_SIZE * (1.0 + np.max(np.abs(states))))
+
+
 def _end_of_holds(orbit: Orbit, side: Side, settings: Settings, stuck: bool) -> bool:
     """End a side that is stuck just before several holds end at once; True if that is so."""
     reached = nearly_reached(orbit, side.tip, settings) if stuck else None
@@ -243,6 +276,10 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
                 after.labels
             )  # where a stop lies on a surface its label is arbitrary
             continue
+        if bifurcation.kind in TERMINAL and _is_point(bifurcation.orbit):
+            side.put_tip(point)
+            side.end = End(EndReason.POINT)
+            return True
         ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, orbit)
         if ends is None:
             side.bifurcations.append(bifurcation)

@@ -15,7 +15,7 @@ from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.simulation import signs_at
-from contfric.orbit.stops import displacements
+from contfric.orbit.stops import displacements, stopping_segments
 from contfric.orbit.system import Margin, System, Word, build_system
 from contfric.orbit.words import decode, end_domain, half_of, mirror_pairs, passed_domains, whole_of
 from contfric.signature import Signature
@@ -322,7 +322,9 @@ class Orbit:
         """Domain in which a segment begins behind a reset."""
         begin, model = self.begins[i], self.model
         signs = signs_at(model, float(begin[0]), begin[1:].copy(), self.vector)
-        across = self.word[i - 1][1]  # the joint lies on it to rounding, on the side of every domain
+        across = self.word[i - 1][
+            1
+        ]  # the joint lies on it to rounding, on the side of every domain
         own = [d for d in model.domains if d.mode == self.word[i][0]]
         fitting = [d for d in own if all(d.signs[s] * signs[s] >= 0 for s in signs if s != across)]
         return (fitting or own)[0].name
@@ -351,11 +353,10 @@ class Orbit:
 
     @cached_property
     def stops(self) -> FloatArray:
-        """Displacements at the stops in the order of the orbit, shape (stops,)."""
+        """Displacements at the stops and impacts in the order of the orbit, shape (stops,)."""
         if not self.model.surface_by_name[self.model.stop_surface].switching:
             return displacements(self, self.model.stop_surface)
-        at = [i for i, (_, exit_) in enumerate(self.word) if exit_ == self.model.stop_surface]
-        return self.ends[at, 1]
+        return self.ends[stopping_segments(self.model, self.word), 1]
 
     @property
     def x_max(self) -> float:

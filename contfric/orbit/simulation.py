@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models import load_model
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.orbit.counts import TALLY
 from contfric.orbit.system import IntArray, mode_bounds
 
@@ -26,7 +26,9 @@ class SimulationEnd(str, Enum):
     IMPOSSIBLE = "events follow each other at once, and time does not go on"
     INFINITE = "the motion grew beyond all numbers"
     QUIET = "the motion meets no surface any more: it has come to an equilibrium, or never changes"
-    CHATTER = "impacts follow each other faster and faster (chatter): infinitely many in finite time"
+    CHATTER = (
+        "impacts follow each other faster and faster (chatter): infinitely many in finite time"
+    )
 
 
 class Tables(NamedTuple):
@@ -188,14 +190,17 @@ def _matches(signs: object, surfaces: list[str], skipped: int, code: int) -> boo
     )
 
 
-def signs_at(model: Model, t: float, y: FloatArray, vector: FloatArray) -> dict[str, int]:
-    """Return the sign of (observable - level) for every surface at a state."""
+def signs_at(
+    model: Model, t: float, y: FloatArray, vector: FloatArray, within: float = 0.0
+) -> dict[str, int]:
+    """Return the sign of (observable - level) for every surface at a state; 0 within a distance."""
     flow, none, empty = model.flow, np.empty(0, dtype=np.int64), np.empty(0)
     names = [o.name for o in model.observables]
     signs = {}
     for k, surface in enumerate(model.surfaces):
         value = flow.observe(names.index(surface.observable), t, y, vector, none, empty)
-        signs[surface.name] = int(np.sign(value - flow.level(k, vector, none, empty)))
+        apart = value - flow.level(k, vector, none, empty)
+        signs[surface.name] = 0 if abs(apart) <= within else int(np.sign(apart))
     return signs
 
 
@@ -204,7 +209,7 @@ def start_of(
 ) -> tuple[int, int]:
     """Return (mode, surfaces that the start lies on and leaves, as bits) of an initial state."""
     signs = signs_at(model, t, y, vector)
-    name = domain or model.domain_at(signs)
+    name = domain or model.domain_at(signs) or _side_of_rates(model, t, y, vector, signs)
     if name is None or name not in model.domain_by_name:
         if domain is not None:
             raise ParameterError(
@@ -215,6 +220,29 @@ def start_of(
     surfaces = [s.name for s in model.surfaces]
     on = sum(1 << surfaces.index(k) for k in mode_bounds(model)[mode] if signs[k] == 0)
     return [m.name for m in model.modes].index(mode), on
+
+
+def _side_of_rates(
+    model: Model, t: float, y: FloatArray, vector: FloatArray, signs: dict[str, int]
+) -> str | None:
+    """Return the domain that a state on some surfaces goes on into: those that its rates lead to.
+
+    Any side of a transparent surface will do.
+    """
+    flow, none, empty = model.flow, np.empty(0, dtype=np.int64), np.empty(0)
+    observables, modes = [o.name for o in model.observables], [m.name for m in model.modes]
+
+    def enters(domain: Domain, surface: Surface) -> bool:
+        if signs[surface.name] != 0 or not model.cuts(surface.name):
+            return True
+        c, mode = observables.index(surface.observable), modes.index(domain.mode)
+        rate = float(flow.rate(mode, c, t, y, vector, none, empty))
+        return domain.signs[surface.name] * rate > 0.0
+
+    beside = [
+        d for d in model.domains if all(sign in (0, d.signs[name]) for name, sign in signs.items())
+    ]
+    return next((d.name for d in beside if all(enters(d, s) for s in model.surfaces)), None)
 
 
 def simulate(

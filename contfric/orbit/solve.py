@@ -181,7 +181,9 @@ def stretches(
     for i in range(1, len(word) - count + 1):
         if word[i : i + count] != system.word:
             continue
-        joints = clocked(system.model, points[i - 1 : i - 1 + count].copy(), points[i - 1 + count, 0])
+        joints = clocked(
+            system.model, points[i - 1 : i - 1 + count].copy(), points[i - 1 + count, 0]
+        )
         gap = points[i - 1 + count, 1:] - joints[0, 1:] @ closure.T
         slip = 0.0
         if not system.model.autonomous:

@@ -1,4 +1,4 @@
-"""Stops of a model whose motion is not cut there: where the displacement is stationary inside segments."""
+"""Stops: where the displacement is stationary, at joints or inside of segments."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.models.definition import FloatArray
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.system import Word
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
@@ -15,10 +16,17 @@ if TYPE_CHECKING:
 _MOST = 1000
 
 
+def stopping_segments(model: Model, word: Word) -> list[int]:
+    """Return the segments that end at a stop or at an impact, where the displacement may turn."""
+    ends = {model.stop_surface, *model.reset_by_surface}
+    return [i for i, (_, exit_) in enumerate(word) if exit_ in ends]
+
+
 def displacements(orbit: Orbit, surface: str) -> FloatArray:
     """Return the displacement wherever an orbit crosses a surface, in order, shape (crossings,).
 
-    Inside its segments and at its joints; by the first roots of the flow.
+    Inside its segments and at its joints, impacts among them; by the first roots of the flow. For models
+    whose motion is not cut at its stops.
     """
     model, flow = orbit.model, orbit.model.flow
     none, empty = np.empty(0, dtype=np.int64), np.empty(0)
@@ -28,9 +36,6 @@ def displacements(orbit: Orbit, surface: str) -> FloatArray:
     modes = [m.name for m in model.modes]
     found: list[float] = []
     for i, (mode, exit_) in enumerate(orbit.word):
-        if exit_ == surface:
-            found.append(float(orbit.ends[i, 1]))
-            continue
         if model.mode_by_name[mode].sliding and exit_ in model.surface_by_name:
             lies = {d.signs[surface] for d in model.domains if d.mode == mode}
             if lies == {0}:
@@ -45,4 +50,6 @@ def displacements(orbit: Orbit, surface: str) -> FloatArray:
                 break
             found.append(float(out[0]))
             start, state, on = start + tau, out.copy(), True
+        if exit_ in model.reset_by_surface:
+            found.append(float(orbit.ends[i, 1]))
     return np.array(found)

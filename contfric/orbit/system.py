@@ -242,9 +242,7 @@ def _turn(model: Model, periods: int, half: bool) -> float:
     return float(periods * (model.symmetry.fraction if half and model.symmetry else 1.0))
 
 
-def _entry_rows(
-    model: Model, word: Word, entered: list[str], domains: tuple[str, ...]
-) -> IntArray:
+def _entry_rows(model: Model, word: Word, entered: list[str], domains: tuple[str, ...]) -> IntArray:
     """Rows of the entry margins: surfaces that a reset may lead across, and that bound the mode behind it."""
     rows: list[tuple[int, ...]] = []
     for i, surface in enumerate(entered):

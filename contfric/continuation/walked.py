@@ -1,0 +1,104 @@
+"""What follows an event as the flow itself says: the words that motions beside it walk.
+
+Where the flow is continuous at an event (static and kinetic limit agree, a grazing impact, two surfaces
+met at once), motions beside the orbit at the event walk its word or that of the orbit that takes over.
+So motions a little beside it are followed for one turn, and each word that is new is proposed. It takes
+no knowledge of the event, and finds nothing where what follows repels too fast to be walked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from contfric.models.definition import FloatArray
+from contfric.orbit.clock import clocked
+from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.simulation import Trajectory, run
+from contfric.orbit.system import Word, build_system
+from contfric.signature import canonical_word
+
+#: Distances of the motions from the orbit at the event (nondimensional): the first where a turn amplifies
+#: little, the last where it amplifies much.
+_BESIDE = (1e-3, 1e-5, 1e-7)
+#: A turn may last this much longer than that at the event: a grazing changes it by the root of a distance.
+_LONGER = 1.2
+
+
+def walked(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator[Orbit]:
+    """Yield orbits, not solved, of the words that motions beside an orbit walk in one turn.
+
+    Parameters
+    ----------
+    orbit : the orbit at the event, on its whole cycle
+    shifts : (parameter, change) of further motions, from the orbit itself at other parameters
+    """
+    seen = {canonical_word(orbit.word, orbit.model)}
+    for vector, state in _beside(orbit, shifts):
+        found = _one_turn(orbit, vector, state)
+        if found is None:
+            continue
+        word = canonical_word(found.word, orbit.model)
+        if word not in seen:
+            seen.add(word)
+            yield found
+
+
+def _middle(orbit: Orbit) -> tuple[int, float]:
+    """Return the longest segment that does not rest, and the time of its middle: far from any surface."""
+    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    rests = [orbit.model.mode_by_name[mode].sliding for mode, _ in orbit.word]
+    i = int(np.argmax(np.where(rests, -1.0, lasts)))
+    return i, float(orbit.cycle[i, 0] + 0.5 * lasts[i])
+
+
+def _beside(
+    orbit: Orbit, shifts: tuple[tuple[int, float], ...]
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    _, time = _middle(orbit)
+    middle = orbit.state(time)
+    for size in _BESIDE:
+        for k in range(len(middle)):
+            for sign in (1.0, -1.0):
+                state = middle.copy()
+                state[k] += sign * size * (1.0 + abs(middle[k]))
+                yield orbit.vector, state
+    for index, change in shifts:
+        vector = orbit.vector.copy()
+        vector[index] += change
+        yield vector, middle
+
+
+def _one_turn(orbit: Orbit, vector: FloatArray, state: FloatArray) -> Orbit | None:
+    """Follow a motion for one turn; return the orbit that it nearly is, None if it breaks off."""
+    model = orbit.model
+    i, time = _middle(orbit)
+    modes = [m.name for m in model.modes]
+    mode = modes.index(orbit.word[i][0])
+    unit = 1.0 if model.autonomous else orbit.period / orbit.periods
+    trajectory = run(model, vector, mode, 0, time, state, _LONGER * orbit.period / unit, 10_000)
+    stop = _end_of_turn(orbit, trajectory, time, unit)
+    if stop is None:
+        return None
+    word: Word = trajectory.word[:stop]
+    clock = trajectory.times + trajectory.cycles * unit * (not model.autonomous)
+    joints = np.column_stack([clock, trajectory.states])[:stop]
+    end = float(joints[-1, 0])
+    joints = np.roll(joints, 1, axis=0)
+    joints[0, 0] -= orbit.period
+    try:
+        system = build_system(model, word, orbit.periods)
+    except ValueError:
+        return None
+    return Orbit(system, clocked(model, joints, end), vector.copy(), np.inf, Status.NOT_CONVERGED)
+
+
+def _end_of_turn(orbit: Orbit, trajectory: Trajectory, start: float, unit: float) -> int | None:
+    """Return the number of events of one turn; None if the motion is in another mode after it."""
+    model, word = orbit.model, trajectory.word
+    clock = trajectory.times + trajectory.cycles * unit * (not model.autonomous)
+    count = int(np.searchsorted(clock, start + orbit.period))
+    i, _ = _middle(orbit)
+    mode = word[count][0] if count < len(word) else trajectory.last[3]
+    return count if count > 0 and mode == orbit.word[i][0] else None
