@@ -58,7 +58,7 @@ def module_path(definition: str) -> Path:
     """Return the file of the generated module; it is written if it is not there."""
     from contfric import compiled
 
-    sources = compiled.cache_folder(Path(compiled.__file__))
+    sources = compiled.cache_folder(Path(__file__))  # of the package, with what generates modules
     digest = hashlib.sha256(f"{sources.name}\n{definition}".encode()).hexdigest()[:16]
     path = sources / "models" / digest / f"contfric_model_{digest}.py"
     if path.is_file():
