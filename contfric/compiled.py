@@ -198,9 +198,10 @@ _OPTIMISATION, _VECTORISE = type(config.OPT)(1), 0
 def _digest(folder: Path) -> str:
     """Digest of the compiled sources that a kernel in ``folder`` may have been built from."""
     root = Path(__file__).parent
-    inside = root in folder.parents
-    # a kernel of the package may use any helper of the package; a user's file only its own folder
-    files = sorted(root.rglob("*.py")) if inside else sorted(folder.glob("*.py"))
+    # a kernel may use any helper of the package, and those of its own folder
+    files = sorted(root.rglob("*.py"))
+    if folder != root and root not in folder.parents:
+        files += sorted(folder.glob("*.py"))
     content = hashlib.sha256()
     for file in files:
         text = file.read_bytes()

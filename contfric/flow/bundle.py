@@ -1,0 +1,83 @@
+"""Helpers handed to helpers, in a way that numba can cache.
+
+A compiled function that takes another one as an argument is specialised for it, but numba then stores the
+address of the Python object with the code, and such code is not cached on disk. A bundle carries its
+helpers (and constants) in its *type*: it has no value at run time, so nothing is stored, and the calls are
+resolved, and inlined where that pays, when the kernel is compiled.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import types
+from numba.core.extending import (
+    infer_getattr,
+    models,
+    register_model,
+    typeof_impl,
+)
+from numba.core.imputils import lower_constant, lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate
+
+
+class Bundle:
+    """Helpers and numbers by their names; a global of the module whose kernels use it.
+
+    Examples
+    --------
+    >>> from contfric.compiled import helper
+    >>> bundle = Bundle(twice=helper(lambda x: 2.0 * x), absolute=1e-12)
+    >>> bundle.members["absolute"]
+    1e-12
+    """
+
+    def __init__(self, **members: Any) -> None:
+        self.members = members
+
+
+class BundleType(types.Opaque):  # type: ignore[misc]
+    """Numba's type of one bundle: two bundles are two types."""
+
+    def __init__(self, bundle: Bundle) -> None:
+        self.bundle = bundle
+        super().__init__(f"Bundle({id(bundle)})")
+
+
+register_model(BundleType)(models.OpaqueModel)
+
+
+@typeof_impl.register(Bundle)
+def _typeof(bundle: Bundle, context: Any) -> BundleType:
+    return BundleType(bundle)
+
+
+@infer_getattr
+class _Members(AttributeTemplate):  # type: ignore[misc]
+    """What an attribute of a bundle is: a helper, or a number."""
+
+    key = BundleType
+
+    def generic_resolve(self, bundle: BundleType, name: str) -> Any:
+        member = bundle.bundle.members.get(name)
+        if member is None:
+            return None
+        return _number(member) or types.Dispatcher(member)
+
+
+@lower_constant(BundleType)
+def _no_value(context: Any, builder: Any, bundle: BundleType, value: Bundle) -> Any:
+    return context.get_dummy_value()
+
+
+@lower_getattr_generic(BundleType)
+def _member(context: Any, builder: Any, bundle: BundleType, value: Any, name: str) -> Any:
+    member = bundle.bundle.members[name]
+    number = _number(member)
+    return context.get_dummy_value() if number is None else context.get_constant(number, member)
+
+
+def _number(member: Any) -> Any:
+    if isinstance(member, float):
+        return types.float64
+    return types.int64 if isinstance(member, int) else None

@@ -1,0 +1,343 @@
+"""The implicit method for stiff motion: Radau IIA collocation with exact derivatives of its equations.
+
+With s stages at the Radau nodes c (the last one is 1), increments ``Z_i = Y_i - y_0`` and J_j the field's
+Jacobian at stage j::
+
+    Z_i = h sum_j A_ij f(t + c_j h, y_0 + Z_j),        y_1 = y_0 + Z_s,
+
+of order 2 s - 1, stable at any stiffness, and exact at infinite stiffness. Newton's method uses all J_j, not
+one of them: its matrix ``I - h A_ij J_j`` is that of the variations, too, whose discrete equations are
+
+    sum_j (I - h A_ij J_j) W_j = h sum_j A_ij (J_j M_0 + [f_t, 0, f_p]_j),      M_1 = M_0 + W_s.
+
+The error is what the collocation polynomial misses at the start, filtered::
+
+    error = (I - h g J_0)^-1 h g (f(t, y_0) - P'(0)),
+
+with g the real eigenvalue of A; it falls like the power s + 1 of the step, and bounds the error of the whole
+polynomial, not only of its end. Source: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II",
+2nd edition, Springer 1996, sections IV.5 (method) and IV.8 (increments, estimate).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from contfric.compiled import helper
+from contfric.models.definition import FloatArray
+
+#: Number of stages: of 3, 5 and 7 the fastest at a tolerance of 1e-12 (docs/integration.md).
+IMPLICIT_STAGES = 7
+#: Most iterations of Newton's method with one matrix, and most matrices in a step.
+_ITERATIONS, _MATRICES = 8, 3
+#: What the iteration may leave, in units of the allowed error: far below it, so that the discrete map is smooth.
+_LEFT = 1e-3
+#: Corrections that no longer fall are rounding if they are below this, in the same units.
+_ROUNDING = 0.1
+#: A correction of more than this share of the one before asks for a new matrix.
+_SLOW = 0.2
+#: The last step is continued as a prediction over at most this many times its length.
+_FARTHEST = 2.5
+
+
+def radau_nodes(s: int) -> FloatArray:
+    """Return the nodes in [0, 1]: the zeros of ``P_s - P_{s-1}`` (Legendre), the last one 1."""
+    zeros = legendre.legroots([0.0] * (s - 1) + [-1.0, 1.0])
+    series = np.array([0.0] * (s - 1) + [-1.0, 1.0])
+    for _ in range(3):  # Newton's method removes what the eigenvalues leave
+        zeros = zeros - legendre.legval(zeros, series) / legendre.legval(
+            zeros, legendre.legder(series)
+        )
+    zeros = np.sort(zeros.real)
+    zeros[-1] = 1.0
+    return np.asarray(0.5 * (1.0 + zeros))
+
+
+def collocation_matrix(nodes: FloatArray) -> FloatArray:
+    """Return ``A_ij``, the integral of the j-th Lagrange polynomial from 0 to node i, by Legendre series."""
+    s, x = len(nodes), 2.0 * nodes - 1.0
+    values = legendre.legvander(x, s)
+    integrals = np.empty((s, s))
+    integrals[:, 0] = nodes
+    for k in range(1, s):
+        integrals[:, k] = 0.5 * (values[:, k + 1] - values[:, k - 1]) / (2 * k + 1)
+    return np.asarray(np.linalg.solve(values[:, :s].T, integrals.T).T)
+
+
+def _at_start(nodes: FloatArray) -> FloatArray:
+    """Return the values of the Lagrange polynomials at 0."""
+    others = [np.delete(nodes, i) for i in range(len(nodes))]
+    return np.array([np.prod(-o / (c - o)) for c, o in zip(nodes, others, strict=True)])
+
+
+_NODES = radau_nodes(IMPLICIT_STAGES)
+_A = collocation_matrix(_NODES)
+_LAGRANGE = _at_start(_NODES)
+_REAL = float(min(np.linalg.eigvals(_A), key=lambda value: abs(value.imag)).real)
+_DEFECT = -_REAL * np.linalg.solve(_A.T, _LAGRANGE)
+#: Nodes of the collocation polynomial: the start and the stages.
+_ALL = np.concatenate([[0.0], _NODES])
+
+
+@helper
+def lagrange(j, place):  # type: ignore[no-untyped-def]
+    """Return the polynomial that is 1 at stage j and 0 at the start and at the others, at a place."""
+    value = 1.0
+    for m in range(_ALL.shape[0]):
+        if m != j + 1:
+            value *= (place - _ALL[m]) / (_ALL[j + 1] - _ALL[m])
+    return value
+
+
+@helper
+def predict(h, room, remembered, inside):  # type: ignore[no-untyped-def]
+    """Predict the increments from the polynomial of the last step: after it, or (inside) within it."""
+    z, memory, slopes = room.increments, room.memory, room.slopes
+    s, n = z.shape
+    known = remembered != 0.0 and abs(h) <= _FARTHEST * abs(remembered)
+    for i in range(s):
+        for k in range(n):
+            z[i, k] = 0.0 if known else _NODES[i] * h * slopes[0, k]
+        if known:
+            place = _NODES[i] * h / remembered + (0.0 if inside else 1.0)
+            for j in range(s):
+                weight = lagrange(j, place)
+                if not inside and j == s - 1:
+                    weight -= 1.0  # relative to the end of the last step
+                for k in range(n):
+                    z[i, k] += weight * memory[j, k]
+
+
+@helper
+def stage_fields(motion, mode, t, h, p, which, room, differentiated):  # type: ignore[no-untyped-def]
+    """Evaluate the field at the stages, with its derivatives if they are asked for."""
+    z, stage, start = room.increments, room.stage, room.start
+    s, n = z.shape
+    for i in range(s):
+        for k in range(n):
+            stage[k] = start[k] + z[i, k]
+        jac = room.stage_partials[i] if differentiated else room.nothing
+        place = t + _NODES[i] * h
+        motion.field(mode, place, stage[:n], p, which, room.stage_slopes[i], jac)
+
+
+@helper
+def factorise(h, room):  # type: ignore[no-untyped-def]
+    """Write and factorise Newton's matrix; tell whether it is regular."""
+    matrix, partials = room.matrix, room.stage_partials
+    s, n = room.increments.shape
+    for i in range(s):
+        for j in range(s):
+            a = h * _A[i, j]
+            for k in range(n):
+                for m in range(n):
+                    matrix[i * n + k, j * n + m] = -a * partials[j, k, 1 + m]
+        for k in range(n):
+            matrix[i * n + k, i * n + k] += 1.0
+    return lu(matrix, room.pivots, s * n)
+
+
+@helper
+def lu(matrix, pivots, size):  # type: ignore[no-untyped-def]
+    """Factorise a matrix in place, with pivots by rows; tell whether it is regular."""
+    for k in range(size):
+        best = k
+        for i in range(k + 1, size):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        pivots[k] = best
+        if best != k:
+            for j in range(size):
+                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+        if not abs(matrix[k, k]) > 0.0:
+            return False
+        inverse = 1.0 / matrix[k, k]
+        for i in range(k + 1, size):
+            factor = matrix[i, k] * inverse
+            matrix[i, k] = factor
+            if factor != 0.0:
+                for j in range(k + 1, size):
+                    matrix[i, j] -= factor * matrix[k, j]
+    return True
+
+
+@helper
+def lu_solve(matrix, pivots, size, right, columns):  # type: ignore[no-untyped-def]
+    """Solve in place for the first columns of ``right``."""
+    for k in range(size):
+        if pivots[k] != k:
+            for c in range(columns):
+                right[k, c], right[pivots[k], c] = right[pivots[k], c], right[k, c]
+    for i in range(size):
+        for j in range(i):
+            factor = matrix[i, j]
+            if factor != 0.0:
+                for c in range(columns):
+                    right[i, c] -= factor * right[j, c]
+    for back in range(size):
+        i = size - 1 - back
+        for j in range(i + 1, size):
+            factor = matrix[i, j]
+            if factor != 0.0:
+                for c in range(columns):
+                    right[i, c] -= factor * right[j, c]
+        inverse = 1.0 / matrix[i, i]
+        for c in range(columns):
+            right[i, c] *= inverse
+
+
+@helper
+def correct_stages(motion, h, room):  # type: ignore[no-untyped-def]
+    """Make one correction of Newton's method; return its size in units of the allowed error."""
+    z, right, slopes = room.increments, room.right, room.stage_slopes
+    s, n = z.shape
+    for i in range(s):
+        for k in range(n):
+            value = -z[i, k]
+            for j in range(s):
+                value += h * _A[i, j] * slopes[j, k]
+            right[i * n + k, 0] = value
+    lu_solve(room.matrix, room.pivots, s * n, right, 1)
+    size = 0.0
+    for i in range(s):
+        for k in range(n):
+            change = right[i * n + k, 0]
+            z[i, k] += change
+            here = abs(change) / (room.allowed[k] + motion.relative * abs(room.start[k]))
+            if not here <= size:
+                size = here
+    return size
+
+
+@helper
+def solve_stages(motion, mode, t, h, p, which, room):  # type: ignore[no-untyped-def]
+    """Solve for the increments from their prediction; tell whether the iteration converged."""
+    for _ in range(_MATRICES):
+        stage_fields(motion, mode, t, h, p, which, room, True)
+        if not factorise(h, room):
+            return False
+        before = np.inf
+        for iteration in range(_ITERATIONS):
+            if iteration > 0:
+                stage_fields(motion, mode, t, h, p, which, room, False)
+            size = correct_stages(motion, h, room)
+            if not math.isfinite(size):
+                return False
+            share = size / before  # 0 at the first correction
+            if size <= _LEFT or (iteration > 0 and share < 1.0 and size * share <= _LEFT * (1.0 - share)):
+                return True
+            if share > _SLOW:
+                if size <= _ROUNDING:
+                    return True
+                break
+            before = size
+    return False
+
+
+@helper
+def implicit_step(motion, mode, c, t, h, p, which, room, target, inside):  # type: ignore[no-untyped-def]
+    """Step from ``room.start``; write the end to ``target`` and tell whether there is one."""
+    start, z = room.start, room.increments
+    s, n = z.shape
+    columns = room.partial.shape[1]
+    predict(h, room, room.control[6], inside)
+    if not solve_stages(motion, mode, t, h, p, which, room):
+        return False
+    for k in range(n):
+        target[k] = start[k] + z[s - 1, k]
+    if c >= 0:
+        target[n] = start[n] + h * mean_rate(motion, mode, c, t, h, p, room, False)
+    if columns > 0:
+        return vary_stages(motion, mode, t, h, p, which, room, target)
+    return True
+
+
+@helper
+def vary_stages(motion, mode, t, h, p, which, room, target):  # type: ignore[no-untyped-def]
+    """Solve the discrete equations of the variations: the increments stay in ``room.right``."""
+    start, right, partials = room.start, room.right, room.stage_partials
+    s, n = room.increments.shape
+    columns = room.partial.shape[1]
+    stage_fields(motion, mode, t, h, p, which, room, True)
+    if not factorise(h, room):
+        return False
+    for i in range(s * n):
+        for column in range(columns):
+            right[i, column] = 0.0
+    for j in range(s):
+        for k in range(n):
+            for column in range(columns):
+                drive = partials[j, k, column] if column == 0 or column > n else 0.0
+                for a in range(n):
+                    drive += partials[j, k, 1 + a] * start[n + a * columns + column]
+                for i in range(s):
+                    right[i * n + k, column] += h * _A[i, j] * drive
+    lu_solve(room.matrix, room.pivots, s * n, right, columns)
+    for k in range(n):
+        for column in range(columns):
+            at = n + k * columns + column
+            target[at] = start[at] + right[(s - 1) * n + k, column]
+    return True
+
+
+@helper
+def mean_rate(motion, mode, c, t, h, p, room, at_start):  # type: ignore[no-untyped-def]
+    """Return the mean rate of the observable over the step, or its polynomial's value at the start."""
+    z, stage = room.increments, room.stage
+    s, n = z.shape
+    total = 0.0
+    for i in range(s):
+        for k in range(n):
+            stage[k] = room.start[k] + z[i, k]
+        value = motion.rate(mode, c, t + _NODES[i] * h, stage[:n], p, room.none, room.empty)
+        total += (_LAGRANGE[i] if at_start else _A[s - 1, i]) * value
+    return total
+
+
+@helper
+def implicit_error(motion, mode, c, t, h, p, room):  # type: ignore[no-untyped-def]
+    """Return the error of the last step, of its worst component, in units of what is allowed."""
+    z, right, small, slopes = room.increments, room.right, room.small[0], room.slopes
+    s, n = z.shape
+    columns = room.partial.shape[1]
+    for k in range(n):
+        for m in range(n):
+            small[k, m] = (1.0 if k == m else 0.0) - h * _REAL * room.local[k, 1 + m]
+    if not lu(small, room.pivots, n):
+        return np.inf
+    worst = 0.0
+    if columns > 0:
+        for k in range(n):
+            for column in range(columns):
+                at = n + k * columns + column
+                defect = h * _REAL * slopes[0, at]
+                for i in range(s):
+                    defect += _DEFECT[i] * right[i * n + k, column]
+                right[k, column] = defect
+        lu_solve(small, room.pivots, n, right, columns)
+        for k in range(n):
+            for column in range(columns):
+                worst = share_of(motion, n + k * columns + column, right[k, column], room, worst)
+    for k in range(n):
+        defect = h * _REAL * slopes[0, k]
+        for i in range(s):
+            defect += _DEFECT[i] * z[i, k]
+        right[k, 0] = defect
+    lu_solve(small, room.pivots, n, right, 1)
+    for k in range(n):
+        worst = share_of(motion, k, right[k, 0], room, worst)
+    if c >= 0:
+        missed = slopes[0, n] - mean_rate(motion, mode, c, t, h, p, room, True)
+        worst = share_of(motion, n, h * _REAL * missed, room, worst)
+    return worst
+
+
+@helper
+def share_of(motion, k, error, room, worst):  # type: ignore[no-untyped-def]
+    """Return the larger of ``worst`` and the error of component k in units of what is allowed."""
+    size = max(abs(room.start[k]), abs(room.end[k]))
+    here = abs(error) / (room.allowed[k] + motion.relative * size)
+    return worst if here <= worst else here

@@ -1,0 +1,139 @@
+"""Steps whose error is controlled, by whichever method: one accepted step at a time.
+
+The step is chosen so that the error of each component in each step is below
+
+    absolute * scale + motion.relative * |component|,
+
+with the scale of the state that the model declares (for variations: that scale over the unit of what is
+varied). The start is Hairer's rule (Hairer, Norsett, Wanner, "Solving Ordinary Differential Equations
+I", section II.4), the control proportional-integral (Hairer, Wanner, "Solving Ordinary Differential
+Equations II", section IV.2).
+
+A *method* is a helper ``motion.attempt(motion, mode, c, t, h, p, which, room)``, which steps from
+``room.start`` to ``room.end`` and returns the error in units of what is allowed (infinite or no number: the
+step failed), together with ``probe(...)``, which steps within the last accepted step.
+"""
+
+from __future__ import annotations
+
+import math
+
+from contfric.compiled import helper
+from contfric.flow.dop853 import POWER, explicit_error, explicit_step
+from contfric.flow.variations import slope
+
+#: What the control remembers: the next step (positive), the last error, the power of the step with which
+#: the error falls, the kind of the method (0 explicit, 1 implicit), steps tried so far, whether the
+#: Jacobian is that of the start, the last implicit step (0: none), steps at the limit of stability, how many
+#: of them are borne, steps since the method changed.
+NEXT, BEFORE, FALLS, KIND, TRIED, FRESH, REMEMBERED, LIMITED, PATIENCE, SINCE = range(10)
+
+#: Most steps tried in one segment. A segment takes 1 to 1e4 of them; one that takes more is stiffer than its
+#: method can bear or ends in a singularity, and the caller is told.
+MOST_STEPS = 200_000
+#: Share of the optimal step that is taken, and the limits of its change (Hairer's values).
+SAFETY, SHRINK, GROW = 0.9, 1.0 / 3.0, 6.0
+#: Share of the integral part in the control (Hairer's value for smooth changes of the step).
+INTEGRAL = 0.04
+#: Change of the step after one that failed altogether.
+FAILED = 0.2
+#: Steps below this many units in the last place of the time do not move it.
+_ULPS = 16.0 * 2.220446049250313e-16
+
+
+@helper
+def first_step(motion, mode, c, t, left, p, which, room):  # type: ignore[no-untyped-def]
+    """Write the slope at the start and propose the first step (Hairer's rule)."""
+    start, slopes, control, allowed = room.start, room.slopes, room.control, room.allowed
+    size = start.shape[0]
+    slope(motion, mode, c, t, start, p, which, room, slopes[0])
+    d0, d1 = 0.0, 0.0
+    for k in range(size):
+        here = allowed[k] + motion.relative * abs(start[k])
+        d0 = max(d0, abs(start[k]) / here)
+        d1 = max(d1, abs(slopes[0, k]) / here)
+    h = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+    h = min(h, abs(left))
+    step = math.copysign(h, left)
+    for k in range(size):
+        room.stage[k] = start[k] + step * slopes[0, k]
+    slope(motion, mode, c, t + step, room.stage, p, which, room, slopes[1])
+    d2 = 0.0
+    for k in range(size):
+        here = allowed[k] + motion.relative * abs(start[k])
+        d2 = max(d2, abs(slopes[1, k] - slopes[0, k]) / here)
+    largest = max(d1, d2 / h) if h > 0.0 else d1
+    proposed = (0.01 / largest) ** (1.0 / POWER) if largest > 1e-15 else max(1e-6, 1e-3 * h)
+    control[NEXT] = min(100.0 * h, proposed)
+    if not control[NEXT] > 0.0:  # nothing finite, or no time left: the first trial finds out
+        control[NEXT] = abs(left)
+    control[BEFORE], control[FALLS], control[PATIENCE] = 1e-4, POWER, 1.0
+
+
+@helper
+def length_of(proposed, left):  # type: ignore[no-untyped-def]
+    """Return the step to take with what is left: no tiny last one."""
+    if proposed >= 0.99 * left:
+        return left
+    return 0.5 * left if proposed > 0.5 * left else proposed
+
+
+@helper
+def next_step(motion, mode, c, t, left, p, which, room):  # type: ignore[no-untyped-def]
+    """Take the next step that is accurate enough, at most ``left`` (of either sign); return it.
+
+    The end and its slope are in ``room.end`` and ``room.last``. No number if there is no such step: too many
+    were tried, or time does not go on.
+    """
+    control = room.control
+    rejected = False
+    while True:
+        control[TRIED] += 1.0
+        size = length_of(control[NEXT], abs(left))
+        # what ends the segment may be as short as it is
+        if control[TRIED] > MOST_STEPS or (size < _ULPS * abs(t) and size < abs(left)):
+            return math.nan
+        h = math.copysign(size, left)
+        error = motion.attempt(motion, mode, c, t, h, p, which, room)
+        if not math.isfinite(error):
+            control[NEXT], rejected = FAILED * size, True
+            if size < 1e-14 * abs(left):
+                return math.nan
+            continue
+        power = 1.0 / control[FALLS] if error > 0.0 else 1.0
+        factor = max(error, 1e-10) ** power / SAFETY
+        if error <= 1.0:
+            factor *= control[BEFORE] ** -INTEGRAL
+            # a last step that was cut short says little of the one that could be taken
+            grown = size / min(max(factor, 1.0 / GROW), 1.0 / SHRINK)
+            control[NEXT] = max(grown, control[NEXT]) if not rejected and size < control[NEXT] and error < 0.1 else grown
+            if rejected:
+                control[NEXT] = min(control[NEXT], size)
+            control[BEFORE] = max(error, 1e-4)
+            slope(motion, mode, c, t + h, room.end, p, which, room, room.last)
+            return h
+        control[NEXT], rejected = size / min(factor, 1.0 / SHRINK), True
+
+
+@helper
+def settle(room):  # type: ignore[no-untyped-def]
+    """Make the end of a step the start of the next one."""
+    start, end, first, last = room.start, room.end, room.slopes, room.last
+    for k in range(start.shape[0]):
+        start[k] = end[k]
+        first[0, k] = last[k]
+    room.control[FRESH] = 0.0
+
+
+@helper
+def explicit(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
+    """Return the error of an explicit step (a method)."""
+    explicit_step(motion, mode, c, t, h, p, which, room, room.end)
+    return explicit_error(motion, h, room)
+
+
+@helper
+def explicit_probe(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
+    """Write the vector at t + h, within the last step, to ``room.trial``; tell whether it is known."""
+    explicit_step(motion, mode, c, t, h, p, which, room, room.trial)
+    return True
