@@ -54,7 +54,7 @@ class Printer(PythonCodePrinter):  # type: ignore[misc]
 
     def _print_Power(self, expr: Any) -> str:
         b, e = (self._print(arg) for arg in expr.args)
-        return f"(({b}) ** ({e}))"
+        return f"power({b}, {e})"
 
     def _print_PowerLog(self, expr: Any) -> str:
         b, e = (self._print(arg) for arg in expr.args)

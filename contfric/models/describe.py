@@ -15,12 +15,15 @@ from contfric.models.names import Names
 KEYS = (
     *("name", "title", "references", "states", "parameters", "constraints", "period"),
     *("autonomous", "define", "observables", "surfaces", "field", "modes", "domains"),
-    *("departures", "resets", "symmetry", "stop_surface", "spread"),
+    *("departures", "resets", "symmetry", "stop_surface", "spread", "integration"),
 )
 _PARAMETER = ("default", "meaning")
 _SURFACE = ("observable", "level", "switching")
 _MODE = ("in", "field", "sliding", "rank")
 _DOMAIN = ("mode", "in", "label")
+_METHODS = ("explicit", "implicit", "automatic")
+#: Tolerances between rounding and what Newton's method on a chain of segments still takes for smooth.
+_TOLERANCES = (1e-14, 1e-6)
 
 
 def from_text(text: str) -> Description:
@@ -61,6 +64,7 @@ def describe(data: Mapping[str, Any]) -> Description:
         {o.name: o.formula for o in observables},
     )
     modes = _modes(top, states, surfaces)
+    method, tolerance = _integration(top)
     found = Description(
         name=top.text("name"),
         title=top.text("title", ""),
@@ -79,6 +83,8 @@ def describe(data: Mapping[str, Any]) -> Description:
         symmetry=_symmetry(top, states),
         stop_surface=_stop_surface(top, surfaces),
         spread=_spread(top, states),
+        method=method,
+        tolerance=tolerance,
     )
     _check_expressions(found, names)
     return found
@@ -274,6 +280,22 @@ def _spread(top: Part, states: tuple[str, ...]) -> tuple[str, ...]:
     part.only(states)
     given = _expressions(part)
     return tuple(given.get(state, "1") for state in states)
+
+
+def _integration(top: Part) -> tuple[str, float]:
+    part = top.part("integration", "{method: explicit, tolerance: 1.0e-12}")
+    part.only(("method", "tolerance"))
+    method = part.one_of("method", _METHODS, "method of integration", "explicit")
+    tolerance = part.data.get("tolerance", 1e-12)
+    low, high = _TOLERANCES
+    number = isinstance(tolerance, (int, float)) and not isinstance(tolerance, bool)
+    if not number or not low <= tolerance <= high:
+        part.fail(
+            "tolerance",
+            f"'tolerance' is a number from {low:g} to {high:g}, got {tolerance!r}; YAML reads 1e-12 "
+            "as text: write 1.0e-12",
+        )
+    return method, float(tolerance)
 
 
 def _check_expressions(found: Description, names: Names) -> None:

@@ -50,6 +50,7 @@ class Description:
     symmetry : name (a state or t) -> expression of its image; None if there is none
     stop_surface : empty if it is to be found
     spread : expression of the half-width of starts, one a state
+    method, tolerance : how motion is integrated (:mod:`contfric.flow.integrated`)
     """
 
     name: str
@@ -69,6 +70,8 @@ class Description:
     symmetry: Mapping[str, str] | None = None
     stop_surface: str = ""
     spread: tuple[str, ...] = ()
+    method: str = "explicit"
+    tolerance: float = 1e-12
 
     def data(self) -> dict[str, Any]:
         """Return the description in the schema of the YAML files, with nothing left out."""
@@ -97,6 +100,7 @@ class Description:
             ],
             "resets": {name: dict(texts) for name, texts in self.resets.items()},
             "spread": dict(zip(self.states, self.spread, strict=True)),
+            "integration": {"method": self.method, "tolerance": self.tolerance},
         }
         found.update({"period": self.period} if self.period else {"autonomous": True})
         if self.symmetry is not None:

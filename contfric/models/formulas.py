@@ -2,8 +2,9 @@
 
 Functions with kinks are classes of their own, so that their derivatives are what motion away from the
 kink sees: ``d abs(x) = sign(x)``, ``d sign(x) = 0``, and ``where`` differentiates both of its sides.
-(Sympy's own would bring Dirac's delta and Heaviside's step.) A power with a formula as exponent is a
-class, too: the derivative ``e b**(e - 1)`` is finite at b = 0 where ``e b**e / b`` is not.
+(Sympy's own would bring Dirac's delta and Heaviside's step.) A power whose exponent is no whole number is a
+class, too: the derivative ``e b**(e - 1)`` is finite at b = 0 where ``e b**e / b`` is not, and a little beyond
+b = 0, where an integrator looks, it goes on as ``-|b|**e``.
 
 This module imports sympy; it is loaded when a model is built for the first time.
 """
@@ -77,14 +78,14 @@ class Where(sympy.Function):  # type: ignore[misc]
 
 
 class Power(sympy.Function):  # type: ignore[misc]
-    """``b**e`` where the exponent is a formula."""
+    """``b**e`` where the exponent is no whole number."""
 
     nargs = 2
 
     @classmethod
     def eval(cls, b: Any, e: Any) -> Any:
-        """Become an ordinary power where the exponent turns out to be a number."""
-        return plain_power(b, e) if e.is_number else None
+        """Become an ordinary power where that is one of a number, or the exponent is whole."""
+        return plain_power(b, e) if e.is_Integer or (b.is_number and e.is_number) else None
 
     def fdiff(self, argindex: int = 1) -> Any:
         """Return the derivative with respect to the base or the exponent."""
@@ -121,7 +122,7 @@ def plain_power(base: Any, exponent: Any) -> Any:
 
 
 def _power(base: Any, exponent: Any) -> Any:
-    return plain_power(base, exponent) if exponent.is_number else Power(base, exponent)
+    return plain_power(base, exponent) if exponent.is_Integer else Power(base, exponent)
 
 
 #: Expressions as formulas; decimal numbers are exact fractions until the code is written.

@@ -20,6 +20,7 @@ from contfric.models.description import Description
 from contfric.models.entries import Address, EntryError
 from contfric.models.formulas import FORMULAS, formula, resolved
 from contfric.models.grammar import TIME, parse
+from contfric.models.motion import motion_code
 
 _HEAD = '''"""Compiled functions of a model, generated from its definition; not to be edited.
 
@@ -49,8 +50,15 @@ def sign(x):
 
 
 @helper
+def power(base, exponent):
+    if base >= 0.0 or exponent == math.floor(exponent):
+        return base**exponent
+    return -((-base) ** exponent)
+
+
+@helper
 def power_log(base, exponent):
-    return base**exponent * math.log(base) if base != 0.0 else 0.0
+    return power(base, exponent) * math.log(abs(base)) if base != 0.0 else 0.0
 
 '''
 
@@ -155,6 +163,35 @@ class Formulas:
             for field in self.fields()
         ]
 
+    def projections(self) -> list[list[Any]]:
+        """Return the state on the surfaces that each mode moves on, beside a state: one Newton step.
+
+        A mode that slides forgets what its start has off its surfaces.
+        """
+        observables = dict(
+            zip((o.name for o in self.description.observables), self.observables(), strict=True)
+        )
+        found = []
+        for mode in self.description.modes:
+            state = list(self.y)
+            for surface, level in zip(self.description.surfaces, self.levels(), strict=True):
+                if mode.sides.get(surface.name) == 0:
+                    above = (observables[surface.observable] - level).xreplace(
+                        dict(zip(self.y, state, strict=True))
+                    )
+                    slope = [above.diff(s) for s in self.y]
+                    square = sum(g**2 for g in slope)
+                    state = [s - above * g / square for s, g in zip(state, slope, strict=True)]
+            found.append([sympy.expand(s) for s in state])
+        return found
+
+    def scales(self) -> list[Any]:
+        """Return the natural size of each state: its spread."""
+        return [
+            self.read(("spread", state), text)
+            for state, text in zip(self.description.states, self.description.spread, strict=True)
+        ]
+
     def resets(self) -> list[list[Any]]:
         """Return the map of the state at each surface."""
         found = []
@@ -191,25 +228,21 @@ def module_source(description: Description, order: Sequence[str], digest: str) -
     )
     writer.of_parameters("period_at(p, which, grad)", None, [formulas.period()])
     writer.vectors("reset_at", "k", "y1", [resets[names.index(n)] for n in order])
+    writer.vectors("onto", "mode", "y1", formulas.projections())
+    writer.scales(formulas.scales())
     code.add(_KERNELS)
-    from contfric.models.motion import MOTION
-
-    constant = [
-        [rate == 0 for rate in (sympy.simplify(r) if not r.is_Atom else r for r in rates)]
-        for rates in formulas.rates()
-    ]
-    code.add(MOTION.replace("@NEVER@", _never(constant)).replace("@N@", str(len(formulas.y))))
+    code.add(motion_code(description, _idle(formulas.rates())))
     return str(code)
 
 
-def _never(constant: list[list[bool]]) -> str:
-    """Return the condition that an observable does not change along a mode."""
-    pairs = [f"(mode == {m} and c == {c})" for m, row in enumerate(constant) for c, _ in _true(row)]
-    return " or ".join(pairs) or "False"
-
-
-def _true(row: list[bool]) -> list[tuple[int, bool]]:
-    return [(i, holds) for i, holds in enumerate(row) if holds]
+def _idle(rates: list[list[Any]]) -> list[tuple[int, int]]:
+    """Return the pairs (mode, observable) for which the observable does not change along the mode."""
+    return [
+        (m, c)
+        for m, row in enumerate(rates)
+        for c, rate in enumerate(row)
+        if rate == 0 or (not rate.is_Atom and sympy.simplify(rate) == 0)
+    ]
 
 
 class _Writer:
@@ -269,6 +302,15 @@ class _Writer:
             for e in values
         ]
         self._blocks(head, index, blocks, "grad", ["grad[j] = 0.0"], "value")
+
+    def scales(self, values: list[Any]) -> None:
+        """Write the sizes of states, the units of their tolerances: at most 1."""
+        blocks = [[Output(VALUES, "value", e)] for e in values]
+        self._blocks("size_of(i, p)", "i", blocks, "", [], "value")
+        self.code.add("", "@helper")
+        self.code.open("def scale_of(i, p):")
+        self.code.add("size = abs(size_of(i, p))", "return size if 0.0 < size < 1.0 else 1.0")
+        self.code.close()
 
     def _define(self, head: str, blocks: list[list[Output]]) -> None:
         """Write the head of a function, and take what its formulas need out of the arrays."""
