@@ -32,12 +32,15 @@ if TYPE_CHECKING:
         AperiodicError,
         ContfricError,
         ConvergenceError,
+        ModelError,
         NotationError,
         ParameterError,
         ResultFileError,
         StudyError,
     )
     from contfric.models import Model, load_model, model_names
+    from contfric.models.check import ModelReport, check_model
+    from contfric.models.oscillator import OscillatorModel
     from contfric.orbit.find import find_orbit
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.simulation import simulate
@@ -60,9 +63,12 @@ _HOMES = {
     "LyapunovExponents": "contfric.chaos.exponents",
     "LyapunovMap": "contfric.chaos.map",
     "Model": "contfric.models",
+    "ModelError": "contfric.errors",
+    "ModelReport": "contfric.models.check",
     "Motion": "contfric.chaos.status",
     "NotationError": "contfric.errors",
     "Orbit": "contfric.orbit.orbit",
+    "OscillatorModel": "contfric.models.oscillator",
     "ParameterError": "contfric.errors",
     "ResultFileError": "contfric.errors",
     "Seeds": "contfric.atlas.seeds",
@@ -70,6 +76,7 @@ _HOMES = {
     "Signature": "contfric.signature",
     "StudyError": "contfric.errors",
     "census": "contfric.atlas.census",
+    "check_model": "contfric.models.check",
     "continue_orbit": "contfric.continuation.trace",
     "explore": "contfric.atlas.explore",
     "find_orbit": "contfric.orbit.find",
@@ -101,9 +108,12 @@ __all__ = [
     "LyapunovExponents",
     "LyapunovMap",
     "Model",
+    "ModelError",
+    "ModelReport",
     "Motion",
     "NotationError",
     "Orbit",
+    "OscillatorModel",
     "ParameterError",
     "ResultFileError",
     "Seeds",
@@ -112,6 +122,7 @@ __all__ = [
     "Window",
     "__version__",
     "census",
+    "check_model",
     "continue_orbit",
     "explore",
     "find_orbit",

@@ -80,6 +80,7 @@ def _parser() -> _Parser:
     _fill_explain(add("explain", commands.explain, "print the plan of a study; compute nothing"))
     _fill_info(add("info", commands.info, "print what a run folder holds"))
     _fill_signatures(add("signatures", commands.list_signatures, "list, show or check signatures"))
+    _fill_check(add("check", commands.check, "verify a model: derivatives, transitions, symmetry"))
     _fill_graph(add("graph", commands.graph, "print or draw the transitions of a model"))
     _fill_simulate(add("simulate", commands.simulate, "print the events of a trajectory as CSV"))
     _fill_census(add("census", commands.census, "list all periodic orbits, stable or not"))
@@ -130,14 +131,28 @@ def _fill_signatures(parser: argparse.ArgumentParser) -> None:
     checking.add_argument("files", metavar="FILE", nargs="+", type=Path)
 
 
+def _fill_check(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("model", metavar="MODEL", help="the name of a model, or the path of its YAML file")
+    add(
+        *("-p", "--param"),
+        dest="params",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="check it at this value of a parameter",
+    )
+    add("--json", action="store_true", help="print everything as JSON")
+
+
 def _fill_graph(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--model", default="coulomb", help="name of the model (%(default)s)")
+    parser.add_argument("--model", default="coulomb", help="name or YAML file of the model (%(default)s)")
     parser.add_argument("--out", metavar="FILE", type=Path, help="draw it: .png, .svg or .pdf")
 
 
 def _fill_simulate(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--model", default="coulomb", help="name of the model (%(default)s)")
+    add("--model", default="coulomb", help="name or YAML file of the model (%(default)s)")
     add("-p", dest="params", metavar="NAME=VALUE", action="append", default=[], help="a parameter")
     add("--state", metavar="X,V", help="initial state, numbers joined by commas")
     add("--time", type=_number, default=0.0, help="initial time (%(default)s)")

@@ -78,10 +78,8 @@ def module_path(definition: str) -> Path:
 def _generated(definition: str, digest: str) -> str:
     from contfric.models.describe import from_text
     from contfric.models.generate import module_source
-    from contfric.models.regions import engine_order
 
-    description = from_text(definition)
-    return module_source(description, engine_order(description), digest)
+    return module_source(from_text(definition), digest)
 
 
 @cache

@@ -107,9 +107,9 @@ def _parameters(top: Part) -> tuple[Parameter, ...]:
         if isinstance(value, Mapping):
             entry = part.part(name, wanted)
             entry.only(_PARAMETER)
-            value, meaning = entry.needs("default", "a number"), entry.text("meaning", "-")
+            value, meaning = entry.needs("default", "a number"), entry.text("meaning", "")
         number = _number(part, name, value)
-        found.append(Parameter(name, number, "" if meaning == "-" else meaning))
+        found.append(Parameter(name, number, meaning))
     return tuple(found)
 
 

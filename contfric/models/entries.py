@@ -52,7 +52,7 @@ class Part:
     def text(self, key: str, default: str | None = None) -> str:
         """Return an entry that is a line of text."""
         value = self.data.get(key)
-        if value is None and default is not None:
+        if value in (None, "") and default is not None:
             return default
         if not isinstance(value, str) or not value.strip():
             self.fail(key if key in self.data else None, f"'{key}' must be a text, got {value!r}")

@@ -9,7 +9,6 @@ This module imports sympy; it is loaded when a model is built for the first time
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import sympy
@@ -21,6 +20,7 @@ from contfric.models.entries import Address, EntryError
 from contfric.models.formulas import FORMULAS, formula, resolved
 from contfric.models.grammar import TIME, parse
 from contfric.models.motion import motion_code
+from contfric.models.regions import engine_order, known_sides
 
 _HEAD = '''"""Compiled functions of a model, generated from its definition; not to be edited.
 
@@ -100,6 +100,7 @@ class Formulas:
 
     def __init__(self, description: Description) -> None:
         self.description = description
+        self.surfaces = engine_order(description)
         self.t = sympy.Symbol("t")
         self.y = sympy.symbols(f"s:{len(description.states)}")
         self.p = sympy.symbols(f"p:{len(description.parameters)}")
@@ -138,9 +139,9 @@ class Formulas:
         }
         found = []
         for mode in self.description.modes:
-            signs = {}
+            signs, known = {}, known_sides(mode, self.surfaces)
             for surface, level in zip(self.description.surfaces, self.levels(), strict=True):
-                side = mode.sides.get(surface.name, 0)
+                side = known.get(surface.name, 0)
                 above = observables[surface.observable] - level
                 if side != 0 and not above.is_number:
                     signs[above] = side
@@ -206,15 +207,15 @@ class Formulas:
         return found
 
 
-def module_source(description: Description, order: Sequence[str], digest: str) -> str:
+def module_source(description: Description, digest: str) -> str:
     """Return the module of a model.
 
     Parameters
     ----------
-    order : names of the surfaces in the order of the engine
     digest : of the sources that the module depends on
     """
     formulas = Formulas(description)
+    order = [s.name for s in formulas.surfaces]
     names = [s.name for s in description.surfaces]
     code = Lines()
     code.add(_HEAD.format(digest=digest))

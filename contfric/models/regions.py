@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
+from dataclasses import replace
 
 from contfric.models.definition import Domain, Surface
 from contfric.models.description import Description, DomainText, ModeText
@@ -14,32 +15,45 @@ Sides = dict[str, int]
 
 
 def ordered_surfaces(description: Description, levels: Mapping[str, float]) -> list[Surface]:
-    """Return the surfaces, those of one observable together and from the highest level down."""
+    """Return the surfaces, those of one observable together and from the highest level down.
+
+    One is switching if the modes change across it: one moves on it, or each lies on one of its sides.
+    """
     observables: list[str] = []
     for surface in description.surfaces:
         if surface.observable not in observables:
             observables.append(surface.observable)
-    return [
-        Surface(s.name, s.observable, s.level, s.switching or _switches(description, s.name))
+    found = [
+        surface
         for name in observables
-        for s in sorted(
+        for surface in sorted(
             (s for s in description.surfaces if s.observable == name),
             key=lambda s: -levels[s.name],
         )
     ]
+    known = [known_sides(mode, found) for mode in description.modes]
+    for i, surface in enumerate(found):
+        sides = {mode.get(surface.name) for mode in known}
+        cut = surface.name not in description.resets and (0 in sides or sides == {1, -1})
+        found[i] = replace(surface, switching=surface.switching or cut)
+    return found
 
 
-def engine_order(description: Description) -> list[str]:
-    """Return the names of the surfaces in the order in which the model has them."""
+def engine_order(description: Description) -> list[Surface]:
+    """Return the surfaces in the order in which the model has them, at the default parameters."""
     evaluator, params = floats(description), defaults(description)
     levels = {s.name: evaluator.value(s.level, params) for s in description.surfaces}
-    return [s.name for s in ordered_surfaces(description, levels)]
+    return ordered_surfaces(description, levels)
 
 
-def _switches(description: Description, surface: str) -> bool:
-    """Return whether the modes change across a surface: one moves on it, or each is on one side."""
-    sides = {mode.sides.get(surface) for mode in description.modes}
-    return surface not in description.resets and (0 in sides or sides == {1, -1})
+def known_sides(mode: ModeText, surfaces: list[Surface]) -> Sides:
+    """Return the sides that all regions of a mode share: those given, and those that follow from them."""
+    regions = combinations(surfaces, mode.sides)
+    return {
+        s.name: regions[0][s.name]
+        for s in surfaces
+        if regions and len({region[s.name] for region in regions}) == 1
+    }
 
 
 def combinations(surfaces: list[Surface], fixed: Mapping[str, int]) -> list[Sides]:
@@ -96,10 +110,10 @@ def _shared(mode: ModeText, other: str, sides: Sides) -> str:
 
 
 def _auto_name(mode: ModeText, sides: Sides, surfaces: list[Surface]) -> str:
-    parts = []
+    parts, known = [], known_sides(mode, surfaces)
     for observable, group in itertools.groupby(surfaces, key=lambda s: s.observable):
         names = [s.name for s in group]
-        if all(name in mode.sides for name in names):
+        if all(name in known for name in names):
             continue
         above = sum(sides[name] >= 0 for name in names)
         place = {0: "-", len(names): "+"}.get(above, "0" if len(names) == 2 else str(above))
