@@ -146,7 +146,9 @@ def _fill_check(parser: argparse.ArgumentParser) -> None:
 
 
 def _fill_graph(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--model", default="coulomb", help="name or YAML file of the model (%(default)s)")
+    parser.add_argument(
+        "--model", default="coulomb", help="name or YAML file of the model (%(default)s)"
+    )
     parser.add_argument("--out", metavar="FILE", type=Path, help="draw it: .png, .svg or .pdf")
 
 

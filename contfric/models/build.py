@@ -1,7 +1,7 @@
 """Generated modules on disk: written once, named by what they depend on, imported when they are needed.
 
-A module lies in a folder of its own below the cache of :mod:`contfric.compiled`, so that numba's cache of
-its kernels is renewed exactly when the module is. Its name carries a digest of the definition and of all
+A module lies in a folder of its own below the cache of compiled kernels, so that numba's cache of its
+kernels is renewed exactly when the module is. Its name carries a digest of the definition and of all
 compiled sources of contfric; what generates it is among those. It is written under another name and moved
 into place: two processes that build the same model at once do not disturb each other.
 """

@@ -23,10 +23,11 @@ from contfric.models.definition import (
     Symmetry,
 )
 from contfric.models.description import Description
-from contfric.models.entries import Address, EntryError
+from contfric.models.entries import EntryError
 from contfric.models.evaluate import Evaluator, Sampler, defaults, floats
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope, parse
 from contfric.models.regions import combinations, departing_side, domains_of, ordered_surfaces
+from contfric.yaml_lines import Address
 
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
 _SAME = 1e-9
@@ -101,7 +102,7 @@ def _level(evaluator: Evaluator[float], surface: Surface, params: dict[str, floa
 
 
 def _mode(description: Description, name: str) -> Mode:
-    """A sliding mode forgets how it was reached: one direction for each surface that it lies on."""
+    """Return a mode; one that slides forgets a direction for each surface that it lies on."""
     text = next(m for m in description.modes if m.name == name)
     held = sum(side == 0 for side in text.sides.values())
     rank = len(description.states) - held if text.rank is None else text.rank
@@ -109,7 +110,7 @@ def _mode(description: Description, name: str) -> Mode:
 
 
 def _reset(description: Description, surface: str) -> Reset:
-    """What a map leaves as it is cannot change: observables without the mapped states."""
+    """Return a reset; observables without the states that it maps are not changed by it."""
     texts = description.resets[surface]
     changed = {state for state, value in texts.items() if value != state}
     own = next(s.observable for s in description.surfaces if s.name == surface)

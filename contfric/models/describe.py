@@ -103,21 +103,21 @@ def _parameters(top: Part) -> tuple[Parameter, ...]:
     part = top.part("parameters", wanted, required=True)
     found = []
     for name, value in part.data.items():
-        meaning = ""
         if isinstance(value, Mapping):
             entry = part.part(name, wanted)
             entry.only(_PARAMETER)
-            value, meaning = entry.needs("default", "a number"), entry.text("meaning", "")
-        number = _number(part, name, value)
-        found.append(Parameter(name, number, meaning))
+            number = _number(entry, "default", entry.needs("default", "a number"), name)
+            found.append(Parameter(name, number, entry.text("meaning", "")))
+        else:
+            found.append(Parameter(name, _number(part, name, value, name), ""))
     return tuple(found)
 
 
-def _number(part: Part, key: str, value: object) -> float:
+def _number(part: Part, key: str, value: object, name: str) -> float:
     if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300:
         return float(value)
     hint = "; YAML reads 1e-3 as text: write 1.0e-3" if isinstance(value, str) else ""
-    part.fail(key, f"the default of '{key}' must be a finite number, got {value!r}{hint}")
+    part.fail(key, f"the default of '{name}' must be a finite number, got {value!r}{hint}")
 
 
 def _constraints(top: Part) -> tuple[tuple[str, str], ...]:
@@ -197,9 +197,7 @@ def _modes(
     return tuple(found)
 
 
-def _rates(
-    part: Part, states: tuple[str, ...], mode: str | None, entry: Part
-) -> tuple[str, ...]:
+def _rates(part: Part, states: tuple[str, ...], mode: str | None, entry: Part) -> tuple[str, ...]:
     if mode is None:
         entry.fail(None, "key 'field' is missing; it must be a mapping of states to rates")
     part.only(states)

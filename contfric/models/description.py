@@ -16,6 +16,7 @@ from typing import Any
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.names import Names
 
+
 @dataclass(frozen=True)
 class ModeText:
     """A mode: its field, one expression a state, and the sides of surfaces that it lies on."""

@@ -70,9 +70,7 @@ class Evaluator(Generic[T]):
         text = self.description.period
         return self.value(text, params) if text else None
 
-    def image(
-        self, params: Mapping[str, T], t: T, y: Sequence[T], period: T
-    ) -> tuple[T, list[T]]:
+    def image(self, params: Mapping[str, T], t: T, y: Sequence[T], period: T) -> tuple[T, list[T]]:
         """Return time and state under the declared symmetry."""
         images = self.description.symmetry or {}
         states = self.description.states

@@ -3,8 +3,8 @@
 Functions with kinks are classes of their own, so that their derivatives are what motion away from the
 kink sees: ``d abs(x) = sign(x)``, ``d sign(x) = 0``, and ``where`` differentiates both of its sides.
 (Sympy's own would bring Dirac's delta and Heaviside's step.) A power whose exponent is no whole number is a
-class, too: the derivative ``e b**(e - 1)`` is finite at b = 0 where ``e b**e / b`` is not, and a little beyond
-b = 0, where an integrator looks, it goes on as ``-|b|**e``.
+class, too: the derivative ``e b**(e - 1)`` is finite at b = 0 where ``e b**e / b`` is not, and a little
+beyond b = 0, where an integrator looks, it goes on as ``-|b|**e``.
 
 This module imports sympy; it is loaded when a model is built for the first time.
 """

@@ -89,4 +89,5 @@ class _Printer(StrPrinter):  # type: ignore[misc]
 
 def as_text(value: Any) -> str:
     """Return a formula as an expression of a model file."""
-    return str(_Printer({"order": "none"}).doprint(sympy.sympify(value)))
+    text: str = _Printer({"order": "none"}).doprint(sympy.sympify(value))
+    return text

@@ -16,11 +16,12 @@ import sympy
 from contfric.errors import ModelError
 from contfric.models.code import SLOPES, VALUES, Lines, Output, write_block
 from contfric.models.description import Description
-from contfric.models.entries import Address, EntryError
+from contfric.models.entries import EntryError
 from contfric.models.formulas import FORMULAS, formula, resolved
 from contfric.models.grammar import TIME, parse
 from contfric.models.motion import motion_code
 from contfric.models.regions import engine_order, known_sides
+from contfric.yaml_lines import Address
 
 _HEAD = '''"""Compiled functions of a model, generated from its definition; not to be edited.
 
@@ -62,7 +63,7 @@ def power_log(base, exponent):
 
 '''
 
-_KERNELS = '''
+_KERNELS = """
 @kernel(observe_signature)
 def observe(c, t, y, p, which, grad):
     return observe_at(c, t, y, p, which, grad)
@@ -92,7 +93,7 @@ def field_of(mode, t, y, p, which, out, jac):
 def reset(k, t, y, p, which, y1, jac):
     reset_at(k, t, y, p, which, y1, jac)
 
-'''
+"""
 
 
 class Formulas:
@@ -134,8 +135,7 @@ class Formulas:
     def fields(self) -> list[list[Any]]:
         """Return the field of each mode, without the kinks that the mode does not see."""
         observables = {
-            o.name: f
-            for o, f in zip(self.description.observables, self.observables(), strict=True)
+            o.name: f for o, f in zip(self.description.observables, self.observables(), strict=True)
         }
         found = []
         for mode in self.description.modes:

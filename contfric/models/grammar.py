@@ -329,7 +329,7 @@ class Scope(Generic[T]):
         return found
 
     def _compared(self, operator: ast.cmpop, left: Any, right: Any, yes: T, no: T) -> T:
-        """``a >= b`` is not ``b > a``: the other side is asked for, and the outcomes change places."""
+        """Choose by one comparison; ``a >= b`` is asked for as ``b > a``, with the outcomes exchanged."""
         where = self.algebra.where
         if isinstance(operator, ast.Gt):
             return where(left - right, yes, no)

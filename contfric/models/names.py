@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from contfric.errors import ModelError, did_you_mean
-from contfric.models.entries import Address, EntryError
+from contfric.models.entries import EntryError
 from contfric.models.grammar import PERIOD, PI, TIME, Algebra, Scope, check_name, names_in, parse
+from contfric.yaml_lines import Address
 
 T = TypeVar("T")
 

@@ -39,23 +39,24 @@ class OscillatorModel:
 
     To write a model:
 
-    1. Derive a class from this one. Its docstring's first line is the title; ``name`` is what results are
-       stored under.
-    2. Set ``states`` (the first one is the displacement that diagrams show), ``parameters`` (name: default, or
-       name: (default, meaning)) and ``constraints`` such as ``"S0 >= S"``.
-    3. Write :meth:`observables`: what the surfaces are level sets of. States need no observable of their own.
-    4. Set ``surfaces``: name: (observable, level), the level an expression of the parameters such as ``"-S0"``.
-    5. Set ``modes``: name: sides of surfaces, +1, -1, or 0 where the mode moves on the surface (it sticks).
-       Surfaces that are not named divide a mode into domains; motion passes them without a change.
-    6. Write :meth:`field`: the rates of the states in a mode. ``sign``, ``abs`` and ``where`` of what a surface at
-       level 0 decides are replaced by what they are in that mode.
-    7. Write :meth:`period` if there is an excitation, and :meth:`reset` if a surface maps the state (an impact).
-    8. If there is a symmetry, set ``symmetry``, such as ``"x -> -x, v -> -v, t -> t + T/2"``; ``spread`` is how
-       far from 0 motion can start.
+    1. Derive a class from this one. Its docstring's first line is the title; ``name`` is what results
+       are stored under.
+    2. Set ``states`` (the first one is the displacement that diagrams show), ``parameters`` (name:
+       default, or name: (default, meaning)) and ``constraints`` such as ``"S0 >= S"``.
+    3. Write :meth:`observables`: what the surfaces are level sets of. States need none of their own.
+    4. Set ``surfaces``: name: (observable, level), the level an expression of the parameters such as
+       ``"-S0"``.
+    5. Set ``modes``: name: sides of surfaces, +1, -1, or 0 where the mode moves on the surface (it
+       sticks). Surfaces that are not named divide a mode into domains; motion passes them unchanged.
+    6. Write :meth:`field`: the rates of the states in a mode. ``sign``, ``abs`` and ``where`` of what the
+       sides of the mode decide are replaced by what they are there.
+    7. Write :meth:`period` if there is an excitation, :meth:`reset` if a surface maps the state (impact).
+    8. If there is a symmetry, set ``symmetry``, such as ``"x -> -x, v -> -v, t -> t + T/2"``; ``spread``
+       is how far from 0 motion can start.
     9. Load it with ``contfric.load_model(MyClass)``, and verify it with ``contfric.check_model(MyClass)``.
 
-    Formulas are written with the functions of :mod:`contfric.models.functions` (or sympy's own); arguments are symbols,
-    so an ``if`` on their values cannot work: use ``where(condition, a, b)``, or another mode.
+    Formulas are written with the functions of :mod:`contfric.models.functions` (or sympy's own); arguments
+    are symbols, so an ``if`` on their values cannot work: use ``where(condition, a, b)``, or another mode.
 
     Examples
     --------

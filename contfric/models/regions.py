@@ -112,11 +112,11 @@ def _shared(mode: ModeText, other: str, sides: Sides) -> str:
 def _auto_name(mode: ModeText, sides: Sides, surfaces: list[Surface]) -> str:
     parts, known = [], known_sides(mode, surfaces)
     for observable, group in itertools.groupby(surfaces, key=lambda s: s.observable):
-        names = [s.name for s in group]
-        if all(name in known for name in names):
+        members = [s.name for s in group]
+        if all(name in known for name in members):
             continue
-        above = sum(sides[name] >= 0 for name in names)
-        place = {0: "-", len(names): "+"}.get(above, "0" if len(names) == 2 else str(above))
+        above = sum(sides[name] >= 0 for name in members)
+        place = {0: "-", len(members): "+"}.get(above, "0" if len(members) == 2 else str(above))
         parts.append(f"{observable}{place}")
     return f"{mode.name}:{','.join(parts)}"
 
@@ -138,8 +138,8 @@ def _renamed(domains: list[Domain], named: tuple[DomainText, ...]) -> tuple[Doma
             )
         d = domains[fits[0]]
         found[fits[0]] = Domain(text.name, d.mode, d.signs, text.label or text.name)
-    names = [d.name for d in found]
-    twice = [name for name in names if names.count(name) > 1]
+    every = [d.name for d in found]
+    twice = [name for name in every if every.count(name) > 1]
     if twice:
         raise EntryError(("domains",), f"two domains have the name '{twice[0]}'")
     return tuple(found)

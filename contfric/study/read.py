@@ -19,11 +19,11 @@ from contfric.models.definition import Model
 from contfric.models.files import relative_model
 from contfric.orbit.orbit import Orbit
 from contfric.signature import Signature, load_signature
-from contfric.yaml_lines import LocatedYaml, read_yaml
 from contfric.study.drawings import Drawing, drawings_of
 from contfric.study.explain_error import fail_with
 from contfric.study.library import SUFFIXES, study_path
 from contfric.study.schema import ContinueTask, ExploreTask, StudyFile, Want
+from contfric.yaml_lines import LocatedYaml, read_yaml
 
 
 @dataclass(frozen=True, eq=False)

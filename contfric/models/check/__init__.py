@@ -1,7 +1,7 @@
 """Checks of a model: what would make its results wrong, in words that say what to do.
 
-The checks look at sampled states (in twice the region that starts are drawn from, at the defaults), so that they
-prove nothing; but a formula that is wrong is wrong almost everywhere.
+The checks look at sampled states (in twice the region that starts are drawn from, at the defaults), so that
+they prove nothing; but a formula that is wrong is wrong almost everywhere.
 """
 
 from __future__ import annotations

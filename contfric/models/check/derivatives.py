@@ -224,9 +224,7 @@ def _field(split: _Split, exact: Evaluator[Any], field: Any, name: str, m: int) 
     return Case(what, split.vector(lambda *a: field(m, *a)), formula, name)
 
 
-def _rate(
-    split: _Split, exact: Evaluator[Any], mode: str, m: int, observable: str, c: int
-) -> Case:
+def _rate(split: _Split, exact: Evaluator[Any], mode: str, m: int, observable: str, c: int) -> Case:
     def formula(point: list[Any]) -> list[Any]:
         t, y, p = split.named(point)
         velocity = [mpmath.mpf(1), *exact.field(mode, p, t, y)]
@@ -242,9 +240,7 @@ def _rate(
     return Case(what, split.scalar(lambda *a: rate(m, c, *a)), formula, mode, _OUTER)
 
 
-def _reset(
-    split: _Split, exact: Evaluator[Any], texts: Any, surface: str, k: int
-) -> Case:
+def _reset(split: _Split, exact: Evaluator[Any], texts: Any, surface: str, k: int) -> Case:
     def formula(point: list[Any]) -> list[Any]:
         t, y, p = split.named(point)
         return [exact.value(texts.get(s, s), p, t, y) for s in split.model.states]
@@ -270,7 +266,7 @@ def _levels(split: _Split, exact: Evaluator[Any], period: str) -> list[Case]:
 
 def _closed(probe: Probe) -> list[Case]:
     model, split = probe.model, _Split(probe.model)
-    flow, none = model.flow, lambda point: list(point)
+    flow, none = model.flow, list
     found = []
     for c, o in enumerate(model.observables):
         compiled = split.scalar(lambda *a, c=c: flow.observe(c, *a))

@@ -9,7 +9,7 @@ from contfric.models.grammar import parse
 
 
 def check_constraints(report: ModelReport, model: Model) -> bool:
-    """The defaults must obey the model's own constraints; return whether they do."""
+    """Check that the defaults obey the model's own constraints; return whether they do."""
     for constraint in model.constraints:
         report.count(Topic.CONSTRAINTS)
         left = constraint.value(model.defaults)
@@ -24,7 +24,7 @@ def check_constraints(report: ModelReport, model: Model) -> bool:
 
 
 def check_names(report: ModelReport, model: Model) -> None:
-    """Every parameter changes something, and every state is moved or moves something."""
+    """Check that every parameter changes something, and that every state is moved."""
     if not model.definition:
         return
     description = from_text(model.definition)
@@ -70,5 +70,3 @@ def _mentions(data: object, name: str) -> bool:
         return name in names_in(parse(data))
     except ModelError:
         return False
-
-

@@ -19,7 +19,7 @@ _SAME = 1e-8
 
 
 def check_surfaces(report: ModelReport, probe: Probe) -> None:
-    """A surface is reached, and the observable changes across it."""
+    """Check that each surface is reached, and that its observable changes across it."""
     for surface in probe.model.surfaces:
         reached = 0
         for t, y in probe.on(surface.name, _ON_SURFACE // 4):
@@ -42,7 +42,7 @@ def check_surfaces(report: ModelReport, probe: Probe) -> None:
 
 
 def check_transitions(report: ModelReport, probe: Probe) -> None:
-    """Every region has a domain, and every crossing that motion makes a next one."""
+    """Check that every region has a domain, and every crossing that motion makes a next one."""
     model = probe.model
     for t, y in probe.states(_EVERYWHERE):
         signs = probe.signs(t, y)
@@ -107,7 +107,7 @@ def _goes_on(
     t: float,
     y: FloatArray,
 ) -> bool:
-    """Motion must be able to enter what follows: else it is sent back at once, for ever."""
+    """Return whether motion can enter what follows; else it is sent back at once, for ever."""
     domain = probe.model.domain_by_name[following]
     side = domain.signs[surface.name]
     if side == 0:
@@ -125,7 +125,7 @@ def _goes_on(
 
 
 def check_sliding(report: ModelReport, probe: Probe) -> None:
-    """On its surfaces, a sliding mode does not change their observables."""
+    """Check that a sliding mode does not change the observables of its surfaces."""
     model = probe.model
     for mode in model.modes:
         if not mode.sliding:
@@ -150,7 +150,7 @@ def check_sliding(report: ModelReport, probe: Probe) -> None:
 
 
 def check_symmetry(report: ModelReport, probe: Probe) -> None:
-    """The map takes solutions to solutions: fields, heights over surfaces, and domains."""
+    """Check that the map takes solutions to solutions: fields, surfaces, and domains."""
     model, symmetry = probe.model, probe.model.symmetry
     if symmetry is None:
         return
@@ -191,7 +191,7 @@ def check_symmetry(report: ModelReport, probe: Probe) -> None:
 
 
 def check_period(report: ModelReport, probe: Probe) -> None:
-    """What depends on time has the period that the model gives, or, if it has none, not on time."""
+    """Check that what depends on time has the model's period, and that nothing does without one."""
     model, period = probe.model, probe.period
     for mode in model.modes:
         seen = 0
@@ -232,5 +232,3 @@ def _place(probe: Probe, t: float, y: FloatArray) -> str:
 def _sides(signs: dict[str, int]) -> str:
     words = {1: "above", -1: "below", 0: "on"}
     return ", ".join(f"{words[side]} {name}" for name, side in signs.items())
-
-
