@@ -92,10 +92,7 @@ def model_from(description: Description) -> Model:
 
 def _level(evaluator: Evaluator[float], surface: Surface, params: dict[str, float]) -> float:
     address = ("surfaces", surface.name, "level")
-    try:
-        level = evaluator.value(surface.level, params)
-    except ArithmeticError:
-        level = math.nan
+    level = evaluator.value(surface.level, params)
     if not math.isfinite(level):
         raise EntryError(address, f"the level '{surface.level}' has no value at the defaults")
     return level
@@ -143,7 +140,7 @@ def _constraint(address: Address, text: str, why: str, params: Mapping[str, floa
         for stretch in (0.5, 2.0, -3.0):
             point = {name: stretch * (1.0 + i) for i, name in enumerate(names)}
             linear = constant + sum(slopes[name] * point[name] for name in names)
-            if abs(difference(point) - linear) > _SAME * (1.0 + abs(linear)):
+            if not abs(difference(point) - linear) <= _SAME * (1.0 + abs(linear)):
                 raise ArithmeticError
     except ArithmeticError:
         raise EntryError(
@@ -269,11 +266,11 @@ def _linear_map(description: Description) -> tuple[tuple[tuple[float, ...], ...]
     for name in states:
         row = tuple(value(name, {**zero, s: 1.0}, 0.0, 0.0) for s in states)
         linear = sum(c * mixed[s] for c, s in zip(row, states, strict=True))
-        if abs(value(name, mixed, 0.7, 0.9) - linear) > _SAME:
+        if not abs(value(name, mixed, 0.7, 0.9) - linear) <= _SAME:
             raise ModelError(f"the image of {name} must be linear in the states, such as -{name}")
         rows.append(row)
     fraction = value(TIME, zero, 0.0, 1.0)
-    if abs(value(TIME, mixed, 0.7, 0.9) - 0.7 - 0.9 * fraction) > _SAME:
+    if not abs(value(TIME, mixed, 0.7, 0.9) - 0.7 - 0.9 * fraction) <= _SAME:
         raise ModelError("the image of t must be t plus a share of the period, such as t + T/2")
     return tuple(rows), fraction
 

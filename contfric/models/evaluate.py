@@ -79,7 +79,7 @@ class Evaluator(Generic[T]):
 
 
 def floats(description: Description) -> Evaluator[float]:
-    """Return the description in ordinary numbers; what has no value is nan or an ArithmeticError."""
+    """Return the description in ordinary numbers; nan where there is no value."""
     return Evaluator(description, FLOATS)
 
 
@@ -141,11 +141,8 @@ class Sampler:
         """
         state = list(y)
         for _ in range(_STEPS):
-            try:
-                above = self.evaluator.height(surface, self.params, t, state)
-                slope = self.gradient(surface, t, state)
-            except ArithmeticError:
-                return None
+            above = self.evaluator.height(surface, self.params, t, state)
+            slope = self.gradient(surface, t, state)
             if abs(above) <= _ON:
                 return t, state
             if any(slope[1:]):

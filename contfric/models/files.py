@@ -84,6 +84,5 @@ def model_of(definition: str) -> Model:
     from contfric.models.build import module_path
     from contfric.models.derive import model_from
 
-    model = model_from(from_text(definition))
-    module_path(definition)  # written now: mistakes that only formulas show belong to loading
-    return model
+    module_path(definition)  # written first: what has no value is reported by formula and place
+    return model_from(from_text(definition))

@@ -134,6 +134,7 @@ FORMULAS: Algebra[Any] = Algebra(
         "sign": Sign,
     },
     where=Where,
+    divide=lambda a, b: a / b,
     power=_power,
     pi=sympy.pi,
 )

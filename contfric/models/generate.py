@@ -108,6 +108,8 @@ class Formulas:
         names = [TIME, *description.states, *(p.name for p in description.parameters)]
         values = dict(zip(names, (self.t, *self.y, *self.p), strict=True))
         self._scope = description.names.scope(FORMULAS, values)
+        for name, text in description.define:
+            self.read(("define", name), text)
 
     def read(self, address: Address, text: str) -> Any:
         """Return one expression as a formula."""
@@ -232,17 +234,20 @@ def module_source(description: Description, digest: str) -> str:
     writer.vectors("onto", "mode", "y1", formulas.projections())
     writer.scales(formulas.scales())
     code.add(_KERNELS)
-    code.add(motion_code(description, _idle(formulas.rates())))
+    code.add(motion_code(description, _idle(description, formulas.rates())))
     return str(code)
 
 
-def _idle(rates: list[list[Any]]) -> list[tuple[int, int]]:
-    """Return the pairs (mode, observable) for which the observable does not change along the mode."""
+def _idle(description: Description, rates: list[list[Any]]) -> list[tuple[int, int]]:
+    """Return the pairs (mode, observable) for which the observable does not change along the mode.
+
+    Only a mode that slides can hide a zero in a long formula.
+    """
     return [
         (m, c)
-        for m, row in enumerate(rates)
+        for m, (mode, row) in enumerate(zip(description.modes, rates, strict=True))
         for c, rate in enumerate(row)
-        if rate == 0 or (not rate.is_Atom and sympy.simplify(rate) == 0)
+        if rate == 0 or (0 in mode.sides.values() and sympy.simplify(rate) == 0)
     ]
 
 

@@ -60,13 +60,14 @@ class Algebra(Generic[T]):
     number : from the text of a decimal number
     functions : the functions of :data:`UNARY`, by name
     where : ``where(d, a, b)`` is a if d > 0, else b
-    power : ``power(base, exponent)``
+    divide, power : ``a / b`` and ``base**exponent``
     pi : the number pi
     """
 
     number: Callable[[str], T]
     functions: Mapping[str, Callable[[T], T]]
     where: Callable[[T, T, T], T]
+    divide: Callable[[T, T], T]
     power: Callable[[T, T], T]
     pi: T
 
@@ -290,7 +291,7 @@ class Scope(Generic[T]):
         elif operator == "*":
             found = left * right
         elif operator == "/":
-            found = left / right
+            found = self.algebra.divide(left, right)
         else:
             found = self.algebra.power(left, right)
         return found  # type: ignore[no-any-return]
@@ -341,7 +342,10 @@ class Scope(Generic[T]):
 
 
 def _real_power(base: float, exponent: float) -> float:
-    value = base**exponent
+    try:
+        value = base**exponent
+    except ArithmeticError:
+        return math.nan
     return math.nan if isinstance(value, complex) else float(value)
 
 
@@ -357,7 +361,7 @@ def _quiet(function: Callable[[float], float]) -> Callable[[float], float]:
     return value
 
 
-#: Ordinary numbers.
+#: Ordinary numbers; nan where there is no value.
 FLOATS: Algebra[float] = Algebra(
     number=float,
     functions={
@@ -366,6 +370,7 @@ FLOATS: Algebra[float] = Algebra(
         "sign": lambda x: float((x > 0) - (x < 0)),
     },
     where=lambda d, a, b: a if d > 0 else b,
+    divide=lambda a, b: a / b if b != 0.0 else math.nan,
     power=_real_power,
     pi=math.pi,
 )
@@ -379,7 +384,4 @@ def number_of(text: str | float, values: Mapping[str, float]) -> float:
     >>> number_of("2*a + 1", {"a": 3.0})
     7.0
     """
-    try:
-        return Scope(FLOATS, dict(values)).evaluate(parse(text))
-    except (ArithmeticError, ValueError):
-        return math.nan
+    return Scope(FLOATS, dict(values)).evaluate(parse(text))

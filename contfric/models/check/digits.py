@@ -21,6 +21,7 @@ MANY_DIGITS: Algebra[Any] = Algebra(
         "sign": mpmath.sign,
     },
     where=lambda d, a, b: a if d > 0 else b,
+    divide=lambda a, b: a / b,
     power=lambda base, exponent: base**exponent,
     pi=mpmath.pi,
 )
