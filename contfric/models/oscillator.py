@@ -136,6 +136,8 @@ def _data(oscillator: OscillatorModel) -> dict[str, Any]:
     import sympy
 
     kind, states = type(oscillator), tuple(oscillator.states)
+    if not states:
+        raise ModelError(f'{kind.__name__}: \'states\' must be a list of names, such as ("x", "v")')
     t = sympy.Symbol(TIME)
     y = Symbols("state", {name: sympy.Symbol(name) for name in states})
     p = Symbols("parameter", {name: sympy.Symbol(name) for name in oscillator.parameters})
@@ -193,8 +195,8 @@ def _traced(oscillator: OscillatorModel, method: str, *arguments: Any) -> Any:
         hint = ""
         if "truth value" in str(error):
             hint = "; an 'if', min() or max() cannot look at values: use where(condition, a, b)"
-        elif "float" in str(error):
-            hint = "; use the functions of contfric.models.functions, not those of math"
+        elif "float" in str(error) or "ufunc" in str(error):
+            hint = "; use the functions of contfric.models.functions, not those of math or numpy"
         raise ModelError(f"{type(oscillator).__name__}.{method}: {error}{hint}") from error
 
 

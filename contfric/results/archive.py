@@ -17,7 +17,7 @@ import numpy as np
 from contfric.atlas.diagram import Diagram
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
-from contfric.errors import ParameterError, ResultFileError
+from contfric.errors import ModelError, ParameterError, ResultFileError
 from contfric.files import replacing
 from contfric.models import load_model
 from contfric.models.definition import Model
@@ -177,6 +177,11 @@ def _owner(path: Path, header: Header, model: Model | None) -> Model:
     name = header["model"]
     try:
         owner = _model_of(header) if model is None else model
+    except ModelError as error:
+        raise ResultFileError(
+            f"{path} holds a definition of its model '{name}' that this contfric cannot read: {error}. "
+            "Pass load(..., model=...), or run its study again"
+        ) from None
     except ParameterError as error:
         raise ResultFileError(
             f"{path} holds results of the model '{name}', which is not installed ({error}): "

@@ -58,10 +58,11 @@ def many_digits(text: str, point: list[object]) -> object:
     return Scope(MANY_DIGITS, dict(zip(NAMES, point, strict=True))).evaluate(parse(text))
 
 
-@settings(deadline=None, max_examples=60)
-@given(expressions, st.randoms(use_true_random=False))
-def test_formulas_and_numbers_agree(text: str, draw: random.Random) -> None:
+@settings(deadline=None, max_examples=60, derandomize=True)
+@given(expressions, st.integers(0, 2**31))
+def test_formulas_and_numbers_agree(text: str, seed: int) -> None:
     """The same tree in ordinary numbers, in 60 digits, and as a formula with exact derivatives."""
+    draw = random.Random(seed)  # not from hypothesis, which likes kinks
     point = [draw.uniform(-2, 2) for _ in NAMES]
     symbols = {name: sympy.Symbol(name) for name in NAMES}
     found = formula(parse(text), Scope(FORMULAS, dict(symbols)))
@@ -208,7 +209,7 @@ def test_compiled_fields_of_random_models(rate: str, observable: str) -> None:
             place = [mpmath.mpf(float(z)) for z in (*y, t, *p)]
             step, wide = mpmath.mpf(10) ** -18, mpmath.mpf(10) ** -9
 
-            def along(point: list[object]) -> list[object]:
+            def along(point: list[object], step: object = step) -> list[object]:
                 v, f = point[1], many_digits(rate, point)
                 ends = [
                     many_digits(
@@ -234,5 +235,5 @@ def test_compiled_fields_of_random_models(rate: str, observable: str) -> None:
 def test_symbols_say_what_they_have() -> None:
     y = Symbols("state", {"x": 1, "v": 2})
     assert (y.x, y["v"], list(y)) == (1, 2, [1, 2])
-    with pytest.raises(ModelError, match="did you mean 'v'|Valid: x, v"):
-        _ = y.vv
+    with pytest.raises(ModelError, match=r"did you mean 'v'"):
+        _ = y.vw
