@@ -39,10 +39,10 @@ from contfric.chaos.rows import CellRows, Limits, Starting
 from contfric.chaos.tangent import (
     ARRIVED,
     Walk,
+    carry,
     differentiate,
     new_walk,
     orthonormalise,
-    push,
     seed,
     state_room,
     to_joint,
@@ -51,13 +51,16 @@ from contfric.compiled import allocating_helper, f8, helper, i8, indices, kernel
 from contfric.models.definition import FloatArray
 from contfric.orbit.equations import FunctionsType
 from contfric.orbit.spectrum import spectrum
-from contfric.orbit.trajectory import HELD, IMPOSSIBLE, StateRoom, TablesType
+from contfric.orbit.trajectory import HELD, IMPOSSIBLE, QUIET, StateRoom, TablesType
 
 #: The motions, by their numbers in :class:`contfric.chaos.status.Motion`.
 PERIODIC, TRANSIENT, CHAOTIC, SETTLING, UNDECIDED, AT_REST, UNBOUNDED, NO_MOTION = range(8)
 #: A separation that grew by this factor has grown from rounding to the size of the motion: the motion
 #: forgot where it started, which one that only settles never does.
 _FORGOTTEN = -math.log(np.finfo(np.float64).eps)
+#: Units of time after which an autonomous motion that meets no surface any more has settled, if it moves by
+#: less than this (relative) in one more.
+_SETTLES, _STILL = 1e4, 1e-9
 
 StartingType = types.NamedTuple([indices, indices, indices], Starting)
 LimitsType = types.NamedTuple([i8, i8, f8, i8], Limits)
@@ -103,6 +106,66 @@ def start_code(functions, observables, t, y, p, room):  # type: ignore[no-untype
 
 
 @helper
+def start_mode(functions, tables, starting, t, y, p, room):  # type: ignore[no-untyped-def]
+    """Return (mode, surfaces that it leaves as bits) of an initial state; (-1, 0) if it is in no domain.
+
+    A state on surfaces that the signs alone do not decide goes to the side that its rates lead to.
+    """
+    observables, bounds = tables.observables, tables.bounds
+    code = start_code(functions, observables, t, y, p, room)
+    if starting.mode[code] >= 0:
+        return starting.mode[code], starting.on[code]
+    count = observables.shape[0]
+    for choice in range(1 << count):
+        other, place, fits, rest = code, 1, True, code
+        for k in range(count):
+            side = 1 if (choice >> k) & 1 == 1 else -1
+            if rest % 3 == 1:
+                other += side * place
+            elif side < 0:
+                fits = False  # a sign that is given: counted once
+            rest //= 3
+            place *= 3
+        mode = starting.mode[other] if fits else -1
+        if mode < 0:
+            continue
+        on, rest = 0, code
+        for k in range(count):
+            if rest % 3 == 1 and bounds[mode, k] != 0:
+                sense = 1.0 if (choice >> k) & 1 == 1 else -1.0
+                rate = functions[6](mode, observables[k], t, y, p, room.none, room.empty)
+                fits = fits and sense * rate > 0.0
+                on |= 1 << k
+            rest //= 3
+        if fits:
+            return mode, on
+    return -1, 0
+
+
+@helper
+def write_quiet(functions, mode, t, p, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+    """Write the exponents of an equilibrium that an autonomous motion settles on inside of a mode."""
+    n = walk.y.shape[0]
+    functions[0](mode, t, walk.y, _SETTLES, p, rows.turns[:0], walk.met, walk.reset[:0])
+    functions[0](mode, t, walk.met, 1.0, p, rows.turns[:0], walk.end, walk.jac)
+    still = True
+    for j in range(n):
+        still = still and abs(walk.end[j] - walk.met[j]) <= _STILL * (1.0 + abs(walk.met[j]))
+    if not still:
+        write_nothing(NO_MOTION, rows, cell)
+        return
+    for i in range(n):
+        for j in range(n):
+            cycle.work[i, j] = walk.jac[i, 1 + j]
+    spectrum(cycle.work[:n, :n], n, cycle.mu, cycle.symmetric, cycle.left, cycle.product)
+    for k in range(n):
+        size = abs(cycle.mu[k])
+        rows.exponents[cell, k] = math.log(size) if size > 0.0 else -np.inf
+        rows.errors[cell, k] = 0.0
+    rows.motions[cell] = AT_REST
+
+
+@helper
 def write_rest(functions, rank, mode, t, p, period, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
     """Write the exponents of a mode that is never left: those of its flow over one period."""
     n = walk.y.shape[0]
@@ -140,9 +203,11 @@ def try_cycle(  # type: ignore[no-untyped-def]
     for k in range(n):
         rows.exponents[cell, k] = cycle.rates[k]
         rows.errors[cell, k] = error
-    rows.turns[cell] = shortest(
-        functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, rooms.state
-    )
+    rows.turns[cell] = 1  # without excitation: a cycle
+    if walk.timeless[0] == 0:
+        rows.turns[cell] = shortest(
+            functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, rooms.state
+        )
     return True
 
 
@@ -198,7 +263,7 @@ def carry_on(functions, tables, ranks, mode, on, t, p, period, live, rooms):  # 
         observable = tables.observables[surface]
         rate = differentiate(functions, observable, mode, duration, t, p, walk, room.none)
         live = min(live, ranks[mode])
-        push(rooms.frame, live, rate, walk.jac, walk.grad, walk.image)
+        carry(functions, tables, surface, t, p, live, rate, rooms.frame, walk, room.none)
         if not orthonormalise(rooms.frame, live, rooms.growth):
             outcome = IMPOSSIBLE
     return outcome, surface, following, duration, turns, t, live
@@ -219,6 +284,9 @@ def follow_cell(functions, tables, ranks, mode, on, t, p, period, limits, rooms,
         outcome, surface, following, duration, turns, t, live = carry_on(
             functions, tables, ranks, mode, on, t, p, period, live, rooms
         )
+        if outcome == QUIET:
+            write_quiet(functions, mode, t, p, walk, rooms.cycle, rows, cell)
+            break
         if outcome == HELD:
             rank = ranks[mode]
             write_rest(functions, rank, mode, t, p, period, walk, rooms.cycle, rows, cell)
@@ -232,7 +300,8 @@ def follow_cell(functions, tables, ranks, mode, on, t, p, period, limits, rooms,
         on = (1 << surface) | tables.lies_on[mode]
         mode, joint, cycle = following, joint + 1, cycle + turns
         key = mode * surfaces + surface
-        joints, lag = returned(rooms.memory, key, cycle, joint, t, walk.y, period)
+        timeless = walk.timeless[0] != 0
+        joints, lag = returned(rooms.memory, key, cycle, joint, t, walk.y, period, timeless)
         if joints > 0 and try_cycle(
             functions, tables, ranks, mode, on, key, t, joints, lag, p, period, rooms, rows, cell
         ):
@@ -271,8 +340,12 @@ def follow_cells(functions, tables, starting, time, vectors, states, limits, row
             rooms.walk.y[j] = states[cell, j]
         rows.turns[cell], rows.followed[cell] = 0, 0
         period = functions[5](p, rooms.state.none, rooms.state.empty)
-        code = start_code(functions, tables.observables, time, rooms.walk.y, p, rooms.state)
-        if starting.mode[code] < 0:
+        timeless = period <= 0.0
+        rooms.walk.timeless[0] = rooms.cycle.walk.timeless[0] = 1 if timeless else 0
+        if timeless:
+            period = 1.0  # periods are units of time
+        mode, on = start_mode(functions, tables, starting, time, rooms.walk.y, p, rooms.state)
+        if mode < 0:
             write_nothing(NO_MOTION, rows, cell)
             continue
         phase = time - math.floor(time / period) * period
@@ -280,8 +353,8 @@ def follow_cells(functions, tables, starting, time, vectors, states, limits, row
             functions,
             tables,
             starting.ranks,
-            starting.mode[code],
-            starting.on[code],
+            mode,
+            on,
             phase,
             p,
             period,

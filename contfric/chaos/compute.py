@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from contfric.chaos.exponents import checked_time, limits_of
 from contfric.chaos.map import LyapunovMap, points_of
-from contfric.chaos.rows import Limits, check_excited
+from contfric.chaos.rows import Limits
 from contfric.chaos.running import Progress, Timer, compute_all
 from contfric.chaos.starts import StateLike, given_states, number_of_starts
 from contfric.chaos.store import TileFolder, digest, open_tiles
@@ -143,7 +143,6 @@ def lyapunov_map(
         )
     grid = _checked_axes(model, axes)
     vector, example = _checked_params(model, grid, params or {})
-    check_excited(model, vector)
     count = number_of_starts(model, state, starts, example)
     states = None if state is None else _all_states(model, grid, vector, state, count)
     job = _Job(model, grid, vector, count, states, checked_time(time), limits, tile)

@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from contfric.chaos.tangent import (
     ARRIVED,
     Walk,
+    carry,
     differentiate,
     new_walk,
     orthonormalise,
-    push,
     to_joint,
 )
 from contfric.compiled import allocating_helper, helper
@@ -139,8 +139,10 @@ def forget(memory):  # type: ignore[no-untyped-def]
 
 
 @helper
-def returned(memory, key, cycle, event, t, y, period):  # type: ignore[no-untyped-def]
+def returned(memory, key, cycle, event, t, y, period, timeless):  # type: ignore[no-untyped-def]
     """Return (joints, periods) since a joint that this one is a near return of; zeros if none.
+
+    Without excitation any time may have passed.
 
     What has been remembered for its span is replaced by this joint.
     """
@@ -153,6 +155,8 @@ def returned(memory, key, cycle, event, t, y, period):  # type: ignore[no-untype
                 slip, turns = slip - period, turns + 1
             elif slip < -0.5 * period:
                 slip, turns = slip + period, turns - 1
+            if timeless:
+                slip, turns = 0.0, 1
             same = turns > 0 and abs(slip) <= near
             for j in range(y.shape[0]):
                 same = same and abs(y[j] - memory.z[i, 1 + j]) <= near * (1.0 + abs(y[j]))
@@ -183,17 +187,20 @@ def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, room)
     Returns
     -------
     tuple
-        (mode and surface at the end as one number, -1 if the walk broke off; rank; periods; phase).
+        (mode and surface at the end as one number, -1 if the walk broke off; rank; periods; phase;
+        duration).
         ``cycle.images`` holds the images of the unit vectors, row by row; ``cycle.logs`` the growth
         of the frame.
     """
     walk, z, images, frame = cycle.walk, cycle.z, cycle.images, cycle.frame
     n = walk.y.shape[0]
     walk.at_once[0] = 0
-    t, turns, rank = z[0], 0, n
+    t, turns, rank, lasted = z[0], 0, n, 0.0
     for i in range(n + 1):
         for j in range(n + 1):
             images[i, j] = 1.0 if i == j else 0.0
+    if walk.timeless[0] != 0:
+        images[0, 0] = 0.0
     for j in range(n):
         walk.y[j] = z[1 + j]
         cycle.logs[j] = 0.0
@@ -203,21 +210,22 @@ def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, room)
             functions, tables, mode, on, t, p, period, walk, room
         )
         if outcome != ARRIVED:
-            return -1, rank, turns, t
+            return -1, rank, turns, t, lasted
         observable = tables.observables[surface]
         rate = differentiate(functions, observable, mode, duration, t, p, walk, room.none)
         rank = min(rank, ranks[mode])
-        push(images, n + 1, rate, walk.jac, walk.grad, walk.image)
-        push(frame, rank, rate, walk.jac, walk.grad, walk.image)
+        carry(functions, tables, surface, t, p, n + 1, rate, images, walk, room.none)
+        carry(functions, tables, surface, t, p, rank, rate, frame, walk, room.none)
+        lasted += duration
         if not orthonormalise(frame, rank, cycle.growth):
-            return -1, rank, turns, t
+            return -1, rank, turns, t, lasted
         for k in range(rank):
             cycle.logs[k] += cycle.growth[k]
         turns += more
         on = (1 << surface) | tables.lies_on[mode]
         mode = following
         key = mode * tables.observables.shape[0] + surface
-    return key, rank, turns, t
+    return key, rank, turns, t, lasted
 
 
 @helper
@@ -269,15 +277,18 @@ def solve_cycle(functions, tables, ranks, mode, on, key, joints, turns, p, perio
         repels. ``cycle.rates`` holds the exponents.
     """
     n, time = cycle.walk.y.shape[0], turns * period
+    timeless = cycle.walk.timeless[0] != 0
     before, moved, rate_before = np.inf, 0.0, 0.0
     sensitivity, amplified = 0.0, 0.0
     for step in range(_PASSES):
-        last, rank, done, t = go_round(
+        last, rank, done, t, lasted = go_round(
             functions, tables, ranks, mode, on, joints, p, period, cycle, room
         )
         if last != key:
             return -1.0
-        cycle.right[0, 0] = t + (done - turns) * period - cycle.z[0]
+        if timeless:
+            time = lasted
+        cycle.right[0, 0] = 0.0 if timeless else t + (done - turns) * period - cycle.z[0]
         for j in range(n):
             cycle.right[1 + j, 0] = cycle.walk.y[j] - cycle.z[1 + j]
         gap = 0.0
@@ -309,7 +320,7 @@ def shortest(functions, tables, ranks, mode, on, key, joints, turns, p, period, 
     for parts in range(turns, 1, -1):
         if turns % parts != 0 or joints % parts != 0:
             continue
-        last, _, done, t = go_round(
+        last, _, done, t, _ = go_round(
             functions, tables, ranks, mode, on, joints // parts, p, period, cycle, room
         )
         gap = abs(t + (done - turns // parts) * period - cycle.z[0])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.chaos.rows import Limits, check_excited, follow
+from contfric.chaos.rows import Limits, follow
 from contfric.chaos.starts import StateLike, default_states, given_states
 from contfric.chaos.status import Motion
 from contfric.errors import ParameterError, whole_number
@@ -25,13 +25,15 @@ class LyapunovExponents:
     model : Model
     params : dict
     exponents : ndarray, shape (n,)
-        Largest first; ``-inf`` where sticks leave nothing of a direction.
+        Largest first; ``-inf`` where sticks leave nothing of a direction. The exponent 0 along the flow
+        of an autonomous model is left out: the last one is ``-inf`` there.
     errors : ndarray, shape (n,)
         Standard errors of averages; for a periodic orbit the error of its solution.
     motion : Motion
         What the motion turned out to be, and what the exponents mean.
     periods : int
-        Period of a periodic motion, in periods of the excitation; 0 for others.
+        Period of a periodic motion, in periods of the excitation; 0 for others. Without excitation 1,
+        and all other periods here are units of time.
     followed : int
         Periods that the motion was followed.
     tolerance : float
@@ -163,7 +165,7 @@ def lyapunov_exponent(
     Raises
     ------
     ParameterError
-        If an argument is not valid, or the model is not excited periodically.
+        If an argument is not valid.
 
     Examples
     --------
@@ -175,7 +177,6 @@ def lyapunov_exponent(
     model = load_model(model)
     limits = limits_of(transient, periods, tolerance, confirm)
     vector = model.vector(params or {})
-    check_excited(model, vector)
     named = model.mapping(vector)
     if state is None:
         states = default_states(model, named, 1)

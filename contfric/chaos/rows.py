@@ -86,7 +86,9 @@ def starting(model: Model) -> Starting:
         name = model.domain_by_name[domain].mode
         mode[code] = modes.index(name)
         on[code] = sum(1 << surfaces.index(k) for k in bounds[name] if named[k] == 0)
-    return Starting(mode, on, np.array([m.rank for m in model.modes], dtype=np.int64))
+    # a shift in time is no disturbance of an autonomous motion
+    ranks = [m.rank - int(model.autonomous) for m in model.modes]
+    return Starting(mode, on, np.array(ranks, dtype=np.int64))
 
 
 def follow(
@@ -125,7 +127,7 @@ def follow(
 
 
 def check_excited(model: Model, vector: FloatArray) -> None:
-    """Refuse a model without a period: its motions would not be recognised as periodic.
+    """Refuse a model without a period, where motions are compared at the same times.
 
     Raises
     ------
@@ -135,6 +137,6 @@ def check_excited(model: Model, vector: FloatArray) -> None:
     period = model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0))
     if not period > 0.0:
         raise ParameterError(
-            f"model '{model.name}' has no period of excitation: exponents are computed for models "
-            "that are excited periodically"
+            f"model '{model.name}' has no period of excitation: two motions are compared for models "
+            "that are excited periodically (lyapunov_exponent takes any model)"
         )

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from contfric.errors import ParameterError, whole_number
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.simulation import displaced
 
 #: A state, shape (n,), several, shape (k, n), or a function of the parameters that returns either.
 StateLike: TypeAlias = ArrayLike | Callable[[Mapping[str, float]], ArrayLike]
@@ -38,6 +39,8 @@ def default_states(model: Model, params: Mapping[str, float], count: int) -> Flo
     width: FloatArray = np.asarray(model.spread(params), dtype=np.float64)
     states = np.zeros((count, len(width)))
     states[0, 0] = width[0]  # as simulations start
+    if model.resets:
+        states[0] = displaced(model, model.vector(params))
     states[1:] = width * spread_points(count - 1, len(width))
     return states
 

@@ -18,6 +18,10 @@ perturbation is ``dy - f dt`` with f the field before or behind the switch; the 
 the saltation matrix of P. C. Mueller, Chaos, Solitons & Fractals 5 (1995) 1671-1681, which is contained
 here.) The direction of the flow, ``(1, f)``, is mapped to zero: n directions are left of 1 + n.
 
+A reset R behind the joint maps the perturbation once more, ``(dt, R_t dt + R_y dy)``: the tangent map of an
+impact, with its saltation. The time of an autonomous model is no coordinate: a shift in time is mapped to
+itself, with the exponent 0, and moves no state. It is left out (dt = 0), and n - 1 directions are left.
+
 A stick forgets the velocity and passes fewer directions than a slide: the rank of the mode says how many.
 ``docs/lyapunov.md`` has the derivation at length, and what happens at jumps of the return map.
 """
@@ -38,6 +42,7 @@ from contfric.orbit.trajectory import (
     INFINITE,
     MOST_AT_ONCE,
     NO_TIME,
+    QUIET,
     TOO_LARGE,
     StateRoom,
     copy_state,
@@ -58,6 +63,9 @@ class Walk(NamedTuple):
     jac, grad : derivatives of the segment's flow and of the observable at its end
     end, image : room for a state and for the image of a perturbation, shape (n,)
     at_once : number of events in a row that followed each other at once, shape (1,)
+    met : state at the last joint, before a reset, shape (n,)
+    reset : derivatives of a reset, shape (n, 1 + n)
+    timeless : whether the model is autonomous, shape (1,)
     """
 
     y: FloatArray
@@ -67,6 +75,9 @@ class Walk(NamedTuple):
     end: FloatArray
     image: FloatArray
     at_once: IntArray
+    met: FloatArray
+    reset: FloatArray
+    timeless: IntArray
 
 
 @allocating_helper
@@ -79,6 +90,9 @@ def new_walk(n):  # type: ignore[no-untyped-def]
         np.empty(1 + n),
         np.empty(n),
         np.empty(n),
+        np.zeros(1, dtype=np.int64),
+        np.empty(n),
+        np.empty((n, 1 + n)),
         np.zeros(1, dtype=np.int64),
     )
 
@@ -107,9 +121,10 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
     longest = tables.longest[mode] * period
     while True:
         tau, surface = first_hit(functions, tables, mode, on, t, y, p, longest, room)
-        if surface < 0:  # a slide that is never left would be an error
+        if surface < 0:  # a slide that is never left would be an error, if there is an excitation
+            quiet = QUIET if walk.timeless[0] != 0 else IMPOSSIBLE
             held = tables.sliding[mode] != 0
-            return HELD if held else IMPOSSIBLE, surface, mode, duration, turns, t
+            return HELD if held else quiet, surface, mode, duration, turns, t
         copy_state(room.after, y)
         t, duration = t + tau, duration + tau
         while t >= period:
@@ -121,11 +136,17 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
         walk.at_once[0] = walk.at_once[0] + 1 if tau <= NO_TIME * period else 0
         if walk.at_once[0] > MOST_AT_ONCE:
             return IMPOSSIBLE, surface, mode, duration, turns, t
+        copy_state(y, walk.met)
+        reset = tables.resets[surface] != 0
+        if reset:
+            functions[7](surface, t, walk.met, p, room.none, y, room.nothing)
         code = sign_code(functions, observables, surface, t, y, p, room.none, room.empty)
         count = observables.shape[0]
         following = tables.following[(mode * count + surface) * (1 << count) + code]
         if following >= 0:
             return ARRIVED, surface, following, duration, turns, t
+        if reset:
+            return IMPOSSIBLE, surface, mode, duration, turns, t
         on = 1 << surface
 
 
@@ -135,11 +156,37 @@ def differentiate(functions, observable, mode, duration, t, p, walk, none):  # t
     n = walk.y.shape[0]
     jac, grad, start = walk.jac, walk.grad, walk.start
     functions[0](mode, start[0], start[1:], duration, p, none, walk.end, jac)
-    functions[1](observable, t, walk.y, p, none, grad)
+    functions[1](observable, t, walk.met, p, none, grad)
     rate = grad[0]
     for k in range(n):
         rate += grad[1 + k] * jac[k, 1 + n]
     return rate
+
+
+@helper
+def carry(functions, tables, surface, t, p, count, rate, frame, walk, none):  # type: ignore[no-untyped-def]
+    """Carry the first rows of a frame over the segment just differentiated, and the reset behind it."""
+    push(frame, count, rate, walk.jac, walk.grad, walk.image)
+    if tables.resets[surface] != 0:
+        functions[7](surface, t, walk.met, p, none, walk.end, walk.reset)
+        leap(frame, count, walk.reset, walk.image)
+    if walk.timeless[0] != 0:
+        for i in range(count):
+            frame[i, 0] = 0.0
+
+
+@helper
+def leap(frame, count, reset, image):  # type: ignore[no-untyped-def]
+    """Replace the first rows of a frame by their images under the derivative of a reset."""
+    n = image.shape[0]
+    for i in range(count):
+        for j in range(n):
+            value = 0.0
+            for k in range(n + 1):
+                value += reset[j, k] * frame[i, k]
+            image[j] = value
+        for j in range(n):
+            frame[i, 1 + j] = image[j]
 
 
 @helper

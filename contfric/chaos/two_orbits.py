@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.chaos.rows import check_excited
 from contfric.errors import ContfricError, ParameterError, whole_number
 from contfric.models import load_model
 from contfric.models.definition import FloatArray, Model
@@ -96,6 +97,7 @@ def two_orbit_estimate(
     whole_number("periods", periods, least=_BATCHES)
     if not 0.0 < distance < 1.0:
         raise ParameterError(f"distance is a number between 0 and 1, got {distance!r}")
+    check_excited(model, model.vector(params or {}))
     begun = simulate(model, dict(params or {}), state=state, time=time, periods=transient)
     vector = model.vector(params or {})
     period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0)))

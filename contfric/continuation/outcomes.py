@@ -67,6 +67,10 @@ class RestsForEver(NotationError):
     """Nothing follows an event because nothing moves any more."""
 
 
+class NoJump(NotationError):
+    """Nothing can be held at an event: the motion there is continuous."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """One outcome at one place.
@@ -98,6 +102,23 @@ def places_of(bifurcation: Bifurcation) -> list[Test]:
     return places
 
 
+def end_message(bifurcation: Bifurcation) -> str:
+    """Return why a branch ends at an event where its kind alone would say something else; else nothing."""
+    orbit, kind = bifurcation.orbit, bifurcation.kind
+    if kind not in (Kind.SS, Kind.AS, Kind.GS) or orbit.system.holds:
+        return ""
+    if any(test.surface in orbit.model.reset_by_surface for test in bifurcation.tests):
+        return "grazing impact: the wall is just touched"
+    for place in places_of(bifurcation)[:1]:
+        try:
+            outcome_at(orbit.as_whole(), place, kind)
+        except NoJump:
+            return f"{kind.meaning}: the signature changes, the motion is continuous"
+        except NotationError:
+            return ""
+    return ""
+
+
 def _normal(test: Test, orbit: Orbit) -> Test:
     """Return a test of what belongs to a hold as one of the hold itself."""
     hold = hold_of_test(test, orbit)
@@ -120,7 +141,9 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
     if place.margin is Margin.ENTRY:
         raise NotationError(f"another mode follows the impact before segment {place.segment + 1}")
     if place.margin is Margin.JOINT and place.surface in orbit.model.reset_by_surface:
-        raise NotationError(f"the wall {place.surface} is met where segment {place.segment + 1} ends")
+        raise NotationError(
+            f"the wall {place.surface} is met where segment {place.segment + 1} ends"
+        )
     if kind is Kind.CS:
         reason = f"swap stick and reversal at stop {place.segment + 1}, at {place.surface}"
         edit = swap_edit(orbit.word, {place.segment: place.surface}, orbit.model)
@@ -152,6 +175,7 @@ def _stops_tangentially(orbit: Orbit, place: Test) -> Outcome:
     """GS: a stop without acceleration."""
     word, i = orbit.word, place.segment
     j = (i + 1) % len(word)
+    _rest_mode(orbit, i, word[i][1])
     if not orbit.model.mode_by_name[word[j][0]].sliding:
         raise NotationError(f"the tangential stop of segment {i + 1} is followed by no stick")
     _check_inside(orbit, word[j][0], orbit.ends[i])
@@ -310,7 +334,7 @@ def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
 def _check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:
     """Check that rest would be left with an acceleration: only then can it be held."""
     if departs is not None and not leaving_rate(orbit, rest, departs, joint) > NO_JUMP:
-        raise NotationError(f"'{rest}' is left without acceleration: nothing can be held there")
+        raise NoJump(f"'{rest}' is left without acceleration: nothing can be held there")
 
 
 def _check_inside(orbit: Orbit, rest: str, joint: FloatArray) -> None:
@@ -320,7 +344,7 @@ def _check_inside(orbit: Orbit, rest: str, joint: FloatArray) -> None:
     for domain in (d for d in model.domains if d.mode == rest):
         if all(place[s] == sign for s, sign in domain.signs.items() if sign != 0):
             return
-    raise NotationError(f"'{rest}' begins on the boundary of its region: nothing can be held there")
+    raise NoJump(f"'{rest}' begins on the boundary of its region: nothing can be held there")
 
 
 def _rest_mode(orbit: Orbit, i: int, surface: str) -> str:
@@ -332,7 +356,7 @@ def _rest_mode(orbit: Orbit, i: int, surface: str) -> str:
             continue
         if model.mode_by_name[model.domain_by_name[target].mode].sliding:
             return model.domain_by_name[target].mode
-    raise NotationError(
+    raise NoJump(
         f"mode '{orbit.word[i][0]}' of model '{model.name}' never comes to rest on {surface}"
     )
 

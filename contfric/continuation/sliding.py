@@ -49,6 +49,7 @@ def sliding_events(
     while hidden := _located_before(orbit, before, point, settings):
         first, point = min(hidden, key=lambda pair: pair[1].arc)
     here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    first = _stop_behind(here, point, first)
     kind = kind_of_margin(orbit.system, orbit.system.tests[first], here)
     together = _TOGETHER
     rough = False
@@ -73,6 +74,30 @@ def sliding_events(
     )
     found = bifurcation_at(kind, here, before, None, point, settings, group)
     return [(replace(found, accuracy=ROUGHLY_REACHED) if rough else found, point)]
+
+
+def _stop_behind(here: Orbit, point: Point, first: int) -> int:
+    """Return the margin of the stop that a segment of no length any more begins at, if that vanishes too.
+
+    Where nothing jumps, a slide between two stops shrinks to nothing as the first of them meets the
+    boundary of rest: that is what happens, and the tangential end of the slide follows from it.
+    """
+    tests = here.system.tests
+    test = tests[first]
+    if test.margin is not Margin.EXIT or hold_of_test(test, here) is not None:
+        return first
+    i = test.segment
+    if here.ends[i, 0] - here.cycle[i, 0] > _VANISHED * here.period:
+        return first
+    before = (i - 1) % here.system.segments
+    at_stop = [
+        k
+        for k, other in enumerate(tests)
+        if other.margin is Margin.JOINT
+        and other.segment == before
+        and abs(point.tests[k]) < _NEARLY_REACHED
+    ]
+    return at_stop[0] if at_stop else first
 
 
 def _located_before(

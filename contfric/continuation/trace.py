@@ -10,6 +10,7 @@ from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.locate import belongs_to, locate_events
+from contfric.continuation.outcomes import end_message
 from contfric.continuation.points import (
     EXTRA,
     FIRST_STEP,
@@ -290,7 +291,8 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             side.put_tip(at_vertex(point, bifurcation.orbit, active))
         else:
             side.put_tip(point)
-        side.end = End(ends, bifurcation=None if point.lost else bifurcation)
+        message = end_message(bifurcation) if ends.name == bifurcation.kind.name else ""
+        side.end = End(ends, message, None if point.lost else bifurcation)
         return True
     reached = after if limit is None else limit[0]
     if np.any(reached.tests[:-EXTRA] < -_VIOLATED):

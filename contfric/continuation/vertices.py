@@ -142,6 +142,8 @@ def _opening(orbit: Orbit) -> float:
     close[0, 0] = 0.0 if orbit.model.autonomous else 1.0  # a turn may take another time
     close[1:, 1:] = orbit.system.layout.closure
     left = p - q @ close
+    if not np.all(np.isfinite(left)):  # an orbit that Newton has lost
+        return np.nan
     values = np.linalg.svd(left, compute_uv=False)
     return float(np.copysign(values[-1] / values[0], np.linalg.det(left)))
 

@@ -15,9 +15,11 @@ shift of an orbit in time is one too: there the end of the turn is pinned, ``z_N
 minus its duration, is found with the rest. (The last exit surface is the section: it fixes the phase.)
 
 The last row of a hold is its pin, a condition on ``z_i``: the observable of a surface less its level, or
-the rate of the exit before it. A slide that leaves a hold may shrink to nothing, where its exit row
-would be singular. It is divided by the duration there: with v on the level at ``z_i``,
-``v(d) / d`` is the mean of v' over the slide, a quadrature without cancellation.
+the rate of the exit before it.
+
+A segment that begins on its exit surface (a slide does) may shrink to nothing, where its exit row is
+singular: a duration of zero solves it whatever the rates. It is divided by the duration there: with v on
+the level at ``z_i``, ``v(d) / d`` is the mean of v' over the slide, a quadrature without cancellation.
 """
 
 from __future__ import annotations
@@ -50,9 +52,9 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN
 from contfric.orbit.system import Layout
 
-#: Times a slide after a hold is shorter than this (nondimensional), its exit row is divided by the
-#: duration: five points of Gauss are exact to rounding there (d^10 f^(10) / 5e32), and the row as it
-#: stands is well conditioned beyond.
+#: Where a segment that begins on its exit surface is shorter than this (nondimensional), its exit row is
+#: divided by the duration: five points of Gauss are exact to rounding there (d^10 f^(10) / 5e32), and the
+#: row as it stands is well conditioned beyond.
 _SHORT = 0.1
 #: Abscissas and weights of Gauss and Legendre on (0, 1), five points.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
@@ -80,6 +82,7 @@ LayoutType = types.NamedTuple(
         i8,
         indices,
         table,
+        indices,
     ],
     Layout,
 )
@@ -221,7 +224,7 @@ def pin_row(functions, layout, i, at, start, after, p, which, room, rows):  # ty
 
 @helper
 def mean_rate_row(functions, layout, i, at, start, duration, p, which, room, rows):  # type: ignore[no-untyped-def]
-    """Write the exit row of a short slide after a hold, divided by its duration; return the residual."""
+    """Write the exit row of a short segment, divided by its duration; return the residual."""
     state, jac, grad = room.state, room.jac, room.grad
     n, free = state.shape[0], which.shape[0]
     m = n + 1
@@ -232,7 +235,9 @@ def mean_rate_row(functions, layout, i, at, start, duration, p, which, room, row
     for k in range(_NODES.shape[0]):
         share, weight = _NODES[k], _WEIGHTS[k]
         time = share * duration
-        functions[0](mode, start[0], start[1:], time, p, which, state, jac)
+        functions[0](mode, start[0], room.begin, time, p, which, state, jac)
+        if layout.entries[i] >= 0:
+            behind_reset(jac, room.reset, grad, n)
         mean += weight * functions[6](mode, c, start[0] + time, state, p, which, grad)
         for j in range(2 + n + free):  # t_0, y_0, duration, parameters
             slope = 0.0
@@ -299,7 +304,7 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
     for k in range(3 * m + free + 1, width):
         rows[row, k] = 0.0
     duration = after[0] - start[0]
-    if layout.pins[i - 1] != NO_PIN and abs(duration) < _SHORT:
+    if layout.returns[i] != 0 and abs(duration) < _SHORT:
         worst += mean_rate_row(functions, layout, i, at, start, duration, p, which, room, rows)
         return worst if math.isfinite(worst) else np.inf
     for k in range(m):

@@ -342,13 +342,26 @@ def run(
     )
 
 
+#: Displacements that a start is looked for at where the region is one-sided, in half-widths of the model.
+_PLACES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
+
+
+def displaced(model: Model, vector: FloatArray) -> FloatArray:
+    """Return the initial state by default: displaced from rest, on the right side of walls."""
+    half_width: FloatArray = model.spread(model.mapping(vector))
+    y = np.zeros(len(model.states))
+    for place in _PLACES if model.resets else _PLACES[:1]:
+        y[0] = place * half_width[0]
+        signs = signs_at(model, 0.0, y, vector)
+        if model.domain_at(signs) or _side_of_rates(model, 0.0, y, vector, signs):
+            break
+    return y
+
+
 def _checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> FloatArray:
     if state is None:
         # away from rest, so that symmetric and asymmetric attractors can both be reached
-        half_width: FloatArray = model.spread(model.mapping(vector))
-        y = np.zeros(len(model.states))
-        y[0] = half_width[0]
-        return y
+        return displaced(model, vector)
     y = np.array(state, dtype=np.float64)
     if y.shape != (len(model.states),) or not np.all(np.isfinite(y)):
         raise ParameterError(

@@ -55,6 +55,7 @@ class Layout(NamedTuple):
     rank : number of independent directions that survive one turn
     entries : surface of the reset that each segment begins behind, shape (N,); -1 where there is none
     after : rows (segment, surface, sign) of the entry margins
+    returns : whether each segment begins on its exit surface, and so may shrink to nothing, shape (N,)
     """
 
     modes: IntArray
@@ -73,6 +74,7 @@ class Layout(NamedTuple):
     rank: int
     entries: IntArray
     after: IntArray
+    returns: IntArray
 
 
 class Margin(str, Enum):
@@ -190,6 +192,8 @@ def build_system(
     ]
     interior, joint, tests = _margins(model, word, inside, bool(domains), holds)
     entered = [first_entry(model, word, half), *(exit_ for _, exit_ in word[:-1])]
+    modes = [mode for mode, _ in word]
+    before = [mirror_mode(model)[modes[-1]] if half else modes[-1], *modes[:-1]]
     after = _entry_rows(model, word, entered, domains)
     behind = len(tests) - len(held_tests(holds))
     entries = tuple(Test(Margin.ENTRY, i, surfaces[k]) for i, k, _ in after)
@@ -224,6 +228,10 @@ def build_system(
             dtype=np.int64,
         ),
         after=after,
+        returns=np.array(
+            [_returns(model, *row) for row in zip(modes, before, exits, entered, strict=True)],
+            dtype=np.int64,
+        ),
     )
     return System(model, word, periods, half, layout, tests, domains, holds)
 
@@ -234,6 +242,14 @@ def first_entry(model: Model, word: Word, half: bool) -> str:
         return word[-1][1]
     inverse = {image: name for name, image in model.symmetry.surfaces.items()}
     return mirror_exit(word[-1][1], inverse)
+
+
+def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> int:
+    """Tell whether a segment begins on the surface that it ends on: it came there, or rested on it."""
+    if model.mode_by_name[mode].sliding:
+        return 0
+    rested = model.domain_by_name[mode_domains(model, before)[0]].signs[exit_] == 0
+    return int(exit_ == entered or rested)
 
 
 def _turn(model: Model, periods: int, half: bool) -> float:

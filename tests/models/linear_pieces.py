@@ -370,7 +370,9 @@ def _belt_flow() -> CompiledFlow:
 
 
 def _impact_flow() -> CompiledFlow:
-    return CompiledFlow(flow, _observe_wall, zero_level, _turning_wall, _hit_wall, period, _rate_wall, bounce)
+    return CompiledFlow(
+        flow, _observe_wall, zero_level, _turning_wall, _hit_wall, period, _rate_wall, bounce
+    )
 
 
 #: Block on a belt: autonomous, static limit S0 above the kinetic friction S.
@@ -499,11 +501,7 @@ def _rate_wall(mode, c, t, y, p, which, grad):
     return rate_of(mode, c + 1, t, y, p, which, grad)
 
 
-@helper
-def rate_of(mode, c, t, y, p, which, grad):
-    for j in range(grad.shape[0]):
-        grad[j] = np.nan  # nothing asks for it
-    return slope(mode, c, t, y[0], y[1], p)
+rate_of = helper(rate.__wrapped__)
 
 
 @kernel(hit_signature)
