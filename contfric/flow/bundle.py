@@ -1,9 +1,9 @@
 """Helpers handed to helpers, in a way that numba can cache.
 
-A compiled function that takes another one as an argument is specialised for it, but numba then stores the
-address of the Python object with the code, and such code is not cached on disk. A bundle carries its
-helpers (and constants) in its *type*: it has no value at run time, so nothing is stored, and the calls are
-resolved, and inlined where that pays, when the kernel is compiled.
+A compiled function that takes another one as an argument is specialised for it, but numba then stores
+the address of the Python object with the code, and such code is not cached on disk. A bundle carries its
+helpers (and constants) in its *type*: it has no value at run time, so nothing is stored, and the calls
+are resolved, and inlined where that pays, when the kernel is compiled.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class BundleType(types.Opaque):  # type: ignore[misc]
 register_model(BundleType)(models.OpaqueModel)
 
 
-@typeof_impl.register(Bundle)
+@typeof_impl.register(Bundle)  # type: ignore[untyped-decorator]
 def _typeof(bundle: Bundle, context: Any) -> BundleType:
     return BundleType(bundle)
 
@@ -65,12 +65,12 @@ class _Members(AttributeTemplate):  # type: ignore[misc]
         return _number(member) or types.Dispatcher(member)
 
 
-@lower_constant(BundleType)
+@lower_constant(BundleType)  # type: ignore[untyped-decorator]
 def _no_value(context: Any, builder: Any, bundle: BundleType, value: Bundle) -> Any:
     return context.get_dummy_value()
 
 
-@lower_getattr_generic(BundleType)
+@lower_getattr_generic(BundleType)  # type: ignore[untyped-decorator]
 def _member(context: Any, builder: Any, bundle: BundleType, value: Any, name: str) -> Any:
     member = bundle.bundle.members[name]
     number = _number(member)

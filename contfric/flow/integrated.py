@@ -1,18 +1,20 @@
 """Flow by numerical integration: the seven functions of a model from its fields.
 
 To write a model whose motion is integrated, write a module with these helpers (decorated with
-:func:`contfric.compiled.helper`: they must not allocate). There are n states; ``which`` lists the m parameters that
-are differentiated by; whatever has no room (an array of length 0) is not filled.
+:func:`contfric.compiled.helper`: they must not allocate). There are n states; ``which`` lists the m
+parameters that are differentiated by; whatever has no room (an array of length 0) is not filled.
 
-1. ``field(mode, t, y, p, which, out, jac)``: write dy/dt to ``out`` (n,) and, if ``jac`` (n, 1 + n + m) has rows, its
-   derivatives by t, y and ``p[which]``. A mode is one smooth field: it is evaluated a little beyond the surfaces
-   that bound it, so that ``|v|`` is ``v`` in the mode with v > 0, and not ``abs(v)``.
+1. ``field(mode, t, y, p, which, out, jac)``: write dy/dt to ``out`` (n,) and, if ``jac`` (n, 1 + n + m)
+   has rows, its derivatives by t, y and ``p[which]``. A mode is one smooth field: it is evaluated a
+   little beyond the surfaces that bound it, so that ``|v|`` is ``v`` in the mode with v > 0, and not
+   ``abs(v)``.
 2. ``observe(c, t, y, p, which, grad)``: return observable c; its derivatives to ``grad`` (1 + n + m,).
-3. ``rate(mode, c, t, y, p, which, grad)``: return the rate of observable c along a mode; the same gradient.
-4. ``period(p, which, grad)``: return the period of the excitation, 0 if there is none; ``grad`` (m,). The field
-   and the observables must have this period.
-5. ``scale(i, p)``: return the natural size of state i, the unit of its absolute tolerance. A state that is multiplied
-   by a stiffness of 1000 in the field has the scale 1/1000.
+3. ``rate(mode, c, t, y, p, which, grad)``: return the rate of observable c along a mode; the same
+   gradient.
+4. ``period(p, which, grad)``: return the period of the excitation, 0 if there is none; ``grad`` (m,).
+   The field and the observables must have this period.
+5. ``scale(i, p)``: return the natural size of state i, the unit of its absolute tolerance. A state that
+   is multiplied by a stiffness of 1000 in the field has the scale 1/1000.
 
 Then bundle them, and write the kernels::
 
@@ -31,11 +33,11 @@ Then bundle them, and write the kernels::
         return integrated_turning(MOTION, mode, c, t0, y0, dt, p, times, values)
 
 The four other kernels (``observe``, ``level``, ``period``, ``rate``) call their helpers, and
-``CompiledFlow(flow, observe, level, turning, hit, period, rate)`` is the flow. A helper and a kernel need different
-names. ``tests/integrated`` has such modules written by hand.
+``CompiledFlow(flow, observe, level, turning, hit, period, rate)`` is the flow. A helper and a kernel
+need different names. ``tests/integrated`` has such modules written by hand.
 
-What breaks down (a state beyond all numbers, too many steps, a field that is no number) is handed back as
-states that are no numbers, and as -1 stationary points; the engine says so.
+What breaks down (a state beyond all numbers, too many steps, a field that is no number) is handed back
+as states that are no numbers, and as -1 stationary points; the engine says so.
 """
 
 from __future__ import annotations
@@ -49,11 +51,12 @@ import numpy as np
 
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.bundle import Bundle
-from contfric.flow.crossing import all_turnings, first_hit
-from contfric.flow.dop853 import STAGES
+from contfric.flow.dop853 import POWER, STAGES
+from contfric.flow.hits import first_hit
 from contfric.flow.radau import IMPLICIT_STAGES
 from contfric.flow.stepping import explicit, explicit_probe, first_step, next_step, settle
 from contfric.flow.stiffness import automatic, automatic_probe, implicit, implicit_probe
+from contfric.flow.turnings import all_turnings
 from contfric.flow.variations import begin, make_room
 
 
@@ -70,8 +73,8 @@ _METHODS = {
     Method.IMPLICIT: (implicit, implicit_probe, IMPLICIT_STAGES),
     Method.AUTOMATIC: (automatic, automatic_probe, IMPLICIT_STAGES),
 }
-#: Error that a step may make, relative to a state and relative to its scale: the error of a segment is about as
-#: large (docs/integration.md), and Newton's method on a chain of segments sees a smooth map.
+#: Error that a step may make, relative to a state and relative to its scale: the error of a segment is
+#: about as large (docs/integration.md), and Newton's method on a chain of segments sees a smooth map.
 TOLERANCE = 1e-12
 
 
@@ -112,6 +115,7 @@ def integrated_motion(
         attempt=attempt,
         probe=probe,
         stages=stages,
+        looseness=(float(relative) / 1e-12) ** (1.0 / POWER),
     )
 
 

@@ -5,16 +5,16 @@ coefficients c over s in [0, 1], and Q the cubic that takes the values and first
 
     P - Q = 10 s^2 (1 - s)^3 D2 + 10 s^3 (1 - s)^2 D3,      |P - Q| <= 0.35 (|D2| + |D3|),
 
-the error of the cubic. The quintic's own is smaller by ``(w H)^2 / 120`` for a motion of frequency w and a
-panel of length H, and steps that are accurate have w H below 2; a tenth of the cubic's error is taken as a bound
-e of it. From the error formula of Hermite interpolation follow the bounds of the rest (in units of e, see
-:mod:`contfric.flow.pieces` for the formula)::
+the error of the cubic. The quintic's own is smaller by ``(w H)^2 / 120`` for a motion of frequency w and
+a panel of length H, and steps that are accurate have w H below 2; a tenth of the cubic's error is taken
+as a bound e of it. From the error formula of Hermite interpolation follow the bounds of the rest (in
+units of e, see :mod:`contfric.flow.pieces` for the formula)::
 
     q - P: 1,   (q - P)/s: 2.3,   (q - P)/s^2: 6.8,   slope: 24,   slope/s: 58,   second derivative: 120
 
 where the forms with s and s^2 serve a panel that starts on a zero. As a polynomial lies between its
-smallest and largest coefficient, panels *without* a zero and panels with *one* are recognised; of all others
-the halves are looked at, first of the polynomial, then of the motion itself.
+smallest and largest coefficient, panels *without* a zero and panels with *one* are recognised; of all
+others the halves are looked at, first of the polynomial, then of the motion itself.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from contfric.flow.pieces import FREE, ISOLATED, UNSURE, part
 
 #: Share of the cubic's error that bounds the quintic's.
 _SHARE = 0.1 * 0.35
-#: Bounds of the interpolation error of the quotients, of the slope and so on, in units of that of the value.
+#: Bounds of the interpolation error of the quotients, of the slope and so on, in units of that of the
+#: value.
 _RATIO, _RATIO2, _SLOPE, _SLOPE_RATIO, _SECOND = 2.3, 6.8, 24.0, 58.0, 120.0
 #: Rounding of a value, relative to the largest coefficient: a few units in the last place.
 _ROUNDING = 1e-15

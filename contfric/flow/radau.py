@@ -1,12 +1,13 @@
 """The implicit method for stiff motion: Radau IIA collocation with exact derivatives of its equations.
 
-With s stages at the Radau nodes c (the last one is 1), increments ``Z_i = Y_i - y_0`` and J_j the field's
-Jacobian at stage j::
+With s stages at the Radau nodes c (the last one is 1), increments ``Z_i = Y_i - y_0`` and J_j the
+field's Jacobian at stage j::
 
     Z_i = h sum_j A_ij f(t + c_j h, y_0 + Z_j),        y_1 = y_0 + Z_s,
 
-of order 2 s - 1, stable at any stiffness, and exact at infinite stiffness. Newton's method uses all J_j, not
-one of them: its matrix ``I - h A_ij J_j`` is that of the variations, too, whose discrete equations are
+of order 2 s - 1, stable at any stiffness, and exact at infinite stiffness. Newton's method uses all J_j,
+not one of them: its matrix ``I - h A_ij J_j`` is that of the variations, too, whose discrete equations
+are
 
     sum_j (I - h A_ij J_j) W_j = h sum_j A_ij (J_j M_0 + [f_t, 0, f_p]_j),      M_1 = M_0 + W_s.
 
@@ -14,9 +15,9 @@ The error is what the collocation polynomial misses at the start, filtered::
 
     error = (I - h g J_0)^-1 h g (f(t, y_0) - P'(0)),
 
-with g the real eigenvalue of A; it falls like the power s + 1 of the step, and bounds the error of the whole
-polynomial, not only of its end. Source: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II",
-2nd edition, Springer 1996, sections IV.5 (method) and IV.8 (increments, estimate).
+with g the real eigenvalue of A; it falls like the power s + 1 of the step, and bounds the error of the
+whole polynomial, not only of its end. Source: E. Hairer, G. Wanner, "Solving Ordinary Differential
+Equations II", 2nd edition, Springer 1996, sections IV.5 (method) and IV.8 (increments, estimate).
 """
 
 from __future__ import annotations
@@ -24,16 +25,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.polynomial import legendre
 
 from contfric.compiled import helper
-from contfric.models.definition import FloatArray
+from contfric.flow.collocation import collocation_matrix, radau_nodes, values_at_start
+from contfric.flow.elimination import lu, lu_solve
 
 #: Number of stages: of 3, 5 and 7 the fastest at a tolerance of 1e-12 (docs/integration.md).
 IMPLICIT_STAGES = 7
 #: Most iterations of Newton's method with one matrix, and most matrices in a step.
 _ITERATIONS, _MATRICES = 8, 3
-#: What the iteration may leave, in units of the allowed error: far below it, so that the discrete map is smooth.
+#: What the iteration may leave, in units of the allowed error: far below it, so that the discrete map is
+#: smooth.
 _LEFT = 1e-3
 #: Corrections that no longer fall are rounding if they are below this, in the same units.
 _ROUNDING = 0.1
@@ -43,39 +45,9 @@ _SLOW = 0.2
 _FARTHEST = 2.5
 
 
-def radau_nodes(s: int) -> FloatArray:
-    """Return the nodes in [0, 1]: the zeros of ``P_s - P_{s-1}`` (Legendre), the last one 1."""
-    zeros = legendre.legroots([0.0] * (s - 1) + [-1.0, 1.0])
-    series = np.array([0.0] * (s - 1) + [-1.0, 1.0])
-    for _ in range(3):  # Newton's method removes what the eigenvalues leave
-        zeros = zeros - legendre.legval(zeros, series) / legendre.legval(
-            zeros, legendre.legder(series)
-        )
-    zeros = np.sort(zeros.real)
-    zeros[-1] = 1.0
-    return np.asarray(0.5 * (1.0 + zeros))
-
-
-def collocation_matrix(nodes: FloatArray) -> FloatArray:
-    """Return ``A_ij``, the integral of the j-th Lagrange polynomial from 0 to node i, by Legendre series."""
-    s, x = len(nodes), 2.0 * nodes - 1.0
-    values = legendre.legvander(x, s)
-    integrals = np.empty((s, s))
-    integrals[:, 0] = nodes
-    for k in range(1, s):
-        integrals[:, k] = 0.5 * (values[:, k + 1] - values[:, k - 1]) / (2 * k + 1)
-    return np.asarray(np.linalg.solve(values[:, :s].T, integrals.T).T)
-
-
-def _at_start(nodes: FloatArray) -> FloatArray:
-    """Return the values of the Lagrange polynomials at 0."""
-    others = [np.delete(nodes, i) for i in range(len(nodes))]
-    return np.array([np.prod(-o / (c - o)) for c, o in zip(nodes, others, strict=True)])
-
-
 _NODES = radau_nodes(IMPLICIT_STAGES)
 _A = collocation_matrix(_NODES)
-_LAGRANGE = _at_start(_NODES)
+_LAGRANGE = values_at_start(_NODES)
 _REAL = float(min(np.linalg.eigvals(_A), key=lambda value: abs(value.imag)).real)
 _DEFECT = -_REAL * np.linalg.solve(_A.T, _LAGRANGE)
 #: Nodes of the collocation polynomial: the start and the stages.
@@ -141,55 +113,6 @@ def factorise(h, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def lu(matrix, pivots, size):  # type: ignore[no-untyped-def]
-    """Factorise a matrix in place, with pivots by rows; tell whether it is regular."""
-    for k in range(size):
-        best = k
-        for i in range(k + 1, size):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
-                best = i
-        pivots[k] = best
-        if best != k:
-            for j in range(size):
-                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
-        if not abs(matrix[k, k]) > 0.0:
-            return False
-        inverse = 1.0 / matrix[k, k]
-        for i in range(k + 1, size):
-            factor = matrix[i, k] * inverse
-            matrix[i, k] = factor
-            if factor != 0.0:
-                for j in range(k + 1, size):
-                    matrix[i, j] -= factor * matrix[k, j]
-    return True
-
-
-@helper
-def lu_solve(matrix, pivots, size, right, columns):  # type: ignore[no-untyped-def]
-    """Solve in place for the first columns of ``right``."""
-    for k in range(size):
-        if pivots[k] != k:
-            for c in range(columns):
-                right[k, c], right[pivots[k], c] = right[pivots[k], c], right[k, c]
-    for i in range(size):
-        for j in range(i):
-            factor = matrix[i, j]
-            if factor != 0.0:
-                for c in range(columns):
-                    right[i, c] -= factor * right[j, c]
-    for back in range(size):
-        i = size - 1 - back
-        for j in range(i + 1, size):
-            factor = matrix[i, j]
-            if factor != 0.0:
-                for c in range(columns):
-                    right[i, c] -= factor * right[j, c]
-        inverse = 1.0 / matrix[i, i]
-        for c in range(columns):
-            right[i, c] *= inverse
-
-
-@helper
 def correct_stages(motion, h, room):  # type: ignore[no-untyped-def]
     """Make one correction of Newton's method; return its size in units of the allowed error."""
     z, right, slopes = room.increments, room.right, room.stage_slopes
@@ -227,7 +150,9 @@ def solve_stages(motion, mode, t, h, p, which, room):  # type: ignore[no-untyped
             if not math.isfinite(size):
                 return False
             share = size / before  # 0 at the first correction
-            if size <= _LEFT or (iteration > 0 and share < 1.0 and size * share <= _LEFT * (1.0 - share)):
+            if size <= _LEFT or (
+                iteration > 0 and share < 1.0 and size * share <= _LEFT * (1.0 - share)
+            ):
                 return True
             if share > _SLOW:
                 if size <= _ROUNDING:

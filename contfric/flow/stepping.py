@@ -2,7 +2,7 @@
 
 The step is chosen so that the error of each component in each step is below
 
-    absolute * scale + motion.relative * |component|,
+    absolute * scale + relative * |component|,
 
 with the scale of the state that the model declares (for variations: that scale over the unit of what is
 varied). The start is Hairer's rule (Hairer, Norsett, Wanner, "Solving Ordinary Differential Equations
@@ -10,8 +10,8 @@ I", section II.4), the control proportional-integral (Hairer, Wanner, "Solving O
 Equations II", section IV.2).
 
 A *method* is a helper ``motion.attempt(motion, mode, c, t, h, p, which, room)``, which steps from
-``room.start`` to ``room.end`` and returns the error in units of what is allowed (infinite or no number: the
-step failed), together with ``probe(...)``, which steps within the last accepted step.
+``room.start`` to ``room.end`` and returns the error in units of what is allowed (infinite or no number:
+the step failed), together with ``probe(...)``, which steps within the last accepted step.
 """
 
 from __future__ import annotations
@@ -24,19 +24,22 @@ from contfric.flow.variations import slope
 
 #: What the control remembers: the next step (positive), the last error, the power of the step with which
 #: the error falls, the kind of the method (0 explicit, 1 implicit), steps tried so far, whether the
-#: Jacobian is that of the start, the last implicit step (0: none), steps at the limit of stability, how many
-#: of them are borne, steps since the method changed.
+#: Jacobian is that of the start, the last implicit step (0: none), steps held back by stiffness, how
+#: patiently that is borne, steps since the method changed.
 NEXT, BEFORE, FALLS, KIND, TRIED, FRESH, REMEMBERED, LIMITED, PATIENCE, SINCE = range(10)
 
-#: Most steps tried in one segment. A segment takes 1 to 1e4 of them; one that takes more is stiffer than its
-#: method can bear or ends in a singularity, and the caller is told.
+#: Most steps tried in one segment. A segment takes 1 to 1e4 of them; one that takes more is stiffer than
+#: its method can bear or ends in a singularity, and the caller is told.
 MOST_STEPS = 200_000
 #: Share of the optimal step that is taken, and the limits of its change (Hairer's values).
 SAFETY, SHRINK, GROW = 0.9, 1.0 / 3.0, 6.0
 #: Share of the integral part in the control (Hairer's value for smooth changes of the step).
 INTEGRAL = 0.04
-#: Change of the step after one that failed altogether.
-FAILED = 0.2
+#: Change of the step after one that failed altogether, and the share of what is left below which that is
+#: given up.
+FAILED, HOPELESS = 0.2, 1e-14
+#: Errors below this are taken for it: the step grows as far as it may anyhow.
+_LEAST = 1e-10
 #: Steps below this many units in the last place of the time do not move it.
 _ULPS = 16.0 * 2.220446049250313e-16
 
@@ -82,8 +85,8 @@ def length_of(proposed, left):  # type: ignore[no-untyped-def]
 def next_step(motion, mode, c, t, left, p, which, room):  # type: ignore[no-untyped-def]
     """Take the next step that is accurate enough, at most ``left`` (of either sign); return it.
 
-    The end and its slope are in ``room.end`` and ``room.last``. No number if there is no such step: too many
-    were tried, or time does not go on.
+    The end and its slope are in ``room.end`` and ``room.last``. No number if there is no such step: too
+    many were tried, or time does not go on.
     """
     control = room.control
     rejected = False
@@ -97,22 +100,18 @@ def next_step(motion, mode, c, t, left, p, which, room):  # type: ignore[no-unty
         error = motion.attempt(motion, mode, c, t, h, p, which, room)
         if not math.isfinite(error):
             control[NEXT], rejected = FAILED * size, True
-            if size < 1e-14 * abs(left):
+            if size < HOPELESS * abs(left):
                 return math.nan
             continue
-        power = 1.0 / control[FALLS] if error > 0.0 else 1.0
-        factor = max(error, 1e-10) ** power / SAFETY
-        if error <= 1.0:
-            factor *= control[BEFORE] ** -INTEGRAL
-            # a last step that was cut short says little of the one that could be taken
-            grown = size / min(max(factor, 1.0 / GROW), 1.0 / SHRINK)
-            control[NEXT] = max(grown, control[NEXT]) if not rejected and size < control[NEXT] and error < 0.1 else grown
-            if rejected:
-                control[NEXT] = min(control[NEXT], size)
-            control[BEFORE] = max(error, 1e-4)
-            slope(motion, mode, c, t + h, room.end, p, which, room, room.last)
-            return h
-        control[NEXT], rejected = size / min(factor, 1.0 / SHRINK), True
+        factor = max(error, _LEAST) ** (1.0 / control[FALLS]) / SAFETY
+        if error > 1.0:
+            control[NEXT], rejected = size / min(factor, 1.0 / SHRINK), True
+            continue
+        grown = size / max(factor * control[BEFORE] ** -INTEGRAL, 1.0 / GROW)
+        control[NEXT] = min(grown, size) if rejected else grown
+        control[BEFORE] = max(error, 1e-4)  # Hairer's floor: a lucky step is no rule
+        slope(motion, mode, c, t + h, room.end, p, which, room, room.last)
+        return h
 
 
 @helper

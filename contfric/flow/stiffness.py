@@ -1,9 +1,17 @@
-"""Which method where: explicit as long as its steps are as long as accuracy allows, implicit beyond.
+"""Which method where: explicit, implicit, or whichever is cheaper at the place.
 
-The spectral radius of the field's Jacobian, ``rho = |J^8|^(1/8)`` in the scales of the states, is known at
-the start of each step. At the tolerances of this package an explicit step resolves what moves: it is far
-below 1/rho. Where steps of more than 3/rho are accepted, the fast component does not move but follows the others,
-and the next step is implicit. Back again where the implicit step is no longer worth its cost.
+The spectral radius of the field's Jacobian, ``rho = |J^8|^(1/8)`` in the scales of the states, is known
+at the start of each step. What oscillates with rho is resolved by explicit steps of 0.15/rho at a
+tolerance of 1e-12. Where something decays with rho that no longer moves by itself (it is slaved to the
+others), accuracy would allow far longer steps; but long before the limit of stability (6/rho) the stages
+lose their order, and steps stay at 0.2/rho to 3/rho. An implicit step costs about as much as seven
+explicit ones. So
+
+* explicit steps that stay above 0.25/rho for a while are followed by implicit ones;
+* implicit steps that do not become longer than 1/rho are followed by explicit ones, and the next trial
+  waits four times as long.
+
+All these lengths grow with the tolerance like the steps, with its eighth root.
 """
 
 from __future__ import annotations
@@ -24,13 +32,14 @@ from contfric.flow.stepping import (
     explicit_probe,
 )
 
-#: Steps times the spectral radius above which an explicit step is at its limit of stability (about 6).
-_STIFF = 3.0
-#: The same, below which an implicit step does not pay: it costs as much as eight explicit ones of 3/rho.
-_MILD = 20.0
-#: Implicit steps before that is judged (the step has to grow first), and explicit steps at the limit of stability
-#: before the implicit method is tried again.
-_TRIALS, _PATIENCE = 4.0, 12.0
+#: Explicit steps above this over the spectral radius may be held back by what decays; at a tolerance of
+#: 1e-12.
+_HELD_BACK = 0.17
+#: Implicit steps below this over the spectral radius do not pay; at a tolerance of 1e-12.
+_MILD = 1.0
+#: How many explicit steps in a row are held back before an implicit one is tried, how much longer that
+#: one is, how many steps it gets to grow, and by how much patience grows after a trial that did not pay.
+_PATIENCE, _LONGER, _TRIALS, _GROWTH = 5.0, 4.0, 4.0, 4.0
 
 
 @helper
@@ -66,17 +75,19 @@ def choose(motion, mode, t, h, p, room):  # type: ignore[no-untyped-def]
     control[FRESH] = 1.0
     if h < 0.0:
         return  # backwards in time what decays grows, and has to be followed
-    stretch = control[NEXT] * spectral_radius(room)
+    radius = spectral_radius(room) / motion.looseness
+    stretch = control[NEXT] * radius
     control[SINCE] += 1.0
     if control[KIND] == 0.0:
-        control[LIMITED] = control[LIMITED] + 1.0 if stretch > _STIFF else 0.0
-        if control[LIMITED] >= control[PATIENCE]:
+        control[LIMITED] = control[LIMITED] + 1.0 if stretch > _HELD_BACK else 0.0
+        if control[LIMITED] >= _PATIENCE * control[PATIENCE]:
             control[KIND], control[FALLS], control[SINCE] = 1.0, IMPLICIT_STAGES + 1.0, 0.0
             control[REMEMBERED] = 0.0
-    elif stretch < _MILD and control[SINCE] > _TRIALS:
+            control[NEXT] *= _LONGER
+    elif stretch < _MILD and control[SINCE] >= _TRIALS:
         control[KIND], control[FALLS], control[LIMITED] = 0.0, POWER, 0.0
-        control[PATIENCE] = _PATIENCE
-        control[NEXT] *= min(1.0, _STIFF / stretch)
+        control[PATIENCE] = _GROWTH * control[PATIENCE] if control[SINCE] == _TRIALS else 1.0
+        control[NEXT] = min(control[NEXT], _HELD_BACK / radius)
 
 
 @helper

@@ -9,8 +9,8 @@ A Runge-Kutta method applied to both together gives the derivatives of its own d
 Newton's method sees the Jacobian of what it solves. Where roots are sought, the observable q goes with
 the state as ``q' = rate``: its steps then resolve the observable, also where the state stands still.
 
-The vector is ``[y (n) | q (0 or 1) | M (n rows of 1 + n + m)]``. Second variations would be further rows of
-the same kind, driven by f_yy; nothing else here depends on how many rows there are.
+The vector is ``[y (n) | q (0 or 1) | M (n rows of 1 + n + m)]``. Second variations would be further rows
+of the same kind, driven by f_yy; nothing else here depends on how many rows there are.
 """
 
 from __future__ import annotations
@@ -18,9 +18,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contfric.compiled import allocating_helper, helper
-from contfric.models.definition import FloatArray
+
+FloatArray = NDArray[np.float64]
 
 
 class Room(NamedTuple):

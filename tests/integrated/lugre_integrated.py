@@ -1,11 +1,57 @@
-"""A mass with LuGre friction as a flow by numerical integration (equations 7 to 9 of the article)."""
+"""A mass with LuGre friction as a flow by numerical integration.
+
+Equations 7 to 9 of the article: ``x'' + x = cos(Omega t) - F``, ``F = sigma0 z + sigma1 z' + c v`` and
+``z' = v - sigma0 |v| z / g(v)``, ``g = S + (S0 - S) exp(-|v| / vS)`` (alpha = 1). The field has a kink
+at v = 0: mode 0 moves with v > 0, mode 1 with v < 0, and each is smooth beyond. Observables: 0 is v, 1
+is z.
+"""
+
 from __future__ import annotations
+
 import math
-import os
-from contfric.compiled import flow_signature, helper, kernel
-from contfric.flow.integrated import integrated_flow, integrated_motion
+
+from contfric.compiled import (
+    flow_signature,
+    helper,
+    hit_signature,
+    kernel,
+    level_signature,
+    observe_signature,
+    period_signature,
+    rate_signature,
+    turning_signature,
+)
+from contfric.flow.integrated import (
+    integrated_flow,
+    integrated_hit,
+    integrated_motion,
+    integrated_turning,
+)
+from contfric.flow.interface import CompiledFlow
 
 OMEGA, S, S0, SIGMA0, SIGMA1, C, VS = range(7)
+
+
+@helper
+def by_parameter(j, t, v, z, e, g, m, dz, sign, p):
+    """Derivatives of v' (without the share of sigma1 z') and of z' by one parameter."""
+    drag = p[SIGMA0] * m * z / g
+    a, b = 0.0, 0.0
+    if j == OMEGA:
+        a = -t * math.sin(p[OMEGA] * t)
+    elif j == S:
+        b = drag * (1.0 - e)
+    elif j == S0:
+        b = drag * e
+    elif j == SIGMA0:
+        a, b = -z, -m * z
+    elif j == SIGMA1:
+        a = -dz
+    elif j == C:
+        a = -v
+    elif j == VS:
+        b = drag * (p[S0] - p[S]) * e * sign * v / (p[VS] * p[VS])
+    return a, b
 
 
 @helper
@@ -37,65 +83,108 @@ def field(mode, t, y, p, which, out, jac):
     jac[1, 2] = -k1 * jac[2, 2] - c
     jac[1, 3] = -k - k1 * jac[2, 3]
     for q in range(which.shape[0]):
-        j = which[q]
-        a, b = 0.0, 0.0
-        if j == OMEGA:
-            a = -t * math.sin(w * t)
-        elif j == S:
-            b = k * m * z / g * (1.0 - e)
-        elif j == S0:
-            b = k * m * z / g * e
-        elif j == SIGMA0:
-            a, b = -z, -m * z
-        elif j == SIGMA1:
-            a = -dz
-        elif j == C:
-            a = -v
-        elif j == VS:
-            b = k * m * z / g * (s0 - s) * e * sign * v / (vs * vs)
+        a, b = by_parameter(which[q], t, v, z, e, g, m, dz, sign, p)
         jac[0, 4 + q] = 0.0
         jac[1, 4 + q] = a - k1 * b
         jac[2, 4 + q] = b
 
 
 @helper
-def observe(c, t, y, p, which, grad):
+def value_of(c, t, y, p, which, grad):
+    j = 1 if c == 0 else 2
     for k in range(grad.shape[0]):
         grad[k] = 0.0
     if grad.shape[0] > 0:
-        grad[2] = 1.0
-    return y[1]
+        grad[1 + j] = 1.0
+    return y[j]
 
 
 @helper
-def rate(mode, c, t, y, p, which, grad):
-    return 0.0
+def rate_of(mode, c, t, y, p, which, grad):
+    """The rate of v or z: a row of the field, whose derivatives are few enough to be written again."""
+    sign = 1.0 if mode == 0 else -1.0
+    x, v, z = y[0], y[1], y[2]
+    s, s0, k, vs = p[S], p[S0], p[SIGMA0], p[VS]
+    e = math.exp(-sign * v / vs)
+    g = s + (s0 - s) * e
+    m = sign * v / g
+    dz = v - k * m * z
+    if grad.shape[0] > 0:
+        dm = sign / g + m * sign / vs * (s0 - s) * e / g
+        z_v, z_z = 1.0 - k * dm * z, -k * m
+        grad[0], grad[1], grad[2], grad[3] = 0.0, 0.0, z_v, z_z
+        if c == 0:
+            grad[0] = -p[OMEGA] * math.sin(p[OMEGA] * t)
+            grad[1] = -1.0
+            grad[2] = -p[SIGMA1] * z_v - p[C]
+            grad[3] = -k - p[SIGMA1] * z_z
+        for q in range(which.shape[0]):
+            a, b = by_parameter(which[q], t, v, z, e, g, m, dz, sign, p)
+            grad[4 + q] = a - p[SIGMA1] * b if c == 0 else b
+    if c == 1:
+        return dz
+    return math.cos(p[OMEGA] * t) - x - k * z - p[SIGMA1] * dz - p[C] * v
+
 
 @helper
-def scale(i, p):
-    return 1.0 / p[3] if i == 2 else 1.0
+def period_of(p, which, grad):
+    value = 2.0 * math.pi / p[OMEGA]
+    for k in range(grad.shape[0]):
+        grad[k] = -value / p[OMEGA] if which[k] == OMEGA else 0.0
+    return value
+
 
 @helper
-def period(p, which, grad):
-    return 2 * math.pi / p[0]
+def scale_of(i, p):
+    return 1.0 / p[SIGMA0] if i == 2 else 1.0
 
-MOTION = integrated_motion(field, observe, rate, period, scale, method=os.environ.get("METHOD","automatic"), relative=float(os.environ.get("TOL","1e-12")),absolute=float(os.environ.get("TOL","1e-12")))
+
+MOTION = integrated_motion(
+    field=field,
+    observe=value_of,
+    rate=rate_of,
+    period=period_of,
+    scale=scale_of,
+    method="automatic",
+)
+
 
 @kernel(flow_signature)
 def flow(mode, t0, y0, dt, p, which, y1, jac):
     integrated_flow(MOTION, mode, t0, y0, dt, p, which, y1, jac)
 
 
-from contfric.compiled import i8, f8, vector, indices, types, allocating_helper
-from contfric.flow.integrated import advance
-from contfric.flow.dop853 import STAGES
-from contfric.flow.variations import make_room
-import numpy as np
+@kernel(hit_signature)
+def hit(mode, c, target, on, t0, y0, dt_max, p, y1):
+    return integrated_hit(MOTION, mode, c, target, on, t0, y0, dt_max, p, y1)
 
-@kernel(types.UniTuple(f8,4)(i8,f8,vector,f8,vector,indices))
-def count(mode,t0,y0,dt,p,which):
-    n=3
-    columns = 1+n+which.shape[0] if which.shape[0]>0 else 0
-    room = make_room(n, 0, columns, STAGES, MOTION.implicit)
-    advance(MOTION, mode, t0, dt, y0, p, which, room)
-    return room.control[4], room.control[3], room.control[0], room.control[9]
+
+@kernel(turning_signature)
+def turning(mode, c, t0, y0, dt, p, times, values):
+    return integrated_turning(MOTION, mode, c, t0, y0, dt, p, times, values)
+
+
+@kernel(observe_signature)
+def observe(c, t, y, p, which, grad):
+    return value_of(c, t, y, p, which, grad)
+
+
+@kernel(rate_signature)
+def rate(mode, c, t, y, p, which, grad):
+    return rate_of(mode, c, t, y, p, which, grad)
+
+
+@kernel(period_signature)
+def period(p, which, grad):
+    return period_of(p, which, grad)
+
+
+@kernel(level_signature)
+def level(k, p, which, grad):
+    for j in range(grad.shape[0]):
+        grad[j] = 0.0
+    return 0.0
+
+
+def compiled_flow() -> CompiledFlow:
+    return CompiledFlow(flow, observe, level, turning, hit, period, rate)

@@ -1,0 +1,77 @@
+"""An observable along a step: nodes of the motion itself, as dense as they are needed.
+
+The observable goes with the state as one more component, so that the steps resolve it. At a node q, q'
+and q'' are known (the second derivative from the gradient of the rate). The nodes at the ends of a step
+certify almost every step as free of roots, or isolate one (:mod:`contfric.flow.panels`). Where they do
+not, the step is bisected by a *probe*: a step from the start of the step to the place. This dense output
+is as accurate as the integration, and a root that it finds is a root of the motion.
+"""
+
+from __future__ import annotations
+
+import math
+
+from contfric.compiled import helper
+from contfric.flow.stepping import first_step
+from contfric.flow.variations import begin
+
+#: Rates at the start below this, relative to 1 + the next one, are rounding.
+AT_START = 1e-13
+#: A panel of less than this share of its step is not divided further: a double root differs from a near
+#: miss by its square, which is rounding.
+SHORTEST = 1e-7
+#: Most probes in a step: a regular one needs none to ten, each double root about 25 more.
+MOST_PROBES = 2000
+
+
+@helper
+def node(motion, mode, c, target, t, y, f, p, room):  # type: ignore[no-untyped-def]
+    """Return q less the target, q' and q'' at a state with its slope f."""
+    grad, n = room.grad, room.scales.shape[0]
+    q = motion.observe(c, t, y[:n], p, room.none, room.empty) - target
+    q1 = motion.rate(mode, c, t, y[:n], p, room.none, grad)
+    q2 = grad[0]
+    for j in range(n):
+        q2 += grad[1 + j] * f[j]
+    return q, q1, q2
+
+
+@helper
+def probed(motion, mode, c, target, t, at, p, room):  # type: ignore[no-untyped-def]
+    """Return q less the target, q' and q'' within the last step, which started at time t.
+
+    The state and its slope are left in ``room.trial`` and ``room.stage``.
+    """
+    n = room.scales.shape[0]
+    if not motion.probe(motion, mode, c, t, at, p, room.none, room):
+        return math.nan, math.nan, math.nan
+    motion.field(mode, t + at, room.trial[:n], p, room.none, room.stage[:n], room.nothing)
+    return node(motion, mode, c, target, t + at, room.trial, room.stage, p, room)
+
+
+@helper
+def is_flat(left, right, h):  # type: ignore[no-untyped-def]
+    """Tell whether an observable keeps its value along a step: a motion on the surface itself."""
+    size = SHORTEST * SHORTEST * (1.0 + abs(left[0]))
+    return (
+        abs(right[0] - left[0]) <= size
+        and max(abs(left[1]), abs(right[1])) * h <= size
+        and max(abs(left[2]), abs(right[2])) * h * h <= size
+    )
+
+
+@helper
+def start_search(motion, mode, c, target, t0, y0, left, p, room):  # type: ignore[no-untyped-def]
+    """Begin the integration of state and observable; return the node at the start."""
+    n = y0.shape[0]
+    begin(motion, y0, p, room.none, room)
+    room.start[n] = motion.observe(c, t0, y0, p, room.none, room.empty)
+    first_step(motion, mode, c, t0, left, p, room.none, room)
+    return node(motion, mode, c, target, t0, room.start, room.slopes[0], p, room)
+
+
+@helper
+def write(source, target):  # type: ignore[no-untyped-def]
+    """Copy a state."""
+    for k in range(target.shape[0]):
+        target[k] = source[k]

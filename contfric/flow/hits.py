@@ -1,0 +1,167 @@
+"""The first hit along an integrated segment.
+
+Roots are isolated between nodes of the motion (:mod:`contfric.flow.dense`) and refined by Newton's
+method with probes until rounding. A motion that starts on the level leaves it with the first power of
+time whose coefficient is not rounding.
+"""
+
+from __future__ import annotations
+
+import math
+
+from contfric.compiled import helper
+from contfric.flow.dense import (
+    AT_START,
+    MOST_PROBES,
+    SHORTEST,
+    is_flat,
+    node,
+    probed,
+    start_search,
+    write,
+)
+from contfric.flow.panels import error_of, scan_values
+from contfric.flow.pieces import FREE, ISOLATED, coefficients, root_of
+from contfric.flow.stepping import next_step, settle
+from contfric.flow.variations import DEPTH
+
+#: Newton's correction, as a share of the step, that may be made along the tangent: its square is
+#: rounding.
+_LAST = 1e-9
+#: Part of the first step over which a start with two vanishing rates shows its side.
+_FLAT = 0.125
+
+
+@helper
+def refine_hit(motion, mode, c, target, sign, t, h, low, high, at, p, room):  # type: ignore[no-untyped-def]
+    """Return the root in a bracket behind which the observable changes sign; the state is in ``room.trial``."""
+    n = room.scales.shape[0]
+    for _ in range(100):  # bisection alone needs 60
+        q, q1, _ = probed(motion, mode, c, target, t, at, p, room)
+        if math.isnan(q):
+            return math.nan
+        if sign * q > 0.0:
+            low = at
+        else:
+            high = at
+        shift = -q / q1 if q1 != 0.0 else math.inf
+        following = at + shift
+        if abs(shift) <= _LAST * h or high - low <= 2e-16 * abs(t):
+            if abs(shift) > _LAST * h:
+                return at
+            for k in range(n):
+                room.trial[k] += shift * room.stage[k]
+            return following
+        at = following if low < following < high else 0.5 * (low + high)
+    return at
+
+
+@helper
+def first_in_step(motion, mode, c, target, sign, multiple, t, a, h, left, right, p, room):  # type: ignore[no-untyped-def]
+    """Return the first root in the last step as time after its start; -1 if there is none.
+
+    ``left`` and ``right`` are the nodes (q, q', q'') at ``a`` and at the end; the observable starts on
+    the side ``sign``, or on a root of order ``multiple``. No number if the search does not come to an
+    end.
+    """
+    nodes = room.nodes
+    nodes[0, 0], nodes[0, 1], nodes[0, 2], nodes[0, 3] = h, right[0], right[1], right[2]
+    q, q1, q2 = left
+    depth, probes = 1, 0
+    while depth > 0:
+        b, r, r1, r2 = (
+            nodes[depth - 1, 0],
+            nodes[depth - 1, 1],
+            nodes[depth - 1, 2],
+            nodes[depth - 1, 3],
+        )
+        length = b - a
+        ends = coefficients(sign * q, sign * q1, sign * q2, sign * r, sign * r1, sign * r2, length)
+        outcome, low, high, here = scan_values(ends, error_of(ends), multiple)
+        if outcome == ISOLATED:
+            at = a + (low + (high - low) * root_of(here)) * length
+            ends_at = a + high * length
+            return refine_hit(
+                motion, mode, c, target, sign, t, h, a + low * length, ends_at, at, p, room
+            )
+        if outcome != FREE and length > SHORTEST * h and depth < DEPTH:
+            probes += 1
+            middle = 0.5 * (a + b)
+            q_m, q1_m, q2_m = probed(motion, mode, c, target, t, middle, p, room)
+            if math.isnan(q_m) or probes > MOST_PROBES:
+                return math.nan
+            nodes[depth, 0], nodes[depth, 1], nodes[depth, 2], nodes[depth, 3] = (
+                middle,
+                q_m,
+                q1_m,
+                q2_m,
+            )
+            depth += 1
+            continue
+        if outcome != FREE and sign * r <= 0.0:
+            return refine_hit(motion, mode, c, target, sign, t, h, a, b, 0.5 * (a + b), p, room)
+        a, q, q1, q2, multiple = b, r, r1, r2, 0
+        depth -= 1
+    return -1.0
+
+
+@helper
+def leaving(left, on):  # type: ignore[no-untyped-def]
+    """Return the side that the motion starts to, and the order of the root that it starts on.
+
+    Side 0: two rates vanish as well.
+    """
+    q, q1, q2 = left
+    if not on:
+        return (1.0 if q > 0.0 else -1.0), 0
+    if abs(q1) > AT_START * (1.0 + abs(q2)):
+        return (1.0 if q1 > 0.0 else -1.0), 1
+    if abs(q2) > AT_START:
+        return (1.0 if q2 > 0.0 else -1.0), 2
+    return 0.0, 0
+
+
+@helper
+def first_hit(motion, mode, c, target, on, t0, y0, dt_max, p, room, y1):  # type: ignore[no-untyped-def]
+    """Return the first time at which an observable takes a value, with the state there in ``y1``.
+
+    Negative if there is none before ``dt_max``. Where the integration breaks down, the time it came to
+    with a state that is no number.
+    """
+    n = y0.shape[0]
+    left = start_search(motion, mode, c, target, t0, y0, dt_max, p, room)
+    if on:
+        left = (0.0, left[1], left[2])
+    elif left[0] == 0.0:
+        write(y0, y1)
+        return 0.0
+    sign, multiple = leaving(left, on)
+    done = 0.0
+    while done < dt_max:
+        t = t0 + done
+        h = next_step(motion, mode, c, t, dt_max - done, p, room.none, room)
+        if math.isnan(h):
+            break
+        right = node(motion, mode, c, target, t + h, room.end, room.last, p, room)
+        if not is_flat(left, right, h):
+            begins = 0.0
+            if sign == 0.0:
+                begins = _FLAT * h
+                left = probed(motion, mode, c, target, t, begins, p, room)
+                sign = 1.0 if left[0] > 0.0 else -1.0
+            at = first_in_step(
+                motion, mode, c, target, sign, multiple, t, begins, h, left, right, p, room
+            )
+            if math.isnan(at):
+                break
+            if at >= 0.0:
+                write(room.trial[:n], y1)
+                return done + at
+            left, multiple = right, 0
+        done = dt_max if h == dt_max - done else done + h
+        settle(room)
+    if done >= dt_max:
+        return -1.0
+    for k in range(n):
+        y1[k] = math.nan
+    return done

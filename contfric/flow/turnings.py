@@ -1,0 +1,147 @@
+"""The stationary points of an observable along an integrated segment: all of them.
+
+Zeros of the rate are isolated between nodes of the motion (:mod:`contfric.flow.dense`) and refined by
+probes.
+"""
+
+from __future__ import annotations
+
+import math
+
+from contfric.compiled import helper
+from contfric.flow.dense import (
+    AT_START,
+    MOST_PROBES,
+    SHORTEST,
+    is_flat,
+    node,
+    probed,
+    start_search,
+)
+from contfric.flow.panels import error_of, scan_slopes, zero_of_slope
+from contfric.flow.pieces import FREE, ISOLATED, coefficients
+from contfric.flow.stepping import next_step, settle
+from contfric.flow.variations import DEPTH
+
+#: Correction, as a share of the step, that a stationary point may be left with, whose value has an error
+#: of the square of that.
+_LAST_STATIONARY = 1e-5
+#: Error of a stationary time, relative to 1 + the time: one within it of a joint is at the joint.
+_AT_JOINT = 4e-10
+
+
+@helper
+def refine_turning(motion, mode, c, t, h, low, high, at, p, room):  # type: ignore[no-untyped-def]
+    """Return a stationary point in a bracket, and the observable there."""
+    q, rising = 0.0, 0.0
+    for _ in range(100):
+        q, q1, q2 = probed(motion, mode, c, 0.0, t, at, p, room)
+        if math.isnan(q):
+            return math.nan, q
+        shift = -q1 / q2 if q2 != 0.0 else math.inf
+        if abs(shift) <= _LAST_STATIONARY * h or high - low <= SHORTEST * h:
+            shift = shift if abs(shift) <= _LAST_STATIONARY * h else 0.0
+            return at + shift, q + 0.5 * shift * q1
+        if rising == 0.0:
+            rising = 1.0 if q2 > 0.0 else -1.0
+        if rising * q1 < 0.0:
+            low = at
+        else:
+            high = at
+        following = at + shift
+        at = following if low < following < high else 0.5 * (low + high)
+    return at, q
+
+
+@helper
+def turnings_in_step(motion, mode, c, t, h, done, span, left, right, p, room, count, times, values):  # type: ignore[no-untyped-def]
+    """Append the stationary points in the last step; return their number, -1 if the search fails."""
+    nodes = room.nodes
+    nodes[0, 0], nodes[0, 1], nodes[0, 2], nodes[0, 3] = h, right[0], right[1], right[2]
+    a, q, q1, q2 = 0.0, left[0], left[1], left[2]
+    depth, probes = 1, 0
+    while depth > 0:
+        b, r, r1, r2 = (
+            nodes[depth - 1, 0],
+            nodes[depth - 1, 1],
+            nodes[depth - 1, 2],
+            nodes[depth - 1, 3],
+        )
+        length = b - a
+        ends = coefficients(q, q1, q2, r, r1, r2, length)
+        at_start = a == 0.0 and done == 0.0 and abs(q1) <= AT_START * (1.0 + abs(q2))
+        outcome, low, high, here = scan_slopes(ends, error_of(ends), at_start)
+        found = outcome == ISOLATED
+        next_node = b
+        if not found and outcome != FREE:
+            if length > SHORTEST * h and depth < DEPTH and done + a < span[1]:
+                next_node = 0.5 * (a + b)
+            elif (q1 < 0.0) != (r1 < 0.0) and not at_start:
+                found, low, high = True, 0.0, 1.0
+        if found:
+            share = zero_of_slope(here) if outcome == ISOLATED else 0.5
+            at, value = refine_turning(
+                motion,
+                mode,
+                c,
+                t,
+                h,
+                a + low * length,
+                a + high * length,
+                a + (low + (high - low) * share) * length,
+                p,
+                room,
+            )
+            if math.isnan(at):
+                return -1
+            if span[0] < done + at < span[1]:
+                if count == times.shape[0]:
+                    return -1
+                times[count], values[count] = done + at, value
+                count += 1
+            if high < 1.0:
+                next_node = a + high * length
+        if next_node == b:
+            a, q, q1, q2 = b, r, r1, r2
+            depth -= 1
+            continue
+        probes += 1
+        q_m, q1_m, q2_m = probed(motion, mode, c, 0.0, t, next_node, p, room)
+        if math.isnan(q_m) or probes > MOST_PROBES:
+            return -1
+        if found:
+            a, q, q1, q2 = next_node, q_m, q1_m, q2_m
+        else:
+            nodes[depth, 0], nodes[depth, 1], nodes[depth, 2], nodes[depth, 3] = (
+                next_node,
+                q_m,
+                q1_m,
+                q2_m,
+            )
+            depth += 1
+    return count
+
+
+@helper
+def all_turnings(motion, mode, c, t0, y0, dt, p, room, times, values):  # type: ignore[no-untyped-def]
+    """Write the interior stationary points of an observable; return their number, or -1."""
+    left = start_search(motion, mode, c, 0.0, t0, y0, dt, p, room)
+    near = _AT_JOINT * (1.0 + dt)
+    span = (min(near, 0.5 * dt), max(dt - near, 0.5 * dt))
+    done, count = 0.0, 0
+    while done < dt:
+        t = t0 + done
+        h = next_step(motion, mode, c, t, dt - done, p, room.none, room)
+        if math.isnan(h):
+            return -1
+        right = node(motion, mode, c, 0.0, t + h, room.end, room.last, p, room)
+        if not is_flat(left, right, h):
+            count = turnings_in_step(
+                motion, mode, c, t, h, done, span, left, right, p, room, count, times, values
+            )
+            if count < 0:
+                return -1
+        done = dt if h == dt - done else done + h
+        settle(room)
+        left = right
+    return count
