@@ -67,6 +67,7 @@ class _Job:
             "contfric": version("contfric"),
             "kernels": cache_folder(Path(__file__)).name,
             "model": self.model.name,
+            **({"definition": self.model.definition} if self.model.definition else {}),
             "params": self.model.mapping(self.vector),
             "axes": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in self.axes.items()},
             "grid": digest(*self.axes.values()),

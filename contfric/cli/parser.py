@@ -10,7 +10,7 @@ from typing import NoReturn
 from contfric.cli import commands
 from contfric.errors import ContfricError, did_you_mean
 
-_COMMANDS = ("run", "explain", "info", "signatures", "graph", "simulate", "census")
+_COMMANDS = ("run", "explain", "info", "signatures", "check", "graph", "simulate", "census")
 _DEBUG = "show the traceback of an error"
 
 

@@ -6,6 +6,7 @@ import ast
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -39,16 +40,20 @@ _POINTS = 8
 class Spread:
     """Half-widths of starts, from the expressions of a description."""
 
-    names: tuple[str, ...]
     texts: tuple[str, ...]
-    description: str
+    definition: str
 
     def __call__(self, params: Mapping[str, float]) -> FloatArray:
         """Return the half-width of each state, shape (n,)."""
-        from contfric.models.describe import from_text
-
-        evaluator = floats(from_text(self.description))
+        evaluator = _evaluator(self.definition)
         return np.array([evaluator.value(text, params) for text in self.texts])
+
+
+@lru_cache(maxsize=64)
+def _evaluator(definition: str) -> Evaluator[float]:
+    from contfric.models.describe import from_text
+
+    return floats(from_text(definition))
 
 
 def model_from(description: Description) -> Model:
@@ -82,7 +87,7 @@ def model_from(description: Description) -> Model:
         symmetry=_symmetry(sampler, surfaces),
         stop_surface=description.stop_surface or _stop_surface(sampler),
         flow_factory=GeneratedFlow(description.text),
-        spread=Spread(description.states, description.spread, description.text),
+        spread=Spread(description.spread, description.text),
         references=description.references,
         resets=tuple(_reset(description, name) for name in description.resets),
         autonomous=not description.period,

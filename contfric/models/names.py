@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeVar
 
 from contfric.errors import ModelError, did_you_mean
@@ -110,5 +111,8 @@ class Names:
 
     def scope(self, algebra: Algebra[T], values: Mapping[str, T]) -> Scope[T]:
         """Return the scope of all names, with the values of states, parameters and t."""
-        parts = {name: parse(text) for name, text in self.parts.items()}
-        return Scope(algebra, dict(values), parts)
+        return Scope(algebra, dict(values), self._trees)
+
+    @cached_property
+    def _trees(self) -> dict[str, ast.expr]:
+        return {name: parse(text) for name, text in self.parts.items()}

@@ -55,9 +55,29 @@ def check_derivatives(report: ModelReport, probe: Probe) -> None:
     """Compare every compiled function with its formula, or with its own differences."""
     model = probe.model
     near = Probe(model, _nearby(model, probe))
+    _rates_along(report, near)
     for case in _described(near) if model.definition else _closed(near):
         for point in _points(near, case.mode):
             _compare(report, model, case, point, bool(model.definition))
+
+
+def _rates_along(report: ModelReport, probe: Probe) -> None:
+    """Compare the rate of each observable with its gradient along the field of the flow."""
+    for mode in probe.model.modes:
+        for point in _points(probe, mode.name):
+            t, y = float(point[0]), point[1 : 1 + len(probe.model.states)].copy()
+            velocity = np.array([1.0, *probe.field(mode.name, t, y)])
+            for surface in probe.model.surfaces:
+                report.count(Topic.DERIVATIVES)
+                rate = probe.rate(mode.name, surface.name, t, y)
+                along = float(probe.slope(surface.name, t, y) @ velocity)
+                if not abs(rate - along) <= _SAME * (1.0 + np.abs(velocity).max()):
+                    report.error(
+                        Topic.DERIVATIVES,
+                        f"the rate of '{surface.observable}' in mode '{mode.name}' is compiled as "
+                        f"{rate:.12g}, its gradient along the flow gives {along:.12g}",
+                    )
+                    break
 
 
 def _nearby(model: Model, probe: Probe) -> dict[str, float]:

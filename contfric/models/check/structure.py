@@ -10,8 +10,8 @@ from contfric.models.definition import FloatArray, Surface
 
 #: States on each surface, and in the whole region.
 _ON_SURFACE, _EVERYWHERE = 200, 400
-#: A gradient this small, against values of size 1, is one that vanishes.
-_FLAT = 1e-9
+#: With a gradient this small a place on the surface is known to 1e-6 only (12 digits of the observable).
+_FLAT = 1e-6
 #: A rate this small is one that rounding has made.
 _STILL = 1e-9
 #: Rounding of values that should be the same, relative to 1 + their size.
