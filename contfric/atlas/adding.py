@@ -98,6 +98,10 @@ def period_adding(bridge: Branch, longest: int = 6) -> tuple[Window, ...]:
     ['1a-2a', '1a-1a-2a']
     """
     whole_number("longest", longest, least=2)
+    if bridge.model.autonomous or bridge.model.resets:
+        raise ParameterError(
+            f"model '{bridge.model.name}': period adding is offered for excited models without impacts"
+        )
     if not bridge.bridge:
         raise ParameterError(f"{bridge!r} is no bridge: its orbits have no hold")
     letters = {}

@@ -103,6 +103,12 @@ def census(
             f"model '{model.name}' has no excitation: the periods of its orbits are unknown, and a "
             "census cannot be bounded by their number"
         )
+    rests = sum(mode.sliding for mode in model.modes)
+    if model.resets or rests != 1 or sum(s.switching for s in model.surfaces) != 1:
+        raise ParameterError(
+            f"model '{model.name}': a census is offered for models with one switching surface, rest on "
+            "it, and no impacts: the walks of others cannot be bounded by their stops"
+        )
     state = _Census(model, vector, limits, finer, most_starts, seed, progress)
     try:
         state.prepare()

@@ -39,10 +39,11 @@ from contfric.chaos.rows import CellRows, Limits, Starting
 from contfric.chaos.tangent import (
     ARRIVED,
     Walk,
-    carry,
+    behind,
     differentiate,
     new_walk,
     orthonormalise,
+    push,
     seed,
     state_room,
     to_joint,
@@ -146,11 +147,11 @@ def start_mode(functions, tables, starting, t, y, p, room):  # type: ignore[no-u
 def write_quiet(functions, mode, t, p, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
     """Write the exponents of an equilibrium that an autonomous motion settles on inside of a mode."""
     n = walk.y.shape[0]
-    functions[0](mode, t, walk.y, _SETTLES, p, rows.turns[:0], walk.met, walk.reset[:0])
-    functions[0](mode, t, walk.met, 1.0, p, rows.turns[:0], walk.end, walk.jac)
+    functions[0](mode, t, walk.y, _SETTLES, p, rows.turns[:0], walk.image, walk.jac[:0])
+    functions[0](mode, t, walk.image, 1.0, p, rows.turns[:0], walk.end, walk.jac)
     still = True
     for j in range(n):
-        still = still and abs(walk.end[j] - walk.met[j]) <= _STILL * (1.0 + abs(walk.met[j]))
+        still = still and abs(walk.end[j] - walk.image[j]) <= _STILL * (1.0 + abs(walk.image[j]))
     if not still:
         write_nothing(NO_MOTION, rows, cell)
         return
@@ -204,7 +205,7 @@ def try_cycle(  # type: ignore[no-untyped-def]
         rows.exponents[cell, k] = cycle.rates[k]
         rows.errors[cell, k] = error
     rows.turns[cell] = 1  # without excitation: a cycle
-    if walk.timeless[0] == 0:
+    if walk.at_once[1] == 0:
         rows.turns[cell] = shortest(
             functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, rooms.state
         )
@@ -261,9 +262,12 @@ def carry_on(functions, tables, ranks, mode, on, t, p, period, live, rooms):  # 
     )
     if outcome == ARRIVED:
         observable = tables.observables[surface]
-        rate = differentiate(functions, observable, mode, duration, t, p, walk, room.none)
+        rate = differentiate(functions, observable, mode, duration, t, p, walk, room)
         live = min(live, ranks[mode])
-        carry(functions, tables, surface, t, p, live, rate, rooms.frame, walk, room.none)
+        push(rooms.frame, live, rate, walk.jac, walk.grad, walk.image)
+        reset = tables.bounds[mode, surface] == 2
+        if reset or walk.at_once[1] != 0:
+            behind(functions, surface, t, p, rooms.frame, live, walk, room, reset)
         if not orthonormalise(rooms.frame, live, rooms.growth):
             outcome = IMPOSSIBLE
     return outcome, surface, following, duration, turns, t, live
@@ -300,7 +304,7 @@ def follow_cell(functions, tables, ranks, mode, on, t, p, period, limits, rooms,
         on = (1 << surface) | tables.lies_on[mode]
         mode, joint, cycle = following, joint + 1, cycle + turns
         key = mode * surfaces + surface
-        timeless = walk.timeless[0] != 0
+        timeless = walk.at_once[1] != 0
         joints, lag = returned(rooms.memory, key, cycle, joint, t, walk.y, period, timeless)
         if joints > 0 and try_cycle(
             functions, tables, ranks, mode, on, key, t, joints, lag, p, period, rooms, rows, cell
@@ -341,7 +345,7 @@ def follow_cells(functions, tables, starting, time, vectors, states, limits, row
         rows.turns[cell], rows.followed[cell] = 0, 0
         period = functions[5](p, rooms.state.none, rooms.state.empty)
         timeless = period <= 0.0
-        rooms.walk.timeless[0] = rooms.cycle.walk.timeless[0] = 1 if timeless else 0
+        rooms.walk.at_once[1] = rooms.cycle.walk.at_once[1] = 1 if timeless else 0
         if timeless:
             period = 1.0  # periods are units of time
         mode, on = start_mode(functions, tables, starting, time, rooms.walk.y, p, rooms.state)

@@ -38,11 +38,13 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.system import IntArray
 from contfric.orbit.trajectory import (
     HELD,
+    HOLD_PERIODS,
     IMPOSSIBLE,
     INFINITE,
     MOST_AT_ONCE,
     NO_TIME,
     QUIET,
+    SLIDE_PERIODS,
     TOO_LARGE,
     StateRoom,
     copy_state,
@@ -62,10 +64,8 @@ class Walk(NamedTuple):
     y, start : state, and start (t, y) of the segment, shapes (n,) and (1 + n,)
     jac, grad : derivatives of the segment's flow and of the observable at its end
     end, image : room for a state and for the image of a perturbation, shape (n,)
-    at_once : number of events in a row that followed each other at once, shape (1,)
-    met : state at the last joint, before a reset, shape (n,)
-    reset : derivatives of a reset, shape (n, 1 + n)
-    timeless : whether the model is autonomous, shape (1,)
+    at_once : number of events in a row that followed each other at once, and whether the model is
+        autonomous, shape (2,)
     """
 
     y: FloatArray
@@ -75,9 +75,6 @@ class Walk(NamedTuple):
     end: FloatArray
     image: FloatArray
     at_once: IntArray
-    met: FloatArray
-    reset: FloatArray
-    timeless: IntArray
 
 
 @allocating_helper
@@ -90,10 +87,7 @@ def new_walk(n):  # type: ignore[no-untyped-def]
         np.empty(1 + n),
         np.empty(n),
         np.empty(n),
-        np.zeros(1, dtype=np.int64),
-        np.empty(n),
-        np.empty((n, 1 + n)),
-        np.zeros(1, dtype=np.int64),
+        np.zeros(2, dtype=np.int64),
     )
 
 
@@ -118,11 +112,11 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
     for j in range(y.shape[0]):
         walk.start[1 + j] = y[j]
     duration, turns = 0.0, 0
-    longest = tables.longest[mode] * period
+    longest = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * period
     while True:
         tau, surface = first_hit(functions, tables, mode, on, t, y, p, longest, room)
         if surface < 0:  # a slide that is never left would be an error, if there is an excitation
-            quiet = QUIET if walk.timeless[0] != 0 else IMPOSSIBLE
+            quiet = QUIET if walk.at_once[1] != 0 else IMPOSSIBLE
             held = tables.sliding[mode] != 0
             return HELD if held else quiet, surface, mode, duration, turns, t
         copy_state(room.after, y)
@@ -136,10 +130,9 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
         walk.at_once[0] = walk.at_once[0] + 1 if tau <= NO_TIME * period else 0
         if walk.at_once[0] > MOST_AT_ONCE:
             return IMPOSSIBLE, surface, mode, duration, turns, t
-        copy_state(y, walk.met)
-        reset = tables.resets[surface] != 0
-        if reset:
-            functions[7](surface, t, walk.met, p, room.none, y, room.nothing)
+        reset = tables.bounds[mode, surface] == 2
+        if reset:  # the state before it stays where the hit has left it
+            functions[7](surface, t, room.after, p, room.none, y, room.nothing)
         code = sign_code(functions, observables, surface, t, y, p, room.none, room.empty)
         count = observables.shape[0]
         following = tables.following[(mode * count + surface) * (1 << count) + code]
@@ -151,12 +144,12 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
 
 
 @helper
-def differentiate(functions, observable, mode, duration, t, p, walk, none):  # type: ignore[no-untyped-def]
+def differentiate(functions, observable, mode, duration, t, p, walk, room):  # type: ignore[no-untyped-def]
     """Differentiate the segment that a walk has just finished; return the rate at its exit."""
     n = walk.y.shape[0]
     jac, grad, start = walk.jac, walk.grad, walk.start
-    functions[0](mode, start[0], start[1:], duration, p, none, walk.end, jac)
-    functions[1](observable, t, walk.met, p, none, grad)
+    functions[0](mode, start[0], start[1:], duration, p, room.none, walk.end, jac)
+    functions[1](observable, t, room.after, p, room.none, grad)
     rate = grad[0]
     for k in range(n):
         rate += grad[1 + k] * jac[k, 1 + n]
@@ -164,13 +157,12 @@ def differentiate(functions, observable, mode, duration, t, p, walk, none):  # t
 
 
 @helper
-def carry(functions, tables, surface, t, p, count, rate, frame, walk, none):  # type: ignore[no-untyped-def]
-    """Carry the first rows of a frame over the segment just differentiated, and the reset behind it."""
-    push(frame, count, rate, walk.jac, walk.grad, walk.image)
-    if tables.resets[surface] != 0:
-        functions[7](surface, t, walk.met, p, none, walk.end, walk.reset)
-        leap(frame, count, walk.reset, walk.image)
-    if walk.timeless[0] != 0:
+def behind(functions, surface, t, p, frame, count, walk, room, reset):  # type: ignore[no-untyped-def]
+    """Carry the first rows of a frame behind a joint: over its reset, and without time if there is none."""
+    if reset:
+        functions[7](surface, t, room.after, p, room.none, walk.end, walk.jac)
+        leap(frame, count, walk.jac, walk.image)
+    if walk.at_once[1] != 0:
         for i in range(count):
             frame[i, 0] = 0.0
 

@@ -9,6 +9,7 @@ from typing import NoReturn
 
 from contfric.cli import commands
 from contfric.errors import ContfricError, did_you_mean
+from contfric.models import DEFAULT_MODEL
 
 _COMMANDS = ("run", "explain", "info", "signatures", "check", "graph", "simulate", "census")
 _DEBUG = "show the traceback of an error"
@@ -147,14 +148,14 @@ def _fill_check(parser: argparse.ArgumentParser) -> None:
 
 def _fill_graph(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--model", default="coulomb", help="name or YAML file of the model (%(default)s)"
+        "--model", default=DEFAULT_MODEL, help="name or YAML file of the model (%(default)s)"
     )
     parser.add_argument("--out", metavar="FILE", type=Path, help="draw it: .png, .svg or .pdf")
 
 
 def _fill_simulate(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--model", default="coulomb", help="name or YAML file of the model (%(default)s)")
+    add("--model", default=DEFAULT_MODEL, help="name or YAML file of the model (%(default)s)")
     add("-p", dest="params", metavar="NAME=VALUE", action="append", default=[], help="a parameter")
     add("--state", metavar="X,V", help="initial state, numbers joined by commas")
     add("--time", type=_number, default=0.0, help="initial time (%(default)s)")
@@ -166,7 +167,7 @@ def _fill_simulate(parser: argparse.ArgumentParser) -> None:
 
 def _fill_census(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("model", metavar="MODEL", nargs="?", default="coulomb", help="a model (%(default)s)")
+    add("model", metavar="MODEL", nargs="?", default=DEFAULT_MODEL, help="a model (%(default)s)")
     add(
         *("-p", "--param"),
         dest="params",

@@ -29,7 +29,7 @@ from contfric.orbit.equations import FunctionsType, LayoutType, close_chain
 from contfric.orbit.monitor import (
     count_margins,
     crossings,
-    entry_margin,
+    find_behind,
     find_turnings,
     held_margin,
     interior_margin,
@@ -38,6 +38,7 @@ from contfric.orbit.monitor import (
 )
 from contfric.orbit.newton import CHECKS, MULTIPLIERS
 from contfric.orbit.spectrum import multipliers
+from contfric.orbit.system import RETURNS
 
 #: What locate() follows: a column of the tests, a label, or the parameter itself.
 BY_TEST, BY_LABEL, BY_PARAMETER = range(3)
@@ -74,7 +75,10 @@ def margin_value(functions, layout, index, z, p, room):  # type: ignore[no-untyp
     if index < first:
         i, c = layout.interior[index, 0], layout.observables[layout.interior[index, 1]]
         equations, turnings = room.equations, room.turnings
-        found = find_turnings(functions, layout, i, c, z, p, equations, turnings)
+        if layout.departs[i] < RETURNS:
+            found = find_behind(functions, layout, i, c, z, p, equations, turnings)
+        else:
+            found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
         return interior_margin(functions, layout, index, found, z, p, equations, turnings)
     if index < first + count:
         sign = layout.exit_signs[index - first]
@@ -83,9 +87,6 @@ def margin_value(functions, layout, index, z, p, room):  # type: ignore[no-untyp
     if index < layout.joint.shape[0]:
         return joint_margin(functions, layout, index, z, p, room.equations)
     index -= layout.joint.shape[0]
-    if index < layout.after.shape[0]:
-        return entry_margin(functions, layout, index, z, p, room.equations)
-    index -= layout.after.shape[0]
     if index < layout.lasting.shape[0]:
         return lasting_margin(layout, index, z, room.equations)
     index -= layout.lasting.shape[0]

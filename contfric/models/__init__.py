@@ -15,7 +15,10 @@ from contfric.models.definition import Model
 if TYPE_CHECKING:
     from contfric.models.oscillator import OscillatorModel
 
-__all__ = ["Model", "load_model", "model_names"]
+__all__ = ["DEFAULT_MODEL", "Model", "load_model", "model_names"]
+
+#: The model of the command line where none is named.
+DEFAULT_MODEL = "coulomb"
 
 
 def model_names() -> list[str]:

@@ -50,7 +50,7 @@ from contfric.compiled import (
 )
 from contfric.models.definition import FloatArray
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN
-from contfric.orbit.system import Layout
+from contfric.orbit.system import PLAIN, RETURNS, Layout
 
 #: Where a segment that begins on its exit surface is shorter than this (nondimensional), its exit row is
 #: divided by the duration: five points of Gauss are exact to rounding there (d^10 f^(10) / 5e32), and the
@@ -80,9 +80,6 @@ LayoutType = types.NamedTuple(
         matrix,
         f8,
         i8,
-        indices,
-        table,
-        indices,
     ],
     Layout,
 )
@@ -94,8 +91,8 @@ class Room(NamedTuple):
     Attributes
     ----------
     state, jac : end of a segment with its derivatives, shapes (n,) and (n, 2 + n + q)
-    begin, reset : where the segment begins, behind a reset if there is one, with the derivatives of the
-        reset, shapes (n,) and (n, 1 + n + q)
+    behind : state behind a reset, in the last row, and the derivatives of the reset, shape
+        (n + 1, 1 + n + q)
     grad, level_grad : gradients of an observable and of a level, shapes (1 + n + q,) and (q,)
     rates : rate of the exit's observable at the end of each segment, shape (N,)
     last, close, close_w : closure of z_0 with its matrices, shapes (m,), (m, m) and (m, q)
@@ -104,8 +101,7 @@ class Room(NamedTuple):
 
     state: FloatArray
     jac: FloatArray
-    begin: FloatArray
-    reset: FloatArray
+    behind: FloatArray
     grad: FloatArray
     level_grad: FloatArray
     rates: FloatArray
@@ -124,8 +120,7 @@ def equation_room(count, m, free):  # type: ignore[no-untyped-def]
     return Room(
         np.empty(n),
         np.empty((n, 2 + n + free)),
-        np.empty(n),
-        np.empty((n, 1 + n + free)),
+        np.empty((n + 1, 1 + n + free)),
         np.empty(1 + n + free),
         np.empty(free),
         np.empty(count),
@@ -163,14 +158,14 @@ def close_chain(functions, layout, z, p, which, room):  # type: ignore[no-untype
 
 
 @helper
-def begin_at(functions, layout, i, start, p, which, jac, room):  # type: ignore[no-untyped-def]
-    """Write the state in which segment i begins: that of its joint, or its image behind a reset."""
-    entry = layout.entries[i]
-    if entry >= 0:
-        functions[7](entry, start[0], start[1:], p, which, room.begin, jac)
-        return
-    for j in range(room.begin.shape[0]):
-        room.begin[j] = start[1 + j]
+def leap(functions, layout, i, start, p, which, room):  # type: ignore[no-untyped-def]
+    """Write the state in which segment i begins, behind its reset, with the derivatives if any are wanted.
+
+    Only for a segment that has one: elsewhere its joint is where it begins.
+    """
+    n, surface = start.shape[0] - 1, ((PLAIN - layout.departs[i]) >> 1) - 1
+    behind = room.behind
+    functions[7](surface, start[0], start[1:], p, which, behind[n, :n], behind[:n])
 
 
 @helper
@@ -235,9 +230,11 @@ def mean_rate_row(functions, layout, i, at, start, duration, p, which, room, row
     for k in range(_NODES.shape[0]):
         share, weight = _NODES[k], _WEIGHTS[k]
         time = share * duration
-        functions[0](mode, start[0], room.begin, time, p, which, state, jac)
-        if layout.entries[i] >= 0:
-            behind_reset(jac, room.reset, grad, n)
+        if layout.departs[i] < RETURNS:
+            functions[0](mode, start[0], room.behind[n, :n], time, p, which, state, jac)
+            behind_reset(jac, room.behind, grad, n)
+        else:
+            functions[0](mode, start[0], start[1:], time, p, which, state, jac)
         mean += weight * functions[6](mode, c, start[0] + time, state, p, which, grad)
         for j in range(2 + n + free):  # t_0, y_0, duration, parameters
             slope = 0.0
@@ -269,10 +266,13 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
     state, jac, grad, level_grad = room.state, room.jac, room.grad, room.level_grad
     n, free, width = state.shape[0], which.shape[0], rows.shape[1]
     m = n + 1
-    begin_at(functions, layout, i, start, p, which, room.reset, room)
-    functions[0](layout.modes[i], start[0], room.begin, after[0] - start[0], p, which, state, jac)
-    if layout.entries[i] >= 0:
-        behind_reset(jac, room.reset, grad, n)
+    begin = start[1:]
+    if layout.departs[i] < RETURNS:
+        leap(functions, layout, i, start, p, which, room)
+        begin = room.behind[n, :n]
+    functions[0](layout.modes[i], start[0], begin, after[0] - start[0], p, which, state, jac)
+    if layout.departs[i] < RETURNS:
+        behind_reset(jac, room.behind, grad, n)
     worst = 0.0
     for j in range(n):
         row = m + j
@@ -304,7 +304,7 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
     for k in range(3 * m + free + 1, width):
         rows[row, k] = 0.0
     duration = after[0] - start[0]
-    if layout.returns[i] != 0 and abs(duration) < _SHORT:
+    if abs(duration) < _SHORT and (PLAIN - layout.departs[i]) & 1 == 1 and layout.departs[i] < 0:
         worst += mean_rate_row(functions, layout, i, at, start, duration, p, which, room, rows)
         return worst if math.isfinite(worst) else np.inf
     for k in range(m):
@@ -325,8 +325,11 @@ def mismatch(functions, layout, z, p, room):  # type: ignore[no-untyped-def]
     for i in range(count):
         after = z[i + 1] if i + 1 < count else room.last
         duration = after[0] - z[i, 0]
-        begin_at(functions, layout, i, z[i], p, none, room.nothing, room)
-        functions[0](layout.modes[i], z[i, 0], room.begin, duration, p, none, state, room.nothing)
+        begin = z[i, 1:]
+        if layout.departs[i] < RETURNS:
+            leap(functions, layout, i, z[i], p, none, room)
+            begin = room.behind[m - 1, : m - 1]
+        functions[0](layout.modes[i], z[i, 0], begin, duration, p, none, state, room.nothing)
         if layout.pins[i] != NO_PIN:
             here = abs(pin_value(functions, layout, i, z[i], p, none, empty))
         else:

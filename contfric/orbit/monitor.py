@@ -18,13 +18,14 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.equations import (
     FunctionsType,
     LayoutType,
-    begin_at,
     close_chain,
     equation_room,
+    leap,
     segment_rows,
 )
 from contfric.orbit.holds import NO_PIN
 from contfric.orbit.newton import CHECKS
+from contfric.orbit.system import RETURNS
 
 #: Most interior stationary points of one observable in one segment; beyond it the orbit is reported
 #: as not finite. A stick of 30 excitation periods has 180 of them with a third harmonic.
@@ -53,15 +54,28 @@ def turning_room():  # type: ignore[no-untyped-def]
 
 
 @helper
-def find_turnings(functions, layout, i, c, z, p, room, turnings):  # type: ignore[no-untyped-def]
+def find_turnings(functions, layout, i, c, z, p, last, turnings):  # type: ignore[no-untyped-def]
     """Fill the stationary points of observable c in segment i; return their number, -1 if too many."""
-    after = z[i + 1] if i + 1 < z.shape[0] else room.last
+    after = z[i + 1] if i + 1 < z.shape[0] else last
     duration = after[0] - z[i, 0]
     if duration <= 0.0:
         return 0
-    begin_at(functions, layout, i, z[i], p, room.none, room.nothing, room)
     return functions[3](
-        layout.modes[i], c, z[i, 0], room.begin, duration, p, turnings.times, turnings.values
+        layout.modes[i], c, z[i, 0], z[i, 1:], duration, p, turnings.times, turnings.values
+    )
+
+
+@helper
+def find_behind(functions, layout, i, c, z, p, room, turnings):  # type: ignore[no-untyped-def]
+    """Do the same for a segment behind a reset."""
+    after, n = z[i + 1] if i + 1 < z.shape[0] else room.last, z.shape[1] - 1
+    duration = after[0] - z[i, 0]
+    if duration <= 0.0:
+        return 0
+    leap(functions, layout, i, z[i], p, room.none, room)
+    begin = room.behind[n, :n]
+    return functions[3](
+        layout.modes[i], c, z[i, 0], begin, duration, p, turnings.times, turnings.values
     )
 
 
@@ -93,23 +107,24 @@ def interior_margin(functions, layout, k, found, z, p, room, turnings):  # type:
 
 
 @helper
+def start_value(functions, layout, i, c, z, p, room):  # type: ignore[no-untyped-def]
+    """Return observable c where segment i begins, behind its reset."""
+    n = z.shape[1] - 1
+    leap(functions, layout, i, z[i], p, room.none, room)
+    return functions[1](c, z[i, 0], room.behind[n, :n], p, room.none, room.empty)
+
+
+@helper
 def joint_margin(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
     """Return joint margin k."""
     i, surface = layout.joint[k, 0], layout.joint[k, 1]
     after = z[i + 1] if i + 1 < z.shape[0] else room.last
     c = layout.observables[surface]
-    value = functions[1](c, after[0], after[1:], p, room.none, room.empty)
+    if layout.joint[k, 3] == 1:  # where the segment begins, behind a reset
+        value = start_value(functions, layout, i, c, z, p, room)
+    else:
+        value = functions[1](c, after[0], after[1:], p, room.none, room.empty)
     return layout.joint[k, 2] * (value - functions[2](surface, p, room.none, room.empty))
-
-
-@helper
-def entry_margin(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
-    """Return entry margin k: the side on which a segment begins behind a reset."""
-    i, surface = layout.after[k, 0], layout.after[k, 1]
-    c = layout.observables[surface]
-    begin_at(functions, layout, i, z[i], p, room.none, room.nothing, room)
-    value = functions[1](c, z[i, 0], room.begin, p, room.none, room.empty)
-    return layout.after[k, 2] * (value - functions[2](surface, p, room.none, room.empty))
 
 
 @helper
@@ -124,7 +139,10 @@ def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-un
     for k in range(interior.shape[0]):
         i, c = interior[k, 0], observables[interior[k, 1]]
         if i != segment or c != watched:  # surfaces of one observable share its stationary points
-            found = find_turnings(functions, layout, i, c, z, p, room, turnings)
+            if layout.departs[i] < RETURNS:
+                found = find_behind(functions, layout, i, c, z, p, room, turnings)
+            else:
+                found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
             segment, watched = i, c
         out[k] = interior_margin(functions, layout, k, found, z, p, room, turnings)
     at = interior.shape[0]
@@ -135,9 +153,6 @@ def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-un
     for k in range(layout.joint.shape[0]):
         out[at + k] = joint_margin(functions, layout, k, z, p, room)
     at += layout.joint.shape[0]
-    for k in range(layout.after.shape[0]):
-        out[at + k] = entry_margin(functions, layout, k, z, p, room)
-    at += layout.after.shape[0]
     for k in range(layout.lasting.shape[0]):
         out[at + k] = lasting_margin(layout, k, z, room)
     at += layout.lasting.shape[0]
@@ -168,7 +183,7 @@ def held_margin(functions, layout, k, z, p, room, turnings):  # type: ignore[no-
         if layout.interior[row, 0] != i or c == watched:
             continue
         watched = c
-        found = find_turnings(functions, layout, i, c, z, p, room, turnings)
+        found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
         for j in range(found):
             time = turnings.times[j]
             if time < first or time > duration - first:
@@ -190,7 +205,6 @@ def count_margins(layout):  # type: ignore[no-untyped-def]
         layout.interior.shape[0]
         + layout.exits.shape[0]
         + layout.joint.shape[0]
-        + layout.after.shape[0]
         + layout.lasting.shape[0]
         + layout.held.shape[0]
     )
@@ -209,8 +223,9 @@ def ends_of(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
     if on >= 0:
         first = functions[2](on, p, room.none, room.empty)
     else:
-        begin_at(functions, layout, i, z[i], p, room.none, room.nothing, room)
-        first = functions[1](c, z[i, 0], room.begin, p, room.none, room.empty)
+        first = functions[1](c, z[i, 0], z[i, 1:], p, room.none, room.empty)
+        if layout.departs[i] < RETURNS:
+            first = start_value(functions, layout, i, c, z, p, room)
     if to >= 0:
         return first, functions[2](to, p, room.none, room.empty)
     return first, functions[1](c, after[0], after[1:], p, room.none, room.empty)
@@ -235,7 +250,10 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
         layout.labels[k, 2],
         layout.labels[k, 3],
     )
-    found = find_turnings(functions, layout, i, c, z, p, room, turnings)
+    if layout.departs[i] < RETURNS:
+        found = find_behind(functions, layout, i, c, z, p, room, turnings)
+    else:
+        found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
     if found < 0:
         return -1, np.inf
     value, final = ends_of(functions, layout, k, z, p, room)

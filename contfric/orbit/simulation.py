@@ -37,12 +37,10 @@ class Tables(NamedTuple):
     Attributes
     ----------
     observables : observable of each surface
-    bounds : whether a surface bounds a mode, shape (modes, surfaces)
+    bounds : whether a surface bounds a mode, shape (modes, surfaces); 2 if it has a reset
     following : mode after (mode, surface, signs of the other surfaces as bits); -1 if there is none
-    sliding : whether a mode slides on a surface
+    sliding : whether a mode slides on a surface; 2 if it may do so for long, without excitation
     lies_on : surfaces that a mode moves on, as bits
-    resets : whether a surface has a reset
-    longest : units of time (periods of the excitation) after which a mode is never left
     """
 
     observables: IntArray
@@ -50,8 +48,6 @@ class Tables(NamedTuple):
     following: IntArray
     sliding: IntArray
     lies_on: IntArray
-    resets: IntArray
-    longest: FloatArray
 
 
 class EventRows(NamedTuple):
@@ -121,11 +117,6 @@ class Trajectory:
         return tuple((modes[m], surfaces[k]) for m, k in zip(self.modes, self.exits, strict=True))
 
 
-#: A sliding mode that is not left within this many periods of the excitation is never left; a slide, and
-#: any mode of an autonomous model, gets far more (periods, or units of time).
-HOLD_PERIODS, SLIDE_PERIODS = 1.001, 1e4
-
-
 @cache
 def tables(model: Model) -> Tables:
     """Return the transition tables of a model."""
@@ -135,7 +126,7 @@ def tables(model: Model) -> Tables:
     bounds = np.zeros((len(modes), len(surfaces)), dtype=np.int64)
     for mode, names in mode_bounds(model).items():
         for name in names:
-            bounds[modes.index(mode), surfaces.index(name)] = 1
+            bounds[modes.index(mode), surfaces.index(name)] = 1 + (name in model.reset_by_surface)
     codes = 1 << len(surfaces)
     following = np.full(len(modes) * len(surfaces) * codes, -1, dtype=np.int64)
     for (name, surface), target in model.transitions.items():
@@ -160,15 +151,10 @@ def tables(model: Model) -> Tables:
         np.array([observables.index(s.observable) for s in model.surfaces], dtype=np.int64),
         bounds,
         following,
-        np.array([int(m.sliding) for m in model.modes], dtype=np.int64),
-        np.array([_surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
-        np.array([int(s.name in model.reset_by_surface) for s in model.surfaces], dtype=np.int64),
         np.array(
-            [
-                HOLD_PERIODS if m.sliding and not model.autonomous else SLIDE_PERIODS
-                for m in model.modes
-            ]
+            [int(m.sliding) * (1 + int(model.autonomous)) for m in model.modes], dtype=np.int64
         ),
+        np.array([_surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
     )
 
 

@@ -35,6 +35,10 @@ from contfric.signature.holds import is_hold, mirror_exit
 IntArray = NDArray[np.int64]
 
 
+#: In the array of departures: a segment that begins as any, and one that begins on its exit surface.
+PLAIN, RETURNS = -1, -2
+
+
 class Layout(NamedTuple):
     """A boundary-value problem as arrays, as the compiled engine takes it.
 
@@ -44,18 +48,18 @@ class Layout(NamedTuple):
     observables : observable of each surface, shape (surfaces,)
     exit_signs : sign of the rate at which each exit is met (a hold is left), shape (N,); 0 if tangential
     interior : rows (segment, surface, sign) of the interior margins
-    joint : rows (segment, surface, sign) of the joint margins, at the segment's end
+    joint : rows (segment, surface, sign, 0) of the joint margins, at the segment's end, and of the entry
+        margins, at its beginning (1)
     labels : rows (segment, observable, surfaces that the segment starts and ends on, or -1)
     pins : surface that each hold starts on, shape (N,); -2 after a touch, -1 where there is no hold
-    departs : mode in which each hold is left, shape (N,); -1 where there is none
+    departs : mode in which each hold is left, shape (N,). Where there is no hold it says how the segment
+        begins: PLAIN, or as far below that as bit 0 if it begins on its exit surface (RETURNS), so that it
+        may shrink to nothing, and above it the surface of the reset that it begins behind, plus one
     lasting : holds that must last: those after a stick, shape (k,)
     held : all holds, which could be left at any time, shape (k,)
     closure : state matrix of the closure, shape (n, n)
     turn : duration of one turn in periods of the excitation; 0 of an autonomous model
     rank : number of independent directions that survive one turn
-    entries : surface of the reset that each segment begins behind, shape (N,); -1 where there is none
-    after : rows (segment, surface, sign) of the entry margins
-    returns : whether each segment begins on its exit surface, and so may shrink to nothing, shape (N,)
     """
 
     modes: IntArray
@@ -72,9 +76,6 @@ class Layout(NamedTuple):
     closure: FloatArray
     turn: float
     rank: int
-    entries: IntArray
-    after: IntArray
-    returns: IntArray
 
 
 class Margin(str, Enum):
@@ -190,14 +191,9 @@ def build_system(
         _segment_domains(model, mode, exit_, _leads_to(i, after, holds), domains[i : i + 1])
         for i, ((mode, exit_), after) in enumerate(zip(word, following, strict=True))
     ]
-    interior, joint, tests = _margins(model, word, inside, bool(domains), holds)
     entered = [first_entry(model, word, half), *(exit_ for _, exit_ in word[:-1])]
-    modes = [mode for mode, _ in word]
-    before = [mirror_mode(model)[modes[-1]] if half else modes[-1], *modes[:-1]]
-    after = _entry_rows(model, word, entered, domains)
-    behind = len(tests) - len(held_tests(holds))
-    entries = tuple(Test(Margin.ENTRY, i, surfaces[k]) for i, k, _ in after)
-    tests = (*tests[:behind], *entries, *tests[behind:])
+    entries = _entry_rows(model, word, entered, domains)
+    interior, joint, tests = _margins(model, word, inside, bool(domains), holds, entries)
     exits = [_exit_surface(i, exit_, holds) for i, (_, exit_) in enumerate(word)]
     held = {hold.segment: hold for hold in holds}
     symmetry = model.symmetry
@@ -213,25 +209,13 @@ def build_system(
         joint=joint,
         labels=_label_rows(model, word, half, bool(domains), holds),
         pins=np.array([_pin(held.get(i), surfaces) for i in range(len(word))], dtype=np.int64),
-        departs=np.array(
-            [names.index(held[i].departs) if i in held else -1 for i in range(len(word))],
-            dtype=np.int64,
-        ),
+        departs=_departs(model, word, exits, entered, half, held),
         lasting=np.array([hold.segment for hold in holds if hold.after_rest], dtype=np.int64),
         held=np.array([hold.segment for hold in holds], dtype=np.int64),
         closure=symmetry.array() if half and symmetry else np.eye(n),
         turn=_turn(model, periods, half),
         # a shift in time is no disturbance of an autonomous orbit
         rank=min(model.mode_by_name[mode].rank for mode, _ in word) - int(model.autonomous),
-        entries=np.array(
-            [surfaces.index(s) if s in model.reset_by_surface else -1 for s in entered],
-            dtype=np.int64,
-        ),
-        after=after,
-        returns=np.array(
-            [_returns(model, *row) for row in zip(modes, before, exits, entered, strict=True)],
-            dtype=np.int64,
-        ),
     )
     return System(model, word, periods, half, layout, tests, domains, holds)
 
@@ -242,6 +226,28 @@ def first_entry(model: Model, word: Word, half: bool) -> str:
         return word[-1][1]
     inverse = {image: name for name, image in model.symmetry.surfaces.items()}
     return mirror_exit(word[-1][1], inverse)
+
+
+def _departs(
+    model: Model,
+    word: Word,
+    exits: list[str],
+    entered: list[str],
+    half: bool,
+    held: dict[int, Hold],
+) -> IntArray:
+    """How holds are left, and other segments begin, as a layout has it."""
+    names = [mode.name for mode in model.modes]
+    modes = [mode for mode, _ in word]
+    before = [mirror_mode(model)[modes[-1]] if half else modes[-1], *modes[:-1]]
+    resets = {
+        s.name: k + 1 for k, s in enumerate(model.surfaces) if s.name in model.reset_by_surface
+    }
+    rows = zip(modes, before, exits, entered, strict=True)
+    found = [PLAIN - 2 * resets.get(row[3], 0) - _returns(model, *row) for row in rows]
+    for i, hold in held.items():
+        found[i] = names.index(hold.departs)
+    return np.array(found, dtype=np.int64)
 
 
 def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> int:
@@ -258,7 +264,9 @@ def _turn(model: Model, periods: int, half: bool) -> float:
     return float(periods * (model.symmetry.fraction if half and model.symmetry else 1.0))
 
 
-def _entry_rows(model: Model, word: Word, entered: list[str], domains: tuple[str, ...]) -> IntArray:
+def _entry_rows(
+    model: Model, word: Word, entered: list[str], domains: tuple[str, ...]
+) -> list[tuple[int, ...]]:
     """Rows of the entry margins: surfaces that a reset may lead across, and that bound the mode behind it."""
     rows: list[tuple[int, ...]] = []
     for i, surface in enumerate(entered):
@@ -271,16 +279,8 @@ def _entry_rows(model: Model, word: Word, entered: list[str], domains: tuple[str
                 for d in (domains[i : i + 1] or mode_domains(model, word[i][0]))
             }
             if model.changed_by(reset, other.name) and len(signs) == 1:
-                rows.append((i, k, signs.pop()))
-    return _rows(rows)
-
-
-def held_tests(holds: tuple[Hold, ...]) -> tuple[Test, ...]:
-    """Return the tests of holds, which stand behind all others."""
-    return (
-        *(Test(Margin.LASTING, h.segment, h.leaves) for h in holds if h.after_rest),
-        *(Test(Margin.HELD, h.segment, h.leaves) for h in holds),
-    )
+                rows.append((i, k, signs.pop(), 1))
+    return rows
 
 
 def _mode_after(model: Model, word: Word, half: bool) -> str:
@@ -349,7 +349,12 @@ def _surface_observables(model: Model) -> IntArray:
 
 
 def _margins(
-    model: Model, word: Word, inside: list[list[str]], full: bool, holds: tuple[Hold, ...]
+    model: Model,
+    word: Word,
+    inside: list[list[str]],
+    full: bool,
+    holds: tuple[Hold, ...],
+    entries: list[tuple[int, ...]],
 ) -> tuple[IntArray, IntArray, tuple[Test, ...]]:
     names = [s.name for s in model.surfaces]
     interior: list[tuple[int, ...]] = []
@@ -369,17 +374,19 @@ def _margins(
             if surface == exit_ or pinned or len(signs) != 1:
                 continue
             if (sign := signs.pop()) != 0:
-                joint.append((i, names.index(surface), sign))
+                joint.append((i, names.index(surface), sign, 0))
     tests = (
         *(Test(Margin.INTERIOR, i, names[k]) for i, k, _ in interior),
         *(
             Test(Margin.EXIT, i, _exit_surface(i, exit_, holds))
             for i, (_, exit_) in enumerate(word)
         ),
-        *(Test(Margin.JOINT, i, names[k]) for i, k, _ in joint),
-        *held_tests(holds),
+        *(Test(Margin.JOINT, i, names[k]) for i, k, *_ in joint),
+        *(Test(Margin.ENTRY, i, names[k]) for i, k, *_ in entries),
+        *(Test(Margin.LASTING, h.segment, h.leaves) for h in holds if h.after_rest),
+        *(Test(Margin.HELD, h.segment, h.leaves) for h in holds),
     )
-    return _rows(interior), _rows(joint), tests
+    return _rows(interior), _rows([*joint, *entries], 4), tests
 
 
 def _rows(rows: list[tuple[int, ...]], width: int = 3) -> IntArray:

@@ -21,7 +21,7 @@ from contfric.orbit.simulation import EventRows, Tables
 from contfric.orbit.system import IntArray
 
 #: Types of the model's tables and of the rows of events, as kernels take them.
-TablesType = types.NamedTuple([indices, table, indices, indices, indices, indices, vector], Tables)
+TablesType = types.NamedTuple([indices, table, indices, indices, indices], Tables)
 RowsType = types.NamedTuple([table, indices, vector, matrix], EventRows)
 
 
@@ -37,6 +37,9 @@ class StateRoom(NamedTuple):
 
 #: How a simulation ended.
 ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE, QUIET, CHATTER = range(7)
+#: A sliding mode that is not left within this many periods of the excitation is never left; a slide, and
+#: any mode of an autonomous model, gets far more (periods, or units of time).
+HOLD_PERIODS, SLIDE_PERIODS = 1.001, 1e4
 
 #: Events within this share of a period follow each other at once; more of them in a row than this do
 #: not come to an end (a stop, a release and a reversal may fall together, twice).
@@ -111,7 +114,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
         left = (periods - (cycle - first_cycle)) * unit - (t - first_time)
         if period <= 0.0:
             left = periods - (t - first_time)
-        allowance = tables.longest[mode] * unit
+        allowance = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * unit
         tau, surface = first_hit(functions, tables, mode, on, t, y, p, min(left, allowance), room)
         if surface < 0:
             if left > allowance:
@@ -132,7 +135,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
         for j in range(y.shape[0]):
             if not abs(y[j]) < TOO_LARGE:
                 return INFINITE, event, mode, cycle, t
-        reset = tables.resets[surface] != 0
+        reset = tables.bounds[mode, surface] == 2
         if reset:  # rows keep the state before it, as the joints of orbits do
             copy_state(y, rows.states[event])
             functions[7](surface, t, rows.states[event], p, none, y, room.nothing)

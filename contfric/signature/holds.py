@@ -119,11 +119,15 @@ def mode_of(model: Model, segments: Sequence[str], index: int) -> str:
     before = model.domain_by_name[segments[index - 1]].mode
     if model.mode_by_name[before].sliding:
         return before
-    for (source, _), target in model.transitions.items():
-        mode = model.domain_by_name[target].mode
-        if model.domain_by_name[source].mode == before and model.mode_by_name[mode].sliding:
-            return mode
-    return before
+    rests = [
+        mode
+        for (source, _), target in model.transitions.items()
+        if model.mode_by_name[mode := model.domain_by_name[target].mode].sliding
+        and model.domain_by_name[source].mode == before
+    ]
+    surface = pinned_surface(segments[index])
+    bounded = [m for m in rests if surface is not None and release_mode(model, m, surface)]
+    return next(iter([*bounded, *rests]), before)
 
 
 def surface_into(model: Model, segments: Sequence[str], index: int) -> str | None:
