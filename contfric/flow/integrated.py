@@ -115,7 +115,7 @@ def integrated_motion(
         attempt=attempt,
         probe=probe,
         stages=stages,
-        looseness=(float(relative) / 1e-12) ** (1.0 / POWER),
+        looseness=(max(relative, absolute) / 1e-12) ** (1.0 / POWER),
     )
 
 
