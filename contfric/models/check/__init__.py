@@ -6,22 +6,17 @@ they prove nothing; but a formula that is wrong is wrong almost everywhere.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contfric.models.check.report import Finding, ModelReport, Severity, Topic
 
 if TYPE_CHECKING:
-    from contfric.models.definition import Model
-    from contfric.models.oscillator import OscillatorModel
+    from contfric.models import ModelSource
 
 __all__ = ["Finding", "ModelReport", "Severity", "Topic", "check_model"]
 
 
-def check_model(
-    model: str | Path | Model | type[OscillatorModel] | OscillatorModel,
-    params: dict[str, float] | None = None,
-) -> ModelReport:
+def check_model(model: ModelSource, params: dict[str, float] | None = None) -> ModelReport:
     """Verify a model: derivatives, surfaces, transitions, sliding modes, symmetry, period, constraints.
 
     Parameters
