@@ -43,10 +43,12 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     """
     from contfric.models import load_model
     from contfric.models.check.derivatives import check_derivatives
+    from contfric.models.check.kinks import check_kinks
     from contfric.models.check.names import check_constraints, check_names
     from contfric.models.check.probe import Probe
     from contfric.models.check.structure import (
         check_period,
+        check_resets,
         check_sliding,
         check_surfaces,
         check_symmetry,
@@ -62,6 +64,8 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_derivatives(report, probe)
     check_surfaces(report, probe)
     check_transitions(report, probe)
+    check_resets(report, probe)
+    check_kinks(report, loaded)
     check_sliding(report, probe)
     check_symmetry(report, probe)
     check_period(report, probe)
