@@ -174,6 +174,9 @@ class Model:
     autonomous : bool
         Whether there is no excitation: the flow's ``period`` returns 0, the period of an orbit is found
         with it, and ``periods`` of a simulation are units of time.
+    filippov : bool
+        Whether rest is left without acceleration everywhere (static and kinetic limit agree), so that the
+        flow never jumps: slides may then shrink to nothing, and are solved for accordingly.
     definition : str
         Text from which the model can be built anywhere (:mod:`contfric.models.description`); empty if
         it is known by its name only.
@@ -196,6 +199,7 @@ class Model:
     references: tuple[str, ...] = ()
     resets: tuple[Reset, ...] = ()
     autonomous: bool = False
+    filippov: bool = False
     definition: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:

@@ -267,7 +267,10 @@ class Orbit:
     def _slack(self) -> FloatArray:
         """A joint may touch a surface to rounding (at an event), and a hold its limits; nothing else may."""
         held = {hold.segment for hold in self.system.holds}
-        may = [t.margin is Margin.JOINT or t.segment in held for t in self.system.tests]
+        may = [
+            t.margin in (Margin.JOINT, Margin.LASTING) or t.segment in held
+            for t in self.system.tests
+        ]
         return np.where(np.array(may), -1e-9, 0.0)
 
     def violations(self) -> list[str]:

@@ -13,7 +13,7 @@ Crossings of transparent surfaces inside a segment do not matter to the motion; 
 
 A hold (:mod:`contfric.orbit.holds`) has a pin at its start in the place of the exit surface. Its exit
 margin is the acceleration with which it is left, which must not be negative anywhere on the way (HELD);
-one that follows a stick must last (LASTING).
+one that follows a stick must last, and so must that stick, whose end is tangential (LASTING).
 
 Everything here derives from the model's definition; nothing knows what moves.
 """
@@ -55,7 +55,7 @@ class Layout(NamedTuple):
     departs : mode in which each hold is left, shape (N,). Where there is no hold it says how the segment
         begins: PLAIN, or as far below that as bit 0 if it begins on its exit surface (RETURNS), so that it
         may shrink to nothing, and above it the surface of the reset that it begins behind, plus one
-    lasting : holds that must last: those after a stick, shape (k,)
+    lasting : segments that must last: holds after a stick, and that stick, shape (k,)
     held : all holds, which could be left at any time, shape (k,)
     closure : state matrix of the closure, shape (n, n)
     turn : duration of one turn in periods of the excitation; 0 of an autonomous model
@@ -210,7 +210,7 @@ def build_system(
         labels=_label_rows(model, word, half, bool(domains), holds),
         pins=np.array([_pin(held.get(i), surfaces) for i in range(len(word))], dtype=np.int64),
         departs=_departs(model, word, exits, entered, half, held),
-        lasting=np.array([hold.segment for hold in holds if hold.after_rest], dtype=np.int64),
+        lasting=np.array([i for i, _ in _lasting(word, holds)], dtype=np.int64),
         held=np.array([hold.segment for hold in holds], dtype=np.int64),
         closure=symmetry.array() if half and symmetry else np.eye(n),
         turn=_turn(model, periods, half),
@@ -253,6 +253,11 @@ def _departs(
 def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> int:
     """Tell whether a segment begins on the surface that it ends on: it came there, or rested on it."""
     if model.mode_by_name[mode].sliding:
+        return 0
+    if is_hold(entered):
+        return 1
+    rest = any(domain.signs[exit_] == 0 for domain in model.domains)
+    if rest and not model.filippov:  # rest is left, and a stop reversed, with an acceleration
         return 0
     rested = model.domain_by_name[mode_domains(model, before)[0]].signs[exit_] == 0
     return int(exit_ == entered or rested)
@@ -383,10 +388,24 @@ def _margins(
         ),
         *(Test(Margin.JOINT, i, names[k]) for i, k, *_ in joint),
         *(Test(Margin.ENTRY, i, names[k]) for i, k, *_ in entries),
-        *(Test(Margin.LASTING, h.segment, h.leaves) for h in holds if h.after_rest),
+        *(Test(Margin.LASTING, i, surface) for i, surface in _lasting(word, holds)),
         *(Test(Margin.HELD, h.segment, h.leaves) for h in holds),
     )
     return _rows(interior), _rows([*joint, *entries], 4), tests
+
+
+def _lasting(word: Word, holds: tuple[Hold, ...]) -> list[tuple[int, str]]:
+    """Segments that no other margin keeps from shrinking through zero, each with the surface that it ends on.
+
+    A hold after a touch of its limit, and the stick up to that touch: where it shrinks to nothing, the
+    margin of the stop before it has a double zero.
+    """
+    return [
+        pair
+        for hold in holds
+        if hold.after_rest
+        for pair in ((hold.segment - 1, word[hold.segment - 1][1]), (hold.segment, hold.leaves))
+    ]
 
 
 def _rows(rows: list[tuple[int, ...]], width: int = 3) -> IntArray:
