@@ -28,7 +28,9 @@ def departing_side(
     # 12 states: what a single one says may be an accident of the region's edge
     for t, y in sampler.on(surface, sides, 12):
         away = [
-            side for side, mode in beside.items() if side * sampler.rate(mode, surface, t, y) > 0.0
+            side
+            for side, mode in beside.items()
+            if side * sampler.rate(mode, surface, side, t, y) > 0.0
         ]
         verdicts.add(away[0] if len(away) == 1 else 0)
     return verdicts.pop() if len(verdicts) == 1 else 0
@@ -73,7 +75,7 @@ def _left_at_rest(
             rest = {k: v for k, v in domain.signs.items() if k not in (on, limit)}
             if other.sides(*place, rest) != rest or not beside:
                 continue
-            rates = [other.rate(d.mode, on, *place) for d in beside]
+            rates = [other.rate(d.mode, on, d.signs[on], *place) for d in beside]
             found.add(min(abs(rate) for rate in rates) <= _STILL)
             places += 1
             if places == _PLACES:
