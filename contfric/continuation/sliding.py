@@ -84,15 +84,8 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
     """
     tests = here.system.tests
     test = tests[first]
-    if test.margin is Margin.ENTRY:  # an impact without speed: it is grazed
-        grazed = [
-            k
-            for k, other in enumerate(tests)
-            if other.margin is Margin.EXIT
-            and other.segment == (test.segment - 1) % here.system.segments
-            and abs(point.tests[k]) < _NEARLY_REACHED
-        ]
-        return grazed[0] if grazed else first
+    if test.margin in (Margin.ENTRY, Margin.JOINT):
+        return _grazed_wall(here, point, first)
     if test.margin is not Margin.EXIT or hold_of_test(test, here) is not None:
         return first
     i = test.segment
@@ -108,6 +101,21 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
         and abs(point.tests[k]) < _NEARLY_REACHED
     ]
     return at_stop[0] if at_stop else first
+
+
+def _grazed_wall(here: Orbit, point: Point, first: int) -> int:
+    """Return the margin of an impact that has no speed any more, if its own speed is what vanishes first."""
+    tests = here.system.tests
+    met = tests[first].segment - (tests[first].margin is Margin.ENTRY)
+    for k, other in enumerate(tests):
+        if (
+            other.margin is Margin.EXIT
+            and other.segment == met % here.system.segments
+            and other.surface in here.model.reset_by_surface
+            and abs(point.tests[k]) < _NEARLY_REACHED
+        ):
+            return k
+    return first
 
 
 def _located_before(

@@ -176,7 +176,7 @@ def test_signature_names_the_impact() -> None:
     again = parse_signature(str(signature), impact, periods=orbit().periods)
     assert again == signature and again.impacts == 1
     found = cf.solve_orbit(impact, again, PARAMS)
-    assert found.joints == pytest.approx(orbit().joints, abs=1e-9) or found.word == orbit().word
+    assert np.sort(found.stops) == pytest.approx(np.sort(orbit().stops), abs=1e-9)
     with pytest.raises(cf.errors.NotationError, match="impact@wall"):
         parse_signature("up -> impact@floor -> down", impact)
 
