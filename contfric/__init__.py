@@ -37,12 +37,15 @@ if TYPE_CHECKING:
         AperiodicError,
         ContfricError,
         ConvergenceError,
+        ModelError,
         NotationError,
         ParameterError,
         ResultFileError,
         StudyError,
     )
     from contfric.models import Model, load_model, model_names
+    from contfric.models.check import ModelReport, check_model
+    from contfric.models.oscillator import OscillatorModel
     from contfric.orbit.find import find_orbit
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.simulation import simulate
@@ -67,9 +70,12 @@ _HOMES = {
     "LyapunovExponents": "contfric.chaos.exponents",
     "LyapunovMap": "contfric.chaos.map",
     "Model": "contfric.models",
+    "ModelError": "contfric.errors",
+    "ModelReport": "contfric.models.check",
     "Motion": "contfric.chaos.status",
     "NotationError": "contfric.errors",
     "Orbit": "contfric.orbit.orbit",
+    "OscillatorModel": "contfric.models.oscillator",
     "Plane": "contfric.atlas.plane",
     "ParameterError": "contfric.errors",
     "ResultFileError": "contfric.errors",
@@ -78,6 +84,7 @@ _HOMES = {
     "Signature": "contfric.signature",
     "StudyError": "contfric.errors",
     "census": "contfric.atlas.census",
+    "check_model": "contfric.models.check",
     "continue_bifurcation": "contfric.curves.trace",
     "continue_orbit": "contfric.continuation.trace",
     "explore": "contfric.atlas.explore",
@@ -113,9 +120,12 @@ __all__ = [
     "LyapunovExponents",
     "LyapunovMap",
     "Model",
+    "ModelError",
+    "ModelReport",
     "Motion",
     "NotationError",
     "Orbit",
+    "OscillatorModel",
     "ParameterError",
     "Plane",
     "ResultFileError",
@@ -125,6 +135,7 @@ __all__ = [
     "Window",
     "__version__",
     "census",
+    "check_model",
     "continue_bifurcation",
     "continue_orbit",
     "explore",

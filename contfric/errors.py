@@ -14,6 +14,10 @@ class ParameterError(ContfricError):
     """A parameter is unknown, missing, not finite, or outside of the model's domain of validity."""
 
 
+class ModelError(ParameterError):
+    """A user's model cannot be read or built: the message says where and what would be valid."""
+
+
 class NotationError(ContfricError):
     """A signature text, file or segment list cannot be read, or is no closed walk."""
 

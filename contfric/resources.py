@@ -8,10 +8,11 @@ from typing import Literal, TypeAlias, get_args
 from contfric.errors import ContfricError, did_you_mean
 
 #: Kinds of files that ship with contfric.
-Kind: TypeAlias = Literal["signatures", "studies"]
+Kind: TypeAlias = Literal["models", "signatures", "studies"]
 
 _PACKAGE = Path(__file__).resolve().parent
 _PLACES: dict[str, tuple[Path, Path]] = {
+    "models": (_PACKAGE / "_data" / "models", _PACKAGE.parent / "models"),
     "signatures": (_PACKAGE / "_data" / "signatures", _PACKAGE.parent / "signatures"),
     "studies": (_PACKAGE / "_data" / "studies", _PACKAGE.parent / "docs" / "studies"),
 }
@@ -22,7 +23,7 @@ def bundled_dir(kind: Kind) -> Path:
 
     Parameters
     ----------
-    kind : {"signatures", "studies"}
+    kind : {"models", "signatures", "studies"}
         Which files.
 
     Raises

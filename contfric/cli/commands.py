@@ -160,6 +160,16 @@ def check_signatures(options: argparse.Namespace) -> int:
 # ------------------------------------------------------------------------ graph, simulation
 
 
+def check(options: argparse.Namespace) -> int:
+    """``contfric check MODEL``: what would make its results wrong; warnings do not fail it."""
+    from contfric.models.check import check_model
+
+    params = dict(_assignment(text) for text in options.params)
+    report = check_model(options.model, params or None)
+    print(json.dumps(report.to_dict(), indent=2) if options.json else report)
+    return Exit.DONE if report.ok else Exit.BAD_INPUT
+
+
 def graph(options: argparse.Namespace) -> int:
     """``contfric graph``."""
     from contfric.models import load_model

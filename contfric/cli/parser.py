@@ -11,7 +11,7 @@ from contfric.cli import commands
 from contfric.errors import ContfricError, did_you_mean
 from contfric.models import DEFAULT_MODEL
 
-_COMMANDS = ("run", "explain", "info", "signatures", "graph", "simulate", "census")
+_COMMANDS = ("run", "explain", "info", "signatures", "check", "graph", "simulate", "census")
 _DEBUG = "show the traceback of an error"
 
 
@@ -81,6 +81,7 @@ def _parser() -> _Parser:
     _fill_explain(add("explain", commands.explain, "print the plan of a study; compute nothing"))
     _fill_info(add("info", commands.info, "print what a run folder holds"))
     _fill_signatures(add("signatures", commands.list_signatures, "list, show or check signatures"))
+    _fill_check(add("check", commands.check, "verify a model: derivatives, transitions, symmetry"))
     _fill_graph(add("graph", commands.graph, "print or draw the transitions of a model"))
     _fill_simulate(add("simulate", commands.simulate, "print the events of a trajectory as CSV"))
     _fill_census(add("census", commands.census, "list all periodic orbits, stable or not"))
@@ -131,14 +132,30 @@ def _fill_signatures(parser: argparse.ArgumentParser) -> None:
     checking.add_argument("files", metavar="FILE", nargs="+", type=Path)
 
 
+def _fill_check(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("model", metavar="MODEL", help="the name of a model, or the path of its YAML file")
+    add(
+        *("-p", "--param"),
+        dest="params",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="check it at this value of a parameter",
+    )
+    add("--json", action="store_true", help="print everything as JSON")
+
+
 def _fill_graph(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--model", default=DEFAULT_MODEL, help="name of the model (%(default)s)")
+    parser.add_argument(
+        "--model", default=DEFAULT_MODEL, help="name or YAML file of the model (%(default)s)"
+    )
     parser.add_argument("--out", metavar="FILE", type=Path, help="draw it: .png, .svg or .pdf")
 
 
 def _fill_simulate(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--model", default=DEFAULT_MODEL, help="name of the model (%(default)s)")
+    add("--model", default=DEFAULT_MODEL, help="name or YAML file of the model (%(default)s)")
     add("-p", dest="params", metavar="NAME=VALUE", action="append", default=[], help="a parameter")
     add("--state", metavar="X,V", help="initial state, numbers joined by commas")
     add("--time", type=_number, default=0.0, help="initial time (%(default)s)")

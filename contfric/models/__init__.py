@@ -1,30 +1,57 @@
-"""Models by name: bundled ones and those of installed packages (entry point ``contfric.models``)."""
+"""Models by name, by file or by class: bundled ones, those of installed packages, and the user's.
+
+A package offers models by the entry point group ``contfric.models``; an entry is a
+:class:`~contfric.models.definition.Model`, a class of :class:`~contfric.models.oscillator.OscillatorModel`,
+the path of a YAML file, the path of a folder of such files, or a function that returns one of these.
+"""
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 
-from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import Model
 
-__all__ = ["DEFAULT_MODEL", "Model", "load_model", "model_names"]
+if TYPE_CHECKING:
+    from contfric.models.oscillator import OscillatorModel
+
+__all__ = ["DEFAULT_MODEL", "Model", "ModelSource", "load_model", "model_names"]
+
+#: What :func:`load_model`, and with it whatever takes a model, accepts.
+ModelSource: TypeAlias = "str | Path | Model | type[OscillatorModel] | OscillatorModel"
 
 #: The model of the command line where none is named.
 DEFAULT_MODEL = "coulomb"
 
 
 def model_names() -> list[str]:
-    """Return the names that :func:`load_model` knows."""
-    return ["coulomb", *sorted(e.name for e in entry_points(group="contfric.models"))]
+    """Return the names that :func:`load_model` knows.
+
+    Examples
+    --------
+    >>> "belt" in model_names()
+    True
+    """
+    from contfric.models.library import names
+
+    return names()
 
 
-def load_model(model: str | Model) -> Model:
-    """Return a model by its bundled name or entry point; a model is returned as it is.
+def load_model(model: ModelSource) -> Model:
+    """Return a model by its name, its YAML file or its class; a model is returned as it is.
+
+    Parameters
+    ----------
+    model : str, Path, Model or class
+        A bundled name, the name of an entry point, the path of a YAML file (a text that ends in
+        ``.yaml`` or ``.yml``, or has a folder in it), or a class that declares a model.
 
     Raises
     ------
     ParameterError
         If no model has that name.
+    ModelError
+        If the file or the class is wrong: where, what, and what would be valid.
 
     Examples
     --------
@@ -33,14 +60,6 @@ def load_model(model: str | Model) -> Model:
     """
     if isinstance(model, Model):
         return model
-    if model == "coulomb":
-        from contfric.models.coulomb import coulomb
+    from contfric.models.library import find
 
-        return coulomb
-    for entry in entry_points(group="contfric.models"):
-        if entry.name == model:
-            loaded = entry.load()
-            if not isinstance(loaded, Model):
-                raise ParameterError(f"entry point '{model}' is no contfric.models.Model")
-            return loaded
-    raise ParameterError(f"unknown model '{model}'{did_you_mean(str(model), model_names())}")
+    return find(model)

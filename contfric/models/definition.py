@@ -87,6 +87,9 @@ class Model:
     filippov : bool
         Whether rest is left without acceleration everywhere (static and kinetic limit agree), so that the
         flow never jumps: slides may then shrink to nothing, and are solved for accordingly.
+    definition : str
+        Text from which the model can be built anywhere (:mod:`contfric.models.description`); empty if
+        it is known by its name only.
     """
 
     name: str
@@ -107,6 +110,7 @@ class Model:
     resets: tuple[Reset, ...] = ()
     autonomous: bool = False
     filippov: bool = False
+    definition: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
         for reset in self.resets:

@@ -22,16 +22,17 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Constraint:
-    """A linear inequality ``sum(c * p) >= 0`` (``> 0`` if strict) that parameters must obey."""
+    """A linear inequality ``constant + sum(c * p) >= 0`` (``> 0`` if strict) that parameters obey."""
 
     text: str
     coefficients: Mapping[str, float]
     strict: bool = False
     meaning: str = ""
+    constant: float = 0.0
 
     def value(self, params: Mapping[str, float]) -> float:
         """Return the left-hand side of the inequality."""
-        return sum(c * params[name] for name, c in self.coefficients.items())
+        return self.constant + sum(c * params[name] for name, c in self.coefficients.items())
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from contfric.errors import ConvergenceError, ParameterError
-from contfric.models import load_model
-from contfric.models.definition import FloatArray, Model
+from contfric.models import ModelSource, load_model
+from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit, Status
@@ -55,7 +55,7 @@ def polish(orbit: Orbit, damped: bool = True) -> Orbit:
 
 
 def solve_orbit(
-    model: str | Model,
+    model: ModelSource,
     signature: str | Path | Signature,
     params: Mapping[str, float],
     *,

@@ -1,7 +1,8 @@
 """One file per result: an uncompressed npz of plain arrays, with a JSON header among them.
 
 Nothing in it is executed when it is read (no pickle). The header says what the file holds, the
-version of the format, and the name of the model, from which the equations are rebuilt.
+version of the format, and the name of the model, from which the equations are rebuilt; of a user's model
+it has the definition, too.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from contfric.atlas.plane import Plane
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
 from contfric.curves.curve import Curve
-from contfric.errors import ParameterError, ResultFileError
+from contfric.errors import ModelError, ParameterError, ResultFileError
 from contfric.files import replacing
 from contfric.models import load_model
 from contfric.models.definition import Model
@@ -68,6 +69,7 @@ def save(x: Saveable, path: str | Path) -> None:
         "mark": _MARK,
         "format": FORMAT,
         "model": x.model.name,
+        "definition": x.model.definition,
         "parameters": list(x.model.parameter_names),
         "states": list(x.model.states),
         "content": content,
@@ -173,10 +175,25 @@ def _damaged(path: Path, error: Exception) -> str:
     )
 
 
+def _model_of(header: Header) -> Model:
+    """Return the model of a file: from its own definition if it has one, else by its name."""
+    definition = header.get("definition")
+    if not definition:
+        return load_model(header["model"])
+    from contfric.models.files import model_of
+
+    return model_of(definition)
+
+
 def _owner(path: Path, header: Header, model: Model | None) -> Model:
     name = header["model"]
     try:
-        owner = load_model(name) if model is None else model
+        owner = _model_of(header) if model is None else model
+    except ModelError as error:
+        raise ResultFileError(
+            f"{path} holds a definition of its model '{name}' that this contfric cannot read: {error}. "
+            "Pass load(..., model=...), or run its study again"
+        ) from None
     except ParameterError as error:
         raise ResultFileError(
             f"{path} holds results of the model '{name}', which is not installed ({error}): "

@@ -13,7 +13,7 @@ from pathlib import Path
 from contfric.errors import NotationError, did_you_mean
 from contfric.models import Model
 from contfric.resources import bundled_dir
-from contfric.signature.yaml_lines import read_yaml
+from contfric.yaml_lines import read_yaml
 
 ENTRY_POINTS = "contfric.signatures"
 SUFFIXES = (".yaml", ".yml")

@@ -9,9 +9,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from contfric.errors import NotationError, ParameterError, did_you_mean
 from contfric.models import Model, load_model
+from contfric.models.files import is_path, relative_model
 from contfric.signature.library import SUFFIXES, signature_path
 from contfric.signature.notation import Signature, split_segments, walk_fault
-from contfric.signature.yaml_lines import Address, LocatedYaml, read_yaml
+from contfric.yaml_lines import Address, LocatedYaml, read_yaml
 
 SignatureLike: TypeAlias = str | Path | Signature
 
@@ -116,10 +117,13 @@ def _same_model(signature: Signature, model: str | Model | None) -> Signature:
 def _owner(located: LocatedYaml, name: str, model: str | Model | None) -> Model:
     """Return the model of a file; it must be the wanted one."""
     wanted = model.name if isinstance(model, Model) else model
-    if wanted not in (None, name):
-        located.fail(("model",), f"the signature is of model '{name}', not of '{wanted}'")
     try:
-        return model if isinstance(model, Model) else load_model(name)
+        # a path is meant from the folder of the signature's file
+        found = load_model(relative_model(name, located.path)) if is_path(name) else None
+        declared = found.name if found else name
+        if wanted not in (None, declared):
+            located.fail(("model",), f"the signature is of model '{declared}', not of '{wanted}'")
+        return model if isinstance(model, Model) else found or load_model(name)
     except ParameterError as error:
         located.fail(("model",), str(error))
 

@@ -10,7 +10,7 @@ from contfric.errors import did_you_mean
 from contfric.study.schema import Figure, FigureKind, Format, Row, StudyFile
 
 if TYPE_CHECKING:
-    from contfric.signature.yaml_lines import LocatedYaml
+    from contfric.yaml_lines import LocatedYaml
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from contfric.study.schema import (
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-    from contfric.signature.yaml_lines import Address, LocatedYaml
+    from contfric.yaml_lines import Address, LocatedYaml
 
 #: Keys below which a part of its own stands.
 _PARTS: dict[str, type[BaseModel]] = {

@@ -17,13 +17,14 @@ from contfric.errors import (
 )
 from contfric.models import load_model
 from contfric.models.definition import Model
+from contfric.models.files import relative_model
 from contfric.orbit.orbit import Orbit
 from contfric.signature import Signature, load_signature
-from contfric.signature.yaml_lines import LocatedYaml, read_yaml
 from contfric.study.drawings import Drawing, drawings_of
 from contfric.study.explain_error import fail_with
 from contfric.study.library import SUFFIXES, study_path
 from contfric.study.schema import ContinueTask, ExploreTask, StudyFile, Want
+from contfric.yaml_lines import LocatedYaml, read_yaml
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +119,7 @@ def _validated(located: LocatedYaml) -> StudyFile:
 
 def _checked(located: LocatedYaml, content: StudyFile) -> Study:
     try:
-        model = load_model(content.model)
+        model = load_model(relative_model(content.model, located.path))
     except ParameterError as error:
         located.fail(("model",), str(error))
     params = _params(located, content, model)

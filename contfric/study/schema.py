@@ -243,7 +243,7 @@ class StudyFile(_Part):
     """
 
     title: str | None = Field(None, description="a text")
-    model: str = Field(description="the name of a model")
+    model: str = Field(description="the name of a model, or the path of its YAML file")
     params: dict[str, float] = Field({}, description="a mapping of parameters to finite numbers")
     start: Start = Field(
         Start(simulate=Simulated()),

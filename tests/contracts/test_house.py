@@ -17,7 +17,10 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 MAX_LINES = 400
 
 #: Loaded by those functions that need them, never by `import contfric`.
-HEAVY = ("matplotlib", "networkx", "numba", "pandas", "pydantic", "scipy.optimize", "yaml")
+HEAVY = (
+    *("matplotlib", "mpmath", "networkx", "numba", "pandas", "pydantic", "scipy.optimize"),
+    *("sympy", "yaml"),
+)
 
 
 def run_python(*args: str) -> subprocess.CompletedProcess[str]:

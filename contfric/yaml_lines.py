@@ -78,6 +78,19 @@ def _text(path: Path) -> str:
         raise NotationError(f"{path}:1: is no UTF-8 text: {error.reason}") from None
 
 
+def comma_hint(key: str) -> str:
+    """Return an explanation of a key that is half of an expression: ``{x: max(a, b)}``.
+
+    Examples
+    --------
+    >>> comma_hint("b)")
+    '; inside { } an expression with a comma needs quotes: {x: "max(a, b)"}'
+    """
+    if key.count(")") <= key.count("("):
+        return ""
+    return '; inside { } an expression with a comma needs quotes: {x: "max(a, b)"}'
+
+
 def _locate(located: LocatedYaml, node: yaml.Node, address: Address) -> None:
     """Enter the lines of everything below a node; duplicate keys are an error."""
     import yaml
@@ -91,7 +104,10 @@ def _locate(located: LocatedYaml, node: yaml.Node, address: Address) -> None:
             if below in located.lines:
                 first = located.lines[below]
                 located.lines[below] = key.start_mark.line + 1
-                located.fail(below, f"key '{key.value}' is given twice (first in line {first})")
+                hint = comma_hint(str(key.value))
+                located.fail(
+                    below, f"key '{key.value}' is given twice (first in line {first}){hint}"
+                )
             located.lines[below] = key.start_mark.line + 1
             _locate(located, value, below)
     elif isinstance(node, yaml.SequenceNode):

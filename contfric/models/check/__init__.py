@@ -1,0 +1,72 @@
+"""Checks of a model: what would make its results wrong, in words that say what to do.
+
+The checks look at sampled states (in twice the region that starts are drawn from, at the defaults), so that
+they prove nothing; but a formula that is wrong is wrong almost everywhere.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from contfric.models.check.report import Finding, ModelReport, Severity, Topic
+
+if TYPE_CHECKING:
+    from contfric.models import ModelSource
+
+__all__ = ["Finding", "ModelReport", "Severity", "Topic", "check_model"]
+
+
+def check_model(model: ModelSource, params: dict[str, float] | None = None) -> ModelReport:
+    """Verify a model: derivatives, surfaces, transitions, sliding modes, symmetry, period, constraints.
+
+    Parameters
+    ----------
+    model : str, Path, Model or class
+        As for :func:`contfric.load_model`.
+    params : mapping, optional
+        Parameters at which it is checked; defaults fill in.
+
+    Returns
+    -------
+    ModelReport
+        ``report.ok``, ``report.findings``; ``print(report)`` says it in words.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be loaded at all.
+
+    Examples
+    --------
+    >>> check_model("belt").ok
+    True
+    """
+    from contfric.models import load_model
+    from contfric.models.check.derivatives import check_derivatives
+    from contfric.models.check.kinks import check_kinks
+    from contfric.models.check.names import check_constraints, check_names
+    from contfric.models.check.probe import Probe
+    from contfric.models.check.structure import (
+        check_period,
+        check_resets,
+        check_sliding,
+        check_surfaces,
+        check_symmetry,
+        check_transitions,
+    )
+
+    loaded = load_model(model)
+    report = ModelReport(loaded.name)
+    check_names(report, loaded)
+    if params is None and not check_constraints(report, loaded):
+        return report  # at such parameters nothing else means anything
+    probe = Probe(loaded, params or {})
+    check_derivatives(report, probe)
+    check_surfaces(report, probe)
+    check_transitions(report, probe)
+    check_resets(report, probe)
+    check_kinks(report, loaded)
+    check_sliding(report, probe)
+    check_symmetry(report, probe)
+    check_period(report, probe)
+    return report

@@ -1,0 +1,72 @@
+"""Parameters that nothing depends on, states that nothing moves, and defaults outside of the constraints."""
+
+from __future__ import annotations
+
+from contfric.models.check.report import ModelReport, Topic
+from contfric.models.definition import Model
+from contfric.models.describe import from_text
+from contfric.models.grammar import parse
+
+
+def check_constraints(report: ModelReport, model: Model) -> bool:
+    """Check that the defaults obey the model's own constraints; return whether they do."""
+    for constraint in model.constraints:
+        report.count(Topic.CONSTRAINTS)
+        left = constraint.value(model.defaults)
+        if left < 0.0 or (constraint.strict and left == 0.0):
+            shown = ", ".join(f"{n} = {model.defaults[n]!r}" for n in constraint.coefficients)
+            report.error(
+                Topic.CONSTRAINTS,
+                f"the defaults violate {constraint.text} ({shown}): change one of them, or the "
+                "constraint",
+            )
+    return not any(f.topic is Topic.CONSTRAINTS for f in report.findings)
+
+
+def check_names(report: ModelReport, model: Model) -> None:
+    """Check that every parameter changes something, and that every state is moved."""
+    if not model.definition:
+        return
+    description = from_text(model.definition)
+    names, used = description.names, set[str]()
+    dynamics = [rate for mode in description.modes for rate in mode.field]
+    events = [o.formula for o in description.observables] + [s.level for s in description.surfaces]
+    resets = [text for texts in description.resets.values() for text in texts.values()]
+    for text in (*dynamics, *events, *resets, description.period or "0"):
+        used |= names.leaves(parse(text), ())
+    for name in names.parameters:
+        report.count(Topic.NAMES)
+        if name not in used:
+            report.warn(Topic.NAMES, f"parameter '{name}' is used nowhere: leave it out")
+    for text, tree in description.define:
+        report.count(Topic.NAMES)
+        if not _mentions(description.data(), text):
+            report.warn(Topic.NAMES, f"'{text}: {tree}' of 'define' is used nowhere: leave it out")
+    for index, state in enumerate(names.states):
+        report.count(Topic.NAMES)
+        rates = [mode.field[index].strip() for mode in description.modes]
+        moved = any(rate not in ("0", "0.0") for rate in rates)
+        if not moved and not any(state in texts for texts in description.resets.values()):
+            report.warn(
+                Topic.NAMES,
+                f"state '{state}' never changes (its rate is 0 in every mode): make it a parameter",
+            )
+        elif state not in used:
+            report.warn(Topic.NAMES, f"nothing depends on state '{state}': leave it out")
+
+
+def _mentions(data: object, name: str) -> bool:
+    """Return whether any expression of a description, other than its own, has a name in it."""
+    from contfric.errors import ModelError
+    from contfric.models.grammar import names_in
+
+    if isinstance(data, dict):
+        return any(_mentions(v, name) for k, v in data.items() if k not in ("title", "references"))
+    if isinstance(data, list):
+        return any(_mentions(v, name) for v in data)
+    if not isinstance(data, str):
+        return False
+    try:
+        return name in names_in(parse(data))
+    except ModelError:
+        return False

@@ -1,0 +1,146 @@
+"""A model's compiled functions as plain Python functions, at one set of parameters."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from contfric.models.build import load_module
+from contfric.models.definition import FloatArray, Model
+
+#: Newton's method onto a surface: it converges in a few steps or not at all.
+_STEPS = 30
+#: On a surface: rounding of an observable of size 1.
+ON = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """Values and gradients at single states.
+
+    Gradients are by time, then by state; fields that are not generated come from the flow over no time.
+    """
+
+    model: Model
+    params: Mapping[str, float]
+    seed: int = 1
+
+    @cached_property
+    def vector(self) -> FloatArray:
+        """The parameters as the engine has them."""
+        return self.model.vector(self.params)
+
+    @cached_property
+    def _none(self) -> np.ndarray:
+        return np.empty(0, dtype=np.int64)
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Names of the observables."""
+        return [o.name for o in self.model.observables]
+
+    @cached_property
+    def period(self) -> float:
+        """Period of the excitation, 0 if there is none."""
+        return float(self.model.flow.period(self.vector, self._none, np.empty(0)))
+
+    def observable(self, name: str, t: float, y: FloatArray) -> float:
+        """Return the value of an observable."""
+        c = self.names.index(name)
+        return float(self.model.flow.observe(c, t, y, self.vector, self._none, np.empty(0)))
+
+    def level(self, surface: str) -> float:
+        """Return the level of a surface."""
+        k = [s.name for s in self.model.surfaces].index(surface)
+        return float(self.model.flow.level(k, self.vector, self._none, np.empty(0)))
+
+    def height(self, surface: str, t: float, y: FloatArray) -> float:
+        """Return (observable - level) of a surface."""
+        name = self.model.surface_by_name[surface].observable
+        return self.observable(name, t, y) - self.level(surface)
+
+    def slope(self, surface: str, t: float, y: FloatArray) -> FloatArray:
+        """Return the gradient of a surface's observable, shape (1 + n,)."""
+        c = self.names.index(self.model.surface_by_name[surface].observable)
+        grad = np.empty(1 + len(y))
+        self.model.flow.observe(c, t, y, self.vector, self._none, grad)
+        return grad
+
+    def rate(self, mode: str, surface: str, t: float, y: FloatArray) -> float:
+        """Return the rate of a surface's observable along a mode."""
+        c = self.names.index(self.model.surface_by_name[surface].observable)
+        m = [mode.name for mode in self.model.modes].index(mode)
+        return float(self.model.flow.rate(m, c, t, y, self.vector, self._none, np.empty(0)))
+
+    def field(self, mode: str, t: float, y: FloatArray) -> FloatArray:
+        """Return the rates of all states in a mode."""
+        m, n = [mode.name for mode in self.model.modes].index(mode), len(y)
+        if self.model.definition:  # without the flow, which takes much longer to compile
+            out, module = np.empty(n), load_module(self.model.definition)
+            module.field_of(m, t, y, self.vector, self._none, out, np.empty((0, 0)))
+            return out
+        state, jac = np.empty(n), np.empty((n, 2 + n))
+        self.model.flow.flow(m, t, y, 0.0, self.vector, self._none, state, jac)
+        return jac[:, 1 + n].copy()
+
+    def reset(self, surface: str, t: float, y: FloatArray) -> FloatArray:
+        """Return the state behind the reset at a surface."""
+        k = [s.name for s in self.model.surfaces].index(surface)
+        state = np.empty(len(y))
+        self.model.flow.reset(k, t, y, self.vector, self._none, state, np.empty((0, 0)))
+        return state
+
+    def states(self, count: int) -> Iterator[tuple[float, FloatArray]]:
+        """Yield times in one period and states in twice the region that starts are drawn from."""
+        draw = random.Random(self.seed)
+        widths = 2.0 * np.abs(self.model.spread(self.model.mapping(self.vector)))
+        for _ in range(count):
+            t = draw.uniform(0.0, self.period or 10.0)
+            yield t, np.array([draw.uniform(-w, w) for w in widths])
+
+    def on(self, surface: str, count: int) -> Iterator[tuple[float, FloatArray]]:
+        """Yield times and states on a surface."""
+        for t, y in self.states(count):
+            landed = self.landed((surface,), t, y)
+            if landed is not None:
+                yield landed
+
+    def inside(self, mode: str, t: float, y: FloatArray) -> tuple[float, FloatArray] | None:
+        """Return a state of a mode near a state: on the surfaces that it moves on; None if outside."""
+        domains = [d for d in self.model.domains if d.mode == mode]
+        on = tuple(name for name, side in domains[0].signs.items() if side == 0)
+        place = self.landed(on, t, y) if on else (t, y)
+        if place is None:
+            return None
+        signs = {**self.signs(*place), **dict.fromkeys(on, 0)}
+        return place if any(d.signs == signs for d in domains) else None
+
+    def landed(
+        self, surfaces: tuple[str, ...], t: float, y: FloatArray
+    ) -> tuple[float, FloatArray] | None:
+        """Return a time and state on some surfaces near others; the time moves only if it must."""
+        point = np.array([t, *y])
+        for _ in range(_STEPS):
+            above = np.array([self.height(s, point[0], point[1:]) for s in surfaces])
+            if np.all(np.abs(above) <= ON):
+                return float(point[0]), point[1:]
+            slopes = np.array([self.slope(s, point[0], point[1:]) for s in surfaces])
+            if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(above))):
+                return None
+            if np.linalg.matrix_rank(slopes[:, 1:]) == len(surfaces):
+                slopes[:, 0] = 0.0
+            point = point - np.linalg.lstsq(slopes, above, rcond=None)[0]
+        return None
+
+    def signs(self, t: float, y: FloatArray) -> dict[str, int]:
+        """Return the side of every surface that a state is on."""
+        found = {}
+        for surface in self.model.surfaces:
+            above = self.height(surface.name, t, y)
+            found[surface.name] = 0 if abs(above) <= ON else int(math.copysign(1, above))
+        return found

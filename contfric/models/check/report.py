@@ -1,0 +1,106 @@
+"""What a check of a model found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+
+class Topic(str, Enum):
+    """What is verified; the text says it."""
+
+    DERIVATIVES = "compiled values and derivatives against the formulas"
+    SURFACES = "surfaces are regular: the gradient does not vanish on them"
+    TRANSITIONS = "every region that motion reaches has a domain, and every crossing a next one"
+    RESETS = "a reset leaves the state on its surface, and sends it back"
+    KINKS = "kinks of the fields lie on surfaces that their modes know"
+    SLIDING = "sliding modes stay on their surfaces"
+    SYMMETRY = "the symmetry holds for fields, surfaces and domains"
+    PERIOD = "the field repeats itself after the period"
+    CONSTRAINTS = "the defaults obey the constraints"
+    NAMES = "every parameter is used, and every state is driven"
+
+
+class Severity(str, Enum):
+    """How bad a finding is: an error makes results wrong, a warning deserves a look."""
+
+    ERROR = "error"
+    WARNING = "warning"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One finding: what is wrong, and what can be done."""
+
+    topic: Topic
+    severity: Severity
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.severity.value}: {self.message}"
+
+
+@dataclass
+class ModelReport:
+    """The outcome of :func:`contfric.check_model`.
+
+    Attributes
+    ----------
+    model : name of the model
+    counts : how many single comparisons were made for each topic; 0 where a topic does not apply
+    findings : what is wrong, errors and warnings
+    """
+
+    model: str
+    counts: dict[Topic, int] = field(default_factory=lambda: dict.fromkeys(Topic, 0))
+    findings: list[Finding] = field(default_factory=list)
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is no error; warnings do not count."""
+        return not any(f.severity is Severity.ERROR for f in self.findings)
+
+    def count(self, topic: Topic) -> None:
+        """Note that one comparison was made."""
+        self.counts[topic] += 1
+
+    def error(self, topic: Topic, message: str) -> None:
+        """Note an error, once."""
+        self._note(Finding(topic, Severity.ERROR, message))
+
+    def warn(self, topic: Topic, message: str) -> None:
+        """Note a warning, once."""
+        self._note(Finding(topic, Severity.WARNING, message))
+
+    def _note(self, finding: Finding) -> None:
+        if finding not in self.findings:
+            self.findings.append(finding)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return {
+            "model": self.model,
+            "ok": self.ok,
+            "checks": {topic.name.lower(): count for topic, count in self.counts.items()},
+            "findings": [
+                {
+                    "topic": f.topic.name.lower(),
+                    "severity": f.severity.value,
+                    "message": f.message,
+                }
+                for f in self.findings
+            ],
+        }
+
+    def __str__(self) -> str:
+        lines = [f"model {self.model}"]
+        for topic, count in self.counts.items():
+            own = [f for f in self.findings if f.topic is topic]
+            bad = any(f.severity is Severity.ERROR for f in own)
+            mark = "WRONG" if bad else "look" if own else "fine" if count else "-"
+            note = f" ({count} comparisons)" if count else " (does not apply)"
+            lines.append(f"  {mark:5}  {topic.value}{note}")
+            lines.extend(f"           {f}" for f in own)
+        lines.append("fine" if self.ok else "not fine: results of this model would be wrong")
+        return "\n".join(lines)

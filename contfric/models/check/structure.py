@@ -1,0 +1,269 @@
+"""Surfaces, transitions, sliding modes, symmetry and period of a model, at sampled states."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.models.check.probe import Probe
+from contfric.models.check.report import ModelReport, Topic
+from contfric.models.definition import FloatArray, Surface
+
+#: States on each surface, and in the whole region.
+_ON_SURFACE, _EVERYWHERE = 200, 400
+#: With a gradient this small a place on the surface is known to 1e-6 only (12 digits of the observable).
+_FLAT = 1e-6
+#: A rate this small is one that rounding has made.
+_STILL = 1e-9
+#: Rounding of values that should be the same, relative to 1 + their size.
+_SAME = 1e-8
+
+
+def check_surfaces(report: ModelReport, probe: Probe) -> None:
+    """Check that each surface is reached, and that its observable changes across it."""
+    for surface in probe.model.surfaces:
+        reached = 0
+        for t, y in probe.on(surface.name, _ON_SURFACE // 4):
+            reached += 1
+            report.count(Topic.SURFACES)
+            if not np.abs(probe.slope(surface.name, t, y)).max() > _FLAT:
+                report.error(
+                    Topic.SURFACES,
+                    f"the gradient of '{surface.observable}' vanishes on surface '{surface.name}' at "
+                    f"{_place(probe, t, y)}: crossings of it cannot be located. Use an observable "
+                    "that changes its sign there with a slope, such as x in place of x**2",
+                )
+                break
+        if not reached:
+            report.warn(
+                Topic.SURFACES,
+                f"no state was found on surface '{surface.name}' ({surface.observable} = "
+                f"{surface.level}): if motion reaches it, enlarge 'spread'; else leave it out",
+            )
+
+
+def check_transitions(report: ModelReport, probe: Probe) -> None:
+    """Check that every region has a domain, and every crossing that motion makes a next one."""
+    model = probe.model
+    for t, y in probe.states(_EVERYWHERE):
+        signs = probe.signs(t, y)
+        if 0 in signs.values():
+            continue
+        report.count(Topic.TRANSITIONS)
+        if model.domain_at(signs) is None and not _behind_wall(probe, signs):
+            report.error(
+                Topic.TRANSITIONS,
+                f"the state {_place(probe, t, y)} is in no domain: {_sides(signs)}. Add a mode whose "
+                "'in' holds there",
+            )
+            return
+    for surface in model.surfaces:
+        if surface.name not in model.reset_by_surface:
+            _check_crossings(report, probe, surface)
+
+
+def _behind_wall(probe: Probe, signs: dict[str, int]) -> bool:
+    """Return whether a region lies on the side of a wall that motion never comes to."""
+    for reset in probe.model.reset_by_surface:
+        sides = {d.signs[reset] for d in probe.model.domains}
+        if signs[reset] not in sides:
+            return True
+    return False
+
+
+def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> None:
+    model = probe.model
+    for t, y in probe.on(surface.name, _ON_SURFACE):
+        signs = {**probe.signs(t, y), surface.name: 0}
+        if list(signs.values()).count(0) != 1 or _behind_wall(probe, {**signs}):
+            continue
+        for side in (1, -1):
+            name = model.domain_at({**signs, surface.name: side})
+            if name is None:
+                continue
+            domain = model.domain_by_name[name]
+            rate = probe.rate(domain.mode, surface.name, t, y)
+            if not side * rate < -_STILL:
+                continue
+            report.count(Topic.TRANSITIONS)
+            following = model.transitions.get((name, surface.name))
+            if following is None:
+                report.error(
+                    Topic.TRANSITIONS,
+                    f"motion in '{name}' meets '{surface.name}' at {_place(probe, t, y)}, and no "
+                    f"domain follows: {_sides(signs)}. Add a mode with {surface.name}: 0 there (motion "
+                    "stays), or one on the other side",
+                )
+                return
+            if not _goes_on(report, probe, surface, name, following, t, y):
+                return
+
+
+def _goes_on(
+    report: ModelReport,
+    probe: Probe,
+    surface: Surface,
+    name: str,
+    following: str,
+    t: float,
+    y: FloatArray,
+) -> bool:
+    """Return whether motion can enter what follows; else it is sent back at once, for ever."""
+    domain = probe.model.domain_by_name[following]
+    side = domain.signs[surface.name]
+    if side == 0:
+        return True
+    rate = probe.rate(domain.mode, surface.name, t, y)
+    if side * rate >= -_STILL:
+        return True
+    report.error(
+        Topic.TRANSITIONS,
+        f"motion in '{name}' meets '{surface.name}' at {_place(probe, t, y)} and should go on in "
+        f"'{following}', whose field leads back to the surface: motion is caught there. Add a mode "
+        f"with {surface.name}: 0 (it slides on the surface), with the condition under which it stays",
+    )
+    return False
+
+
+def check_resets(report: ModelReport, probe: Probe) -> None:
+    """Check that a reset leaves the state on its surface, and that it moves away from there."""
+    model = probe.model
+    for name in model.reset_by_surface:
+        for t, y in probe.on(name, _ON_SURFACE // 2):
+            signs = probe.signs(t, y)
+            inside = {d.signs[name] for d in model.domains} - {0}
+            before = model.domain_at({**signs, name: min(inside)}) if len(inside) == 1 else None
+            if before is None:
+                continue
+            side, mode = min(inside), model.domain_by_name[before].mode
+            if not side * probe.rate(mode, name, t, y) < -_STILL:
+                continue
+            report.count(Topic.RESETS)
+            behind = probe.reset(name, t, y)
+            if not abs(probe.height(name, t, behind)) <= _SAME * (1.0 + np.abs(y).max()):
+                report.error(
+                    Topic.RESETS,
+                    f"the reset at '{name}' takes the state {_place(probe, t, y)} off the surface: it may "
+                    "not change what the surface's observable depends on",
+                )
+                return
+            after = model.domain_at({**probe.signs(t, behind), name: side})
+            if after is None or not (
+                side * probe.rate(model.domain_by_name[after].mode, name, t, behind) > 0.0
+            ):
+                report.error(
+                    Topic.RESETS,
+                    f"behind the reset at '{name}' the motion from {_place(probe, t, y)} still runs into "
+                    "the surface, or is in no domain: a reset must turn the rate of "
+                    f"'{model.surface_by_name[name].observable}' around, such as v: -e*v",
+                )
+                return
+
+
+def check_sliding(report: ModelReport, probe: Probe) -> None:
+    """Check that a sliding mode does not change the observables of its surfaces."""
+    model = probe.model
+    for mode in model.modes:
+        if not mode.sliding:
+            continue
+        domain = next(d for d in model.domains if d.mode == mode.name)
+        surfaces = tuple(name for name, side in domain.signs.items() if side == 0)
+        for t, y in probe.states(_ON_SURFACE):
+            place = probe.inside(mode.name, t, y)
+            if place is None:
+                continue
+            report.count(Topic.SLIDING)
+            for name in surfaces:
+                rate = probe.rate(mode.name, name, *place)
+                if not abs(rate) <= _SAME * (1.0 + np.abs(place[1]).max()):
+                    report.error(
+                        Topic.SLIDING,
+                        f"mode '{mode.name}' leaves its surface '{name}': at "
+                        f"{_place(probe, *place)} the rate of "
+                        f"'{model.surface_by_name[name].observable}' is {rate:.6g}, it must be 0",
+                    )
+                    return
+
+
+def check_symmetry(report: ModelReport, probe: Probe) -> None:
+    """Check that the map takes solutions to solutions: fields, surfaces, and domains."""
+    model, symmetry = probe.model, probe.model.symmetry
+    if symmetry is None:
+        return
+    matrix, shift = symmetry.array(), symmetry.fraction * probe.period
+    try:
+        images = model.mirror_domain
+    except Exception as error:  # the model says itself which domain is without an image
+        report.error(Topic.SYMMETRY, f"{error}: leave 'symmetry' out, or add the missing domain")
+        return
+    for domain in model.domains:
+        for t, y in probe.states(_EVERYWHERE):
+            place = probe.inside(domain.mode, t, y)
+            if place is None:
+                continue
+            moved, mirrored = place[0] + shift, matrix @ place[1]
+            report.count(Topic.SYMMETRY)
+            mode = model.domain_by_name[images[domain.name]].mode
+            here = matrix @ probe.field(domain.mode, *place)
+            there = probe.field(mode, moved, mirrored)
+            if not np.allclose(here, there, rtol=_SAME, atol=_SAME):
+                report.error(
+                    Topic.SYMMETRY,
+                    f"the field of mode '{mode}' is no image of that of '{domain.mode}': at "
+                    f"{_place(probe, *place)} the image of the rates is {here.tolist()}, the rates at "
+                    f"the image are {there.tolist()}. Leave 'symmetry' out, or correct a field",
+                )
+                return
+            for name, image in symmetry.surfaces.items():
+                a = probe.height(name, moved, mirrored)
+                b = probe.height(image, *place)
+                if not abs(a + b) <= _SAME * (1.0 + abs(a) + abs(b)):
+                    report.error(
+                        Topic.SYMMETRY,
+                        f"surface '{image}' is no image of '{name}' at {_place(probe, *place)}",
+                    )
+                    return
+            break
+
+
+def check_period(report: ModelReport, probe: Probe) -> None:
+    """Check that what depends on time has the model's period, and that nothing does without one."""
+    model, period = probe.model, probe.period
+    for mode in model.modes:
+        seen = 0
+        for t, y in probe.states(_EVERYWHERE):
+            place = probe.inside(mode.name, t, y)
+            if place is None:
+                continue
+            seen += 1
+            later = place[0] + (period or 0.7310585)  # any time will do where nothing depends on it
+            report.count(Topic.PERIOD)
+            fields = (probe.field(mode.name, *place), probe.field(mode.name, later, place[1]))
+            if not np.allclose(*fields, rtol=_SAME, atol=_SAME):
+                report.error(Topic.PERIOD, _not_periodic(f"the field of '{mode.name}'", period))
+                return
+            for name in probe.names:
+                a, b = (probe.observable(name, when, place[1]) for when in (place[0], later))
+                if not abs(a - b) <= _SAME * (1.0 + abs(a)):
+                    report.error(Topic.PERIOD, _not_periodic(f"observable '{name}'", period))
+                    return
+            if seen == 4:
+                break
+
+
+def _not_periodic(what: str, period: float) -> str:
+    if period <= 0.0:
+        return f"{what} depends on time, but the model is autonomous: give its 'period'"
+    return (
+        f"{what} is not the same one period ({period:.9g} at the defaults) later: 'period' must be a "
+        "common period of everything that depends on t"
+    )
+
+
+def _place(probe: Probe, t: float, y: FloatArray) -> str:
+    values = ", ".join(f"{s} = {v:.6g}" for s, v in zip(probe.model.states, y, strict=True))
+    return values if probe.model.autonomous else f"t = {t:.6g}, {values}"
+
+
+def _sides(signs: dict[str, int]) -> str:
+    words = {1: "above", -1: "below", 0: "on"}
+    return ", ".join(f"{words[side]} {name}" for name, side in signs.items())

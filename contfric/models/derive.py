@@ -1,0 +1,301 @@
+"""From a description to a model: what can be derived is not asked for."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from contfric.errors import ModelError
+from contfric.models.build import GeneratedFlow
+from contfric.models.definition import (
+    Constraint,
+    Departure,
+    Domain,
+    FloatArray,
+    Mode,
+    Model,
+    Reset,
+    Surface,
+    Symmetry,
+)
+from contfric.models.departing import departing_side, leaves_at_rest
+from contfric.models.description import Description
+from contfric.models.entries import EntryError
+from contfric.models.evaluate import Evaluator, Sampler, defaults, floats
+from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope, parse
+from contfric.models.regions import combinations, domains_of, ordered_surfaces
+from contfric.yaml_lines import Address
+
+#: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
+_SAME = 1e-9
+#: Points at which two expressions must agree to be the same.
+_POINTS = 8
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Half-widths of starts, from the expressions of a description."""
+
+    texts: tuple[str, ...]
+    definition: str
+
+    def __call__(self, params: Mapping[str, float]) -> FloatArray:
+        """Return the half-width of each state, shape (n,)."""
+        evaluator = _evaluator(self.definition)
+        return np.array([evaluator.value(text, params) for text in self.texts])
+
+
+@lru_cache(maxsize=64)
+def _evaluator(definition: str) -> Evaluator[float]:
+    from contfric.models.describe import from_text
+
+    return floats(from_text(definition))
+
+
+def model_from(description: Description) -> Model:
+    """Build the model of a description.
+
+    Raises
+    ------
+    EntryError
+        If the description contradicts itself; with the address of the entry.
+    """
+    params = defaults(description)
+    evaluator = floats(description)
+    sampler = Sampler(evaluator, params)
+    levels = {s.name: _level(evaluator, s, params) for s in description.surfaces}
+    surfaces = ordered_surfaces(description, levels)
+    domains = domains_of(description, surfaces)
+    return Model(
+        name=description.name,
+        title=description.title or description.name,
+        states=description.states,
+        parameters=description.parameters,
+        constraints=tuple(
+            _constraint(("constraints", i), text, why, params)
+            for i, (text, why) in enumerate(description.constraints)
+        ),
+        observables=description.observables,
+        surfaces=tuple(surfaces),
+        modes=tuple(_mode(description, m.name) for m in description.modes),
+        domains=domains,
+        departures=description.departures or _departures(sampler, surfaces, domains),
+        symmetry=_symmetry(sampler, surfaces),
+        stop_surface=description.stop_surface or _stop_surface(sampler),
+        flow_factory=GeneratedFlow(description.text),
+        spread=Spread(description.spread, description.text),
+        references=description.references,
+        resets=tuple(_reset(description, name) for name in description.resets),
+        autonomous=not description.period,
+        filippov=leaves_at_rest(sampler, description, domains),
+        definition=description.text,
+    )
+
+
+def _level(evaluator: Evaluator[float], surface: Surface, params: dict[str, float]) -> float:
+    address = ("surfaces", surface.name, "level")
+    level = evaluator.value(surface.level, params)
+    if not math.isfinite(level):
+        raise EntryError(address, f"the level '{surface.level}' has no value at the defaults")
+    return level
+
+
+def _mode(description: Description, name: str) -> Mode:
+    """Return a mode; one that slides forgets a direction for each surface that it lies on."""
+    text = next(m for m in description.modes if m.name == name)
+    held = sum(side == 0 for side in text.sides.values())
+    rank = len(description.states) - held if text.rank is None else text.rank
+    return Mode(name, rank, held > 0)
+
+
+def _reset(description: Description, surface: str) -> Reset:
+    """Return a reset; observables without the states that it maps are not changed by it."""
+    texts = description.resets[surface]
+    changed = {state for state, value in texts.items() if value != state}
+    own = next(s.observable for s in description.surfaces if s.name == surface)
+    changes = tuple(
+        o.name
+        for o in description.observables
+        if o.name != own and description.names.leaves(parse(o.formula), ()) & changed
+    )
+    formula = ", ".join(f"{state} -> {value}" for state, value in texts.items())
+    return Reset(surface, formula, changes)
+
+
+# ------------------------------------------------------------------------------ constraints
+
+
+def _constraint(address: Address, text: str, why: str, params: Mapping[str, float]) -> Constraint:
+    """Read ``S0 >= S``: the difference of both sides, linear in the parameters."""
+    tree = _comparison(address, text)
+    sign = 1.0 if isinstance(tree.ops[0], (ast.Gt, ast.GtE)) else -1.0
+    names = sorted(params)
+
+    def difference(values: Mapping[str, float]) -> float:
+        scope = Scope(FLOATS, dict(values))
+        return sign * (scope.evaluate(tree.left) - scope.evaluate(tree.comparators[0]))
+
+    try:
+        zero = dict.fromkeys(names, 0.0)
+        constant = difference(zero)
+        slopes = {name: difference({**zero, name: 1.0}) - constant for name in names}
+        for stretch in (0.5, 2.0, -3.0):
+            point = {name: stretch * (1.0 + i) for i, name in enumerate(names)}
+            linear = constant + sum(slopes[name] * point[name] for name in names)
+            if not abs(difference(point) - linear) <= _SAME * (1.0 + abs(linear)):
+                raise ArithmeticError
+    except ArithmeticError:
+        raise EntryError(
+            address, f"'{text}' must be linear in the parameters, such as S0 >= S or Omega > 0"
+        ) from None
+    except ModelError as error:
+        raise EntryError(address, f"'{text}': {error}") from None
+    coefficients = {name: slope for name, slope in slopes.items() if slope != 0.0}
+    strict = isinstance(tree.ops[0], (ast.Gt, ast.Lt))
+    return Constraint(text, coefficients, strict, why, constant)
+
+
+def _comparison(address: Address, text: str) -> ast.Compare:
+    wanted = f"a constraint is such as 'S0 >= S' or 'Omega > 0', got '{text}'"
+    try:
+        parse(f"where({text}, 1, 0)")
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (ModelError, SyntaxError) as error:
+        raise EntryError(address, f"{wanted}: {error}") from None
+    if not isinstance(tree, ast.Compare) or len(tree.ops) != 1:
+        raise EntryError(address, wanted)
+    return tree
+
+
+# ------------------------------------------------------------------------------- departures
+
+
+def _departures(
+    sampler: Sampler, surfaces: list[Surface], domains: tuple[Domain, ...]
+) -> tuple[Departure, ...]:
+    """Find where motion on a surface goes when it leaves: the side that its field points to."""
+    found = []
+    for domain in domains:
+        on = [name for name, side in domain.signs.items() if side == 0]
+        if len(on) != 1:
+            continue
+        for surface in surfaces:
+            if surface.name == on[0] or not _can_flip(surfaces, domain, surface.name):
+                continue
+            signs = {**domain.signs, surface.name: -domain.signs[surface.name]}
+            if any(d.signs == signs for d in domains):
+                continue
+            departure = _departure(sampler, on[0], surface.name, signs, domains)
+            if departure is not None and departure not in found:
+                found.append(departure)
+    return tuple(found)
+
+
+def _can_flip(surfaces: list[Surface], domain: Domain, surface: str) -> bool:
+    signs = {**domain.signs, surface: -domain.signs[surface]}
+    return signs in combinations(surfaces, signs)
+
+
+def _departure(
+    sampler: Sampler, on: str, through: str, signs: dict[str, int], domains: tuple[Domain, ...]
+) -> Departure | None:
+    beside = {}
+    for side in (1, -1):
+        modes = {d.mode for d in domains if d.signs == {**signs, on: side}}
+        if modes:
+            beside[side] = modes.pop()
+    side = departing_side(sampler, beside, on, signs)
+    if side == 0:
+        return None
+    return Departure({on: 0, through: signs[through]}, {on: side})
+
+
+# --------------------------------------------------------------------------- stops, symmetry
+
+
+def _stop_surface(sampler: Sampler) -> str:
+    """Find the surface on which the first state is stationary in every mode that moves it."""
+    evaluator, description = sampler.evaluator, sampler.evaluator.description
+    moving = [m for m in description.modes if 0 not in m.sides.values()] or description.modes
+    points = list(sampler.states(_POINTS))
+    for surface in description.surfaces:
+        ratios = set()
+        for t, y in points:
+            above = evaluator.height(surface.name, sampler.params, t, y)
+            for mode in moving:
+                rate = evaluator.value(mode.field[0], sampler.params, t, y)
+                ratios.add(_ratio(rate, above))
+        if len(ratios) == 1 and ratios & {1, -1}:
+            return surface.name
+    state = description.states[0]
+    raise EntryError(
+        ("surfaces",),
+        f"no surface is '{state}' at rest: add one, such as stop: {{observable: v}} if {state}' = v, "
+        "or name it with 'stop_surface'",
+    )
+
+
+def _ratio(a: float, b: float) -> int:
+    scale = _SAME * (1.0 + abs(a) + abs(b))
+    return 1 if abs(a - b) <= scale else -1 if abs(a + b) <= scale else 0
+
+
+def _symmetry(sampler: Sampler, surfaces: list[Surface]) -> Symmetry | None:
+    """Read the linear map and find the image of every surface."""
+    description = sampler.evaluator.description
+    if description.symmetry is None:
+        return None
+    try:
+        matrix, fraction = _linear_map(description)
+        images = {s.name: _image(sampler, s, surfaces) for s in surfaces}
+    except ModelError as error:
+        raise EntryError(("symmetry",), str(error)) from None
+    if not description.period:
+        fraction = 0.5
+    return Symmetry(matrix, fraction, images)
+
+
+def _linear_map(description: Description) -> tuple[tuple[tuple[float, ...], ...], float]:
+    images, states = description.symmetry or {}, description.states
+    zero = dict.fromkeys(states, 0.0)
+
+    def value(name: str, state: Mapping[str, float], t: float, period: float) -> float:
+        scope = Scope(FLOATS, {**state, TIME: t, PERIOD: period})
+        return scope.evaluate(parse(images[name]))
+
+    rows = []
+    mixed = {name: 0.3 + 0.7 * i for i, name in enumerate(states)}
+    for name in states:
+        row = tuple(value(name, {**zero, s: 1.0}, 0.0, 0.0) for s in states)
+        linear = sum(c * mixed[s] for c, s in zip(row, states, strict=True))
+        if not abs(value(name, mixed, 0.7, 0.9) - linear) <= _SAME:
+            raise ModelError(f"the image of {name} must be linear in the states, such as -{name}")
+        rows.append(row)
+    fraction = value(TIME, zero, 0.0, 1.0)
+    if not abs(value(TIME, mixed, 0.7, 0.9) - 0.7 - 0.9 * fraction) <= _SAME:
+        raise ModelError("the image of t must be t plus a share of the period, such as t + T/2")
+    return tuple(rows), fraction
+
+
+def _image(sampler: Sampler, surface: Surface, surfaces: list[Surface]) -> str:
+    evaluator, params = sampler.evaluator, sampler.params
+    period = evaluator.period(params) or 0.0
+    points = list(sampler.states(_POINTS))
+    for other in surfaces:
+        same = True
+        for t, y in points:
+            moved_t, moved = evaluator.image(params, t, y, period)
+            a = evaluator.height(surface.name, params, moved_t, moved)
+            b = evaluator.height(other.name, params, t, y)
+            same = same and abs(a + b) <= _SAME * (1.0 + abs(a) + abs(b))
+        if same:
+            return other.name
+    raise ModelError(
+        f"the image of surface '{surface.name}' ({surface.observable} = {surface.level}) is none of "
+        "the surfaces with its sides exchanged: there is no such symmetry, or a surface is missing"
+    )

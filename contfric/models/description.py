@@ -1,0 +1,133 @@
+"""A user's model as plain data: what a YAML file, a class and a results file all come down to.
+
+:func:`contfric.models.describe.describe` reads a mapping in the schema of the YAML files, checks every
+entry, and gives a :class:`Description`. :meth:`Description.data` gives such a mapping back, so that a
+description can be stored anywhere (:attr:`Description.text`) and read again with the same checks.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from contfric.models.definition import Departure, Observable, Parameter, Surface
+from contfric.models.names import Names
+
+
+@dataclass(frozen=True)
+class ModeText:
+    """A mode: its field, one expression a state, and the sides of surfaces that it lies on."""
+
+    name: str
+    field: tuple[str, ...]
+    sides: Mapping[str, int]
+    rank: int | None = None
+
+
+@dataclass(frozen=True)
+class DomainText:
+    """A domain that was named: its mode and the sides of surfaces."""
+
+    name: str
+    mode: str
+    sides: Mapping[str, int]
+    label: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """A model as plain data; all formulas are texts in the language of expressions.
+
+    Attributes
+    ----------
+    constraints : (text, meaning) of each
+    period : expression of the excitation's period; empty for an autonomous model
+    define : (name, expression) of each named part
+    modes, domains, departures : as declared; what can be derived is derived from them
+    resets : surface -> state -> expression
+    symmetry : name (a state or t) -> expression of its image; None if there is none
+    stop_surface : empty if it is to be found
+    spread : expression of the half-width of starts, one a state
+    method, tolerance : how motion is integrated (:mod:`contfric.flow.integrated`)
+    """
+
+    name: str
+    title: str
+    references: tuple[str, ...]
+    states: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    constraints: tuple[tuple[str, str], ...]
+    period: str
+    define: tuple[tuple[str, str], ...]
+    observables: tuple[Observable, ...]
+    surfaces: tuple[Surface, ...]
+    modes: tuple[ModeText, ...]
+    domains: tuple[DomainText, ...] = ()
+    departures: tuple[Departure, ...] = ()
+    resets: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    symmetry: Mapping[str, str] | None = None
+    stop_surface: str = ""
+    spread: tuple[str, ...] = ()
+    method: str = "explicit"
+    tolerance: float = 1e-12
+
+    def data(self) -> dict[str, Any]:
+        """Return the description in the schema of the YAML files, with nothing left out."""
+        found: dict[str, Any] = {
+            "name": self.name,
+            "title": self.title,
+            "references": list(self.references),
+            "states": list(self.states),
+            "parameters": {
+                p.name: {"default": p.default, "meaning": p.meaning} for p in self.parameters
+            },
+            "constraints": dict(self.constraints),
+            "define": dict(self.define),
+            "observables": {o.name: o.formula for o in self.observables},
+            "surfaces": {
+                s.name: {"observable": s.observable, "level": s.level, "switching": s.switching}
+                for s in self.surfaces
+            },
+            "modes": {m.name: self._mode(m) for m in self.modes},
+            "domains": {
+                d.name: {"mode": d.mode, "in": dict(d.sides), "label": d.label}
+                for d in self.domains
+            },
+            "departures": [
+                {"where": dict(d.where), "leaves": dict(d.leaves)} for d in self.departures
+            ],
+            "resets": {name: dict(texts) for name, texts in self.resets.items()},
+            "spread": dict(zip(self.states, self.spread, strict=True)),
+            "integration": {"method": self.method, "tolerance": self.tolerance},
+        }
+        found.update({"period": self.period} if self.period else {"autonomous": True})
+        if self.symmetry is not None:
+            found["symmetry"] = dict(self.symmetry)
+        if self.stop_surface:
+            found["stop_surface"] = self.stop_surface
+        return found
+
+    def _mode(self, mode: ModeText) -> dict[str, Any]:
+        found: dict[str, Any] = {
+            "in": dict(mode.sides),
+            "field": dict(zip(self.states, mode.field, strict=True)),
+        }
+        return found if mode.rank is None else {**found, "rank": mode.rank}
+
+    @cached_property
+    def text(self) -> str:
+        """The description as one line of JSON, always the same for the same description."""
+        return json.dumps(self.data(), ensure_ascii=False, allow_nan=False)
+
+    @cached_property
+    def names(self) -> Names:
+        """What each name of the expressions means."""
+        return Names.of(
+            self.states,
+            tuple(p.name for p in self.parameters),
+            dict(self.define),
+            {o.name: o.formula for o in self.observables},
+        )

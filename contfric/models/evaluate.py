@@ -1,0 +1,180 @@
+"""A description evaluated at points, in numbers of any kind: what needs no compiled code."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Generic, TypeVar
+
+from contfric.models.description import Description
+from contfric.models.grammar import FLOATS, PERIOD, TIME, Algebra, parse
+
+T = TypeVar("T")
+
+#: Points that sides and identities are judged by: enough that a coincidence is no explanation.
+_TRIES, _STEPS = 400, 30
+#: A state is on a surface where the observable differs by less than this, relative to 1.
+_ON = 1e-12
+#: Central differences: the cube root of the rounding error.
+_DIFFERENCE = 6e-6
+#: Beside a surface: far beyond rounding, and nothing against a rate that matters.
+_BESIDE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluator(Generic[T]):
+    """Fields, observables and levels of a description in an algebra."""
+
+    description: Description
+    algebra: Algebra[T]
+
+    @cached_property
+    def _trees(self) -> dict[str, object]:
+        return {}
+
+    def value(
+        self, text: str, params: Mapping[str, T], t: T | None = None, y: Sequence[T] = (), **more: T
+    ) -> T:
+        """Return the value of any expression; ``more`` are names that the model does not have."""
+        values = dict(params) | more
+        if t is not None:
+            values[TIME] = t
+        values.update(zip(self.description.states, y, strict=False))
+        tree = self._tree(text)
+        return self.description.names.scope(self.algebra, values).evaluate(tree)  # type: ignore[arg-type]
+
+    def _tree(self, text: str) -> object:
+        if text not in self._trees:
+            self._trees[text] = parse(text)
+        return self._trees[text]
+
+    def observable(self, name: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> T:
+        """Return the value of an observable."""
+        formula = next(o.formula for o in self.description.observables if o.name == name)
+        return self.value(formula, params, t, y)
+
+    def height(self, surface: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> T:
+        """Return (observable - level) of a surface."""
+        s = next(s for s in self.description.surfaces if s.name == surface)
+        above = self.observable(s.observable, params, t, y)
+        return above - self.value(s.level, params)  # type: ignore[operator,no-any-return]
+
+    def field(self, mode: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> list[T]:
+        """Return the rates of all states in a mode."""
+        rates = next(m.field for m in self.description.modes if m.name == mode)
+        return [self.value(rate, params, t, y) for rate in rates]
+
+    def period(self, params: Mapping[str, T]) -> T | None:
+        """Return the period of the excitation, None if there is none."""
+        text = self.description.period
+        return self.value(text, params) if text else None
+
+    def image(self, params: Mapping[str, T], t: T, y: Sequence[T], period: T) -> tuple[T, list[T]]:
+        """Return time and state under the declared symmetry."""
+        images = self.description.symmetry or {}
+        states = self.description.states
+        found = [self.value(images.get(s, s), params, t, y, **{PERIOD: period}) for s in states]
+        return self.value(images.get(TIME, TIME), params, t, y, **{PERIOD: period}), found
+
+
+def floats(description: Description) -> Evaluator[float]:
+    """Return the description in ordinary numbers; nan where there is no value."""
+    return Evaluator(description, FLOATS)
+
+
+def defaults(description: Description) -> dict[str, float]:
+    """Return the default of every parameter."""
+    return {p.name: p.default for p in description.parameters}
+
+
+@dataclass(frozen=True, eq=False)
+class Sampler:
+    """Random states in the region where motion takes place, always the same for the same seed."""
+
+    evaluator: Evaluator[float]
+    params: Mapping[str, float]
+    seed: int = 1
+
+    @cached_property
+    def widths(self) -> list[float]:
+        """Half-widths of the region: twice those that starts are drawn from."""
+        spread = self.evaluator.description.spread
+        found = [abs(self.evaluator.value(text, self.params)) for text in spread]
+        return [2.0 * w if 0.0 < w < math.inf else 2.0 for w in found]
+
+    def states(self, count: int) -> Iterator[tuple[float, list[float]]]:
+        """Yield times and states."""
+        draw = random.Random(self.seed)
+        span = self.evaluator.period(self.params) or 10.0
+        for _ in range(count):
+            yield draw.uniform(0.0, span), [draw.uniform(-w, w) for w in self.widths]
+
+    def on(
+        self, surface: str, sides: Mapping[str, int], most: int
+    ) -> Iterator[tuple[float, list[float]]]:
+        """Yield up to ``most`` times and states on a surface, on the given sides of others."""
+        found = 0
+        for t, y in self.states(_TRIES):
+            landed = self.landed(surface, t, y)
+            if landed is None or self.sides(*landed, sides) != dict(sides):
+                continue
+            yield landed
+            found += 1
+            if found == most:
+                return
+
+    def sides(self, t: float, y: Sequence[float], surfaces: Iterable[str]) -> dict[str, int]:
+        """Return the sides of some surfaces that a state is on."""
+        found = {}
+        for name in surfaces:
+            above = self.evaluator.height(name, self.params, t, y)
+            found[name] = 0 if abs(above) <= _ON else 1 if above > 0 else -1
+        return found
+
+    def landed(
+        self, surface: str, t: float, y: Sequence[float]
+    ) -> tuple[float, list[float]] | None:
+        """Return a time and state on a surface, near others: Newton's method along the gradient.
+
+        The time moves only if the surface does not depend on the state.
+        """
+        state = list(y)
+        for _ in range(_STEPS):
+            above = self.evaluator.height(surface, self.params, t, state)
+            slope = self.gradient(surface, t, state)
+            if abs(above) <= _ON:
+                return t, state
+            if any(slope[1:]):
+                slope[0] = 0.0
+            square = sum(g * g for g in slope)
+            if not 0.0 < square < math.inf or not abs(above) < math.inf:
+                return None
+            t -= above * slope[0] / square
+            state = [s - above * g / square for s, g in zip(state, slope[1:], strict=True)]
+        return None
+
+    def gradient(self, surface: str, t: float, y: Sequence[float]) -> list[float]:
+        """Return the derivatives of an observable by time and state, by differences."""
+        found, point = [], [t, *y]
+        for i in range(len(point)):
+            ahead, behind = list(point), list(point)
+            ahead[i] += _DIFFERENCE
+            behind[i] -= _DIFFERENCE
+            up = self.evaluator.height(surface, self.params, ahead[0], ahead[1:])
+            down = self.evaluator.height(surface, self.params, behind[0], behind[1:])
+            found.append((up - down) / (2 * _DIFFERENCE))
+        return found
+
+    def rate(self, mode: str, surface: str, side: int, t: float, y: Sequence[float]) -> float:
+        """Return the rate at which a mode moves off a surface, upwards, just beside it.
+
+        The field is that of the side: on the surface itself ``sign`` would be 0.
+        """
+        slope = self.gradient(surface, t, y)
+        size = math.sqrt(sum(g * g for g in slope)) or 1.0
+        beside = [a + side * _BESIDE * g / size for a, g in zip((t, *y), slope, strict=True)]
+        velocity = [1.0, *self.evaluator.field(mode, self.params, beside[0], beside[1:])]
+        return sum(g * v for g, v in zip(slope, velocity, strict=True))

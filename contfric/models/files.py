@@ -1,0 +1,88 @@
+"""Models in YAML files: read, checked and built, with the line of every mistake."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from contfric.errors import ModelError, NotationError, did_you_mean
+from contfric.models.definition import Model
+from contfric.models.describe import describe, from_text
+from contfric.models.description import Description
+from contfric.models.entries import EntryError
+
+SUFFIXES = (".yaml", ".yml")
+
+
+def is_path(name: str) -> bool:
+    """Return whether a text is the path of a file, not a name: it has the suffix, or a folder."""
+    return name.endswith(SUFFIXES) or "/" in name or "\\" in name
+
+
+def relative_model(name: str, beside: Path) -> str | Path:
+    """Return a name as it is, and the path of a file as seen from another file's folder.
+
+    Examples
+    --------
+    >>> relative_model("coulomb", Path("studies/a.yaml"))
+    'coulomb'
+    """
+    return beside.parent / name if is_path(name) else name
+
+
+def read_model(path: Path) -> Model:
+    """Build the model of a YAML file.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be read or is wrong: ``file.yaml:LINE: what, and what is valid``.
+
+    Examples
+    --------
+    >>> from contfric.resources import bundled_dir
+    >>> read_model(bundled_dir("models") / "belt.yaml").states
+    ('x', 'v')
+    """
+    from contfric.yaml_lines import read_yaml
+
+    try:
+        located = read_yaml(_file(path))
+        try:
+            return built(describe(located.data))
+        except EntryError as error:
+            located.fail(error.address, str(error))
+    except NotationError as error:
+        raise ModelError(str(error)) from None
+
+
+def _file(path: Path) -> Path:
+    if path.is_file():
+        return path
+    if path.is_dir():
+        raise ModelError(f"{path} is a folder; give the YAML file of a model")
+    near = [p.name for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
+    raise ModelError(
+        f"there is no file {path}{did_you_mean(path.name, sorted(near)) if near else ''}"
+    )
+
+
+def built(description: Description) -> Model:
+    """Return the model of a description; the same one for the same description."""
+    return model_of(description.text)
+
+
+@lru_cache(maxsize=64)
+def model_of(definition: str) -> Model:
+    """Return the model of a definition: a description as text.
+
+    Raises
+    ------
+    ModelError
+        If it cannot be built.
+    """
+    from contfric.models.build import module_path
+    from contfric.models.derive import model_from
+
+    module_path(definition)  # written first: what has no value is reported by formula and place
+    return model_from(from_text(definition))

@@ -1,0 +1,191 @@
+"""Expressions as formulas of sympy, with derivatives that a compiled model can use.
+
+Functions with kinks are classes of their own, so that their derivatives are what motion away from the
+kink sees: ``d abs(x) = sign(x)``, ``d sign(x) = 0``, and ``where`` differentiates both of its sides.
+(Sympy's own would bring Dirac's delta and Heaviside's step.) A power whose exponent is no whole number is a
+class, too: the derivative ``e b**(e - 1)`` is finite at b = 0 where ``e b**e / b`` is not, and a little
+beyond b = 0, where an integrator looks, it goes on as ``-|b|**e``.
+
+This module imports sympy; it is loaded when a model is built for the first time.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import sys
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import sympy
+
+from contfric.errors import ModelError
+from contfric.models.grammar import UNARY, Algebra, Scope
+
+#: Powers of numbers up to this exponent stay exact; beyond, they are rounded.
+_EXACT_POWER = 64
+#: The largest ordinary number.
+_LARGEST = sys.float_info.max
+
+
+class Sign(sympy.Function):  # type: ignore[misc]
+    """The sign of x: 1, 0 or -1. Its derivative is 0: that of the motion on either side."""
+
+    nargs = 1
+
+    @classmethod
+    def eval(cls, x: Any) -> Any:
+        """Simplify numbers."""
+        return sympy.sign(x) if x.is_number and x.is_real else None
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        """Return the derivative."""
+        return sympy.Integer(0)
+
+
+class Abs(sympy.Function):  # type: ignore[misc]
+    """The absolute value; its derivative is the sign."""
+
+    nargs = 1
+
+    @classmethod
+    def eval(cls, x: Any) -> Any:
+        """Simplify numbers."""
+        return sympy.Abs(x) if x.is_number and x.is_real else None
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        """Return the derivative."""
+        return Sign(self.args[0])
+
+
+class Where(sympy.Function):  # type: ignore[misc]
+    """``Where(d, a, b)`` is a if d > 0, else b; the derivative is that of the side that holds."""
+
+    nargs = 3
+
+    @classmethod
+    def eval(cls, d: Any, a: Any, b: Any) -> Any:
+        """Simplify what is known."""
+        if a == b:
+            return a
+        if d.is_number and d.is_real:
+            return a if d > 0 else b
+        return None
+
+    def _eval_derivative(self, symbol: Any) -> Any:
+        d, a, b = self.args
+        return Where(d, a.diff(symbol), b.diff(symbol))
+
+
+class Power(sympy.Function):  # type: ignore[misc]
+    """``b**e`` where the exponent is no whole number."""
+
+    nargs = 2
+
+    @classmethod
+    def eval(cls, b: Any, e: Any) -> Any:
+        """Become an ordinary power where that is one of a number, or the exponent is whole."""
+        return plain_power(b, e) if e.is_Integer or (b.is_number and e.is_number) else None
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        """Return the derivative with respect to the base or the exponent."""
+        b, e = self.args
+        return e * Power(b, e - 1) if argindex == 1 else PowerLog(b, e)
+
+
+class PowerLog(sympy.Function):  # type: ignore[misc]
+    """``b**e log(b)``, and 0 at b = 0: its limit there for e > 0."""
+
+    nargs = 2
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        """Return the derivative with respect to the base; a second one to the exponent is not used."""
+        b, e = self.args
+        if argindex == 1:
+            return e * PowerLog(b, e - 1) + Power(b, e - 1)
+        return PowerLog(b, e) * sympy.log(b)
+
+
+def plain_power(base: Any, exponent: Any) -> Any:
+    """Return a power with a number as exponent; huge ones of numbers are not written out."""
+    if not (base.is_number and exponent.is_number):
+        return base**exponent
+    try:
+        value = float(base) ** float(exponent)
+    except (ArithmeticError, TypeError, ValueError):
+        value = math.inf
+    if isinstance(value, complex) or not math.isfinite(value):
+        raise ModelError(f"the power ({base})**({exponent}) has no finite real value")
+    if exponent.is_Rational and abs(exponent) <= _EXACT_POWER:
+        return base**exponent
+    return sympy.Rational(repr(value))
+
+
+def _power(base: Any, exponent: Any) -> Any:
+    return plain_power(base, exponent) if exponent.is_Integer else Power(base, exponent)
+
+
+#: Expressions as formulas; decimal numbers are exact fractions until the code is written.
+FORMULAS: Algebra[Any] = Algebra(
+    number=sympy.Rational,
+    functions={
+        **{name: getattr(sympy, name) for name in UNARY if name not in ("abs", "sign")},
+        "abs": Abs,
+        "sign": Sign,
+    },
+    where=Where,
+    divide=lambda a, b: a / b,
+    power=_power,
+    pi=sympy.pi,
+)
+
+
+def formula(tree: ast.expr, scope: Scope[Any]) -> Any:
+    """Return an expression as a formula of the symbols in a scope.
+
+    Raises
+    ------
+    ModelError
+        If it has no finite real value, such as ``1/0`` or ``sqrt(-1)``.
+    """
+    found = sympy.sympify(scope.evaluate(tree))
+    if found.has(sympy.zoo, sympy.oo, -sympy.oo, sympy.nan, sympy.I):
+        raise ModelError(f"'{ast.unparse(tree)}' has no finite real value")
+    if any(abs(number) > _LARGEST for number in found.atoms(sympy.Number)):
+        raise ModelError(f"'{ast.unparse(tree)}' has a number that is too large")
+    return found
+
+
+def resolved(expression: Any, signs: Mapping[Any, int]) -> Any:
+    """Return a formula where the signs of some parts are known: kinks that a mode does not see.
+
+    Parameters
+    ----------
+    signs : from a formula to its sign, +1 or -1
+    """
+
+    def side(x: Any) -> int:
+        for known, sign in signs.items():
+            ratio = sympy.cancel(x / known) if x.free_symbols == known.free_symbols else x
+            if ratio.is_number and ratio.is_real and ratio != 0:
+                return sign if ratio > 0 else -sign
+        return 0
+
+    swaps: dict[Any, Any] = {}
+    for part in expression.atoms(Sign, Abs, Where):
+        s = side(part.args[0])
+        if s == 0:
+            continue
+        if isinstance(part, Sign):
+            swaps[part] = sympy.Integer(s)
+        elif isinstance(part, Abs):
+            swaps[part] = s * part.args[0]
+        else:
+            swaps[part] = part.args[1] if s > 0 else part.args[2]
+    return resolved(expression.xreplace(swaps), signs) if swaps else expression
+
+
+def kinks_in(expression: Any, moving: Collection[Any]) -> list[Any]:
+    """Return what changes its sign at the kinks and jumps of a formula, if it depends on ``moving``."""
+    parts = (part.args[0] for part in expression.atoms(Sign, Abs, Where))
+    return sorted({x for x in parts if x.free_symbols & set(moving)}, key=str)

@@ -1,0 +1,353 @@
+"""The compiled functions of a described model, written as a module of Python for numba.
+
+Each function comes from formulas and their exact derivatives; the rate of an observable along a mode,
+``o_t + o_y . f``, has the second derivatives of the observable in its gradient. What the user wrote never
+stands in the module: names are replaced by ``t``, ``s0 ...`` (states) and ``p0 ...``.
+
+This module imports sympy; it is loaded when a model is built for the first time.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy
+
+from contfric.errors import ModelError
+from contfric.models.code import SLOPES, VALUES, Lines, Output, write_block
+from contfric.models.description import Description
+from contfric.models.entries import EntryError
+from contfric.models.formulas import FORMULAS, formula, resolved
+from contfric.models.grammar import TIME, parse
+from contfric.models.motion import motion_code
+from contfric.models.regions import engine_order, known_sides
+from contfric.yaml_lines import Address
+
+_HEAD = '''"""Compiled functions of a model, generated from its definition; not to be edited.
+
+Digest of the sources that it was generated with: {digest}
+"""
+
+import math
+
+from contfric.compiled import (
+    flow_signature,
+    helper,
+    hit_signature,
+    kernel,
+    level_signature,
+    observe_signature,
+    period_signature,
+    rate_signature,
+    reset_signature,
+    turning_signature,
+)
+from contfric.flow.interface import CompiledFlow
+
+
+@helper
+def sign(x):
+    return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
+
+
+@helper
+def power(base, exponent):
+    if base >= 0.0 or exponent == math.floor(exponent):
+        return base**exponent
+    return -((-base) ** exponent)
+
+
+@helper
+def power_log(base, exponent):
+    return power(base, exponent) * math.log(abs(base)) if base != 0.0 else 0.0
+
+'''
+
+_KERNELS = """
+@kernel(observe_signature)
+def observe(c, t, y, p, which, grad):
+    return observe_at(c, t, y, p, which, grad)
+
+
+@kernel(rate_signature)
+def rate(mode, c, t, y, p, which, grad):
+    return rate_at(mode, c, t, y, p, which, grad)
+
+
+@kernel(level_signature)
+def level(k, p, which, grad):
+    return level_at(k, p, which, grad)
+
+
+@kernel(period_signature)
+def period(p, which, grad):
+    return period_at(p, which, grad)
+
+
+@kernel(reset_signature)  # the same types
+def field_of(mode, t, y, p, which, out, jac):
+    field(mode, t, y, p, which, out, jac)
+
+
+@kernel(reset_signature)
+def reset(k, t, y, p, which, y1, jac):
+    reset_at(k, t, y, p, which, y1, jac)
+
+"""
+
+
+class Formulas:
+    """The formulas of a description, in the symbols t, s0 ... and p0 ..."""
+
+    def __init__(self, description: Description) -> None:
+        self.description = description
+        self.surfaces = engine_order(description)
+        self.t = sympy.Symbol("t")
+        self.y = sympy.symbols(f"s:{len(description.states)}")
+        self.p = sympy.symbols(f"p:{len(description.parameters)}")
+        names = [TIME, *description.states, *(p.name for p in description.parameters)]
+        values = dict(zip(names, (self.t, *self.y, *self.p), strict=True))
+        self._scope = description.names.scope(FORMULAS, values)
+        for name, text in description.define:
+            self.read(("define", name), text)
+
+    def read(self, address: Address, text: str) -> Any:
+        """Return one expression as a formula."""
+        try:
+            return formula(parse(text), self._scope)
+        except EntryError:
+            raise
+        except ModelError as error:
+            raise EntryError(address, str(error)) from None
+
+    def observables(self) -> list[Any]:
+        """Return the formula of each observable."""
+        return [self.read(("observables", o.name), o.formula) for o in self.description.observables]
+
+    def levels(self) -> list[Any]:
+        """Return the level of each surface, in the order of the description."""
+        return [
+            self.read(("surfaces", s.name, "level"), s.level) for s in self.description.surfaces
+        ]
+
+    def period(self) -> Any:
+        """Return the period, 0 if there is none."""
+        return self.read(("period",), self.description.period or "0")
+
+    def fields(self) -> list[list[Any]]:
+        """Return the field of each mode, without the kinks that the mode does not see."""
+        observables = {
+            o.name: f for o, f in zip(self.description.observables, self.observables(), strict=True)
+        }
+        found = []
+        for mode in self.description.modes:
+            signs, known = {}, known_sides(mode, self.surfaces)
+            for surface, level in zip(self.description.surfaces, self.levels(), strict=True):
+                side = known.get(surface.name, 0)
+                above = observables[surface.observable] - level
+                if side != 0 and not above.is_number:
+                    signs[above] = side
+            found.append(
+                [
+                    resolved(self.read(("modes", mode.name, "field", state), rate), signs)
+                    for state, rate in zip(self.description.states, mode.field, strict=True)
+                ]
+            )
+        return found
+
+    def rates(self) -> list[list[Any]]:
+        """Return the rate of each observable along each mode."""
+        return [
+            [
+                sympy.expand_mul(o.diff(self.t))
+                + sum(o.diff(s) * f for s, f in zip(self.y, field, strict=True))
+                for o in self.observables()
+            ]
+            for field in self.fields()
+        ]
+
+    def projections(self) -> list[list[Any]]:
+        """Return the state on the surfaces that each mode moves on, beside a state: one Newton step.
+
+        A mode that slides forgets what its start has off its surfaces.
+        """
+        observables = dict(
+            zip((o.name for o in self.description.observables), self.observables(), strict=True)
+        )
+        found = []
+        for mode in self.description.modes:
+            state = list(self.y)
+            for surface, level in zip(self.description.surfaces, self.levels(), strict=True):
+                if mode.sides.get(surface.name) == 0:
+                    above = (observables[surface.observable] - level).xreplace(
+                        dict(zip(self.y, state, strict=True))
+                    )
+                    slope = [above.diff(s) for s in self.y]
+                    square = sum(g**2 for g in slope)
+                    state = [s - above * g / square for s, g in zip(state, slope, strict=True)]
+            found.append([sympy.expand(s) for s in state])
+        return found
+
+    def scales(self) -> list[Any]:
+        """Return the natural size of each state: its spread."""
+        return [
+            self.read(("spread", state), text)
+            for state, text in zip(self.description.states, self.description.spread, strict=True)
+        ]
+
+    def resets(self) -> list[list[Any]]:
+        """Return the map of the state at each surface."""
+        found = []
+        for surface in self.description.surfaces:
+            texts = self.description.resets.get(surface.name, {})
+            found.append(
+                [
+                    self.read(("resets", surface.name, state), texts.get(state, state))
+                    for state in self.description.states
+                ]
+            )
+        return found
+
+
+def module_source(description: Description, digest: str) -> str:
+    """Return the module of a model.
+
+    Parameters
+    ----------
+    digest : of the sources that the module depends on
+    """
+    formulas = Formulas(description)
+    order = [s.name for s in formulas.surfaces]
+    names = [s.name for s in description.surfaces]
+    code = Lines()
+    code.add(_HEAD.format(digest=digest))
+    writer = _Writer(code, formulas)
+    writer.vectors("field", "mode", "out", formulas.fields())
+    writer.scalars("observe_at(c, t, y, p, which, grad)", "c", formulas.observables())
+    writer.rates(formulas.rates())
+    levels, resets = formulas.levels(), formulas.resets()
+    writer.of_parameters(
+        "level_at(k, p, which, grad)", "k", [levels[names.index(n)] for n in order]
+    )
+    writer.of_parameters("period_at(p, which, grad)", None, [formulas.period()])
+    writer.vectors("reset_at", "k", "y1", [resets[names.index(n)] for n in order])
+    writer.vectors("onto", "mode", "y1", formulas.projections())
+    writer.scales(formulas.scales())
+    code.add(_KERNELS)
+    code.add(motion_code(description, _idle(description, formulas.rates())))
+    return str(code)
+
+
+def _idle(description: Description, rates: list[list[Any]]) -> list[tuple[int, int]]:
+    """Return the pairs (mode, observable) for which the observable does not change along the mode.
+
+    Only a mode that slides can hide a zero in a long formula.
+    """
+    return [
+        (m, c)
+        for m, (mode, row) in enumerate(zip(description.modes, rates, strict=True))
+        for c, rate in enumerate(row)
+        if rate == 0 or (0 in mode.sides.values() and sympy.simplify(rate) == 0)
+    ]
+
+
+class _Writer:
+    """Writes the functions of a model."""
+
+    def __init__(self, code: Lines, formulas: Formulas) -> None:
+        self.code, self.f = code, formulas
+
+    def vectors(self, name: str, index: str, target: str, rows: list[list[Any]]) -> None:
+        """Write a vector function of state, one block for each index."""
+        n = len(self.f.y)
+
+        def outputs(row: list[Any]) -> list[Output]:
+            found = [Output(VALUES, f"{target}[{i}]", e) for i, e in enumerate(row)]
+            for i, e in enumerate(row):
+                found += [
+                    Output(SLOPES, f"jac[{i}, {m}]", e.diff(s))
+                    for m, s in enumerate((self.f.t, *self.f.y))
+                ]
+                found += [
+                    Output(k, f"jac[{i}, {1 + n} + j]", e.diff(s)) for k, s in enumerate(self.f.p)
+                ]
+            return _without_idle(found)
+
+        columns = [f"jac[{i}, {1 + n} + j] = 0.0" for i in range(n)]
+        head = f"{name}({index}, t, y, p, which, {target}, jac)"
+        self._blocks(head, index, [outputs(row) for row in rows], "jac", columns, None)
+
+    def scalars(self, head: str, index: str, values: list[Any]) -> None:
+        """Write a scalar function of state with its gradient."""
+        idle = [f"grad[{1 + len(self.f.y)} + j] = 0.0"]
+        self._blocks(head, index, [self._gradient(e) for e in values], "grad", idle, "value")
+
+    def rates(self, rows: list[list[Any]]) -> None:
+        """Write the rates of all observables along all modes."""
+        flat = [e for row in rows for e in row]
+        self.scalars("rate_at(mode, c, t, y, p, which, grad)", f"mode * {len(rows[0])} + c", flat)
+
+    def _gradient(self, e: Any) -> list[Output]:
+        n = len(self.f.y)
+        found = [Output(VALUES, "value", e)]
+        found += [
+            Output(SLOPES, f"grad[{m}]", e.diff(s)) for m, s in enumerate((self.f.t, *self.f.y))
+        ]
+        found += [Output(k, f"grad[{1 + n} + j]", e.diff(s)) for k, s in enumerate(self.f.p)]
+        return _without_idle(found)
+
+    def of_parameters(self, head: str, index: str | None, values: list[Any]) -> None:
+        """Write a scalar function of the parameters alone."""
+        blocks = [
+            _without_idle(
+                [
+                    Output(VALUES, "value", e),
+                    *(Output(k, "grad[j]", e.diff(s)) for k, s in enumerate(self.f.p)),
+                ]
+            )
+            for e in values
+        ]
+        self._blocks(head, index, blocks, "grad", ["grad[j] = 0.0"], "value")
+
+    def scales(self, values: list[Any]) -> None:
+        """Write the sizes of states, the units of their tolerances: at most 1."""
+        blocks = [[Output(VALUES, "value", e)] for e in values]
+        self._blocks("size_of(i, p)", "i", blocks, "", [], "value")
+        self.code.add("", "@helper")
+        self.code.open("def scale_of(i, p):")
+        self.code.add("size = abs(size_of(i, p))", "return size if 0.0 < size < 1.0 else 1.0")
+        self.code.close()
+
+    def _define(self, head: str, blocks: list[list[Output]]) -> None:
+        """Write the head of a function, and take what its formulas need out of the arrays."""
+        self.code.add("", "@helper")
+        self.code.open(f"def {head}:")
+        used = {s for outputs in blocks for o in outputs for s in o.expression.free_symbols}
+        self.code.add(*(f"{s} = y[{i}]" for i, s in enumerate(self.f.y) if s in used))
+        self.code.add(*(f"{s} = p[{i}]" for i, s in enumerate(self.f.p) if s in used))
+
+    def _blocks(
+        self,
+        head: str,
+        index: str | None,
+        blocks: list[list[Output]],
+        room: str,
+        columns: list[str],
+        result: str | None,
+    ) -> None:
+        """Write one block for each index; the last one stands for all that are left."""
+        self._define(head, blocks)
+        for i, outputs in enumerate(blocks):
+            last = i == len(blocks) - 1
+            if not last:
+                self.code.open(f"if {index} == {i}:")
+            write_block(self.code, outputs, room, columns, result)
+            if not last:
+                self.code.close()
+        self.code.close()
+
+
+def _without_idle(outputs: list[Output]) -> list[Output]:
+    """Leave out the parameters that nothing depends on."""
+    busy = {o.section for o in outputs if o.section >= 0 and o.expression != 0}
+    return [o for o in outputs if o.section < 0 or o.section in busy]

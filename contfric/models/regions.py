@@ -1,0 +1,145 @@
+"""Domains of a described model: every combination of sides that a mode can have."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import replace
+
+from contfric.models.definition import Domain, Surface
+from contfric.models.description import Description, DomainText, ModeText
+from contfric.models.entries import EntryError
+from contfric.models.evaluate import defaults, floats
+
+Sides = dict[str, int]
+
+
+def ordered_surfaces(description: Description, levels: Mapping[str, float]) -> list[Surface]:
+    """Return the surfaces, those of one observable together and from the highest level down.
+
+    One is switching if the modes change across it: one moves on it, or each lies on one of its sides.
+    """
+    observables: list[str] = []
+    for surface in description.surfaces:
+        if surface.observable not in observables:
+            observables.append(surface.observable)
+    found = [
+        surface
+        for name in observables
+        for surface in sorted(
+            (s for s in description.surfaces if s.observable == name),
+            key=lambda s: -levels[s.name],
+        )
+    ]
+    known = [known_sides(mode, found) for mode in description.modes]
+    for i, surface in enumerate(found):
+        sides = {mode.get(surface.name) for mode in known}
+        cut = surface.name not in description.resets and (0 in sides or sides == {1, -1})
+        found[i] = replace(surface, switching=surface.switching or cut)
+    return found
+
+
+def engine_order(description: Description) -> list[Surface]:
+    """Return the surfaces in the order in which the model has them, at the default parameters."""
+    evaluator, params = floats(description), defaults(description)
+    levels = {s.name: evaluator.value(s.level, params) for s in description.surfaces}
+    return ordered_surfaces(description, levels)
+
+
+def known_sides(mode: ModeText, surfaces: list[Surface]) -> Sides:
+    """Return the sides that all regions of a mode share: those given, and those that follow from them."""
+    regions = combinations(surfaces, mode.sides)
+    return {
+        s.name: regions[0][s.name]
+        for s in surfaces
+        if regions and len({region[s.name] for region in regions}) == 1
+    }
+
+
+def combinations(surfaces: list[Surface], fixed: Mapping[str, int]) -> list[Sides]:
+    """Return all sides that are possible together with some that are fixed."""
+    found: list[Sides] = [{}]
+    groups = itertools.groupby(surfaces, key=lambda s: s.observable)
+    for _, group in groups:
+        names = [s.name for s in group]
+        choices = [c for c in _heights(names) if all(fixed.get(n, c[n]) == c[n] for n in names)]
+        # on a surface only where that is said
+        choices = [c for c in choices if all(c[n] != 0 or fixed.get(n) == 0 for n in names)]
+        found = [{**sides, **choice} for sides in found for choice in choices]
+    return found
+
+
+def _heights(names: list[str]) -> list[Sides]:
+    """Return the sides from above the highest level to below the lowest one."""
+    found = []
+    for place in range(2 * len(names) + 1):
+        found.append({n: (2 * i + 1 > place) - (2 * i + 1 < place) for i, n in enumerate(names)})
+    return found
+
+
+def domains_of(description: Description, surfaces: list[Surface]) -> tuple[Domain, ...]:
+    """Return the domains of all modes, with the names that were given."""
+    owner: dict[tuple[int, ...], str] = {}
+    found: list[Domain] = []
+    order = [s.name for s in surfaces]
+    for mode in description.modes:
+        regions = combinations(surfaces, mode.sides)
+        if not regions:
+            raise EntryError(("modes", mode.name, "in"), _impossible(mode, surfaces))
+        for sides in regions:
+            key = tuple(sides[name] for name in order)
+            if key in owner:
+                raise EntryError(("modes", mode.name, "in"), _shared(mode, owner[key], sides))
+            owner[key] = mode.name
+            name = mode.name if len(regions) == 1 else _auto_name(mode, sides, surfaces)
+            found.append(Domain(name, mode.name, {n: sides[n] for n in order}, name))
+    return _renamed(found, description.domains)
+
+
+def _impossible(mode: ModeText, surfaces: list[Surface]) -> str:
+    levels = ", ".join(f"{s.name} ({s.observable} = {s.level})" for s in surfaces)
+    return f"mode '{mode.name}' can be nowhere: its sides contradict each other. Surfaces: {levels}"
+
+
+def _shared(mode: ModeText, other: str, sides: Sides) -> str:
+    where = ", ".join(f"{name} {side:+d}" for name, side in sides.items())
+    return (
+        f"modes '{other}' and '{mode.name}' share the region ({where}): give each a side of a "
+        "surface that divides them"
+    )
+
+
+def _auto_name(mode: ModeText, sides: Sides, surfaces: list[Surface]) -> str:
+    parts, known = [], known_sides(mode, surfaces)
+    for observable, group in itertools.groupby(surfaces, key=lambda s: s.observable):
+        members = [s.name for s in group]
+        if all(name in known for name in members):
+            continue
+        above = sum(sides[name] >= 0 for name in members)
+        place = {0: "-", len(members): "+"}.get(above, "0" if len(members) == 2 else str(above))
+        parts.append(f"{observable}{place}")
+    return f"{mode.name}:{','.join(parts)}"
+
+
+def _renamed(domains: list[Domain], named: tuple[DomainText, ...]) -> tuple[Domain, ...]:
+    found = list(domains)
+    for text in named:
+        fits = [
+            i
+            for i, d in enumerate(domains)
+            if d.mode == text.mode and all(d.signs[s] == v for s, v in text.sides.items())
+        ]
+        if len(fits) != 1:
+            names = ", ".join(domains[i].name for i in fits) or "none"
+            raise EntryError(
+                ("domains", text.name),
+                f"'in' of domain '{text.name}' must hold for one region of mode '{text.mode}', "
+                f"it holds for: {names}",
+            )
+        d = domains[fits[0]]
+        found[fits[0]] = Domain(text.name, d.mode, d.signs, text.label or text.name)
+    every = [d.name for d in found]
+    twice = [name for name in every if every.count(name) > 1]
+    if twice:
+        raise EntryError(("domains",), f"two domains have the name '{twice[0]}'")
+    return tuple(found)

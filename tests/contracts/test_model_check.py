@@ -1,0 +1,193 @@
+"""``contfric check``: sound models pass, and each kind of mistake is found and said."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import contfric as cf
+from contfric.cli import main
+from contfric.models.check import Severity, Topic, check_model
+from contfric.resources import bundled_dir
+
+GOOD = """\
+name: checked
+states: [x, v]
+parameters: {Omega: 0.7, S: 0.2, k: 1.0}
+constraints: [Omega > 0]
+period: 2*pi/Omega
+observables: {u: k*x - cos(Omega*t)}
+surfaces:
+  F+: {observable: u, level: S}
+  F-: {observable: u, level: -S}
+  v: {observable: v, level: 0}
+field: {x: v, v: -u - S*sign(v)}
+modes:
+  forward: {in: {v: +}}
+  backward: {in: {v: -}}
+  stick: {in: {v: 0, F+: -, F-: +}, field: {x: 0, v: 0}}
+symmetry: x -> -x, v -> -v, t -> t + T/2
+"""
+
+
+def report_of(tmp_path: Path, text: str) -> cf.ModelReport:
+    path = tmp_path / "checked.yaml"
+    path.write_text(text, encoding="utf-8")
+    return check_model(path)
+
+
+@pytest.mark.parametrize(
+    "name", ["coulomb", *sorted(p.stem for p in bundled_dir("models").glob("*.yaml"))]
+)
+def test_bundled_models_pass(name: str) -> None:
+    report = check_model(name)
+    assert report.ok, str(report)
+    assert report.findings == []
+    assert report.counts[Topic.DERIVATIVES] > 0
+
+
+#: (what is written in the place of what, topic, severity, what the finding says)
+MISTAKES = [
+    ("- S*sign(v)", "- S*sign(v) - v**2/9", Topic.SYMMETRY, "error", "no image of that of"),
+    (
+        "field: {x: 0, v: 0}",
+        "field: {x: 0, v: 0.1}",
+        Topic.SLIDING,
+        "error",
+        "is 0.1, it must be 0",
+    ),
+    ("2*pi/Omega", "3*pi/Omega", Topic.PERIOD, "error", "common period"),
+    ("Omega > 0]", "Omega > 1]", Topic.CONSTRAINTS, "error", "violate Omega > 1 (Omega = 0.7)"),
+    ("S*sign(v)", "S*sign(v/k)", Topic.KINKS, "warning", "kink where v/k = 0"),
+    ("k: 1.0}", "k: 1.0, mu: 0.3}", Topic.NAMES, "warning", "parameter 'mu' is used nowhere"),
+    ("  backward: {in: {v: -}}\n", "", Topic.TRANSITIONS, "error", "is in no domain"),
+    (
+        "  stick: {in: {v: 0, F+: -, F-: +}, field: {x: 0, v: 0}}\n",
+        "",
+        Topic.TRANSITIONS,
+        "error",
+        "motion is caught there",
+    ),
+    (
+        "states: [x, v]",
+        "states: [x, v]\ndefine: {g: 2*Omega}",
+        Topic.NAMES,
+        "warning",
+        "'g: 2*Omega'",
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "topic", "severity", "says"),
+    MISTAKES,
+    ids=[m[4] for m in MISTAKES],
+)
+def test_mistakes_are_found(
+    tmp_path: Path, old: str, new: str, topic: Topic, severity: str, says: str
+) -> None:
+    assert old in GOOD
+    text = GOOD.replace(old, new, 1)
+    if topic in (Topic.TRANSITIONS, Topic.PERIOD):
+        text = text.replace("symmetry: x -> -x, v -> -v, t -> t + T/2\n", "")
+    report = report_of(tmp_path, text)
+    found = [f for f in report.findings if f.topic is topic]
+    assert any(says in f.message for f in found), str(report)
+    assert {f.severity for f in found} == {Severity(severity)}
+    assert report.ok == (severity == "warning")
+
+
+def test_flat_surfaces_are_found(tmp_path: Path) -> None:
+    text = GOOD.replace("{u: k*x", "{w: x**3, u: k*x").replace(
+        "  v: {observable: v", "  w: {observable: w, level: 0}\n  v: {observable: v"
+    )
+    report = report_of(tmp_path, text)
+    assert any("vanishes on surface 'w'" in f.message for f in report.findings), str(report)
+
+
+WALL = """\
+name: wall
+states: [x, v]
+parameters: {Omega: 0.7, e: 0.8, b: 0.5}
+period: 2*pi/Omega
+surfaces:
+  wall: {observable: x, level: b}
+  stop: {observable: v, level: 0}
+modes:
+  rise: {in: {wall: -, stop: +}, field: {x: v, v: cos(Omega*t) - x}}
+  fall: {in: {wall: -, stop: -}, field: {x: v, v: cos(Omega*t) - x}}
+resets: {wall: {v: -e*v}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("reset", "says"),
+    [("v: -e*v", ""), ("v: e*v", "must turn the rate"), ("v: -e*v, x: x - 0.1", "off the surface")],
+)
+def test_resets_are_checked(tmp_path: Path, reset: str, says: str) -> None:
+    report = report_of(tmp_path, WALL.replace("v: -e*v", reset))
+    assert report.counts[Topic.RESETS] > 0
+    assert report.ok == (not says), str(report)
+    assert not says or any(says in f.message for f in report.findings), str(report)
+
+
+def test_states_that_do_nothing_are_found(tmp_path: Path) -> None:
+    text = (
+        GOOD.replace("states: [x, v]", "states: [x, v, z, w]")
+        .replace("field: {x: v, v: -u - S*sign(v)}", "field: {x: v, v: -u - S*sign(v), z: 0, w: v}")
+        .replace("field: {x: 0, v: 0}", "field: {x: 0, v: 0, z: 0, w: v}")
+        .replace("v -> -v,", "v -> -v, w -> -w,")
+    )
+    report = report_of(tmp_path, text)
+    messages = [f.message for f in report.findings]
+    assert any("state 'z' never changes" in m for m in messages), str(report)
+    assert any("nothing depends on state 'w'" in m for m in messages), str(report)
+    assert report.ok
+
+
+def altered(model: cf.Model, **functions: Any) -> cf.Model:
+    flow = replace(model.flow, **functions)
+    return replace(model, flow_factory=lambda: flow)
+
+
+@pytest.mark.parametrize("name", ["coulomb", "coulomb-yaml"])
+def test_wrong_derivatives_are_found(name: str) -> None:
+    """Compiled code with one wrong derivative, and with one wrong value."""
+    model = cf.load_model(name)
+
+    def slope(c: int, t: float, y: Any, p: Any, which: Any, grad: Any) -> float:
+        value: float = model.flow.observe(c, t, y, p, which, grad)
+        if len(grad) > 3:
+            grad[3] *= 1.001
+        return value
+
+    report = check_model(altered(model, observe=slope))
+    message = next(f.message for f in report.findings if f.topic is Topic.DERIVATIVES)
+    assert "its derivative by Omega is compiled as" in message
+
+    def rate(mode: int, c: int, t: float, y: Any, p: Any, which: Any, grad: Any) -> float:
+        value: float = model.flow.rate(mode, c, t, y, p, which, grad)
+        return value + 1e-6 * y[0]
+
+    report = check_model(altered(model, rate=rate))
+    assert not report.ok
+    assert {f.topic for f in report.findings} >= {Topic.DERIVATIVES}
+
+
+def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "checked.yaml"
+    path.write_text(GOOD, encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    assert capsys.readouterr().out.endswith("fine\n")
+    path.write_text(GOOD.replace("Omega > 0]", "Omega > 1]"), encoding="utf-8")
+    assert main(["check", str(path), "--json"]) == 2
+    found = json.loads(capsys.readouterr().out)
+    assert found["ok"] is False
+    assert found["findings"][0]["topic"] == "constraints"
+    path.write_text(GOOD.replace("states", "sates"), encoding="utf-8")
+    assert main(["check", str(path)]) == 2
+    assert f"{path}:2: unknown key 'sates'; did you mean 'states'?" in capsys.readouterr().err
