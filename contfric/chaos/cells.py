@@ -265,6 +265,23 @@ def carry_on(functions, tables, ranks, mode, on, t, p, period, live, rooms):  # 
         rate = differentiate(functions, observable, mode, duration, t, p, walk, room.none)
         live = min(live, ranks[mode])
         push(rooms.frame, live, rate, walk.jac, walk.grad, walk.image)
+        if not orthonormalise(rooms.frame, live, rooms.growth):
+            outcome = IMPOSSIBLE
+    return outcome, surface, following, duration, turns, t, live
+
+
+@helper
+def carry_behind(functions, tables, ranks, mode, on, t, p, period, live, rooms):  # type: ignore[no-untyped-def]
+    """Do the same where there are resets or no excitation (apart: it would cost all others a tenth)."""
+    walk, room = rooms.walk, rooms.state
+    outcome, surface, following, duration, turns, t = to_joint(
+        functions, tables, mode, on, t, p, period, walk, room
+    )
+    if outcome == ARRIVED:
+        observable = tables.observables[surface]
+        rate = differentiate(functions, observable, mode, duration, t, p, walk, room.none)
+        live = min(live, ranks[mode])
+        push(rooms.frame, live, rate, walk.jac, walk.grad, walk.image)
         reset = tables.bounds[mode, surface] == 2
         if reset or walk.at_once[1] & 1 != 0:
             behind(functions, surface, t, p, rooms.frame, live, walk, room, reset)
@@ -285,9 +302,14 @@ def follow_cell(functions, tables, ranks, mode, on, t, p, period, limits, rooms,
     forget(rooms.memory)
     clear(averages)
     while not (done and cycle >= end):
-        outcome, surface, following, duration, turns, t, live = carry_on(
-            functions, tables, ranks, mode, on, t, p, period, live, rooms
-        )
+        if walk.at_once[1] == 0:
+            outcome, surface, following, duration, turns, t, live = carry_on(
+                functions, tables, ranks, mode, on, t, p, period, live, rooms
+            )
+        else:
+            outcome, surface, following, duration, turns, t, live = carry_behind(
+                functions, tables, ranks, mode, on, t, p, period, live, rooms
+            )
         if outcome == QUIET:
             write_quiet(functions, mode, t, p, walk, rooms.cycle, rows, cell)
             break
