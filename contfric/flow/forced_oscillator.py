@@ -241,4 +241,4 @@ def turning(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-d
 
 def compiled_flow() -> CompiledFlow:
     """Return the compiled functions of this flow."""
-    return CompiledFlow(flow, observe, level, turning, hit, period, rate, second)
+    return CompiledFlow(flow, observe, level, turning, hit, period, rate, second=second)

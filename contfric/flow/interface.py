@@ -7,7 +7,7 @@ are, or what the excitation looks like. The types of the functions stand in
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -37,8 +37,8 @@ class CompiledFlow:
     hit: Any
     period: Any
     rate: Any
-    reset: Any = None
-    second: Any = None
+    reset: Any = field(default=None, kw_only=True)
+    second: Any = field(default=None, kw_only=True)
 
     def functions(self) -> tuple[Any, ...]:
         """Return the functions as kernels take them."""

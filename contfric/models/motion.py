@@ -93,4 +93,4 @@ def motion_code(description: Description, idle: list[tuple[int, int]]) -> str:
         idle=" or ".join(f"(mode == {m} and c == {c})" for m, c in idle) or "False",
         slides=" or ".join(f"mode == {m}" for m in sliding) or "False",
     )
-    return head + _KERNELS.replace("{reset}", ", reset" if description.resets else "")
+    return head + _KERNELS.replace("{reset}", ", reset=reset" if description.resets else "")

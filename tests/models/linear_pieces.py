@@ -372,7 +372,7 @@ def _belt_flow() -> CompiledFlow:
 
 def _impact_flow() -> CompiledFlow:
     return CompiledFlow(
-        flow, _observe_wall, zero_level, _turning_wall, _hit_wall, period, _rate_wall, bounce
+        flow, _observe_wall, zero_level, _turning_wall, _hit_wall, period, _rate_wall, reset=bounce
     )
 
 
