@@ -8,11 +8,10 @@ the path of a YAML file, the path of a folder of such files, or a function that 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
-
-from contfric.models.definition import Model
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
+    from contfric.models.definition import Model
     from contfric.models.oscillator import OscillatorModel
 
 __all__ = ["DEFAULT_MODEL", "Model", "ModelSource", "load_model", "model_names"]
@@ -58,8 +57,20 @@ def load_model(model: ModelSource) -> Model:
     >>> load_model("coulomb").states
     ('x', 'v')
     """
-    if isinstance(model, Model):
-        return model
+    from contfric.models.definition import Model
     from contfric.models.library import find
 
+    if isinstance(model, Model):
+        return model
+
     return find(model)
+
+
+def __getattr__(name: str) -> Any:
+    if (
+        name == "Model"
+    ):  # the command line asks for the name of the default model and for nothing else
+        from contfric.models.definition import Model
+
+        return Model
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

@@ -266,28 +266,6 @@ def test_errors() -> None:
         cf.lyapunov_map("coulom", GRID)
 
 
-def test_autonomous_models_are_refused() -> None:
-    import dataclasses
-
-    from contfric.flow.interface import CompiledFlow
-
-    model = cf.load_model("coulomb")
-    flow = model.flow
-
-    def never(vector: Any, which: Any, grad: Any) -> float:
-        return 0.0
-
-    still = dataclasses.replace(
-        model,
-        name="still",
-        flow_factory=lambda: CompiledFlow(
-            flow.flow, flow.observe, flow.level, flow.turning, flow.hit, never, flow.rate
-        ),
-    )
-    with pytest.raises(cf.ParameterError, match="no period of excitation"):
-        cf.lyapunov_exponent(still)
-
-
 # ----------------------------------------------------------------------------------- the house
 
 
