@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 
@@ -43,10 +44,11 @@ def with_table(page: str, name: str, lines: list[str]) -> str:
     return found.sub(lambda m: m.group(1) + "\n".join(lines) + "\n" + m.group(2), page)
 
 
-def main() -> None:
+def main(studies: tuple[str, ...] = STUDIES) -> None:
+    """Run the studies, write their figures and tables."""
     file = HERE / "planes.md"
     page = file.read_text(encoding="utf-8")
-    for name in STUDIES:
+    for name in studies:
         with tempfile.TemporaryDirectory() as folder:
             result = cf.run_study(name, Path(folder) / "out")
             assert result.plane is not None
@@ -57,4 +59,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(tuple(sys.argv[1:]) or STUDIES)
