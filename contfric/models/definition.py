@@ -163,7 +163,7 @@ class Model:
     surfaces : tuple of Surface
         Those of one observable from the highest level down.
     stop_surface : str
-        Surface on which the displacement is stationary: stops and extrema lie on it.
+        Surface (or kink) on which the displacement is stationary: stops and extrema lie on it.
     flow_factory : callable
         Returns the :class:`~contfric.flow.interface.CompiledFlow`; called at first use only.
     spread : callable
@@ -174,6 +174,9 @@ class Model:
     autonomous : bool
         Whether there is no excitation: the flow's ``period`` returns 0, the period of an orbit is found
         with it, and ``periods`` of a simulation are units of time.
+    kinks : tuple of str
+        Observables at whose zeros the fields have kinks and no jumps: no joints, labels or events
+        (:mod:`contfric.flow.kinked`).
     definition : str
         Text from which the model can be built anywhere (:mod:`contfric.models.description`); empty if
         it is known by its name only.
@@ -196,6 +199,7 @@ class Model:
     references: tuple[str, ...] = ()
     resets: tuple[Reset, ...] = ()
     autonomous: bool = False
+    kinks: tuple[str, ...] = ()
     definition: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
@@ -253,6 +257,8 @@ class Model:
 
     def cuts(self, surface: str) -> bool:
         """Return whether motion is cut at a surface: it is switching, or has a reset."""
+        if surface in self.kinks:
+            return False
         return self.surface_by_name[surface].switching or surface in self.reset_by_surface
 
     @cached_property

@@ -91,6 +91,7 @@ def model_from(description: Description) -> Model:
         references=description.references,
         resets=tuple(_reset(description, name) for name in description.resets),
         autonomous=not description.period,
+        kinks=description.kinks,
         definition=description.text,
     )
 
