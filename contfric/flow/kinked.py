@@ -41,14 +41,14 @@ _STATIONARY = 1e-9
 
 
 @helper
-def piece_at(motion, mode, t, y, p, room):  # type: ignore[no-untyped-def]
-    """Return the piece that a state lies in, or enters if it lies on a kink."""
+def piece_at(motion, mode, t, y, on, p, room):  # type: ignore[no-untyped-def]
+    """Return the piece that a state lies in, or enters if it lies on a kink (on kink ``on`` it does)."""
     bits = 0
     first = mode << motion.kinks
     n = room.scales.shape[0]
     for k in range(motion.kinks):
         side = motion.observe(motion.kink(k), t, y, p, room.none, room.empty)
-        if side == 0.0:  # the fields of both sides are the same here
+        if side == 0.0 or k == on:  # the fields of both sides are the same here
             motion.field(first, t, y, p, room.none, room.stage[:n], room.nothing)
             c = motion.kink(k)
             _, side, second = node(motion, first, c, 0.0, t, y, room.stage, p, room)
@@ -105,7 +105,7 @@ def advance_through(motion, mode, t0, dt, y0, p, which, room):  # type: ignore[n
     looked for.
     """
     begin(motion, y0, p, which, room)
-    piece = piece_at(motion, mode, t0, y0, p, room)
+    piece = piece_at(motion, mode, t0, y0, -1, p, room)
     first_step(motion, piece, -1, t0, dt, p, which, room)
     if not math.isfinite(t0 + dt):
         return -1
@@ -173,8 +173,12 @@ def kinked_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ign
     here, behind = y0.copy(), np.empty(n)
     period = motion.period(p, room.none, room.empty)
     phase = t0 - folded(t0, period) * period
-    piece = piece_at(motion, mode, phase, here, p, room)
-    done, kink = 0.0, -1
+    kink = -1
+    for k in range(motion.kinks):
+        if on and target == 0.0 and c == motion.kink(k):
+            kink = k
+    piece = piece_at(motion, mode, phase, here, kink, p, room)
+    done = 0.0
     while done < dt_max:
         t, left = phase + done, dt_max - done
         until, k = next_kink(motion, piece, t, here, kink, left, p, room, behind)
@@ -204,7 +208,7 @@ def kinked_turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: igno
     here, behind = y0.copy(), np.empty(n)
     period = motion.period(p, room.none, room.empty)
     phase = t0 - folded(t0, period) * period
-    piece = piece_at(motion, mode, phase, here, p, room)
+    piece = piece_at(motion, mode, phase, here, -1, p, room)
     done, kink, count = 0.0, -1, 0
     while done < dt:
         t, left = phase + done, dt - done
