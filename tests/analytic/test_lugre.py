@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import contfric as cf
+from contfric.orbit.solve import polish
 
 WHERE = {"Omega": 0.5, "S0": 0.4}
 #: Events of the symmetric branch of Fig. 17 between S = 0.374 and S = 0.378 (docs/gallery/fig17.md).
@@ -72,7 +74,7 @@ def test_derivatives_pass_kinks(model):
     p, start = model.vector(params), np.array([1.2, -0.3, 0.0])
     out, jac = np.empty(3), np.empty((3, 7))
     model.flow.flow(0, 4.0, start, 5.0, p, which, out, jac)
-    for column, (name, h) in enumerate((("t", 1e-5), (0, 1e-6), (1, 1e-6), (2, 1e-9), ("dt", 1e-6),
+    for column, (name, h) in enumerate((("t", 1e-6), (0, 1e-6), (1, 1e-6), (2, 1e-9), ("dt", 1e-6),
                                         ("S", 1e-6), ("Omega", 1e-6))):  # fmt: skip
         ends = []
         for side in (h, -h):
@@ -83,7 +85,7 @@ def test_derivatives_pass_kinks(model):
             t, dt = 4.0 + side * (name == "t"), 5.0 + side * (name == "dt")
             ends.append(advance(model, t, y, dt, q))
         difference = (ends[0] - ends[1]) / (2.0 * h)
-        assert jac[:, column] == pytest.approx(difference, abs=1e-6 * np.abs(jac[:, column]).max())
+        assert jac[:, column] == pytest.approx(difference, abs=3e-6 * np.abs(jac[:, column]).max())
 
 
 def test_hits_of_a_kink_follow_each_other(model, orbit):
@@ -114,15 +116,16 @@ def test_multipliers_are_those_of_the_stroboscopic_map(model, orbit):
         unit = np.eye(3)[j] * h
         ends = [advance(model, 1.0, y + side * unit, period, orbit.vector) for side in (1, -1)]
         columns.append((ends[0] - ends[1]) / (2.0 * h))
-    mine = np.sort_complex(orbit.multipliers[:2])
+    mine = orbit.multipliers[:2]
     theirs = np.linalg.eigvals(np.column_stack(columns))
-    theirs = np.sort_complex(theirs[np.argsort(-np.abs(theirs))][:2])
-    assert mine == pytest.approx(theirs, abs=1e-6)
+    theirs = theirs[np.argsort(-np.abs(theirs))][:2]
+    for e in (1, 2):  # what does not depend on their order
+        assert np.sum(mine**e) == pytest.approx(np.sum(theirs**e), abs=1e-6)
 
 
 def test_events_do_not_depend_on_where_orbits_are_cut(model, orbit):
     other = cf.find_orbit(model, {**WHERE, "S": 0.38, "phi0": 2.1})
-    for start, max_step in ((orbit, 0.05), (other, 0.03)):
+    for start, max_step in ((orbit, 0.002), (other, 0.001)):
         branch = cf.continue_orbit(start, "S", (0.374, 0.385), max_step=max_step)
         found = {kind: [] for kind in cf.Kind}
         for event in branch.bifurcations:
@@ -133,11 +136,15 @@ def test_events_do_not_depend_on_where_orbits_are_cut(model, orbit):
 
 
 @pytest.mark.parametrize(("offset", "symmetric"), [(1e-6, True), (-1e-6, False)])
-def test_simulation_settles_on_what_the_symmetry_breaking_says(model, offset, symmetric):
-    start = cf.find_orbit(model, {**WHERE, "S": 0.37})
+def test_simulation_settles_on_what_the_symmetry_breaking_says(model, orbit, offset, symmetric):
+    """Symmetric orbits are stable in a window of 3.7e-6 between the branch point and a fold."""
+    branch = cf.continue_orbit(orbit, "S", (0.374, 0.385), max_step=0.002)
+    breaking = next(b for b in branch.bifurcations if b.kind is cf.Kind.BP)
     at = {**WHERE, "S": BREAKING + offset}
-    window = cf.continue_orbit(start, "S", (0.37, at["S"]), max_step=0.02)
-    assert window is not None
-    settled = cf.find_orbit(model, at, state=window[0].state(0.0), longest=20_000)
+    beside = polish(replace(breaking.orbit, vector=model.vector(at)))
+    assert beside.converged
+    assert beside.stable == symmetric
+    settled = cf.find_orbit(model, at, state=beside.state(0.0) + [1e-8, 0.0, 0.0], longest=20_000)
     assert settled.stable
     assert settled.symmetric == symmetric
+    assert (settled.asymmetry < 1e-9) == symmetric
