@@ -1,8 +1,10 @@
 """Located events of the LuGre oscillator against brute-force simulation on both sides.
 
-For every event of a diagram: a disturbance of the located orbit's neighbour on each side of the event is followed
-by the stroboscopic map alone (no Jacobian, no Newton) until it has grown or died out by 1e4, or for 60 turns. Its
-rate a period is compared with the largest multiplier there. ``python -m benchmarks.lugre_events DIAGRAM.npz``.
+For every event of a diagram the orbits next to it on both sides are disturbed a little, and the disturbance is
+followed by the stroboscopic map alone (no Jacobian, no Newton) for up to 60 turns, its size set back after
+each. Its rate a period is compared with the largest multiplier there.
+
+    python benchmarks/lugre_events.py DIAGRAM.npz
 """
 
 from __future__ import annotations
@@ -13,8 +15,8 @@ import numpy as np
 
 import contfric as cf
 
-#: Turns followed, and how far the disturbance may grow or fall.
-TURNS, FACTOR = 60, 1e3
+#: Turns followed at most.
+TURNS = 60
 #: First size of the disturbance: far above rounding and far below the scale of kinks.
 SIZE = 1e-9
 

@@ -31,8 +31,8 @@ _OPENS = 1e-4
 _BESIDE = 1e-6
 #: Odd parts below this (nondimensional) are what a singular system leaves undetermined.
 _ODD = 1e-5
-#: Odd parts below this are rounding: away from a vertex the orbit is symmetric (undoubled). Orbits with a small
-#: odd part may be truly asymmetric, where a vertex lies beside a fold.
+#: Odd parts below this are rounding: away from a vertex the orbit is symmetric (undoubled). Orbits with
+#: a small odd part may be truly asymmetric, where a vertex lies beside a fold.
 _EVEN = 1e-9
 #: Halvings of a step to the resolution of the parameter.
 _HALVINGS = 40

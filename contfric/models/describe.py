@@ -171,7 +171,9 @@ def _surfaces(
         top.fail("surfaces", "a model has at least one surface")
     for name in top.texts("kinks"):
         if name not in (*formulas, *states):
-            top.fail("kinks", f"a kink is where an observable or a state is 0, and '{name}' is none")
+            top.fail(
+                "kinks", f"a kink is where an observable or a state is 0, and '{name}' is none"
+            )
         formulas.setdefault(name, name)
     return tuple(Observable(name, text) for name, text in formulas.items()), tuple(surfaces)
 

@@ -145,7 +145,7 @@ class Formulas:
         }
         found = []
         for mode, bits in itertools.product(self.description.modes, self.pieces):
-            signs = {observables[name]: bit for name, bit in zip(self.description.kinks, bits)}
+            signs = {observables[name]: bit for name, bit in zip(self.description.kinks, bits, strict=True)}
             known = known_sides(mode, self.surfaces)
             for surface, level in zip(self.description.surfaces, self.levels(), strict=True):
                 side = known.get(surface.name, 0)
@@ -164,7 +164,9 @@ class Formulas:
     def pieces(self) -> list[tuple[int, ...]]:
         """Signs of the kinks in each piece of a mode, in the order of their bits."""
         count = len(self.description.kinks)
-        return [tuple(1 if piece >> k & 1 else -1 for k in range(count)) for piece in range(1 << count)]
+        return [
+            tuple(1 if piece >> k & 1 else -1 for k in range(count)) for piece in range(1 << count)
+        ]
 
     def rates(self) -> list[list[Any]]:
         """Return the rate of each observable along each piece of each mode."""
@@ -247,7 +249,9 @@ def module_source(description: Description, digest: str) -> str:
     kinks = [[o.name for o in description.observables].index(name) for name in description.kinks]
     code.add(piece_code(kinks))
     code.add(_KERNELS)
-    timed = [c for c, o in enumerate(formulas.observables()) if not o.free_symbols & set(formulas.y)]
+    timed = [
+        c for c, o in enumerate(formulas.observables()) if not o.free_symbols & set(formulas.y)
+    ]
     code.add(motion_code(description, _idle(description, formulas.rates()), timed))
     return str(code)
 

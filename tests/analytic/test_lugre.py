@@ -144,7 +144,8 @@ def test_simulation_settles_on_what_the_symmetry_breaking_says(model, orbit, off
     beside = polish(replace(breaking.orbit, vector=model.vector(at)))
     assert beside.converged
     assert beside.stable == symmetric
-    settled = cf.find_orbit(model, at, state=beside.state(0.0) + [1e-8, 0.0, 0.0], longest=20_000)
+    shift = np.array([1e-8, 0.0, 0.0])
+    settled = cf.find_orbit(model, at, state=beside.state(0.0) + shift, longest=20_000)
     assert settled.stable
     assert settled.symmetric == symmetric
     assert (settled.asymmetry < 1e-9) == symmetric
