@@ -75,6 +75,7 @@ bench: $(BENCH_STAMP)
 	@$(BIN)/python benchmarks/error.py
 	@$(BIN)/python benchmarks/scale.py
 	@$(BIN)/python benchmarks/scenes.py
+	@$(BIN)/python benchmarks/integrated.py
 
 # An hour or more; sequences go on where they were interrupted.
 stress: $(STAMP)

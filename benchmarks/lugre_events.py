@@ -1,7 +1,7 @@
 """Located events of the LuGre oscillator against brute-force simulation on both sides.
 
-For every event of a diagram the orbits next to it on both sides are disturbed a little, and the disturbance is
-followed by the stroboscopic map alone (no Jacobian, no Newton) for up to 60 turns, its size set back after
+For every event of a diagram the orbits next to it on both sides are disturbed a little, and the disturbance
+is followed by the stroboscopic map alone (no Jacobian, no Newton) for up to 60 turns, its size set back after
 each. Its rate a period is compared with the largest multiplier there.
 
     python benchmarks/lugre_events.py DIAGRAM.npz

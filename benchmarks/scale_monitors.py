@@ -14,6 +14,7 @@ from measuring import Case, Row, measure
 from page import duration
 
 import contfric as cf
+from contfric.study.findings import Findings
 from contfric.study.paint import paint
 from contfric.study.read import Study, read_study
 from contfric.study.tables import write_points
@@ -124,7 +125,7 @@ def figure_cases(folder: Path) -> list[Case]:
     def draw(index: int) -> tuple[None, str]:
         drawing = study.drawings[index]
         path = folder / drawing.file
-        paint(path, drawing, orbit, diagram, study.title)
+        paint(path, drawing, Findings(orbit, diagram=diagram), study.title)
         return None, f"{path.stat().st_size / 1e3:.0f} kB"
 
     return [

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from contfric.atlas.census_result import Census
     from contfric.atlas.diagram import Diagram
     from contfric.atlas.explore import explore
+    from contfric.atlas.plane import Plane
+    from contfric.atlas.plane_explore import explore_plane
     from contfric.atlas.seeds import Seeds
     from contfric.chaos.compute import lyapunov_map
     from contfric.chaos.exponents import LyapunovExponents, lyapunov_exponent
@@ -28,6 +30,9 @@ if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
     from contfric.continuation.events import Bifurcation, EndReason, Kind
     from contfric.continuation.trace import continue_orbit
+    from contfric.curves.curve import Curve
+    from contfric.curves.special import CodimTwo
+    from contfric.curves.trace import continue_bifurcation
     from contfric.errors import (
         AperiodicError,
         ContfricError,
@@ -55,6 +60,8 @@ _HOMES = {
     "Bifurcation": "contfric.continuation.events",
     "Branch": "contfric.continuation.branch",
     "Census": "contfric.atlas.census_result",
+    "CodimTwo": "contfric.curves.special",
+    "Curve": "contfric.curves.curve",
     "ContfricError": "contfric.errors",
     "ConvergenceError": "contfric.errors",
     "Diagram": "contfric.atlas.diagram",
@@ -69,6 +76,7 @@ _HOMES = {
     "NotationError": "contfric.errors",
     "Orbit": "contfric.orbit.orbit",
     "OscillatorModel": "contfric.models.oscillator",
+    "Plane": "contfric.atlas.plane",
     "ParameterError": "contfric.errors",
     "ResultFileError": "contfric.errors",
     "Seeds": "contfric.atlas.seeds",
@@ -77,8 +85,10 @@ _HOMES = {
     "StudyError": "contfric.errors",
     "census": "contfric.atlas.census",
     "check_model": "contfric.models.check",
+    "continue_bifurcation": "contfric.curves.trace",
     "continue_orbit": "contfric.continuation.trace",
     "explore": "contfric.atlas.explore",
+    "explore_plane": "contfric.atlas.plane_explore",
     "find_orbit": "contfric.orbit.find",
     "load": "contfric.results",
     "load_model": "contfric.models",
@@ -100,8 +110,10 @@ __all__ = [
     "Bifurcation",
     "Branch",
     "Census",
+    "CodimTwo",
     "ContfricError",
     "ConvergenceError",
+    "Curve",
     "Diagram",
     "EndReason",
     "Kind",
@@ -115,6 +127,7 @@ __all__ = [
     "Orbit",
     "OscillatorModel",
     "ParameterError",
+    "Plane",
     "ResultFileError",
     "Seeds",
     "Signature",
@@ -123,8 +136,10 @@ __all__ = [
     "__version__",
     "census",
     "check_model",
+    "continue_bifurcation",
     "continue_orbit",
     "explore",
+    "explore_plane",
     "find_orbit",
     "load",
     "load_model",

@@ -70,6 +70,10 @@ rate_signature = f8(i8, i8, f8, vector, vector, indices, vector)
 #: reset(k, t, y, p, which, y1, jac): state behind the reset at surface k; ``jac`` (n, 1 + n + len(which))
 #: holds its derivatives with respect to t, y and the parameters ``which``; not filled if it is empty.
 reset_signature = types.void(i8, f8, vector, vector, indices, vector, matrix)
+#: second(mode, c, t, y, dt, p, which, direction, jac, room): derivative of flow's ``jac`` in a direction
+#: (1 + n + 1) of (t0, y0, dt); with c >= 0 that of observable c's gradient in a direction of (t, y), in
+#: the first row of ``jac``. ``room`` holds 8 + n numbers. 0 where a flow has none.
+second_signature = i8(i8, i8, f8, vector, f8, vector, indices, vector, matrix, vector)
 
 FlowType = types.FunctionType(flow_signature)
 ObserveType = types.FunctionType(observe_signature)
@@ -79,6 +83,7 @@ HitType = types.FunctionType(hit_signature)
 PeriodType = types.FunctionType(period_signature)
 RateType = types.FunctionType(rate_signature)
 ResetType = types.FunctionType(reset_signature)
+SecondType = types.FunctionType(second_signature)
 
 
 class Kernel:

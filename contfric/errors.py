@@ -43,7 +43,7 @@ class AperiodicError(ConvergenceError):
 
 
 def did_you_mean(word: str, valid: Iterable[str]) -> str:
-    """Return ``" (did you mean 'x'?)"`` for the closest valid word, and the list of valid words.
+    """Return ``"; did you mean 'x'?"`` for the closest valid words, and the list of valid words.
 
     Examples
     --------
@@ -51,8 +51,10 @@ def did_you_mean(word: str, valid: Iterable[str]) -> str:
     "; did you mean 'Omega'? Valid: Omega, S"
     """
     names = [str(name) for name in valid]
-    close = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
-    hint = f"; did you mean '{close[0]}'?" if close else "."
+    likeness = {name: difflib.SequenceMatcher(None, word, name).ratio() for name in names}
+    best = max(likeness.values(), default=0.0)
+    close = [f"'{name}'" for name in likeness if likeness[name] == best]
+    hint = f"; did you mean {' or '.join(close)}?" if best >= 0.5 and len(close) <= 2 else "."
     return f"{hint} Valid: {', '.join(names)}"
 
 

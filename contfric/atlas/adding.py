@@ -35,6 +35,11 @@ from contfric.signature.edits import concatenate
 #: Places over the gap at which the margins of a word are looked at: they are smooth curves there, with a
 #: few changes of sign for a word of six turns.
 _GRID = 48
+#: Rounds of the motion before Newton: a stable word contracts the error of 1e-3 to far below the length
+#: of its sticks. Most crossings of an exit surface looked at: one in the wrong sense, one in the right one.
+_ROUNDS, _PASSES = 4, 2
+#: A state is on a surface if it is this near: the starts of slides are solved to rounding.
+_ON_SURFACE = 1e-12
 #: Steps towards one change of sign, and the resolution of its place: the method needs about ten.
 _MOST_STEPS, _RESOLUTION = 60, 1e-15
 
@@ -95,7 +100,7 @@ def period_adding(bridge: Branch, longest: int = 6) -> tuple[Window, ...]:
     >>> found = cf.explore(orbit, "Omega", (0.48, 0.55))
     >>> bridge = next(branch for branch in found.branches if branch.bridge)
     >>> [window.word for window in cf.period_adding(bridge, longest=3)]
-    ['1a-2a', '1a-1a-2a']
+    ['1a-2a-2a', '1a-2a', '1a-1a-2a']
     """
     whole_number("longest", longest, least=2)
     if bridge.model.autonomous or bridge.model.resets:
@@ -203,9 +208,48 @@ def _in_turn(orbits: list[Orbit]) -> Orbit:
 
 
 def _at(orbit: Orbit, parameter: str, value: float) -> Orbit:
+    """Return the orbit of a word at a parameter.
+
+    Newton alone may take the wrong root where a stick of a turn is short: its load falls through the
+    limit before it grows through it. So the joints are first those of the motion itself.
+    """
     vector = orbit.vector.copy()
     vector[orbit.model.index_of(parameter)] = value
-    return polish(replace(orbit, vector=vector))
+    return polish(_settled(replace(orbit, vector=vector)))
+
+
+def _settled(orbit: Orbit) -> Orbit:
+    """Return an orbit with the joints of the motion that takes its outcomes, after some rounds."""
+    layout, joints = orbit.system.layout, orbit.joints.copy()
+    end = joints[0].copy()
+    for _ in range(_ROUNDS):
+        for i in range(len(joints)):
+            joints[i] = end
+            after = _next_joint(orbit, layout.modes[i], layout.exits[i], layout.exit_signs[i], end)
+            if after is None:
+                return orbit
+            end = after
+        end[0] -= orbit.period
+    return replace(orbit, joints=joints)
+
+
+def _next_joint(
+    orbit: Orbit, mode: int, surface: int, sign: float, joint: FloatArray
+) -> FloatArray | None:
+    """Return where a segment meets its exit with the right sign of the rate; None if it does not."""
+    flow, p, none, empty = orbit.model.flow, orbit.vector, np.empty(0, dtype=np.int64), np.empty(0)
+    c = int(orbit.system.layout.observables[surface])
+    level = flow.level(surface, p, none, empty)
+    time, state, after = float(joint[0]), joint[1:].copy(), np.empty(len(joint) - 1)
+    on = abs(flow.observe(c, time, state, p, none, empty) - level) < _ON_SURFACE
+    for _ in range(_PASSES):
+        duration = flow.hit(mode, c, level, on, time, state, orbit.period, p, after)
+        if duration < 0.0:
+            return None
+        time, state, on = time + duration, after.copy(), True
+        if flow.rate(mode, c, time, state, p, none, empty) * sign > 0.0:
+            return np.array([time, *state])
+    return None
 
 
 def _bounds(

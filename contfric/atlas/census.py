@@ -23,7 +23,7 @@ from contfric.atlas.census_search import Mesh, Progress, Search
 from contfric.atlas.census_sections import Section, exit_arcs, period_of, sections_of
 from contfric.atlas.census_words import canonical_pair, closed_words
 from contfric.errors import ParameterError, whole_number
-from contfric.models import load_model
+from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.words import whole_of
 from contfric.signature import ReducedWord
@@ -47,7 +47,7 @@ _DOUBLINGS = 3
 
 
 def census(
-    model: str | Model,
+    model: ModelSource,
     params: Mapping[str, float],
     *,
     periods: int = 2,

@@ -9,13 +9,14 @@ A candidate is accepted when it is solved, and admissible beyond the event in on
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration, Progress
-from contfric.atlas.matching import SAME_STOPS, part_distance
+from contfric.atlas.matching import SAME_MOTION, part_distance
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, candidates, directions, wider_candidates
@@ -48,6 +49,9 @@ _SHARES = (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6)
 _NOWHERE = 1e-7
 #: The same for an event that is located to the root of rounding only.
 _NOWHERE_ROUGHLY = 1e-3
+#: One that gets this far has left it in the right one. A shorter one may have gone back the way that the
+#: start was beside the event: a touch at the very end of a segment is located to the root of rounding.
+_SURELY_AWAY = 1e-4
 
 
 def follow(state: Exploration, event: Event) -> None:
@@ -65,10 +69,14 @@ def follow(state: Exploration, event: Event) -> None:
 
 
 def _follow_sliding(state: Exploration, event: Event) -> None:
-    accepted = [_judge(state, event, c) for c in candidates(event.bifurcation)]
-    if not any(accepted):
-        accepted = [_judge(state, event, c) for c in wider_candidates(event.bifurcation)]
-    if not any(accepted):
+    accepted = jumps = False
+    for proposed in (candidates, wider_candidates):
+        for candidate in proposed(event.bifurcation):
+            jumps = jumps or candidate.has_hold
+            accepted = _judge(state, event, candidate) or accepted
+        if accepted:
+            return
+    if not jumps:  # else motions beside the event are not near what follows it
         _follow_flow(state, event)
 
 
@@ -107,7 +115,7 @@ def _meets(end: End, event: Event, settings: Settings) -> bool:
     gap = abs(a.params[settings.parameter] - b.params[settings.parameter])
     if gap > max(a.accuracy, b.accuracy) * settings.width:
         return False
-    return part_distance(a.orbit.stops, b.orbit.stops) < SAME_STOPS
+    return part_distance(a.orbit.stops, b.orbit.stops) < SAME_MOTION
 
 
 def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:
@@ -151,20 +159,33 @@ def _leave_event(state: Exploration, candidate: Candidate, event: Event) -> Bran
     orbit = candidate.orbit
     assert orbit is not None
     settings = settings_for(orbit, state.settings)
-    active = orbit.model.index_of(settings.parameter)
     if candidate.away is not None:
         return _leave_beside(state, orbit, candidate.away, event, settings)
+    longest: tuple[Orbit, Side] | None = None
+    for there, side in _ways(orbit, settings, state.progress):
+        if _went_somewhere(side, event) and (longest is None or side.length > longest[1].length):
+            longest = there, side
+        if longest is not None and side.length > _SURELY_AWAY:
+            break
+    if longest is None:
+        return None
+    there, side = longest
+    first = _first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
+    return assemble(there, settings, side, first)
+
+
+def _ways(
+    orbit: Orbit, settings: Settings, progress: Progress | None
+) -> Iterator[tuple[Orbit, Side]]:
+    """Yield what is traced in each direction from an orbit at an event."""
+    active = orbit.model.index_of(settings.parameter)
     for tangent, slope in directions(orbit, active):
         start = first_point(orbit, settings, tangent, slope)
         if start is None:
             continue
         there = start.orbit(orbit.system, orbit.vector, active)
         for point in (start, start.reversed()):
-            side = _trace(there, point, settings, state.progress)
-            if _went_somewhere(side, event):
-                first = _first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
-                return assemble(there, settings, side, first)
-    return None
+            yield there, _trace(there, point, settings, progress)
 
 
 def _leave_beside(

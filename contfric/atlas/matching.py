@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from contfric.continuation.branch import Branch
@@ -12,8 +14,8 @@ from contfric.orbit.solve import polish
 from contfric.orbit.words import mirror_pairs
 from contfric.signature import ReducedWord, canonical_word
 
-#: Events whose parameters agree to their accuracy and whose stops agree to this are one.
-SAME_STOPS = 1e-4
+#: Events whose parameters agree to their accuracy and whose motions agree to this are one.
+SAME_MOTION = 1e-4
 #: Orbits solved at the same parameter are one if their stops agree to this.
 _SAME_ORBIT = 1e-8
 
@@ -61,7 +63,30 @@ def same_event(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> 
     if abs(a.params[parameter] - b.params[parameter]) > max(a.accuracy, b.accuracy) * width:
         return False
     mirror = a.orbit.model.symmetry is not None
-    return stops_distance(a.orbit.stops, b.orbit.stops, mirror) < SAME_STOPS
+    if stops_distance(a.orbit.stops, b.orbit.stops, mirror) >= SAME_MOTION:
+        return False
+    if a.orbit.model.autonomous:  # no time is common to both
+        return True
+    images = (b.orbit, b.orbit.mirror()) if mirror else (b.orbit,)
+    return any(motions_distance(a.orbit, image) < SAME_MOTION for image in images)
+
+
+def motions_distance(a: Orbit, b: Orbit) -> float:
+    """Return how far two motions are apart, once a period of the excitation, best whole shift.
+
+    Orbits that run through the same stops a different number of times are told apart by it.
+    """
+    common = math.lcm(a.periods, b.periods)
+    one = np.tile(strobe(a), (common // a.periods, 1))
+    other = np.tile(strobe(b), (common // b.periods, 1))
+    shifted = (np.roll(other, shift, axis=0) for shift in range(b.periods))
+    return float(min(np.max(np.abs(one - moved)) for moved in shifted))
+
+
+def strobe(orbit: Orbit) -> FloatArray:
+    """Return the state once a period of the excitation, shape (periods, n)."""
+    period = orbit.period / orbit.periods
+    return np.array([orbit.state(k * period) for k in range(orbit.periods)])
 
 
 def on_branch(orbit: Orbit, branch: Branch) -> bool:

@@ -205,7 +205,7 @@ def try_cycle(  # type: ignore[no-untyped-def]
         rows.exponents[cell, k] = cycle.rates[k]
         rows.errors[cell, k] = error
     rows.turns[cell] = 1  # without excitation: a cycle
-    if walk.at_once[1] == 0:
+    if walk.at_once[1] & 1 == 0:
         rows.turns[cell] = shortest(
             functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, rooms.state
         )
@@ -262,11 +262,11 @@ def carry_on(functions, tables, ranks, mode, on, t, p, period, live, rooms):  # 
     )
     if outcome == ARRIVED:
         observable = tables.observables[surface]
-        rate = differentiate(functions, observable, mode, duration, t, p, walk, room)
+        rate = differentiate(functions, observable, mode, duration, t, p, walk, room.none)
         live = min(live, ranks[mode])
         push(rooms.frame, live, rate, walk.jac, walk.grad, walk.image)
         reset = tables.bounds[mode, surface] == 2
-        if reset or walk.at_once[1] != 0:
+        if reset or walk.at_once[1] & 1 != 0:
             behind(functions, surface, t, p, rooms.frame, live, walk, room, reset)
         if not orthonormalise(rooms.frame, live, rooms.growth):
             outcome = IMPOSSIBLE
@@ -304,7 +304,7 @@ def follow_cell(functions, tables, ranks, mode, on, t, p, period, limits, rooms,
         on = (1 << surface) | tables.lies_on[mode]
         mode, joint, cycle = following, joint + 1, cycle + turns
         key = mode * surfaces + surface
-        timeless = walk.at_once[1] != 0
+        timeless = walk.at_once[1] & 1 != 0
         joints, lag = returned(rooms.memory, key, cycle, joint, t, walk.y, period, timeless)
         if joints > 0 and try_cycle(
             functions, tables, ranks, mode, on, key, t, joints, lag, p, period, rooms, rows, cell
@@ -338,6 +338,9 @@ def follow_cells(functions, tables, starting, time, vectors, states, limits, row
     """
     n = states.shape[1]
     rooms = new_rooms(n)
+    walls = 0
+    for k in range(tables.observables.shape[0]):
+        walls = 1 if tables.bounds[0, k] == 2 else walls
     for cell in range(states.shape[0]):
         p = vectors[cell]
         for j in range(n):
@@ -345,7 +348,7 @@ def follow_cells(functions, tables, starting, time, vectors, states, limits, row
         rows.turns[cell], rows.followed[cell] = 0, 0
         period = functions[5](p, rooms.state.none, rooms.state.empty)
         timeless = period <= 0.0
-        rooms.walk.at_once[1] = rooms.cycle.walk.at_once[1] = 1 if timeless else 0
+        rooms.walk.at_once[1] = rooms.cycle.walk.at_once[1] = 2 * walls + (1 if timeless else 0)
         if timeless:
             period = 1.0  # periods are units of time
         mode, on = start_mode(functions, tables, starting, time, rooms.walk.y, p, rooms.state)

@@ -19,7 +19,7 @@ from contfric.chaos.starts import StateLike, given_states, number_of_starts
 from contfric.chaos.store import TileFolder, digest, open_tiles
 from contfric.chaos.tiles import Place, Tile, TileRows, empty_tile, inside, places
 from contfric.errors import ParameterError, whole_number
-from contfric.models import load_model
+from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
 
 
@@ -80,7 +80,7 @@ class _Job:
 
 
 def lyapunov_map(
-    model: str | Model,
+    model: ModelSource,
     axes: Mapping[str, ArrayLike],
     params: Mapping[str, float] | None = None,
     *,

@@ -200,7 +200,7 @@ def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, room)
     for i in range(n + 1):
         for j in range(n + 1):
             images[i, j] = 1.0 if i == j else 0.0
-    if walk.at_once[1] != 0:
+    if walk.at_once[1] & 1 != 0:
         images[0, 0] = 0.0
     for j in range(n):
         walk.y[j] = z[1 + j]
@@ -213,12 +213,12 @@ def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, room)
         if outcome != ARRIVED:
             return -1, rank, turns, t, lasted
         observable = tables.observables[surface]
-        rate = differentiate(functions, observable, mode, duration, t, p, walk, room)
+        rate = differentiate(functions, observable, mode, duration, t, p, walk, room.none)
         rank = min(rank, ranks[mode])
         push(images, n + 1, rate, walk.jac, walk.grad, walk.image)
         push(frame, rank, rate, walk.jac, walk.grad, walk.image)
         reset = tables.bounds[mode, surface] == 2
-        if reset or walk.at_once[1] != 0:
+        if reset or walk.at_once[1] & 1 != 0:
             behind(functions, surface, t, p, images, n + 1, walk, room, reset)
             behind(functions, surface, t, p, frame, rank, walk, room, reset)
         lasted += duration
@@ -282,7 +282,7 @@ def solve_cycle(functions, tables, ranks, mode, on, key, joints, turns, p, perio
         repels. ``cycle.rates`` holds the exponents.
     """
     n, time = cycle.walk.y.shape[0], turns * period
-    timeless = cycle.walk.at_once[1] != 0
+    timeless = cycle.walk.at_once[1] & 1 != 0
     before, moved, rate_before = np.inf, 0.0, 0.0
     sensitivity, amplified = 0.0, 0.0
     for step in range(_PASSES):

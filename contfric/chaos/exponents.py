@@ -12,7 +12,7 @@ from contfric.chaos.rows import Limits, follow
 from contfric.chaos.starts import StateLike, default_states, given_states
 from contfric.chaos.status import Motion
 from contfric.errors import ParameterError, whole_number
-from contfric.models import load_model
+from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
 
 
@@ -136,7 +136,7 @@ def checked_time(time: float) -> float:
 
 
 def lyapunov_exponent(
-    model: str | Model,
+    model: ModelSource,
     params: Mapping[str, float] | None = None,
     *,
     state: StateLike | None = None,

@@ -42,6 +42,7 @@ from contfric.orbit.trajectory import (
     IMPOSSIBLE,
     INFINITE,
     MOST_AT_ONCE,
+    NO_FLIGHT,
     NO_TIME,
     QUIET,
     SLIDE_PERIODS,
@@ -64,8 +65,8 @@ class Walk(NamedTuple):
     y, start : state, and start (t, y) of the segment, shapes (n,) and (1 + n,)
     jac, grad : derivatives of the segment's flow and of the observable at its end
     end, image : room for a state and for the image of a perturbation, shape (n,)
-    at_once : number of events in a row that followed each other at once, and whether the model is
-        autonomous, shape (2,)
+    at_once : number of events in a row that followed each other at once, and 1 if the model is
+        autonomous, plus 2 if it has resets, shape (2,)
     """
 
     y: FloatArray
@@ -112,11 +113,12 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
     for j in range(y.shape[0]):
         walk.start[1 + j] = y[j]
     duration, turns = 0.0, 0
+    at_most = NO_FLIGHT if walk.at_once[1] & 2 != 0 else NO_TIME
     longest = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * period
     while True:
         tau, surface = first_hit(functions, tables, mode, on, t, y, p, longest, room)
         if surface < 0:  # a slide that is never left would be an error, if there is an excitation
-            quiet = QUIET if walk.at_once[1] != 0 else IMPOSSIBLE
+            quiet = QUIET if walk.at_once[1] & 1 != 0 else IMPOSSIBLE
             held = tables.sliding[mode] != 0
             return HELD if held else quiet, surface, mode, duration, turns, t
         copy_state(room.after, y)
@@ -127,7 +129,7 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
         for j in range(y.shape[0]):
             if not abs(y[j]) < TOO_LARGE:
                 return INFINITE, surface, mode, duration, turns, t
-        walk.at_once[0] = walk.at_once[0] + 1 if tau <= NO_TIME * period else 0
+        walk.at_once[0] = walk.at_once[0] + 1 if tau <= at_most * period else 0
         if walk.at_once[0] > MOST_AT_ONCE:
             return IMPOSSIBLE, surface, mode, duration, turns, t
         reset = tables.bounds[mode, surface] == 2
@@ -144,12 +146,13 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
 
 
 @helper
-def differentiate(functions, observable, mode, duration, t, p, walk, room):  # type: ignore[no-untyped-def]
+def differentiate(functions, observable, mode, duration, t, p, walk, none):  # type: ignore[no-untyped-def]
     """Differentiate the segment that a walk has just finished; return the rate at its exit."""
     n = walk.y.shape[0]
     jac, grad, start = walk.jac, walk.grad, walk.start
-    functions[0](mode, start[0], start[1:], duration, p, room.none, walk.end, jac)
-    functions[1](observable, t, room.after, p, room.none, grad)
+    functions[0](mode, start[0], start[1:], duration, p, none, walk.end, jac)
+    met = walk.end if walk.at_once[1] & 2 != 0 else walk.y  # before a reset
+    functions[1](observable, t, met, p, none, grad)
     rate = grad[0]
     for k in range(n):
         rate += grad[1 + k] * jac[k, 1 + n]
@@ -162,7 +165,7 @@ def behind(functions, surface, t, p, frame, count, walk, room, reset):  # type: 
     if reset:
         functions[7](surface, t, room.after, p, room.none, walk.end, walk.jac)
         leap(frame, count, walk.jac, walk.image)
-    if walk.at_once[1] != 0:
+    if walk.at_once[1] & 1 != 0:
         for i in range(count):
             frame[i, 0] = 0.0
 

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from contfric.chaos.rows import check_excited
 from contfric.errors import ContfricError, ParameterError, whole_number
-from contfric.models import load_model
+from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.simulation import SimulationEnd, run, simulate
 
@@ -67,7 +67,7 @@ class _Rider:
 
 
 def two_orbit_estimate(
-    model: str | Model,
+    model: ModelSource,
     params: Mapping[str, float] | None = None,
     *,
     state: ArrayLike | None = None,

@@ -32,7 +32,7 @@ def run(options: argparse.Namespace) -> int:
     """``contfric run STUDY``."""
     from contfric.cli.progress import ProgressLine
     from contfric.study import run_study
-    from contfric.study.run import RunStatus
+    from contfric.study.result import RunStatus
 
     with ProgressLine(options.quiet) as progress:
         result = run_study(options.study, options.out, force=options.force, progress=progress)

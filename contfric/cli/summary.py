@@ -10,18 +10,35 @@ Record = dict[str, Any]
 
 def headline(record: Record) -> Iterator[str]:
     """Yield the title, the status and the start."""
-    start = record["start"]
-    values = ", ".join(f"{name} = {value:g}" for name, value in start["params"].items())
     yield f"{record['name']}: {record['title']}"
     yield f"status    {record['status']}; contfric {record['contfric']}, {record['date']}"
+    start = record.get("start")
+    if start is None:
+        return
+    values = ", ".join(f"{name} = {value:g}" for name, value in start["params"].items())
     yield f"start     {start['signature']} over {start['periods']} period(s), {values}"
     yield f"          {start['segments']}"
 
 
 def findings(record: Record) -> Iterator[str]:
-    """Yield branches, bifurcations and loose ends as tables."""
-    if "branches" not in record:
-        return
+    """Yield branches, bifurcations and loose ends as tables; and what the map holds."""
+    if "branches" in record:
+        yield from _diagram(record)
+    if "lyapunov" in record:
+        yield ""
+        yield from _map(record["lyapunov"])
+
+
+def _map(entry: Record) -> Iterator[str]:
+    sides = (f"{n} {low:g} to {high:g} ({k})" for n, (low, high, k) in entry["grid"].items())
+    found = ", ".join(f"{count} {motion}" for motion, count in entry["motions"].items())
+    yield f"exponents at {' x '.join(sides)}, {entry['starts']} start(s) each: {found}"
+    yield f"largest   {entry['largest']:.6g}"
+    if not entry["complete"]:
+        yield "incomplete: the same command goes on from the finished tiles"
+
+
+def _diagram(record: Record) -> Iterator[str]:
     name = record["parameter"]
     rows = [["branch", "name", "points", name, "", "ends"]]
     for branch in record["branches"]:

@@ -19,6 +19,7 @@ a hold has no length any more          drop it: the regular orbit with the earli
 a hold reaches its regular release     it becomes a stick: the regular orbit with the later outcome
 a hold is left without acceleration    the slide behind it is gone: the stick behind that takes over
 a hold touches F on its way            its pin moves to the touch
+the stick up to that touch vanishes    the hold is pinned to the stop
 a hold can just not be left inside     split it there: a slide and a second hold
 =====================================  ========================================================
 
@@ -153,6 +154,8 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
     if place.surface in orbit.model.reset_by_surface:
         return _grazing_impact(orbit, place)
     rests = orbit.model.mode_by_name[mode].sliding
+    if place.margin is Margin.LASTING:
+        return _pinned_at_stop(orbit, place)
     if place.margin is Margin.EXIT:
         return _released_tangentially(orbit, place) if rests else _stops_tangentially(orbit, place)
     return _limit_touched(orbit, place) if rests else _rest_touched(orbit, place)
@@ -189,6 +192,13 @@ def _released_tangentially(orbit: Orbit, place: Test) -> Outcome:
     edit = insert(i, (mode, TOUCH))
     reason = f"hold behind the tangential release of stick {i + 1} at {orbit.word[i][1]}"
     return Outcome(edit, {(i, 0): orbit.ends[i]}, reason)
+
+
+def _pinned_at_stop(orbit: Orbit, place: Test) -> Outcome:
+    """AS: the stick up to a touch of the limit has shrunk to nothing, at a stop on the limit."""
+    i, surface = place.segment, orbit.word[place.segment][1]
+    edit = Edit(frozenset({i}), {(i + 1) % len(orbit.word): hold_at(surface)})
+    return Outcome(edit, {}, f"stick {i + 1} vanishes: the hold behind it starts at the stop")
 
 
 def _limit_touched(orbit: Orbit, place: Test) -> Outcome:

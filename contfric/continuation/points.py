@@ -41,7 +41,7 @@ class Settings:
     low_reason, high_reason : the model's constraint that limits it there; empty for the range
     width : width of the range asked for; arclength counts it as 1
     largest : largest step
-    stability : whether multipliers are evaluated (and BP and PD detected)
+    stability : whether multipliers are evaluated (and PD detected)
     most_points : most points of one side
     """
 

@@ -84,10 +84,13 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
     """
     tests = here.system.tests
     test = tests[first]
+    if test.margin in (Margin.ENTRY, Margin.JOINT):
+        return _grazed_wall(here, point, first)
     if test.margin is not Margin.EXIT or hold_of_test(test, here) is not None:
         return first
     i = test.segment
-    if here.ends[i, 0] - here.cycle[i, 0] > _VANISHED * here.period:
+    rests = here.model.mode_by_name[here.word[i][0]].sliding
+    if rests or here.ends[i, 0] - here.cycle[i, 0] > _VANISHED * here.period:
         return first
     before = (i - 1) % here.system.segments
     at_stop = [
@@ -98,6 +101,21 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
         and abs(point.tests[k]) < _NEARLY_REACHED
     ]
     return at_stop[0] if at_stop else first
+
+
+def _grazed_wall(here: Orbit, point: Point, first: int) -> int:
+    """Return the margin of an impact that has no speed any more, if its own speed is what vanishes first."""
+    tests = here.system.tests
+    met = tests[first].segment - (tests[first].margin is Margin.ENTRY)
+    for k, other in enumerate(tests):
+        if (
+            other.margin is Margin.EXIT
+            and other.segment == met % here.system.segments
+            and other.surface in here.model.reset_by_surface
+            and abs(point.tests[k]) < _NEARLY_REACHED
+        ):
+            return k
+    return first
 
 
 def _located_before(
@@ -117,7 +135,8 @@ def _vanished_stick(here: Orbit, kind: Kind, test: Test) -> Test | None:
     CS and AS at once: the margin vanishes quadratically, and the orbit is one of a continuum (as at
     Omega = 1/2, where a slide lasts a whole natural period whatever its amplitude).
     """
-    if kind is not Kind.AS or hold_of_test(test, here) is not None:
+    of_hold = test.margin is Margin.LASTING or hold_of_test(test, here) is not None
+    if kind is not Kind.AS or of_hold:
         return None
     start, end = here.cycle[test.segment, 0], here.ends[test.segment, 0]
     if end - start >= _VANISHED * here.period:
@@ -146,8 +165,10 @@ def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation 
     ]
     if not near:
         return None
-    # a stop that meets a surface says more than a stick that has no length any more
-    first = next((test for test in near if test.margin is Margin.JOINT), near[0])
+    # a stick that has no length any more before a hold brings its stop to the limit; else a stop that
+    # meets a surface says more
+    rank = {Margin.LASTING: 0, Margin.JOINT: 1}
+    first = min(near, key=lambda test: rank.get(test.margin, 2))
     kind = kind_of_margin(orbit.system, first, here)
     group = tuple(test for test in near if kind_of_margin(orbit.system, test, here) is kind)
     return bifurcation_at(kind, here, tip, None, tip, settings, group)

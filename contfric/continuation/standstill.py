@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import inside_sign, mode_domains
@@ -135,6 +136,11 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
     """Return the joint at which a segment comes nearest to a surface inside.
 
     Without a surface: at which a hold is nearest to not being left any more.
+
+    Raises
+    ------
+    NotationError
+        If no observable of the surface is stationary inside: the touch has moved out through a joint.
     """
     model = orbit.model
     if surface is None:
@@ -147,5 +153,7 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
     level = model.flow.level(k, orbit.vector, _NONE, _EMPTY)
     sign = inside_sign(model, orbit.word[i][0], surface)
     found = _turnings(orbit, i, c)
+    if not found:
+        raise NotationError(f"segment {i + 1} touches {surface} nowhere inside")
     time = min(found, key=lambda pair: sign * (pair[1] - level))[0]
     return joint_within(orbit, i, time)

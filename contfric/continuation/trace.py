@@ -77,7 +77,8 @@ def continue_orbit(
         Largest step along the branch, as a share of the range (times 1 + the size of the
         state); 0.01 by default.
     stability : bool
-        Whether multipliers are evaluated; without them BP and PD are not detected.
+        Whether multipliers are evaluated; without them PD is not detected, nor BP where no
+        asymmetric branch turns.
     max_points : int
         Most points of each side; a branch that reaches it says so.
 

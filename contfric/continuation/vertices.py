@@ -174,8 +174,10 @@ def _opening(orbit: Orbit) -> float:
 
     The pencil of one turn, ``P z_0 + Q z_N = 0``, with ``z_N = -K z_0``: the least singular value of
     P - Q K against the largest, with the sign of the determinant. Other than the multiplier -1 that it
-    stands for, it is defined also on a bridge.
+    stands for, it is defined also on a bridge. Nan for an orbit that Newton has lost.
     """
+    if not (orbit.converged and np.all(np.isfinite(orbit.joints))):
+        return float(np.nan)
     p, q = pencil_of_turn(orbit.system, orbit.joints, orbit.vector)
     close = np.eye(len(p))
     close[0, 0] = 0.0 if orbit.model.autonomous else 1.0  # a turn may take another time

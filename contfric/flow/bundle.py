@@ -8,6 +8,8 @@ are resolved, and inlined where that pays, when the kernel is compiled.
 
 from __future__ import annotations
 
+import hashlib
+from functools import cached_property
 from typing import Any
 
 from numba import types
@@ -35,13 +37,32 @@ class Bundle:
     def __init__(self, **members: Any) -> None:
         self.members = members
 
+    @cached_property
+    def name(self) -> str:
+        """A name that is the same in every process, and another one for other members.
+
+        It is part of the symbols of compiled code: code from the cache must not meet other code of the
+        same name, as it would if this were an address.
+        """
+        content = hashlib.sha256()
+        for key, member in sorted(self.members.items()):
+            code = getattr(getattr(member, "py_func", None), "__code__", None)
+            place = (code.co_filename, code.co_name, code.co_firstlineno) if code else repr(member)
+            content.update(f"{key}={place};".encode())
+        return f"Bundle{content.hexdigest()[:16]}"
+
 
 class BundleType(types.Opaque):  # type: ignore[misc]
     """Numba's type of one bundle: two bundles are two types."""
 
     def __init__(self, bundle: Bundle) -> None:
         self.bundle = bundle
-        super().__init__(f"Bundle({id(bundle)})")
+        super().__init__(bundle.name)
+
+    @property
+    def key(self) -> Any:
+        """What makes it equal to another type: the same bundle, not one of the same name."""
+        return self.name, id(self.bundle)
 
 
 register_model(BundleType)(models.OpaqueModel)

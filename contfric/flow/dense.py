@@ -75,3 +75,17 @@ def write(source, target):  # type: ignore[no-untyped-def]
     """Copy a state."""
     for k in range(target.shape[0]):
         target[k] = source[k]
+
+
+@helper
+def push(nodes, depth, at, values):  # type: ignore[no-untyped-def]
+    """Put a node (time, q, q', q'') on the stack; return its new depth."""
+    nodes[depth, 0] = at
+    nodes[depth, 1], nodes[depth, 2], nodes[depth, 3] = values
+    return depth + 1
+
+
+@helper
+def top(nodes, depth):  # type: ignore[no-untyped-def]
+    """Return the time of the last node on the stack, and its (q, q', q'')."""
+    return nodes[depth - 1, 0], (nodes[depth - 1, 1], nodes[depth - 1, 2], nodes[depth - 1, 3])

@@ -17,8 +17,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from contfric.compiled import (
     allocating_helper,
     flow_signature,
@@ -30,6 +28,7 @@ from contfric.compiled import (
     rate_signature,
     turning_signature,
 )
+from contfric.flow.damping import damping_response
 from contfric.flow.interface import CompiledFlow
 from contfric.flow.motion import (
     OMEGA,
@@ -44,9 +43,10 @@ from contfric.flow.motion import (
     phases,
     point,
 )
-from contfric.flow.response import divided_exponentials, forced, free, roots
+from contfric.flow.response import forced, free
 from contfric.flow.rest import rest_hit, rest_turnings
 from contfric.flow.roots import interior_of, roots_along
+from contfric.flow.second import second
 
 #: A load this far from a level is not there by rounding: its next hit is one of the closed form's.
 AWAY = 1e-6
@@ -54,31 +54,11 @@ AWAY = 1e-6
 
 @allocating_helper
 def damping_slope(s, p, t0, x0, v0, d):  # type: ignore[no-untyped-def]
-    """Return d(x, v)/dzeta: the response ``-2 G * v`` to the velocity (the equation differentiated)."""
-    w, h = p[OMEGA], p[H]
-    a, b = roots(p[ZETA])
-    # G*G, its slope G*C, and C*C' by exp_d over the repeated roots
-    nodes = np.empty(5, dtype=np.complex128)
-    nodes[0], nodes[1], nodes[2], nodes[3] = a, b, a, b
-    e = divided_exponentials(nodes[:4], d)
-    g2 = e[3]
-    g2_1 = b * e[3] + e[2]
-    g2_2 = b * g2_1 + a * e[2] + e[1]
-    load = x0 + s * p[S]
-    x = v0 * g2_1 - load * g2
-    v = v0 * g2_2 - load * g2_1
-    for k in range(1, 4, 2):
-        size = 1.0 if k == 1 else h
-        if size != 0.0:
-            node = complex(0.0, k * w)
-            nodes[4] = node
-            q = divided_exponentials(nodes, d)[4]
-            q1 = node * q + g2
-            q2 = node * q1 + g2_1
-            turn = size * complex(math.cos(k * w * t0), math.sin(k * w * t0))
-            x += turn * q1
-            v += turn * q2
-    return -2.0 * x.real, -2.0 * v.real
+    """Return d(x, v)/dzeta."""
+    one, three = p[OMEGA] * t0, 3 * p[OMEGA] * t0
+    first = complex(math.cos(one), math.sin(one))
+    third = p[H] * complex(math.cos(three), math.sin(three))
+    return damping_response(p, x0 + s * p[S], v0, first, third, d)
 
 
 @allocating_helper
@@ -261,4 +241,4 @@ def turning(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-d
 
 def compiled_flow() -> CompiledFlow:
     """Return the compiled functions of this flow."""
-    return CompiledFlow(flow, observe, level, turning, hit, period, rate)
+    return CompiledFlow(flow, observe, level, turning, hit, period, rate, second)

@@ -17,7 +17,9 @@ from contfric.flow.dense import (
     is_flat,
     node,
     probed,
+    push,
     start_search,
+    top,
     write,
 )
 from contfric.flow.panels import error_of, scan_values
@@ -34,7 +36,7 @@ _FLAT = 0.125
 
 @helper
 def refine_hit(motion, mode, c, target, sign, t, h, low, high, at, p, room):  # type: ignore[no-untyped-def]
-    """Return the root in a bracket behind which the observable changes sign; the state is in ``room.trial``."""
+    """Return the root in a bracket; the state there is in ``room.trial``."""
     n = room.scales.shape[0]
     for _ in range(100):  # bisection alone needs 60
         q, q1, _ = probed(motion, mode, c, target, t, at, p, room)
@@ -65,44 +67,37 @@ def first_in_step(motion, mode, c, target, sign, multiple, t, a, h, left, right,
     end.
     """
     nodes = room.nodes
-    nodes[0, 0], nodes[0, 1], nodes[0, 2], nodes[0, 3] = h, right[0], right[1], right[2]
-    q, q1, q2 = left
-    depth, probes = 1, 0
+    depth, probes = push(nodes, 0, h, right), 0
     while depth > 0:
-        b, r, r1, r2 = (
-            nodes[depth - 1, 0],
-            nodes[depth - 1, 1],
-            nodes[depth - 1, 2],
-            nodes[depth - 1, 3],
-        )
+        b, after = top(nodes, depth)
         length = b - a
-        ends = coefficients(sign * q, sign * q1, sign * q2, sign * r, sign * r1, sign * r2, length)
+        ends = signed_coefficients(sign, left, after, length)
         outcome, low, high, here = scan_values(ends, error_of(ends), multiple)
         if outcome == ISOLATED:
             at = a + (low + (high - low) * root_of(here)) * length
-            ends_at = a + high * length
-            return refine_hit(
-                motion, mode, c, target, sign, t, h, a + low * length, ends_at, at, p, room
-            )
+            low, high = a + low * length, a + high * length
+            return refine_hit(motion, mode, c, target, sign, t, h, low, high, at, p, room)
         if outcome != FREE and length > SHORTEST * h and depth < DEPTH:
             probes += 1
             middle = 0.5 * (a + b)
-            q_m, q1_m, q2_m = probed(motion, mode, c, target, t, middle, p, room)
-            if math.isnan(q_m) or probes > MOST_PROBES:
+            between = probed(motion, mode, c, target, t, middle, p, room)
+            if math.isnan(between[0]) or probes > MOST_PROBES:
                 return math.nan
-            nodes[depth, 0], nodes[depth, 1], nodes[depth, 2], nodes[depth, 3] = (
-                middle,
-                q_m,
-                q1_m,
-                q2_m,
-            )
-            depth += 1
+            depth = push(nodes, depth, middle, between)
             continue
-        if outcome != FREE and sign * r <= 0.0:
+        if outcome != FREE and sign * after[0] <= 0.0:
             return refine_hit(motion, mode, c, target, sign, t, h, a, b, 0.5 * (a + b), p, room)
-        a, q, q1, q2, multiple = b, r, r1, r2, 0
+        a, left, multiple = b, after, 0
         depth -= 1
     return -1.0
+
+
+@helper
+def signed_coefficients(sign, left, right, length):  # type: ignore[no-untyped-def]
+    """Return the quintic between two nodes, times a sign."""
+    q, q1, q2 = left
+    r, r1, r2 = right
+    return coefficients(sign * q, sign * q1, sign * q2, sign * r, sign * r1, sign * r2, length)
 
 
 @helper
@@ -136,6 +131,10 @@ def first_hit(motion, mode, c, target, on, t0, y0, dt_max, p, room, y1):  # type
         write(y0, y1)
         return 0.0
     sign, multiple = leaving(left, on)
+    side = motion.side(mode, c) if on else 0.0
+    if sign * side < 0.0:  # it leaves the level to where the mode does not live
+        write(y0, y1)
+        return 0.0
     done = 0.0
     while done < dt_max:
         t = t0 + done
@@ -149,6 +148,9 @@ def first_hit(motion, mode, c, target, on, t0, y0, dt_max, p, room, y1):  # type
                 begins = _FLAT * h
                 left = probed(motion, mode, c, target, t, begins, p, room)
                 sign = 1.0 if left[0] > 0.0 else -1.0
+                if sign * side < 0.0:
+                    write(y0, y1)
+                    return 0.0
             at = first_in_step(
                 motion, mode, c, target, sign, multiple, t, begins, h, left, right, p, room
             )

@@ -15,6 +15,8 @@ parameters that are differentiated by; whatever has no room (an array of length 
    The field and the observables must have this period.
 5. ``scale(i, p)``: return the natural size of state i, the unit of its absolute tolerance. A state that
    is multiplied by a stiffness of 1000 in the field has the scale 1/1000.
+6. ``side(mode, c)``, if a mode lives on one side of a level of observable c that its segments start on:
+   return 1 above it, -1 below it, 0 otherwise. A start that leaves to the other side hits at once.
 
 Then bundle them, and write the kernels::
 
@@ -78,6 +80,12 @@ _METHODS = {
 TOLERANCE = 1e-12
 
 
+@helper
+def no_side(mode, c):  # type: ignore[no-untyped-def]
+    """Return that a mode may leave a level to both sides."""
+    return 0.0
+
+
 def integrated_motion(
     *,
     field: Callable[..., Any],
@@ -85,6 +93,7 @@ def integrated_motion(
     rate: Callable[..., Any],
     period: Callable[..., Any],
     scale: Callable[..., Any],
+    side: Callable[..., Any] | None = None,
     method: Method | str = Method.EXPLICIT,
     relative: float = TOLERANCE,
     absolute: float = TOLERANCE,
@@ -95,7 +104,7 @@ def integrated_motion(
 
     Parameters
     ----------
-    field, observe, rate, period, scale : the helpers that the module describes
+    field, observe, rate, period, scale, side : the helpers that the module describes
     method : ``explicit`` (order 8), or ``automatic`` where a mode is stiff: it changes to the implicit
         method and back as the motion asks for it, and takes longer to compile
     relative, absolute : error that a step may make relative to a state, and to its scale
@@ -114,6 +123,7 @@ def integrated_motion(
         rate=rate,
         period=period,
         scale=scale,
+        side=no_side if side is None else side,
         relative=float(relative),
         absolute=float(absolute),
         attempt=attempt,

@@ -1,4 +1,4 @@
-"""What the engine asks of a flow, closed form or integrated: a few compiled functions.
+"""What the engine asks of a flow, closed form or integrated: seven compiled functions and optional ones.
 
 The engine knows nothing else of a model's motion: not how a state is advanced, how many states there
 are, or what the excitation looks like. The types of the functions stand in
@@ -26,6 +26,8 @@ class CompiledFlow:
     period : period of the excitation (0 for an autonomous model), with its gradient
     rate : rate of an observable along a mode, with its gradient
     reset : state behind the reset at a surface, with its derivatives; None if the model has no resets
+    second : second derivatives in a direction, for curves in two parameters; without it they are
+        differences of the first ones
     """
 
     flow: Any
@@ -36,10 +38,19 @@ class CompiledFlow:
     period: Any
     rate: Any
     reset: Any = None
+    second: Any = None
 
     def functions(self) -> tuple[Any, ...]:
         """Return the functions as kernels take them."""
         return self._first_class
+
+    @cached_property
+    def second_derivatives(self) -> Any:
+        """Return the second derivatives as kernels take them; one that says that there is none by default."""
+        from contfric.compiled import FirstClass
+        from contfric.flow.without import no_second
+
+        return FirstClass(no_second if self.second is None else self.second)
 
     @cached_property
     def _first_class(self) -> tuple[Any, ...]:

@@ -29,8 +29,9 @@ import numpy as np
 from contfric.compiled import helper
 from contfric.flow.collocation import collocation_matrix, radau_nodes, values_at_start
 from contfric.flow.elimination import lu, lu_solve
+from contfric.flow.stepping import REMEMBERED
 
-#: Number of stages: of 3, 5 and 7 the fastest at a tolerance of 1e-12 (docs/integration.md).
+#: Number of stages: seven are faster than five from tolerances of 1e-9 on (docs/integration.md).
 IMPLICIT_STAGES = 7
 #: Most iterations of Newton's method with one matrix, and most matrices in a step.
 _ITERATIONS, _MATRICES = 8, 3
@@ -168,7 +169,7 @@ def implicit_step(motion, mode, c, t, h, p, which, room, target, inside):  # typ
     start, z = room.start, room.increments
     s, n = z.shape
     columns = room.partial.shape[1]
-    predict(h, room, room.control[6], inside)
+    predict(h, room, room.control[REMEMBERED], inside)
     if not solve_stages(motion, mode, t, h, p, which, room):
         return False
     for k in range(n):

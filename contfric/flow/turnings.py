@@ -16,7 +16,9 @@ from contfric.flow.dense import (
     is_flat,
     node,
     probed,
+    push,
     start_search,
+    top,
 )
 from contfric.flow.panels import error_of, scan_slopes, zero_of_slope
 from contfric.flow.pieces import FREE, ISOLATED, coefficients
@@ -54,71 +56,58 @@ def refine_turning(motion, mode, c, t, h, low, high, at, p, room):  # type: igno
 
 
 @helper
+def recorded(at, value, span, count, times, values):  # type: ignore[no-untyped-def]
+    """Append a stationary point if it is inside; return their number, -1 if there is no room or no point."""
+    if math.isnan(at):
+        return -1
+    if not span[0] < at < span[1]:
+        return count
+    if count == times.shape[0]:
+        return -1
+    times[count], values[count] = at, value
+    return count + 1
+
+
+@helper
 def turnings_in_step(motion, mode, c, t, h, done, span, left, right, p, room, count, times, values):  # type: ignore[no-untyped-def]
     """Append the stationary points in the last step; return their number, -1 if the search fails."""
-    nodes = room.nodes
-    nodes[0, 0], nodes[0, 1], nodes[0, 2], nodes[0, 3] = h, right[0], right[1], right[2]
-    a, q, q1, q2 = 0.0, left[0], left[1], left[2]
-    depth, probes = 1, 0
+    nodes, a = room.nodes, 0.0
+    depth, probes = push(nodes, 0, h, right), 0
     while depth > 0:
-        b, r, r1, r2 = (
-            nodes[depth - 1, 0],
-            nodes[depth - 1, 1],
-            nodes[depth - 1, 2],
-            nodes[depth - 1, 3],
-        )
-        length = b - a
-        ends = coefficients(q, q1, q2, r, r1, r2, length)
+        b, after = top(nodes, depth)
+        length, next_node = b - a, b
+        q, q1, q2 = left
+        ends = coefficients(q, q1, q2, after[0], after[1], after[2], length)
         at_start = a == 0.0 and done == 0.0 and abs(q1) <= AT_START * (1.0 + abs(q2))
         outcome, low, high, here = scan_slopes(ends, error_of(ends), at_start)
-        found = outcome == ISOLATED
-        next_node = b
-        if not found and outcome != FREE:
+        found, share = outcome == ISOLATED, 0.5
+        if found:
+            share = zero_of_slope(here)
+        elif outcome != FREE:
             if length > SHORTEST * h and depth < DEPTH and done + a < span[1]:
                 next_node = 0.5 * (a + b)
-            elif (q1 < 0.0) != (r1 < 0.0) and not at_start:
+            elif (q1 < 0.0) != (after[1] < 0.0) and not at_start:
                 found, low, high = True, 0.0, 1.0
         if found:
-            share = zero_of_slope(here) if outcome == ISOLATED else 0.5
-            at, value = refine_turning(
-                motion,
-                mode,
-                c,
-                t,
-                h,
-                a + low * length,
-                a + high * length,
-                a + (low + (high - low) * share) * length,
-                p,
-                room,
-            )
-            if math.isnan(at):
+            at = a + (low + (high - low) * share) * length
+            low, high = a + low * length, b if high == 1.0 else a + high * length
+            at, value = refine_turning(motion, mode, c, t, h, low, high, at, p, room)
+            count = recorded(done + at, value, span, count, times, values)
+            if count < 0:
                 return -1
-            if span[0] < done + at < span[1]:
-                if count == times.shape[0]:
-                    return -1
-                times[count], values[count] = done + at, value
-                count += 1
-            if high < 1.0:
-                next_node = a + high * length
+            next_node = high
         if next_node == b:
-            a, q, q1, q2 = b, r, r1, r2
+            a, left = b, after
             depth -= 1
             continue
         probes += 1
-        q_m, q1_m, q2_m = probed(motion, mode, c, 0.0, t, next_node, p, room)
-        if math.isnan(q_m) or probes > MOST_PROBES:
+        between = probed(motion, mode, c, 0.0, t, next_node, p, room)
+        if math.isnan(between[0]) or probes > MOST_PROBES:
             return -1
         if found:
-            a, q, q1, q2 = next_node, q_m, q1_m, q2_m
+            a, left = next_node, between
         else:
-            nodes[depth, 0], nodes[depth, 1], nodes[depth, 2], nodes[depth, 3] = (
-                next_node,
-                q_m,
-                q1_m,
-                q2_m,
-            )
-            depth += 1
+            depth = push(nodes, depth, next_node, between)
     return count
 
 

@@ -141,7 +141,7 @@ def make_room(n, observed, columns, stages, implicit):  # type: ignore[no-untype
         flat[4],
         flat[5],
         np.empty(n),
-        np.empty((rows, 1 + n + (columns - 1 - n) if columns > 0 else 0)),
+        np.empty((rows, columns)),
         np.empty((n, 1 + n)),
         np.empty(1 + n),
         np.zeros(CONTROLS),

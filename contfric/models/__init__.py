@@ -8,14 +8,17 @@ the path of a YAML file, the path of a folder of such files, or a function that 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from contfric.models.definition import Model
 
 if TYPE_CHECKING:
     from contfric.models.oscillator import OscillatorModel
 
-__all__ = ["DEFAULT_MODEL", "Model", "load_model", "model_names"]
+__all__ = ["DEFAULT_MODEL", "Model", "ModelSource", "load_model", "model_names"]
+
+#: What :func:`load_model`, and with it whatever takes a model, accepts.
+ModelSource: TypeAlias = "str | Path | Model | type[OscillatorModel] | OscillatorModel"
 
 #: The model of the command line where none is named.
 DEFAULT_MODEL = "coulomb"
@@ -34,7 +37,7 @@ def model_names() -> list[str]:
     return names()
 
 
-def load_model(model: str | Path | Model | type[OscillatorModel] | OscillatorModel) -> Model:
+def load_model(model: ModelSource) -> Model:
     """Return a model by its name, its YAML file or its class; a model is returned as it is.
 
     Parameters

@@ -23,11 +23,12 @@ from contfric.models.definition import (
     Surface,
     Symmetry,
 )
+from contfric.models.departing import departing_side, leaves_at_rest
 from contfric.models.description import Description
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import Evaluator, Sampler, defaults, floats
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope, parse
-from contfric.models.regions import combinations, departing_side, domains_of, ordered_surfaces
+from contfric.models.regions import combinations, domains_of, ordered_surfaces
 from contfric.yaml_lines import Address
 
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
@@ -92,6 +93,7 @@ def model_from(description: Description) -> Model:
         resets=tuple(_reset(description, name) for name in description.resets),
         autonomous=not description.period,
         kinks=description.kinks,
+        filippov=leaves_at_rest(sampler, description, domains),
         definition=description.text,
     )
 

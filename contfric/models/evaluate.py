@@ -20,6 +20,8 @@ _TRIES, _STEPS = 400, 30
 _ON = 1e-12
 #: Central differences: the cube root of the rounding error.
 _DIFFERENCE = 6e-6
+#: Beside a surface: far beyond rounding, and nothing against a rate that matters.
+_BESIDE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,8 +168,13 @@ class Sampler:
             found.append((up - down) / (2 * _DIFFERENCE))
         return found
 
-    def rate(self, mode: str, surface: str, t: float, y: Sequence[float]) -> float:
-        """Return the rate at which a mode moves away from a surface, upwards."""
-        velocity = [1.0, *self.evaluator.field(mode, self.params, t, y)]
+    def rate(self, mode: str, surface: str, side: int, t: float, y: Sequence[float]) -> float:
+        """Return the rate at which a mode moves off a surface, upwards, just beside it.
+
+        The field is that of the side: on the surface itself ``sign`` would be 0.
+        """
         slope = self.gradient(surface, t, y)
+        size = math.sqrt(sum(g * g for g in slope)) or 1.0
+        beside = [a + side * _BESIDE * g / size for a, g in zip((t, *y), slope, strict=True)]
+        velocity = [1.0, *self.evaluator.field(mode, self.params, beside[0], beside[1:])]
         return sum(g * v for g, v in zip(slope, velocity, strict=True))

@@ -14,7 +14,7 @@ from __future__ import annotations
 import ast
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import sympy
@@ -185,6 +185,7 @@ def resolved(expression: Any, signs: Mapping[Any, int]) -> Any:
     return resolved(expression.xreplace(swaps), signs) if swaps else expression
 
 
-def kinks_in(expression: Any) -> list[str]:
-    """Return the parts of a formula that have a kink or jump, as text."""
-    return sorted(str(part) for part in expression.atoms(Sign, Abs, Where))
+def kinks_in(expression: Any, moving: Collection[Any]) -> list[Any]:
+    """Return what changes its sign at the kinks and jumps of a formula, if it depends on ``moving``."""
+    parts = (part.args[0] for part in expression.atoms(Sign, Abs, Where))
+    return sorted({x for x in parts if x.free_symbols & set(moving)}, key=str)

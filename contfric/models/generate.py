@@ -145,7 +145,10 @@ class Formulas:
         }
         found = []
         for mode, bits in itertools.product(self.description.modes, self.pieces):
-            signs = {observables[name]: bit for name, bit in zip(self.description.kinks, bits, strict=True)}
+            signs = {
+                observables[name]: bit
+                for name, bit in zip(self.description.kinks, bits, strict=True)
+            }
             known = known_sides(mode, self.surfaces)
             for surface, level in zip(self.description.surfaces, self.levels(), strict=True):
                 side = known.get(surface.name, 0)
@@ -356,7 +359,7 @@ class _Writer:
         columns: list[str],
         result: str | None,
     ) -> None:
-        """Write one block for each index, or each few that share it; the last one is for all that are left."""
+        """Write one block for each index, or for each few that share it; the last for all that are left."""
         self._define(head, blocks)
         same: dict[tuple[Output, ...], list[int]] = {}
         for i, outputs in enumerate(blocks):  # two modes with one field share a block

@@ -9,7 +9,7 @@ from dataclasses import replace
 from contfric.models.definition import Domain, Surface
 from contfric.models.description import Description, DomainText, ModeText
 from contfric.models.entries import EntryError
-from contfric.models.evaluate import Sampler, defaults, floats
+from contfric.models.evaluate import defaults, floats
 
 Sides = dict[str, int]
 
@@ -143,22 +143,3 @@ def _renamed(domains: list[Domain], named: tuple[DomainText, ...]) -> tuple[Doma
     if twice:
         raise EntryError(("domains",), f"two domains have the name '{twice[0]}'")
     return tuple(found)
-
-
-def departing_side(
-    sampler: Sampler, beside: Mapping[int, str], surface: str, sides: Mapping[str, int]
-) -> int:
-    """Return the side that motion on a surface leaves to in a region, 0 if that is not clear.
-
-    Parameters
-    ----------
-    beside : the mode on each side, by +1 and -1
-    """
-    verdicts = set()
-    # 12 states: what a single one says may be an accident of the region's edge
-    for t, y in sampler.on(surface, sides, 12):
-        away = [
-            side for side, mode in beside.items() if side * sampler.rate(mode, surface, t, y) > 0.0
-        ]
-        verdicts.add(away[0] if len(away) == 1 else 0)
-    return verdicts.pop() if len(verdicts) == 1 else 0

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.errors import AperiodicError, ConvergenceError, whole_number
-from contfric.models import load_model
-from contfric.models.definition import Model
+from contfric.models import ModelSource, load_model
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
@@ -37,7 +36,7 @@ _ATTRACTS = 1.0 + 1e-6
 
 
 def find_orbit(
-    model: str | Model,
+    model: ModelSource,
     params: Mapping[str, float] | None = None,
     periods: int | None = None,
     *,

@@ -162,7 +162,7 @@ def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-un
 
 @helper
 def lasting_margin(layout, k, z, room):  # type: ignore[no-untyped-def]
-    """Return the duration of hold k of those that must last."""
+    """Return the duration of segment k of those that must last."""
     i = layout.lasting[k]
     after = z[i + 1] if i + 1 < z.shape[0] else room.last
     return after[0] - z[i, 0]

@@ -14,13 +14,12 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import pencil_of_turn
+from contfric.orbit.reading import read_signature
 from contfric.orbit.simulation import signs_at
 from contfric.orbit.stops import displacements, stopping_segments
 from contfric.orbit.system import Margin, System, Word, build_system
-from contfric.orbit.words import decode, end_domain, half_of, mirror_pairs, passed_domains, whole_of
+from contfric.orbit.words import half_of, mirror_pairs, whole_of
 from contfric.signature import Signature
-from contfric.signature.holds import TOUCH, domain_after, is_hold
-from contfric.signature.impacts import impact_at, mirror_name
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -267,7 +266,10 @@ class Orbit:
     def _slack(self) -> FloatArray:
         """A joint may touch a surface to rounding (at an event), and a hold its limits; nothing else may."""
         held = {hold.segment for hold in self.system.holds}
-        may = [t.margin is Margin.JOINT or t.segment in held for t in self.system.tests]
+        may = [
+            t.margin in (Margin.JOINT, Margin.LASTING) or t.segment in held
+            for t in self.system.tests
+        ]
         return np.where(np.array(may), -1e-9, 0.0)
 
     def violations(self) -> list[str]:
@@ -285,66 +287,8 @@ class Orbit:
 
     @cached_property
     def signature(self) -> Signature:
-        """The signature, with all seven domains, read off the solved segments."""
-        model, system = self.model, self.system
-        if system.domains:  # in full form each segment is one of them
-            plain = Signature(model, system.domains, self.periods, symmetric=self.symmetric)
-            return replace(plain, name=plain.auto_name(self.symmetric))
-        _, labels, _ = self._watched
-        surfaces = [s.name for s in model.surfaces]
-        ends, word = self._end_domains(), self.word
-        crossed: list[list[str]] = [[] for _ in system.word]
-        for row, code in zip(system.layout.labels, labels, strict=True):
-            crossed[row[0]] += decode(int(code), surfaces)
-        domains: list[str] = []
-        for i, passed in enumerate(crossed):
-            entry = word[i - 1][1]  # of the whole word: its last exit leads into the first
-            if is_hold(word[i][1]):
-                domains.append(word[i][1])
-                continue
-            if is_hold(entry):
-                start = str(domain_after(model, word[i - 1][0], word[i][0]))
-            elif entry in model.reset_by_surface:
-                start = self._domain_behind(i)
-            else:
-                start = model.transitions[ends[i - 1], entry]
-            domains += passed_domains(model, start, ends[i], passed)
-            if word[i][1] in model.reset_by_surface:
-                domains.append(impact_at(word[i][1]))
-        if system.half:
-            assert model.symmetry is not None
-            image = {**model.symmetry.surfaces, **model.mirror_domain}
-            domains += [mirror_name(d, image) for d in domains]
-        plain = Signature(model, tuple(domains), self.periods, symmetric=self.symmetric)
-        return replace(plain, name=plain.auto_name(self.symmetric))
-
-    def _domain_behind(self, i: int) -> str:
-        """Domain in which a segment begins behind a reset."""
-        begin, model = self.begins[i], self.model
-        signs = signs_at(model, float(begin[0]), begin[1:].copy(), self.vector)
-        across = self.word[i - 1][
-            1
-        ]  # the joint lies on it to rounding, on the side of every domain
-        own = [d for d in model.domains if d.mode == self.word[i][0]]
-        fitting = [d for d in own if all(d.signs[s] * signs[s] >= 0 for s in signs if s != across)]
-        return (fitting or own)[0].name
-
-    def _end_domains(self) -> list[str]:
-        """Domain in which each segment of the whole orbit ends."""
-        found, word = [], self.word
-        for i, (mode, exit_) in enumerate(word):
-            end = self.ends[i]
-            signs = signs_at(self.model, float(end[0]), end[1:].copy(), self.vector)
-            after, following = word[(i + 1) % len(word)]
-            if is_hold(exit_):
-                found.append(next(d.name for d in self.model.domains if d.mode == mode))
-                continue
-            if is_hold(following) and (
-                mode == after or following != TOUCH
-            ):  # it leads beyond the hold
-                after = word[(i + 2) % len(word)][0]
-            found.append(end_domain(self.model, mode, exit_, after, signs))
-        return found
+        """The signature, with all of the model's domains, read off the solved segments."""
+        return read_signature(self, self._watched[1])
 
     @property
     def name(self) -> str:

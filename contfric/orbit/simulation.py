@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.errors import ParameterError, did_you_mean
-from contfric.models import load_model
+from contfric.models import ModelSource, load_model
 from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.orbit.counts import TALLY
 from contfric.orbit.system import IntArray, mode_bounds
@@ -232,7 +232,7 @@ def _side_of_rates(
 
 
 def simulate(
-    model: str | Model,
+    model: ModelSource,
     params: dict[str, float] | None = None,
     *,
     state: ArrayLike | None = None,

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from contfric.errors import ConvergenceError
-from contfric.models import load_model
-from contfric.models.definition import FloatArray, Model
+from contfric.errors import ConvergenceError, ParameterError
+from contfric.models import ModelSource, load_model
+from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit, Status
@@ -55,7 +55,7 @@ def polish(orbit: Orbit, damped: bool = True) -> Orbit:
 
 
 def solve_orbit(
-    model: str | Model,
+    model: ModelSource,
     signature: str | Path | Signature,
     params: Mapping[str, float],
     *,
@@ -165,7 +165,10 @@ def _matching_stretches(
         if rng.random() < 0.5:
             y[1:] = 0.0  # at rest: the start of a stick or of a slide
         time = rng.uniform(0.0, period)
-        mode, on = start_of(model, time, y, vector, None)
+        try:
+            mode, on = start_of(model, time, y, vector, None)
+        except ParameterError:  # beyond a wall
+            continue
         trajectory = run(model, vector, mode, on, time, y, length, events)
         yield from stretches(trajectory, system, period)
 

@@ -13,7 +13,7 @@ Crossings of transparent surfaces inside a segment do not matter to the motion; 
 
 A hold (:mod:`contfric.orbit.holds`) has a pin at its start in the place of the exit surface. Its exit
 margin is the acceleration with which it is left, which must not be negative anywhere on the way (HELD);
-one that follows a stick must last (LASTING).
+one that follows a stick must last, and so must that stick, whose end is tangential (LASTING).
 
 Everything here derives from the model's definition; nothing knows what moves.
 """
@@ -29,14 +29,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.begins import PLAIN, RETURNS, departures, entry_rows, first_entry
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN, Hold, holds_of
-from contfric.signature.holds import is_hold, mirror_exit
+from contfric.orbit.structure import (
+    exit_domains,
+    inside_sign,
+    mirror_mode,
+    mode_bounds,
+    mode_domains,
+)
+from contfric.signature.holds import is_hold
+
+__all__ = [
+    "PLAIN",
+    "RETURNS",
+    "IntArray",
+    "Layout",
+    "Margin",
+    "System",
+    "Test",
+    "Word",
+    "build_system",
+    "exit_domains",
+    "inside_sign",
+    "mirror_mode",
+    "mode_bounds",
+    "mode_domains",
+]
 
 IntArray = NDArray[np.int64]
-
-
-#: In the array of departures: a segment that begins as any, and one that begins on its exit surface.
-PLAIN, RETURNS = -1, -2
 
 
 class Layout(NamedTuple):
@@ -55,7 +76,7 @@ class Layout(NamedTuple):
     departs : mode in which each hold is left, shape (N,). Where there is no hold it says how the segment
         begins: PLAIN, or as far below that as bit 0 if it begins on its exit surface (RETURNS), so that it
         may shrink to nothing, and above it the surface of the reset that it begins behind, plus one
-    lasting : holds that must last: those after a stick, shape (k,)
+    lasting : segments that must last: holds after a stick, and that stick, shape (k,)
     held : all holds, which could be left at any time, shape (k,)
     closure : state matrix of the closure, shape (n, n)
     turn : duration of one turn in periods of the excitation; 0 of an autonomous model
@@ -131,43 +152,6 @@ class System:
 
 
 @cache
-def mode_bounds(model: Model) -> dict[str, tuple[str, ...]]:
-    """Surfaces that bound each mode: resets, and those through which a transition changes the mode."""
-    bounds: dict[str, set[str]] = {mode.name: set() for mode in model.modes}
-    for (name, surface), targets in model.targets.items():
-        mode = model.domain_by_name[name].mode
-        if surface in model.reset_by_surface or model.domain_by_name[targets[0]].mode != mode:
-            bounds[mode].add(surface)
-    return {
-        mode: tuple(s.name for s in model.surfaces if s.name in found)
-        for mode, found in bounds.items()
-    }
-
-
-def mode_domains(model: Model, mode: str) -> list[str]:
-    """Return the domains of one mode."""
-    return [d.name for d in model.domains if d.mode == mode]
-
-
-def inside_sign(model: Model, mode: str, surface: str) -> int:
-    """Return the sign of (observable - level) inside a mode, 0 if the mode lies on both sides."""
-    signs = {model.domain_by_name[d].signs[surface] for d in mode_domains(model, mode)}
-    return signs.pop() if len(signs) == 1 else 0
-
-
-def exit_domains(model: Model, mode: str, surface: str, following: str) -> list[str]:
-    """Return the domains of a mode from which a surface leads into the following mode."""
-    return [
-        name
-        for name in mode_domains(model, mode)
-        if any(
-            model.domain_by_name[target].mode == following
-            for target in model.targets.get((name, surface), ())
-        )
-    ]
-
-
-@cache
 def build_system(
     model: Model, word: Word, periods: int, half: bool = False, domains: tuple[str, ...] = ()
 ) -> System:
@@ -192,7 +176,7 @@ def build_system(
         for i, ((mode, exit_), after) in enumerate(zip(word, following, strict=True))
     ]
     entered = [first_entry(model, word, half), *(exit_ for _, exit_ in word[:-1])]
-    entries = _entry_rows(model, word, entered, domains)
+    entries = entry_rows(model, word, entered, domains)
     interior, joint, tests = _margins(model, word, inside, bool(domains), holds, entries)
     exits = [_exit_surface(i, exit_, holds) for i, (_, exit_) in enumerate(word)]
     held = {hold.segment: hold for hold in holds}
@@ -209,8 +193,8 @@ def build_system(
         joint=joint,
         labels=_label_rows(model, word, half, bool(domains), holds),
         pins=np.array([_pin(held.get(i), surfaces) for i in range(len(word))], dtype=np.int64),
-        departs=_departs(model, word, exits, entered, half, held),
-        lasting=np.array([hold.segment for hold in holds if hold.after_rest], dtype=np.int64),
+        departs=departures(model, word, exits, entered, half, held),
+        lasting=np.array([i for i, _ in _lasting(word, holds)], dtype=np.int64),
         held=np.array([hold.segment for hold in holds], dtype=np.int64),
         closure=symmetry.array() if half and symmetry else np.eye(n),
         turn=_turn(model, periods, half),
@@ -220,79 +204,16 @@ def build_system(
     return System(model, word, periods, half, layout, tests, domains, holds)
 
 
-def first_entry(model: Model, word: Word, half: bool) -> str:
-    """Return the surface through which the first segment of a turn is entered."""
-    if not half or model.symmetry is None:
-        return word[-1][1]
-    inverse = {image: name for name, image in model.symmetry.surfaces.items()}
-    return mirror_exit(word[-1][1], inverse)
-
-
-def _departs(
-    model: Model,
-    word: Word,
-    exits: list[str],
-    entered: list[str],
-    half: bool,
-    held: dict[int, Hold],
-) -> IntArray:
-    """How holds are left, and other segments begin, as a layout has it."""
-    names = [mode.name for mode in model.modes]
-    modes = [mode for mode, _ in word]
-    before = [mirror_mode(model)[modes[-1]] if half else modes[-1], *modes[:-1]]
-    resets = {
-        s.name: k + 1 for k, s in enumerate(model.surfaces) if s.name in model.reset_by_surface
-    }
-    rows = zip(modes, before, exits, entered, strict=True)
-    found = [PLAIN - 2 * resets.get(row[3], 0) - _returns(model, *row) for row in rows]
-    for i, hold in held.items():
-        found[i] = names.index(hold.departs)
-    return np.array(found, dtype=np.int64)
-
-
-def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> int:
-    """Tell whether a segment begins on the surface that it ends on: it came there, or rested on it."""
-    if model.mode_by_name[mode].sliding:
-        return 0
-    rested = model.domain_by_name[mode_domains(model, before)[0]].signs[exit_] == 0
-    return int(exit_ == entered or rested)
-
-
 def _turn(model: Model, periods: int, half: bool) -> float:
     if model.autonomous:
         return 0.0
     return float(periods * (model.symmetry.fraction if half and model.symmetry else 1.0))
 
 
-def _entry_rows(
-    model: Model, word: Word, entered: list[str], domains: tuple[str, ...]
-) -> list[tuple[int, ...]]:
-    """Rows of the entry margins: surfaces that a reset may lead across, and that bound the mode behind it."""
-    rows: list[tuple[int, ...]] = []
-    for i, surface in enumerate(entered):
-        reset = model.reset_by_surface.get(surface)
-        if reset is None:
-            continue
-        for k, other in enumerate(model.surfaces):
-            signs = {
-                model.domain_by_name[d].signs[other.name]
-                for d in (domains[i : i + 1] or mode_domains(model, word[i][0]))
-            }
-            if model.changed_by(reset, other.name) and len(signs) == 1:
-                rows.append((i, k, signs.pop(), 1))
-    return rows
-
-
 def _mode_after(model: Model, word: Word, half: bool) -> str:
     if not half:
         return word[0][0]
     return mirror_mode(model)[word[0][0]]
-
-
-@cache
-def mirror_mode(model: Model) -> dict[str, str]:
-    """Image of each mode under the symmetry."""
-    return {d.mode: model.domain_by_name[model.mirror_domain[d.name]].mode for d in model.domains}
 
 
 def _segment_domains(
@@ -383,10 +304,24 @@ def _margins(
         ),
         *(Test(Margin.JOINT, i, names[k]) for i, k, *_ in joint),
         *(Test(Margin.ENTRY, i, names[k]) for i, k, *_ in entries),
-        *(Test(Margin.LASTING, h.segment, h.leaves) for h in holds if h.after_rest),
+        *(Test(Margin.LASTING, i, surface) for i, surface in _lasting(word, holds)),
         *(Test(Margin.HELD, h.segment, h.leaves) for h in holds),
     )
     return _rows(interior), _rows([*joint, *entries], 4), tests
+
+
+def _lasting(word: Word, holds: tuple[Hold, ...]) -> list[tuple[int, str]]:
+    """Segments that no other margin keeps from shrinking through zero, each with the surface that it ends on.
+
+    A hold after a touch of its limit, and the stick up to that touch: where it shrinks to nothing, the
+    margin of the stop before it has a double zero.
+    """
+    return [
+        pair
+        for hold in holds
+        if hold.after_rest
+        for pair in ((hold.segment - 1, word[hold.segment - 1][1]), (hold.segment, hold.leaves))
+    ]
 
 
 def _rows(rows: list[tuple[int, ...]], width: int = 3) -> IntArray:

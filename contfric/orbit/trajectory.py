@@ -44,6 +44,9 @@ HOLD_PERIODS, SLIDE_PERIODS = 1.001, 1e4
 #: Events within this share of a period follow each other at once; more of them in a row than this do
 #: not come to an end (a stop, a release and a reversal may fall together, twice).
 NO_TIME, MOST_AT_ONCE = 1e-12, 16
+#: The same where impacts chatter: a mass that bounces to less than rounding of its displacement (1e-16)
+#: is in flight for the root of that, and never for less.
+NO_FLIGHT = 1e-7
 #: A state this large grows for ever (negative damping, or resonance without any): its square is still
 #: far from overflow, and its events are still exact.
 TOO_LARGE = 1e100
@@ -109,7 +112,10 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
         cycle = int(math.floor(t / period))
         t -= cycle * period
     first_cycle, first_time = cycle, t
-    event, at_once = 0, 0
+    event, at_once, struck, at_most = 0, 0, False, NO_TIME
+    for k in range(observables.shape[0]):
+        if tables.bounds[mode, k] == 2:  # a wall bounds every mode
+            at_most = NO_FLIGHT
     while event < joints.shape[0]:
         left = (periods - (cycle - first_cycle)) * unit - (t - first_time)
         if period <= 0.0:
@@ -143,9 +149,10 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
         target = following[
             (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code
         ]
-        at_once = at_once + 1 if tau <= NO_TIME * unit else 0
+        at_once = at_once + 1 if tau <= at_most * unit else 0
+        struck = reset or (struck and at_once > 0)
         if at_once > MOST_AT_ONCE:
-            return (CHATTER if reset else IMPOSSIBLE), event, mode, cycle, t
+            return (CHATTER if struck else IMPOSSIBLE), event, mode, cycle, t
         on = 1 << surface
         if reset and target < 0:
             return IMPOSSIBLE, event, mode, cycle, t

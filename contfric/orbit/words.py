@@ -37,12 +37,12 @@ def end_domain(model: Model, mode: str, exit_: str, after: str, signs: dict[str,
 
     Where a stop lies on a surface to rounding (at an event) the word decides, not the sign.
     """
-    candidates = exit_domains(model, mode, exit_, after)
-    for domain in candidates:
+
+    def wrong(domain: str) -> int:
         own = model.domain_by_name[domain].signs
-        if all(own[s] * signs[s] >= 0 for s in own if s != exit_):
-            return domain
-    return candidates[0]
+        return sum(own[s] * signs[s] < 0 for s in own if s != exit_)
+
+    return min(exit_domains(model, mode, exit_, after), key=wrong)
 
 
 def passed_domains(model: Model, start: str, end: str, crossed: list[str]) -> list[str]:

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from contfric.plot.branch_graph import plot_branch_graph
     from contfric.plot.diagram import plot_branches, plot_diagram, plot_diagram_row
-    from contfric.plot.graph import plot_diagram_graph, plot_transition_graph
+    from contfric.plot.graph import plot_transition_graph
     from contfric.plot.lyapunov import plot_lyapunov_map
     from contfric.plot.orbit import plot_orbit, plot_orbit_in_time, plot_orbit_panels
+    from contfric.plot.plane import plot_curves, plot_plane
     from contfric.plot.save import new_figure, save_figure
     from contfric.plot.style import ROWS
 
@@ -25,13 +26,14 @@ _HOMES = {
     "new_figure": "contfric.plot.save",
     "plot_branch_graph": "contfric.plot.branch_graph",
     "plot_branches": "contfric.plot.diagram",
+    "plot_curves": "contfric.plot.plane",
     "plot_diagram": "contfric.plot.diagram",
-    "plot_diagram_graph": "contfric.plot.graph",
     "plot_diagram_row": "contfric.plot.diagram",
     "plot_lyapunov_map": "contfric.plot.lyapunov",
     "plot_orbit": "contfric.plot.orbit",
     "plot_orbit_in_time": "contfric.plot.orbit",
     "plot_orbit_panels": "contfric.plot.orbit",
+    "plot_plane": "contfric.plot.plane",
     "plot_transition_graph": "contfric.plot.graph",
     "save_figure": "contfric.plot.save",
 }
@@ -41,13 +43,14 @@ __all__ = [
     "new_figure",
     "plot_branch_graph",
     "plot_branches",
+    "plot_curves",
     "plot_diagram",
-    "plot_diagram_graph",
     "plot_diagram_row",
     "plot_lyapunov_map",
     "plot_orbit",
     "plot_orbit_in_time",
     "plot_orbit_panels",
+    "plot_plane",
     "plot_transition_graph",
     "save_figure",
 ]

@@ -239,3 +239,67 @@ class LyapunovMapLike(Protocol):
 
     def absent(self, missing: bool) -> NDArray[np.bool_]:
         """Tell where no motion has an exponent, or (``missing``) where nothing was computed."""
+
+
+class SpecialLike(Protocol):
+    """A point of codimension two."""
+
+    @property
+    def name(self) -> str:
+        """What it is, such as ``SN-CS``."""
+
+    @property
+    def params(self) -> Mapping[str, float]:
+        """The parameters there."""
+
+
+class CurveLike(Protocol):
+    """A curve of bifurcations in two parameters."""
+
+    @property
+    def parameters(self) -> tuple[str, str]:
+        """The two parameters."""
+
+    @property
+    def label(self) -> str:
+        """Name in the manner of the reference."""
+
+    @property
+    def values(self) -> FloatArray:
+        """Both parameters at each point, shape (k, 2)."""
+
+    @property
+    def arc(self) -> FloatArray:
+        """Arclength at each point, shape (k,)."""
+
+    @property
+    def kinds(self) -> Sequence[KindLike]:
+        """The bifurcation at each point."""
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Whether stable orbits are bounded at each point, shape (k,)."""
+
+    @property
+    def special(self) -> Sequence[SpecialLike]:
+        """Points of codimension two."""
+
+
+class PlaneLike(Protocol):
+    """Curves of a plane."""
+
+    @property
+    def ranges(self) -> FloatArray:
+        """Limits of both parameters, shape (2, 2)."""
+
+    @property
+    def curves(self) -> Sequence[CurveLike]:
+        """The curves."""
+
+    @property
+    def twins(self) -> Sequence[int]:
+        """For each curve the first one of the same motion."""
+
+    @property
+    def special(self) -> Sequence[SpecialLike]:
+        """Points of codimension two, each once."""

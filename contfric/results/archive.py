@@ -15,18 +15,21 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from contfric.atlas.diagram import Diagram
+from contfric.atlas.plane import Plane
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
+from contfric.curves.curve import Curve
 from contfric.errors import ModelError, ParameterError, ResultFileError
 from contfric.files import replacing
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
+from contfric.results.curves import pack_curve, pack_plane, unpack_curve, unpack_plane
 from contfric.results.lyapunov import pack_map, unpack_map
 from contfric.results.pack import Arrays, Header, Packer
 from contfric.results.unpack import Unpacker
 
-Saveable: TypeAlias = Orbit | Branch | Diagram | LyapunovMap
+Saveable: TypeAlias = Orbit | Branch | Diagram | Curve | Plane | LyapunovMap
 
 #: Version of the format; it grows when an older contfric could not read what is written.
 FORMAT = 1
@@ -38,7 +41,7 @@ _DAMAGE = (ValueError, LookupError, TypeError, AttributeError, AssertionError)
 
 
 def save(x: Saveable, path: str | Path) -> None:
-    """Write an orbit, a branch, a diagram or a Lyapunov map to a file; a file of that name is replaced.
+    """Write an orbit, branch, diagram, curve, plane or Lyapunov map to a file, which is replaced.
 
     Raises
     ------
@@ -57,7 +60,8 @@ def save(x: Saveable, path: str | Path) -> None:
     """
     if not isinstance(x, Saveable):
         raise ResultFileError(
-            f"only an Orbit, a Branch, a Diagram or a LyapunovMap can be saved, got {type(x).__name__}"
+            "only an Orbit, a Branch, a Diagram, a Curve, a Plane or a LyapunovMap can be saved, "
+            f"got {type(x).__name__}"
         )
     packer = Packer(x.model)
     content = _content(x, packer)
@@ -88,13 +92,17 @@ def _content(x: Saveable, packer: Packer) -> Header:
         return {"kind": "orbit", "index": packer.orbit(x)}
     if isinstance(x, Branch):
         return {"kind": "branch", "index": packer.branch(x)}
+    if isinstance(x, Curve):
+        return {"kind": "curve", **pack_curve(x, packer, 0)}
+    if isinstance(x, Plane):
+        return {"kind": "plane", **pack_plane(x, packer)}
     if isinstance(x, LyapunovMap):
         return {"kind": "lyapunov map", **pack_map(x, packer.arrays)}
     return {"kind": "diagram", **packer.diagram(x)}
 
 
 def load(path: str | Path, model: Model | None = None) -> Saveable:
-    """Read an orbit, a branch, a diagram or a Lyapunov map from a file that :func:`save` wrote.
+    """Read what :func:`save` wrote: an orbit, branch, diagram, curve, plane or Lyapunov map.
 
     Parameters
     ----------
@@ -136,6 +144,10 @@ def _restored(content: Header, pool: Unpacker) -> Saveable:
         return pool.branches[content["index"]]
     if kind == "diagram":
         return pool.diagram(content)
+    if kind == "curve":
+        return unpack_curve(content, pool, 0)
+    if kind == "plane":
+        return unpack_plane(content, pool)
     if kind == "lyapunov map":
         return unpack_map(pool.model, content, pool.arrays)
     raise ValueError(f"unknown kind of result {kind!r}")

@@ -12,13 +12,14 @@ if TYPE_CHECKING:
     from contfric.study.library import study_names, study_path
     from contfric.study.plan import Plan, make_plan
     from contfric.study.read import Study, read_study
-    from contfric.study.run import StudyResult, UnwrittenError, run_study
+    from contfric.study.result import StudyResult, UnwrittenError
+    from contfric.study.run import run_study
 
 _HOMES = {
     "Plan": "contfric.study.plan",
     "Study": "contfric.study.read",
-    "StudyResult": "contfric.study.run",
-    "UnwrittenError": "contfric.study.run",
+    "StudyResult": "contfric.study.result",
+    "UnwrittenError": "contfric.study.result",
     "make_plan": "contfric.study.plan",
     "read_study": "contfric.study.read",
     "run_study": "contfric.study.run",

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from contfric.atlas.collect import FINAL
 from contfric.atlas.diagram import Diagram, LooseEnd, Node
+from contfric.atlas.plane import Plane
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import EndReason
 from contfric.orbit.orbit import Orbit
 from contfric.study.read import Study
-from contfric.study.schema import ContinueTask, ExploreTask, Want
+from contfric.study.schema import ContinueTask, ExploreTask, LyapunovTask, PlaneTask, Want
+
+if TYPE_CHECKING:
+    from contfric.chaos.map import LyapunovMap
 
 Say = Callable[[str], None]
 
@@ -79,6 +87,43 @@ def continue_from(study: Study, orbit: Orbit, task: ContinueTask, say: Say) -> B
         stability=study.wants(Want.STABILITY),
         progress=lambda text: say(f"continue: {text}"),
         **task.options(),
+    )
+
+
+def lyapunov_from(study: Study, task: LyapunovTask, tiles: Path, say: Say) -> LyapunovMap:
+    """Compute a map; finished tiles are kept until it is complete, and a killed run goes on from them."""
+    import shutil
+
+    from contfric.chaos.compute import lyapunov_map
+
+    found = lyapunov_map(
+        study.model,
+        {name: np.linspace(low, high, int(n)) for name, (low, high, n) in task.grid.items()},
+        {name: value for name, value in study.params.items() if name not in task.grid},
+        folder=tiles,
+        progress=lambda text: say(f"lyapunov: {text}"),
+        **task.options(),
+    )
+    if found.complete:
+        shutil.rmtree(tiles, ignore_errors=True)
+    return found
+
+
+def plane_from(study: Study, orbit: Orbit, task: PlaneTask, say: Say) -> Plane:
+    """Explore a plane; on Ctrl-C what was found so far, with ``complete`` False."""
+    from contfric.atlas.plane_explore import explore_plane
+    from contfric.atlas.seeds import Seeds
+
+    options = task.options()
+    if task.seeds is not None:
+        options["seeds"] = Seeds(**task.seeds.model_dump())
+    return explore_plane(
+        orbit,
+        (task.parameters[0], task.parameters[1]),
+        {name: (pair[0], pair[1]) for name, pair in task.range.items()},
+        task.sections,
+        progress=lambda text: say(f"plane: {text}"),
+        **options,
     )
 
 

@@ -39,6 +39,10 @@ def _rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row, ..
             located.fail(("figures", index, "rows"), "only a diagram has rows")
         if figure.kind is FigureKind.BRANCHES:
             _check_task(located, content, index, "a graph of branches")
+        if figure.kind is FigureKind.LYAPUNOV and content.lyapunov is None:
+            located.fail(("figures", index), "a map of Lyapunov exponents needs 'lyapunov'")
+        if figure.kind is FigureKind.PLANE and content.plane is None:
+            located.fail(("figures", index), "a plane needs 'plane'")
         return ()
     _check_task(located, content, index, "a diagram")
     if figure.rows is None:

@@ -16,7 +16,10 @@ from contfric.study.schema import (
     Figure,
     FigureKind,
     Format,
+    LyapunovTask,
+    PlaneTask,
     Row,
+    SeedsTask,
     Simulated,
     Start,
     StudyFile,
@@ -33,7 +36,10 @@ _PARTS: dict[str, type[BaseModel]] = {
     "start": Start,
     "simulate": Simulated,
     "explore": ExploreTask,
+    "seeds": SeedsTask,
+    "lyapunov": LyapunovTask,
     "continue": ContinueTask,
+    "plane": PlaneTask,
     "figures": Figure,
 }
 #: Keys whose values are names out of a list.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from contfric.study.read import Study
-from contfric.study.schema import ContinueTask, ExploreTask, Want
+from contfric.study.schema import ContinueTask, ExploreTask, LyapunovTask, PlaneTask, Want
 
 RECORD = "run.json"
 POINTS = "points.csv"
@@ -15,8 +15,15 @@ BIFURCATIONS = "bifurcations.csv"
 ORBIT = "orbit.npz"
 BRANCH = "branch.npz"
 DIAGRAM = "diagram.npz"
+LYAPUNOV = "lyapunov.npz"
+LYAPUNOV_TABLE = "lyapunov.csv"
+PLANE = "plane.npz"
+CURVES = "curves.csv"
+SPECIAL = "special.csv"
+REGIONS = "regions.csv"
+_TABLES = (POINTS, BIFURCATIONS, CURVES, SPECIAL, REGIONS, LYAPUNOV_TABLE)
 #: Files that every run may write, figures apart.
-RESULT_FILES = (RECORD, POINTS, BIFURCATIONS, ORBIT, BRANCH, DIAGRAM)
+RESULT_FILES = (RECORD, *_TABLES, ORBIT, BRANCH, DIAGRAM, PLANE, LYAPUNOV)
 
 
 class StepName(str, Enum):
@@ -25,6 +32,8 @@ class StepName(str, Enum):
     ORBIT = "orbit"
     EXPLORE = "explore"
     CONTINUE = "continue"
+    PLANE = "plane"
+    LYAPUNOV = "lyapunov"
     TABLES = "tables"
     DATA = "data"
     FIGURES = "figures"
@@ -67,7 +76,8 @@ class Plan:
     def __str__(self) -> str:
         study = self.study
         values = ", ".join(f"{name} = {value:g}" for name, value in study.params.items())
-        lines = [f"{study.name}: {study.title}", f"model {study.model.name}, start at {values}", ""]
+        what = "start at" if study.content.needs_orbit else "parameters"
+        lines = [f"{study.name}: {study.title}", f"model {study.model.name}, {what} {values}", ""]
         for number, step in enumerate(self.steps, start=1):
             lines.append(f"{number}. {step.name.value}: {step.does}")
             if step.files:
@@ -91,17 +101,17 @@ def make_plan(study: Study) -> Plan:
 
 def _steps(study: Study) -> Iterator[Step]:
     task = study.task
-    yield Step(StepName.ORBIT, _start_text(study))
+    if study.content.needs_orbit:
+        yield Step(StepName.ORBIT, _start_text(study))
     if task is not None:
         name = StepName.EXPLORE if isinstance(task, ExploreTask) else StepName.CONTINUE
         yield Step(name, _task_text(study, task))
-    yield Step(
-        StepName.TABLES,
-        f"one row a point: {', '.join(['parameters', *table_quantities(study)])}"
-        + ("" if task is None else "; one row a bifurcation"),
-        (POINTS,) if task is None else (POINTS, BIFURCATIONS),
-    )
-    yield Step(StepName.DATA, "all that a restart needs", _data_files(task))
+    if study.content.plane is not None:
+        yield Step(StepName.PLANE, _plane_text(study.content.plane))
+    if study.content.lyapunov is not None:
+        yield Step(StepName.LYAPUNOV, _lyapunov_text(study.content.lyapunov))
+    yield Step(StepName.TABLES, _tables_text(study), _table_files(study))
+    yield Step(StepName.DATA, "all that a restart needs", _data_files(study))
     if study.drawings:
         shown = [
             f"{d.kind.value} ({', '.join(row.value for row in d.rows)})" if d.rows else d.kind.value
@@ -138,10 +148,54 @@ def _task_text(study: Study, task: ExploreTask | ContinueTask) -> str:
     return text + (", with multipliers" if study.wants(Want.STABILITY) else "")
 
 
-def _data_files(task: ExploreTask | ContinueTask | None) -> tuple[str, ...]:
-    if task is None:
-        return (ORBIT,)
-    return ORBIT, DIAGRAM if isinstance(task, ExploreTask) else BRANCH
+def _plane_text(task: PlaneTask) -> str:
+    where = ", ".join(f"{n} from {r[0]:g} to {r[1]:g}" for n, r in task.range.items())
+    kinds = "" if task.kinds is None else f" of {', '.join(task.kinds)}"
+    return f"every curve{kinds} that can be reached, {where}, and what lives between them"
+
+
+def _lyapunov_text(task: LyapunovTask) -> str:
+    sides = (
+        f"{name} from {low:g} to {high:g} ({count:g})"
+        for name, (low, high, count) in task.grid.items()
+    )
+    return f"exponents of motions at {' x '.join(sides)}"
+
+
+def _tables_text(study: Study) -> str:
+    content, parts = study.content, []
+    if content.needs_orbit:
+        parts.append(f"one row a point: {', '.join(['parameters', *table_quantities(study)])}")
+    if study.task is not None:
+        parts.append("one row a bifurcation")
+    if content.plane is not None:
+        parts.append("points of curves, of codimension two, regions")
+    if content.lyapunov is not None:
+        parts.append("one row a motion of the map")
+    return "; ".join(parts)
+
+
+def _table_files(study: Study) -> tuple[str, ...]:
+    content = study.content
+    return (
+        *((POINTS,) if content.needs_orbit else ()),
+        *((BIFURCATIONS,) if study.task is not None else ()),
+        *((CURVES, SPECIAL, REGIONS) if content.plane is not None else ()),
+        *((LYAPUNOV_TABLE,) if content.lyapunov is not None else ()),
+    )
+
+
+def _data_files(study: Study) -> tuple[str, ...]:
+    content, task = study.content, study.task
+    found: tuple[str, ...] = ()
+    if task is not None:
+        found = (DIAGRAM if isinstance(task, ExploreTask) else BRANCH,)
+    return (
+        *((ORBIT,) if content.needs_orbit else ()),
+        *found,
+        *((PLANE,) if content.plane is not None else ()),
+        *((LYAPUNOV,) if content.lyapunov is not None else ()),
+    )
 
 
 #: Columns of each quantity.
@@ -160,7 +214,9 @@ def table_quantities(study: Study) -> list[str]:
 
 def _skipped(study: Study) -> Iterator[Skipped]:
     start, task = study.content.start, study.task
-    if start.simulate is None:
+    if not study.content.needs_orbit:
+        yield Skipped("the orbit of the start", "nothing asks for it")
+    elif start.simulate is None:
         origin = "a saved orbit" if study.orbit is not None else "a signature"
         yield Skipped("simulation to a steady state", f"the start is {origin}")
     if task is None:
@@ -169,11 +225,17 @@ def _skipped(study: Study) -> Iterator[Skipped]:
         yield Skipped("other branches", "'continue' follows one branch only")
     elif task.bridges is False:
         yield Skipped("bridges: branches end where the flow jumps", "switched off (bridges: false)")
+    if study.content.needs_orbit:
+        yield from _unwanted(study)
+    if not study.drawings:
+        yield Skipped("matplotlib", "no figures")
+
+
+def _unwanted(study: Study) -> Iterator[Skipped]:
+    task = study.task
     if not study.wants(Want.STABILITY):
-        lost = "" if task is None else ", and BP and PD with them"
+        lost = "" if task is None else ", and PD with them"
         yield Skipped(f"multipliers{lost}", "not wanted (stability)")
     for want, columns in COLUMNS.items():
         if want is not Want.STABILITY and not study.wants(want):
             yield Skipped(f"columns {columns}", f"not wanted ({want.value})")
-    if not study.drawings:
-        yield Skipped("matplotlib", "no figures")

@@ -13,6 +13,7 @@ from contfric.errors import (
     ParameterError,
     ResultFileError,
     StudyError,
+    did_you_mean,
 )
 from contfric.models import load_model
 from contfric.models.definition import Model
@@ -127,6 +128,8 @@ def _checked(located: LocatedYaml, content: StudyFile) -> Study:
         params = _same_params(located, content, orbit)
     _check_start(located, content, model)
     _check_task(located, content, model, params)
+    _check_grid(located, content, model)
+    _check_plane(located, content, model)
     return Study(
         located.path,
         content,
@@ -239,6 +242,64 @@ def _check_task(
     fault = _range_fault(model, params, task)
     if fault is not None:
         located.fail((key, "range"), fault)
+
+
+def _check_grid(located: LocatedYaml, content: StudyFile, model: Model) -> None:
+    task = content.lyapunov
+    if task is None:
+        return
+    if task.state is not None and len(task.state) != len(model.states):
+        located.fail(
+            ("lyapunov", "state"),
+            f"a state of '{model.name}' is {len(model.states)} numbers "
+            f"({', '.join(model.states)}), got {len(task.state)}",
+        )
+    for name, values in task.grid.items():
+        address = ("lyapunov", "grid", name)
+        try:
+            model.index_of(name)
+        except ParameterError as error:
+            located.fail(address, str(error))
+        fits = len(values) == 3 and values[0] < values[1] and values[2] >= 2
+        if not fits or values[2] != int(values[2]):
+            located.fail(
+                address,
+                f"{name} is [low, high, number of values], with low < high and a whole number of at "
+                f"least 2, got {values}",
+            )
+
+
+def _check_plane(located: LocatedYaml, content: StudyFile, model: Model) -> None:
+    task = content.plane
+    if task is None:
+        return
+    from contfric.continuation.events import Kind
+    from contfric.curves.problem import box_of
+
+    one, other = task.parameters
+    ranges = {name: (pair[0], pair[-1]) for name, pair in task.range.items()}
+    wrong = next((name for name, pair in task.range.items() if len(pair) != 2), None)
+    if wrong is not None:
+        located.fail(
+            ("plane", "range", wrong), f"the range of '{wrong}' is two numbers [low, high]"
+        )
+    try:
+        box_of(model, (one, other), ranges)
+    except ParameterError as error:
+        located.fail(("plane",), str(error))
+    for name, values in (task.sections or {}).items():
+        if name not in ranges:
+            hint = did_you_mean(name, ranges)
+            located.fail(("plane", "sections"), f"'{name}' is none of the two parameters{hint}")
+        low, high = ranges[name]
+        for value in values:
+            if not low <= value <= high:
+                text = f"the section {name} = {value:g} is outside of its range [{low:g}, {high:g}]"
+                located.fail(("plane", "sections", name), text)
+    known = [kind.value for kind in Kind if kind is not Kind.NS]
+    for kind in task.kinds or []:
+        if kind not in known:
+            located.fail(("plane", "kinds"), f"no curves of '{kind}'{did_you_mean(kind, known)}")
 
 
 def _range_fault(

@@ -18,7 +18,9 @@ from contfric.continuation.events import Proposal
 from contfric.orbit.counts import Counts
 from contfric.orbit.orbit import Orbit
 from contfric.results import replacing
+from contfric.study.findings import Findings
 from contfric.study.plan import Plan
+from contfric.study.record_plane import map_entries, plane_entries
 from contfric.study.tables import listed_nodes
 
 #: Modules that a run loads only if the study needs them.
@@ -45,8 +47,7 @@ def record_of(
     plan: Plan,
     counts: Counts,
     timings: Mapping[str, float],
-    orbit: Orbit,
-    diagram: Diagram | None,
+    found: Findings,
 ) -> dict[str, Any]:
     """Return the record of a run as plain data; status and files are added by the run."""
     return {
@@ -61,14 +62,22 @@ def record_of(
         "module_count": len(sys.modules),
         "timings": {name: round(seconds, 6) for name, seconds in timings.items()},
         "skipped": [asdict(item) for item in plan.skipped],
+        **(_start_entries(found.orbit) if found.orbit is not None else {}),
+        **(_diagram_entries(found.diagram) if found.diagram is not None else {}),
+        **({"plane": plane_entries(found.plane)} if found.plane is not None else {}),
+        **({"lyapunov": map_entries(found.lyapunov)} if found.lyapunov is not None else {}),
+    }
+
+
+def _start_entries(orbit: Orbit) -> dict[str, Any]:
+    return {
         "start": {
             "signature": orbit.name,
             "segments": str(orbit.signature),
             "periods": orbit.periods,
             "params": orbit.params,
             "residual": orbit.residual,
-        },
-        **(_diagram_entries(diagram) if diagram is not None else {}),
+        }
     }
 
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from contfric.atlas.diagram import Diagram
-from contfric.continuation.branch import Branch
+from contfric.continuation.events import EndReason
 from contfric.errors import ContfricError, ResultFileError
 from contfric.orbit.counts import Counts, counts
 from contfric.orbit.orbit import Orbit
@@ -21,77 +20,42 @@ from contfric.study.compute import (
     continue_from,
     explore_from,
     find_start,
+    lyapunov_from,
     one_branch,
+    plane_from,
     was_interrupted,
 )
+from contfric.study.findings import Findings
 from contfric.study.folder import Folder, open_folder
 from contfric.study.plan import (
     BIFURCATIONS,
     BRANCH,
+    CURVES,
     DIAGRAM,
+    LYAPUNOV,
+    LYAPUNOV_TABLE,
     ORBIT,
+    PLANE,
     POINTS,
     RECORD,
+    REGIONS,
+    SPECIAL,
     Plan,
     StepName,
     make_plan,
 )
 from contfric.study.read import Study, read_study
+from contfric.study.result import RunStatus, StudyResult, UnwrittenError
 from contfric.study.schema import ContinueTask, ExploreTask
 
+if TYPE_CHECKING:
+    from contfric.atlas.plane import Plane
+    from contfric.chaos.map import LyapunovMap
+
 Progress = Callable[[str], None]
+#: Folder of the finished tiles of a map, inside that of the run, until the map is complete.
+_TILES = "lyapunov-tiles"
 _T = TypeVar("_T")
-
-
-class RunStatus(str, Enum):
-    """How a run ended."""
-
-    DONE = "done"
-    INTERRUPTED = "interrupted"
-    UNWRITTEN = "some files could not be written"
-
-
-@dataclass(frozen=True, eq=False)
-class StudyResult:
-    """What a run found and where it is.
-
-    Attributes
-    ----------
-    study : Study
-    out : Path
-        The folder of the results.
-    status : RunStatus
-    orbit : Orbit or None
-        The orbit of the start; None if the run was interrupted before it was found.
-    branch : Branch or None
-        The branch, if the study continues one.
-    diagram : Diagram or None
-        The diagram, if the study has a task.
-    info : dict
-        The content of ``run.json``.
-    files : tuple of Path
-        The files written.
-    """
-
-    study: Study
-    out: Path
-    status: RunStatus
-    orbit: Orbit | None
-    branch: Branch | None
-    diagram: Diagram | None
-    info: dict[str, Any]
-    files: tuple[Path, ...]
-
-    def __repr__(self) -> str:
-        return f"<StudyResult {self.study.name}: {self.status.value}, in {self.out}>"
-
-
-class UnwrittenError(ResultFileError):
-    """Some files could not be written; ``result`` holds everything that was computed."""
-
-    def __init__(self, message: str, result: StudyResult) -> None:
-        super().__init__(message)
-        self.result = result
 
 
 def run_study(
@@ -148,9 +112,7 @@ class _Run:
     folder: Folder
     progress: Progress | None
     status: RunStatus = RunStatus.DONE
-    orbit: Orbit | None = None
-    branch: Branch | None = None
-    diagram: Diagram | None = None
+    found: Findings = field(default_factory=Findings)
     timings: dict[str, float] = field(default_factory=dict)
     written: list[str] = field(default_factory=list)
     failures: list[Exception] = field(default_factory=list)
@@ -172,11 +134,11 @@ class _Run:
         except BaseException as error:
             self._rescue(error)
             raise
-        if self.orbit is None:
+        if self.found.empty:
             self.folder.discard_if_empty()
             return self._result({})
-        self._write_all(self.orbit)
-        record = self._write_record(self.orbit)
+        self._write_all()
+        record = self._write_record()
         result = self._result(record)
         if self.failures:
             raise UnwrittenError(self._failure_text(), result) from self.failures[0]
@@ -187,24 +149,49 @@ class _Run:
         study = self.study
         if study.task is not None:
             compile_continuation()
-        self.orbit = orbit = self._timed(StepName.ORBIT, lambda: find_start(study, self.say))
-        self.say(f"orbit: {orbit.name} over {orbit.periods} period(s)")
-        task = study.task
+        if study.content.needs_orbit:
+            orbit = self._timed(StepName.ORBIT, lambda: find_start(study, self.say))
+            self.found.orbit = orbit
+            self.say(f"orbit: {orbit.name} over {orbit.periods} period(s)")
+            self._follow(orbit)
+        self._find_plane()
+        grid = study.content.lyapunov
+        if grid is not None:
+            tiles = self.folder.path / _TILES
+            lmap = self._timed(
+                StepName.LYAPUNOV, lambda: lyapunov_from(study, grid, tiles, self.say)
+            )
+            self.found.lyapunov = lmap
+            if not lmap.complete:
+                self.status = RunStatus.INTERRUPTED
+
+    def _find_plane(self) -> None:
+        study, orbit, task = self.study, self.found.orbit, self.study.content.plane
+        if task is None or orbit is None:
+            return
+        plane = self._timed(StepName.PLANE, lambda: plane_from(study, orbit, task, self.say))
+        self.found.plane = plane
+        if EndReason.INTERRUPTED.value in plane.notes:
+            raise KeyboardInterrupt
+
+    def _follow(self, orbit: Orbit) -> None:
+        study, task = self.study, self.study.task
         if isinstance(task, ExploreTask):
             found = self._timed(
                 StepName.EXPLORE, lambda: explore_from(study, orbit, task, self.say)
             )
             self._keep(found)
         elif isinstance(task, ContinueTask):
-            self.branch = self._timed(
+            branch = self._timed(
                 StepName.CONTINUE, lambda: continue_from(study, orbit, task, self.say)
             )
-            self._keep(one_branch(self.branch, (task.range[0], task.range[1])))
+            self.found.branch = branch
+            self._keep(one_branch(branch, (task.range[0], task.range[1])))
 
     def _keep(self, found: Diagram) -> None:
-        self.diagram = found if found.branches else None
+        self.found.diagram = found if found.branches else None
         if was_interrupted(found):
-            self.status = RunStatus.INTERRUPTED
+            raise KeyboardInterrupt
 
     def _timed(self, name: StepName, step: Callable[[], _T]) -> _T:
         start = time.perf_counter()
@@ -215,55 +202,67 @@ class _Run:
 
     def _rescue(self, error: BaseException) -> None:
         """Save the orbit if there is one, and let the message say so."""
-        if self.orbit is None:
+        orbit = self.found.orbit
+        if orbit is None:
             self.folder.discard_if_empty()
             return
         path = self.folder.free_name("orbit-of-failed-run", ".npz")
         try:
-            save(self.orbit, path)
+            save(orbit, path)
         except ResultFileError:
             return
         if isinstance(error, ContfricError):
-            error.args = (f"{error} (the orbit {self.orbit.name} found before is in {path})",)
+            error.args = (f"{error} (the orbit {orbit.name} found before is in {path})",)
 
-    def _write_all(self, orbit: Orbit) -> None:
+    def _write_all(self) -> None:
+        found, unfinished = self.found, self.study.task is not None and self.found.diagram is None
+        self._timed(StepName.TABLES, lambda: self._write_tables(unfinished))
+        self._timed(StepName.DATA, self._write_data)
+        if self.study.drawings:
+            self._timed(StepName.FIGURES, lambda: self._draw(found))
+        self.say(f"written to {self.folder.path}")
+
+    def _write_tables(self, unfinished: bool) -> None:
         from contfric.study.tables import write_bifurcations, write_points
 
-        folder, diagram = self.folder.path, self.diagram
-        unfinished = self.study.task is not None and diagram is None
-        start = time.perf_counter()
-        if not unfinished:
+        orbit, diagram = self.found.orbit, self.found.diagram
+        if orbit is not None and not unfinished:
             sources = diagram.branches if diagram else (orbit,)
             self._write(POINTS, lambda path: write_points(path, self.study, sources))
         if diagram is not None:
             self._write(BIFURCATIONS, lambda path: write_bifurcations(path, diagram))
-        self.timings[StepName.TABLES.value] = time.perf_counter() - start
-        start = time.perf_counter()
-        self._write(ORBIT, lambda path: save(orbit, path))
-        if self.branch is not None:
-            branch = self.branch
-            self._write(BRANCH, lambda path: save(branch, path))
-        elif diagram is not None:
-            self._write(DIAGRAM, lambda path: save(diagram, path))
-        self.timings[StepName.DATA.value] = time.perf_counter() - start
-        if self.study.drawings and not unfinished:
-            self._timed(StepName.FIGURES, lambda: self._draw(orbit))
-        self.say(f"written to {folder}")
+        self._write_plane_tables(self.found.plane, self.found.lyapunov)
 
-    def _draw(self, orbit: Orbit) -> None:
-        from contfric.study.paint import paint
+    def _write_plane_tables(self, plane: Plane | None, lmap: LyapunovMap | None) -> None:
+        from contfric.study import tables_plane
 
-        for drawing in self.study.drawings:
-            self._write(
-                drawing.file,
-                partial(
-                    paint,
-                    drawing=drawing,
-                    orbit=orbit,
-                    diagram=self.diagram,
-                    title=self.study.title,
-                ),
-            )
+        if plane is not None:
+            self._write(CURVES, lambda path: tables_plane.write_curves(path, plane))
+            self._write(SPECIAL, lambda path: tables_plane.write_special(path, plane))
+            self._write(REGIONS, lambda path: tables_plane.write_regions(path, plane))
+        if lmap is not None:
+            self._write(LYAPUNOV_TABLE, lambda path: tables_plane.write_motions(path, lmap))
+
+    def _write_data(self) -> None:
+        found = self.found
+        whole = None if found.branch is not None else found.diagram  # a branch is its own diagram
+        for name, result in (
+            (ORBIT, found.orbit),
+            (BRANCH, found.branch),
+            (DIAGRAM, whole),
+            (PLANE, found.plane),
+            (LYAPUNOV, found.lyapunov),
+        ):
+            if result is not None:
+                self._write(name, partial(save, result))
+
+    def _draw(self, found: Findings) -> None:
+        from contfric.study.paint import can_be_drawn, paint
+
+        title = self.study.title
+        shown = (d for d in self.study.drawings if can_be_drawn(d.kind, found))
+        for drawing in shown:
+            self._write(drawing.file, partial(paint, drawing=drawing, found=found, title=title))
 
     def _write(self, name: str, write: Callable[[Path], None]) -> None:
         """Write one file; one that fails does not keep the others from being written."""
@@ -278,11 +277,11 @@ class _Run:
         else:
             self.written.append(name)
 
-    def _write_record(self, orbit: Orbit) -> dict[str, Any]:
+    def _write_record(self) -> dict[str, Any]:
         from contfric.study.record import record_of, write_record
 
         work = counts() - self.before
-        record = record_of(self.plan, work, self.timings, orbit, self.diagram)
+        record = record_of(self.plan, work, self.timings, self.found)
         record |= {
             "status": self.status.value,
             "failures": [_one_line(error) for error in self.failures],
@@ -301,9 +300,11 @@ class _Run:
             self.study,
             self.folder.path,
             self.status,
-            self.orbit,
-            self.branch,
-            self.diagram,
+            self.found.orbit,
+            self.found.branch,
+            self.found.diagram,
+            self.found.plane,
+            self.found.lyapunov,
             record,
             tuple(self.folder.path / name for name in self.written),
         )

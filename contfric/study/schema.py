@@ -24,6 +24,8 @@ class FigureKind(str, Enum):
     ORBIT = "orbit"
     TRANSITIONS = "transitions"
     BRANCHES = "branches"
+    LYAPUNOV = "lyapunov"
+    PLANE = "plane"
 
 
 class Row(str, Enum):
@@ -143,11 +145,84 @@ class ExploreTask(_Task):
     )
 
 
+class LyapunovTask(_Part):
+    """Lyapunov exponents on a grid of two parameters."""
+
+    grid: dict[str, list[float]] = Field(
+        min_length=2,
+        max_length=2,
+        description="a mapping of two parameters, each to [low, high, number of values]",
+    )
+    periods: int | None = Field(
+        None, ge=1, description="a whole number >= 1: most periods to average over"
+    )
+    transient: int | None = Field(
+        None, ge=0, description="a whole number >= 0: periods before averaging begins"
+    )
+    tolerance: float | None = Field(
+        None, gt=0.0, description="a number > 0: relative error at which averaging ends"
+    )
+    confirm: int | None = Field(
+        None, ge=0, description="a whole number >= 0: periods that chaos is followed further"
+    )
+    starts: int | None = Field(
+        None, ge=1, description="a whole number >= 1: initial conditions at each point"
+    )
+    state: list[float] | None = Field(
+        None, description="a list of finite numbers, one for each state: where every motion starts"
+    )
+
+    def options(self) -> dict[str, Any]:
+        """Return what is given beyond the grid, as arguments."""
+        return self.model_dump(exclude={"grid"}, exclude_none=True)
+
+
+class PlaneTask(_Part):
+    """Follow the curves of bifurcations in a plane of two parameters."""
+
+    parameters: list[str] = Field(
+        min_length=2, max_length=2, description="the names of two parameters of the model"
+    )
+    range: dict[str, list[float]] = Field(
+        description="a mapping of both parameters to two finite numbers [low, high]"
+    )
+    sections: dict[str, list[float]] | None = Field(
+        None, description="a mapping of one or both parameters to lists of values"
+    )
+    kinds: list[str] | None = Field(
+        None, min_length=1, description="a list with any of SN, BP, PD, CS, SS, AS, GS, T"
+    )
+    seeds: SeedsTask | None = Field(None, description="a mapping with any of values, states, seed")
+    max_step: float | None = Field(
+        None,
+        gt=0.0,
+        le=1.0,
+        description="a number in (0, 1]: largest step, as a share of the ranges",
+    )
+    max_periods: int | None = Field(
+        None,
+        ge=1,
+        le=16,
+        description="a whole number from 1 to 16: longest orbits whose curves count",
+    )
+    max_curves: int | None = Field(
+        None, ge=1, description="a whole number >= 1: most curves to compute"
+    )
+    max_sections: int | None = Field(
+        None, ge=1, description="a whole number >= 1: most sections, those of the study among them"
+    )
+
+    def options(self) -> dict[str, Any]:
+        """Return what is given beyond the plane and its sections, as arguments."""
+        given = {"parameters", "range", "sections", "seeds"}
+        return self.model_dump(exclude=given, exclude_none=True)
+
+
 class Figure(_Part):
     """One figure."""
 
     kind: Annotated[FigureKind, Field(strict=False)] = Field(
-        description="one of diagram, orbit, transitions, branches"
+        description="one of diagram, orbit, transitions, branches, lyapunov, plane"
     )
     rows: _Rows | None = Field(
         None, description="a list of rows of a diagram: any of x_max, x_min, stops, psi"
@@ -184,6 +259,16 @@ class StudyFile(_Part):
         alias="continue",
         description="a mapping with parameter and range; also max_step, max_points",
     )
+    lyapunov: LyapunovTask | None = Field(
+        None,
+        description="a mapping with grid; also periods, transient, tolerance, confirm, starts, "
+        "state",
+    )
+    plane: PlaneTask | None = Field(
+        None,
+        description="a mapping with parameters and range; also sections, kinds, seeds, max_step, "
+        "max_periods, max_curves, max_sections",
+    )
     want: _Wants = Field([], description="a list with any of stability, asymmetry, extrema, stops")
     figures: list[Figure] = Field([], description="a list of mappings, each with its kind")
 
@@ -191,6 +276,17 @@ class StudyFile(_Part):
     def task(self) -> ExploreTask | ContinueTask | None:
         """What is done with the first orbit; None if nothing is."""
         return self.explore or self.continue_
+
+    @property
+    def needs_orbit(self) -> bool:
+        """Whether anything is asked for that needs the orbit of the start."""
+        shown = {figure.kind for figure in self.figures}
+        alone = self.lyapunov is not None and self.task is None and self.plane is None
+        return (
+            not alone
+            or "start" in self.model_fields_set
+            or bool(shown & {FigureKind.ORBIT, FigureKind.TRANSITIONS})
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Return what the file says, as plain data."""

@@ -33,7 +33,7 @@ def write_points(path: Path, study: Study, sources: Sequence[Branch | Orbit]) ->
         for number, (source, table) in enumerate(zip(sources, tables, strict=True), start=1)
         for row in _rows(table, header)
     )
-    _write(path, ["branch", "signature", *header], rows)
+    write_table(path, ["branch", "signature", *header], rows)
 
 
 def _rows(table: dict[str, list[Any]], header: list[str]) -> Iterable[tuple[Any, ...]]:
@@ -74,7 +74,7 @@ def write_bifurcations(path: Path, diagram: Diagram) -> None:
         for node in listed_nodes(diagram)
     )
     header = ["kind", "branch", "signature", *names, "stable_before", "stable_after"]
-    _write(path, header, rows)
+    write_table(path, header, rows)
 
 
 def listed_nodes(diagram: Diagram) -> list[Node]:
@@ -87,7 +87,8 @@ def _known(value: bool | None) -> str:
     return "" if value is None else str(value)
 
 
-def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a table as CSV, whole or not at all."""
     with (
         replacing(path) as temporary,
         temporary.open("w", encoding="utf-8", newline="") as file,

@@ -24,7 +24,7 @@ IMAGES = HERE.parent / "images" / "gallery"
 #: Studies of each page: bundled ones by name, those beside this script by their files.
 PAGES: dict[str, tuple[str, ...]] = {
     "fig03": ("fig03",),
-    "fig04": ("fig04", "fig04-9seg"),
+    "fig04": ("fig04",),
     "fig05": ("fig05",),
     "fig06": ("fig06",),
     "fig07": ("fig07",),
@@ -37,6 +37,8 @@ LONG = ("fig17", "fig18")
 STUDIES = tuple(study for studies in PAGES.values() for study in studies)
 #: Digits behind the point in the tables: events are located to about 1e-10.
 DIGITS = 9
+#: Most turns of a word in the table of windows: longer ones have windows of 1e-6 and less.
+LONGEST = 6
 #: An event belongs to what was published if it is this near to it.
 NEAR = 3e-5
 
@@ -109,6 +111,18 @@ def table_of(name: str, result: cf.StudyResult) -> list[str]:
     return [head, "|---|---|---|---|", *map(str, rows_of(name, result.diagram))]
 
 
+def windows_of(diagram: cf.Diagram) -> list[str]:
+    """Return the table of the orbits between the two ends of the first bridge: words over both."""
+    bridge = next(branch for branch in diagram.branches if branch.bridge)
+    rows = [
+        f"| {window.word} | {window.branch.name} | {window.range[0]:.{DIGITS}f} "
+        f"| {window.range[1]:.{DIGITS}f} | {'yes' if window.branch.stable.all() else 'in part'} |"
+        for window in cf.period_adding(bridge, longest=LONGEST)
+    ]
+    head = f"| word | orbit | {diagram.parameter} from | to | stable |"
+    return [head, "|---|---|---|---|---|", *rows]
+
+
 def tables_in(page: str) -> dict[str, list[str]]:
     """Return the tables in the text of a page, by the names of their studies."""
     found = re.findall(r"<!-- events: (\S+) -->\n(.*?)\n<!-- end -->", page, re.DOTALL)
@@ -125,7 +139,7 @@ def with_table(page: str, name: str, lines: list[str]) -> str:
 
 
 def main(pages: list[str]) -> None:
-    """Run every study of some pages (of all by default), write its figures and put its table into its page."""
+    """Run every study of some pages (by default all); write its figures, put its table into its page."""
     IMAGES.mkdir(parents=True, exist_ok=True)
     for page, names in PAGES.items():
         if pages and page not in pages:
@@ -140,6 +154,8 @@ def main(pages: list[str]) -> None:
                         kind = "" if file.stem == _first_figure(result) else f"-{file.stem}"
                         shutil.copyfile(file, IMAGES / f"{name}{kind}.png")
                 text = with_table(text, name, table_of(name, result))
+                if f"<!-- events: {name}-windows -->" in text:
+                    text = with_table(text, f"{name}-windows", windows_of(result.diagram))
             print(f"{name}: {path.name}")
         path.write_text(text, encoding="utf-8")
 

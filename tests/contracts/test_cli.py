@@ -141,7 +141,7 @@ def test_bad_study(study, tmp_path, capsys, monkeypatch, name, text, message) ->
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["run", "fig5"], "unknown study 'fig5'; did you mean 'fig05'"),
+        (["run", "fig5"], "unknown study 'fig5'; did you mean 'fig05' or 'fig15'?"),
         (["explain", "none.yaml"], "there is no file none.yaml"),
         (["rnu", "fig05"], "unknown command 'rnu'; did you mean 'run'"),
         (["run"], "required: STUDY (see: contfric run --help)"),

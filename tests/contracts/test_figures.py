@@ -29,7 +29,6 @@ from contfric.plot import (
     plot_branch_graph,
     plot_branches,
     plot_diagram,
-    plot_diagram_graph,
     plot_diagram_row,
     plot_orbit,
     plot_orbit_in_time,
@@ -340,7 +339,6 @@ def test_unknown_row_has_a_remedy(diagram: Any) -> None:
 def test_an_empty_diagram_is_drawn() -> None:
     empty = SimpleNamespace(parameter="p", range=(0.0, 1.0), branches=(), nodes=(), bifurcations=())
     assert len(plot_diagram(empty)) == 3
-    assert isinstance(plot_diagram_graph(empty), Axes)
     assert isinstance(plot_branch_graph(empty), Axes)
 
 
@@ -443,13 +441,6 @@ def test_transition_graph_highlights_a_walk(orbit: Any) -> None:
     bold = {patch.get_gid() for patch in ax.patches if patch.get_linewidth() > 1.5}
     assert bold == {f"{a} -> {b}" for a, b in zip(walk, (*walk[1:], walk[0]), strict=True)}
     assert len(ax.patches) == 14
-
-
-def test_diagram_graph_has_every_branch(diagram: Any) -> None:
-    ax = plot_diagram_graph(diagram)
-    for branch in diagram.branches:
-        assert branch.name.replace(", ", ",\n") in texts(ax)
-    assert any(text.startswith(r"$\mathrm{BP}_{2s}$") for text in texts(ax))
 
 
 def test_branch_graph_has_every_branch_and_every_joint_once(diagram: Any) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +17,10 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 MAX_LINES = 400
 
 #: Loaded by those functions that need them, never by `import contfric`.
-HEAVY = ("matplotlib", "networkx", "numba", "pandas", "pydantic", "scipy.optimize", "yaml")
+HEAVY = (
+    *("matplotlib", "mpmath", "networkx", "numba", "pandas", "pydantic", "scipy.optimize"),
+    *("sympy", "yaml"),
+)
 
 
 def run_python(*args: str) -> subprocess.CompletedProcess[str]:
@@ -42,6 +46,21 @@ def test_import_contracts_hold() -> None:
     code = "from importlinter.cli import lint_imports_command as run; run()"
     done = run_python("-c", code, "--no-cache")
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+#: Where models and their flows are defined.
+OF_MODELS = ("models", "flow")
+
+
+@pytest.mark.parametrize("module", MODULES, ids=name_of)
+def test_no_model_is_named_outside_of_models_and_flows(module: Path) -> None:
+    """Examples in docstrings, and the name of a default, need some model; nothing else does."""
+    if module.relative_to(PACKAGE).parts[0] in OF_MODELS:
+        return
+    lines = module.read_text(encoding="utf-8").splitlines()
+    code = [line for line in lines if not line.lstrip().startswith((">>>", "..."))]
+    named = [line.strip() for line in code if re.search("coulomb|lugre", line, re.IGNORECASE)]
+    assert not named, named
 
 
 def test_modules_are_found() -> None:

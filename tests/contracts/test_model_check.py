@@ -62,6 +62,7 @@ MISTAKES = [
     ),
     ("2*pi/Omega", "3*pi/Omega", Topic.PERIOD, "error", "common period"),
     ("Omega > 0]", "Omega > 1]", Topic.CONSTRAINTS, "error", "violate Omega > 1 (Omega = 0.7)"),
+    ("S*sign(v)", "S*sign(v/k)", Topic.KINKS, "warning", "kink where v/k = 0"),
     ("k: 1.0}", "k: 1.0, mu: 0.3}", Topic.NAMES, "warning", "parameter 'mu' is used nowhere"),
     ("  backward: {in: {v: -}}\n", "", Topic.TRANSITIONS, "error", "is in no domain"),
     (
@@ -106,6 +107,32 @@ def test_flat_surfaces_are_found(tmp_path: Path) -> None:
     )
     report = report_of(tmp_path, text)
     assert any("vanishes on surface 'w'" in f.message for f in report.findings), str(report)
+
+
+WALL = """\
+name: wall
+states: [x, v]
+parameters: {Omega: 0.7, e: 0.8, b: 0.5}
+period: 2*pi/Omega
+surfaces:
+  wall: {observable: x, level: b}
+  stop: {observable: v, level: 0}
+modes:
+  rise: {in: {wall: -, stop: +}, field: {x: v, v: cos(Omega*t) - x}}
+  fall: {in: {wall: -, stop: -}, field: {x: v, v: cos(Omega*t) - x}}
+resets: {wall: {v: -e*v}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("reset", "says"),
+    [("v: -e*v", ""), ("v: e*v", "must turn the rate"), ("v: -e*v, x: x - 0.1", "off the surface")],
+)
+def test_resets_are_checked(tmp_path: Path, reset: str, says: str) -> None:
+    report = report_of(tmp_path, WALL.replace("v: -e*v", reset))
+    assert report.counts[Topic.RESETS] > 0
+    assert report.ok == (not says), str(report)
+    assert not says or any(says in f.message for f in report.findings), str(report)
 
 
 def test_states_that_do_nothing_are_found(tmp_path: Path) -> None:

@@ -58,6 +58,19 @@ def test_everything_is_derived(tmp_path: Path) -> None:
     assert model.transitions["stick", "F+"] == "backward:u+"
 
 
+def test_models_without_jumps_are_recognised(tmp_path: Path) -> None:
+    """The stick ends where the slide would begin at rest; not so with a static limit of its own."""
+    assert cf.load_model(written(tmp_path, GOOD)).filippov
+    higher = GOOD.replace("S: 0.2", "S: 0.2\n  S0: 0.2").replace("level: S}", "level: S0}")
+    assert not cf.load_model(
+        written(tmp_path, higher.replace("level: -S}", "level: -S0}"))
+    ).filippov
+    assert [cf.load_model(n).filippov for n in ("belt", "popp", "coulomb-yaml", "lugre")] == [
+        *(True, True),
+        *(False, False),
+    ]
+
+
 def test_same_definition_is_the_same_model(tmp_path: Path) -> None:
     path = written(tmp_path, GOOD)
     again = tmp_path / "other.yaml"

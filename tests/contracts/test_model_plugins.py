@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import pickle
 import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import ClassVar
 
@@ -275,3 +277,33 @@ def test_mistakes_in_a_class(change: dict[str, object], says: str) -> None:
         cf.load_model(type("Wrong", (Walled,), change))
     assert says in str(caught.value)
     assert "Wrong" in str(caught.value)
+
+
+def test_maps_in_several_processes(damped: cf.Model) -> None:
+    """The model reaches other processes by its definition; the exponents are those of the closed form."""
+    axes = {"Omega": [0.5, 0.7], "S": [0.1, 0.2]}
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as executor:
+        spread = cf.lyapunov_map(damped, axes, executor=executor, periods=60)
+    np.testing.assert_array_equal(spread.values, cf.lyapunov_map(damped, axes, periods=60).values)
+    for i, omega in enumerate(axes["Omega"]):
+        for j, s in enumerate(axes["S"]):
+            values = {"Omega": omega, "S": s, "S0": s, "zeta": 0.05}
+            closed = cf.lyapunov_map("coulomb", {"Omega": [omega], "S": [s]}, values, periods=60)
+            assert spread.values[i, j] == pytest.approx(closed.values[0, 0], abs=1e-8)
+
+
+def test_models_work_without_a_cache(tmp_path: Path) -> None:
+    """Where no folder can be written, the module of a model belongs to its process."""
+    (tmp_path / "file").write_text("no folder")
+    (tmp_path / "damped.yaml").write_text(YAML.format(name="damped"))
+    code = (
+        "import os, numpy as np\n"
+        f"os.environ['CONTFRIC_CACHE_DIR'] = {str(tmp_path / 'file' / 'cache')!r}\n"
+        "import contfric as cf\n"
+        f"model = cf.load_model({str(tmp_path / 'damped.yaml')!r})\n"
+        "none = np.empty(0, dtype=np.int64)\n"
+        "print(model.flow.period(model.vector({'Omega': 2 * np.pi}), none, np.empty(0)))\n"
+    )
+    done = in_site(tmp_path, code)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) == pytest.approx(1.0)

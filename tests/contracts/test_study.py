@@ -16,7 +16,7 @@ import contfric as cf
 from contfric.continuation.events import End, EndReason
 from contfric.orbit.counts import counts
 from contfric.study import UnwrittenError, make_plan, read_study, study_names
-from contfric.study.run import RunStatus
+from contfric.study.result import RunStatus
 
 HEAD = "model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\n"
 EXPLORE = "explore: {parameter: Omega, range: [0.45, 0.56]}\n"
@@ -177,7 +177,9 @@ def test_bad_signature_file_is_named_with_its_line(study) -> None:
 
 
 def test_unknown_study(tmp_path) -> None:
-    with pytest.raises(cf.StudyError, match="unknown study 'fig5'; did you mean 'fig05'"):
+    with pytest.raises(
+        cf.StudyError, match="unknown study 'fig5'; did you mean 'fig05' or 'fig15'"
+    ):
         read_study("fig5")
     (tmp_path / "scene.yaml").write_text("")
     with pytest.raises(cf.StudyError, match=r"no file .*scne\.yaml; did you mean 'scene.yaml'"):
@@ -212,7 +214,7 @@ def test_plan_says_what_is_skipped(study) -> None:
         "2. explore: every branch that can be reached, Omega from 0.45 to 0.56\n",
         "points.csv, bifurcations.csv",
         "orbit.npz, diagram.npz",
-        "- multipliers, and BP and PD with them: not wanted (stability)",
+        "- multipliers, and PD with them: not wanted (stability)",
         "- columns psi: not wanted (asymmetry)",
         "- matplotlib: no figures",
     ):

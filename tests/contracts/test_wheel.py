@@ -52,8 +52,9 @@ def test_wheel_runs_fig05_from_an_empty_folder(installed: Path, tmp_path: Path) 
     assert "BP" in table
 
 
-def test_wheel_ships_signatures_and_studies(installed: Path) -> None:
+def test_wheel_ships_models_signatures_and_studies(installed: Path) -> None:
     data = installed / "contfric" / "_data"
+    assert (data / "models" / "belt.yaml").is_file()
     assert (data / "signatures" / "2s.yaml").is_file()
     for number in ("03", "04", "05", "06", "07", "13"):
         assert (data / "studies" / f"fig{number}.yaml").is_file()

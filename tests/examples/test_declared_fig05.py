@@ -24,7 +24,10 @@ def diagrams() -> tuple[cf.Diagram, cf.Diagram]:
 
 def test_all_bifurcations_agree(diagrams: tuple[cf.Diagram, cf.Diagram]) -> None:
     closed, declared = (
-        sorted((b.kind.value, str(b.orbit.signature), b.params["Omega"]) for b in d.bifurcations)
+        sorted(
+            (b.kind.value, str(b.orbit.signature), b.params["Omega"])
+            for b in (n.bifurcation for n in d.nodes)
+        )
         for d in diagrams
     )
     assert len(closed) == 12

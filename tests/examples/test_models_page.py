@@ -1,4 +1,4 @@
-"""The page on users' models: its file and its class are what they say, and give the same orbit."""
+"""The page on users' models: its file and its class are what they say, and make the same model."""
 
 from __future__ import annotations
 
@@ -23,4 +23,4 @@ def test_page_runs(
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "model my_block"
     assert "fine" in lines
-    assert abs(float(lines[-1])) < 1e-11
+    assert lines[-1] == "True True"

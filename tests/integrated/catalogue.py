@@ -1,12 +1,12 @@
 """Motions of two states as integrated flows, each for what it shows.
 
-Mode 0 is Van der Pol's oscillator, ``x'' = mu (1 - x^2) x' - x``. Mode 1 is at rest, for observables that move by
-themselves. Observables: 0 is x, 1 is x', 2 is a trigonometric sum that moves with time alone::
+Mode 0 is Van der Pol's oscillator, ``x'' = mu (1 - x^2) x' - x``. Mode 1 is at rest, for observables
+that move by themselves. Observables: 0 is x, 1 is x', 2 is a trigonometric sum that moves with time alone::
 
     q(t, y) = x + a_0 + sum_k a_(2k-1) cos(k t) + a_(2k) sin(k t),      k = 1 to 4,
 
-which is all that an observable can be. Parameters: mu, the scale of the states (with ``relative = 0`` it is the
-absolute tolerance), a_0 to a_8.
+which is all that an observable can be. Parameters: mu, the scale of the states (with ``relative = 0`` it
+is the absolute tolerance), a_0 to a_8.
 """
 
 from __future__ import annotations

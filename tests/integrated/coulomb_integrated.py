@@ -150,8 +150,18 @@ def scale_of(i, p):
     return 1.0
 
 
+@helper
+def side_of(mode, c):
+    return (1.0 if mode == 0 else -1.0) if c == SPEED and mode != STICK else 0.0
+
+
 MOTION = integrated_motion(
-    field=field, observe=value_of, rate=rate_of, period=period_of, scale=scale_of
+    field=field,
+    observe=value_of,
+    rate=rate_of,
+    period=period_of,
+    scale=scale_of,
+    side=side_of,
 )
 
 

@@ -4,8 +4,9 @@ Each mode is ``x'' + 2 zeta x' + x = b + f cos(Omega t)`` with a constant b of i
 ``x' = V``. Derivatives are by complex steps, exact to rounding. First roots are by a march of small steps
 that looks at the sign of the function and, where its slope turns, at the extremum; good enough for tests.
 
-Parameters: zeta, S, S0, V, f, Omega, wall, e, a. Observables: 0 is the load ``x + 2 zeta x' - f cos(Omega t)``,
-1 is x', 2 is the distance to a wall at ``wall + a cos(Omega t)``, above the mass.
+Parameters: zeta, S, S0, V, f, Omega, wall, e, a. Observables: 0 is the load
+``x + 2 zeta x' - f cos(Omega t)``, 1 is x', 2 is the distance to a wall above the mass, at
+``wall + a cos(Omega t)``.
 """
 
 from __future__ import annotations
@@ -245,7 +246,7 @@ def hit(mode, c, target, on, t0, y0, dt_max, p, y1):
 
 @kernel(turning_signature)
 def turning(mode, c, t0, y0, dt, p, times, values):
-    rests = mode == STICK or mode == STICK_BACK
+    rests = mode in (STICK, STICK_BACK)
     if dt <= 0.0 or (rests and (c == 1 or (p[F] == 0.0 and c == 0))):
         return 0
     count, a, first = 0, 1e-9, 1e-9
@@ -471,6 +472,7 @@ dead_band = Model(
     flow_factory=_dead_band_flow,
     spread=_spread,
     autonomous=True,
+    filippov=True,
 )
 
 

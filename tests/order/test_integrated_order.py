@@ -33,7 +33,9 @@ def after(implicit, steps, dt=2.0):
     return out
 
 
-@pytest.mark.parametrize(("implicit", "order", "steps"), [(False, 8, (8, 12, 18, 26)), (True, 13, (2, 3, 4))])
+@pytest.mark.parametrize(
+    ("implicit", "order", "steps"), [(False, 8, (8, 12, 18, 26)), (True, 13, (2, 3, 4))]
+)
 def test_order(implicit, order, steps):
     exact = after(False, 400)
     errors = np.array([np.abs(after(implicit, n) - exact) for n in steps])

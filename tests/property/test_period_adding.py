@@ -25,8 +25,9 @@ def windows() -> tuple[cf.Window, ...]:
 
 
 def test_the_windows_in_order() -> None:
-    """From 2a at 0.4917488 to 1a at 0.4918167; each next word has one turn of 1a more."""
+    """Between two neighbours stands the word of both, as in a Farey tree; then one turn of 1a more."""
     assert [w.word for w in windows()] == [
+        "1a-2a-2a",
         "1a-2a-1a-2a-2a",
         "1a-2a",
         "1a-1a-2a",
@@ -34,10 +35,22 @@ def test_the_windows_in_order() -> None:
         "1a-1a-1a-1a-2a",
         "1a-1a-1a-1a-1a-2a",
     ]
-    assert all(0.49174881 < w.range[0] < w.range[1] < 0.49181666 for w in windows())
+    lows = [w.range[0] for w in windows()]
+    highs = [w.range[1] for w in windows()]
+    assert lows == sorted(lows) and highs == sorted(highs)
+    assert lows[0] < 0.49174881 < highs[0], "the first one lives beside 2a, too"
+    assert lows[1] > 0.49174881 and highs[-1] < 0.49181666
 
 
-@pytest.mark.parametrize("index", range(6))
+def test_every_simulation_in_the_gap_settles_on_a_word_of_the_list_or_a_longer_one() -> None:
+    known = {identity(w.branch[0]) for w in windows()}
+    for value in np.linspace(0.4917489, 0.4918166, 40):
+        orbit = cf.find_orbit("coulomb", {**PARAMS, "Omega": float(value)})
+        if orbit.periods <= 6:
+            assert identity(orbit) in known, orbit
+
+
+@pytest.mark.parametrize("index", range(7))
 def test_simulation_settles_on_the_word(index: int) -> None:
     """From beside the orbit: windows overlap a little, and two attractors have their basins there."""
     window = windows()[index]
@@ -52,7 +65,7 @@ def test_simulation_settles_on_the_word(index: int) -> None:
     assert found.stable and bool(np.all(window.branch.stable))
 
 
-@pytest.mark.parametrize("index", range(6))
+@pytest.mark.parametrize("index", range(7))
 def test_a_window_ends_where_a_stop_meets_the_surface(index: int) -> None:
     """Just outside of the window the simulation leaves the word within its period."""
     window = windows()[index]

@@ -6,22 +6,17 @@ they prove nothing; but a formula that is wrong is wrong almost everywhere.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contfric.models.check.report import Finding, ModelReport, Severity, Topic
 
 if TYPE_CHECKING:
-    from contfric.models.definition import Model
-    from contfric.models.oscillator import OscillatorModel
+    from contfric.models import ModelSource
 
 __all__ = ["Finding", "ModelReport", "Severity", "Topic", "check_model"]
 
 
-def check_model(
-    model: str | Path | Model | type[OscillatorModel] | OscillatorModel,
-    params: dict[str, float] | None = None,
-) -> ModelReport:
+def check_model(model: ModelSource, params: dict[str, float] | None = None) -> ModelReport:
     """Verify a model: derivatives, surfaces, transitions, sliding modes, symmetry, period, constraints.
 
     Parameters
@@ -48,10 +43,12 @@ def check_model(
     """
     from contfric.models import load_model
     from contfric.models.check.derivatives import check_derivatives
+    from contfric.models.check.kinks import check_kinks
     from contfric.models.check.names import check_constraints, check_names
     from contfric.models.check.probe import Probe
     from contfric.models.check.structure import (
         check_period,
+        check_resets,
         check_sliding,
         check_surfaces,
         check_symmetry,
@@ -67,6 +64,8 @@ def check_model(
     check_derivatives(report, probe)
     check_surfaces(report, probe)
     check_transitions(report, probe)
+    check_resets(report, probe)
+    check_kinks(report, loaded)
     check_sliding(report, probe)
     check_symmetry(report, probe)
     check_period(report, probe)

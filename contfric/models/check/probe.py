@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
+from contfric.models.build import load_module
 from contfric.models.definition import FloatArray, Model
 
 #: Newton's method onto a surface: it converges in a few steps or not at all.
@@ -22,7 +23,7 @@ ON = 1e-12
 class Probe:
     """Values and gradients at single states.
 
-    Gradients are by time, then by state; fields come from the flow over a duration of zero.
+    Gradients are by time, then by state; fields that are not generated come from the flow over no time.
     """
 
     model: Model
@@ -79,6 +80,10 @@ class Probe:
     def field(self, mode: str, t: float, y: FloatArray) -> FloatArray:
         """Return the rates of all states in a mode."""
         m, n = [mode.name for mode in self.model.modes].index(mode), len(y)
+        if self.model.definition:  # without the flow, which takes much longer to compile
+            out, module = np.empty(n), load_module(self.model.definition)
+            module.field_of(m, t, y, self.vector, self._none, out, np.empty((0, 0)))
+            return out
         state, jac = np.empty(n), np.empty((n, 2 + n))
         self.model.flow.flow(m, t, y, 0.0, self.vector, self._none, state, jac)
         return jac[:, 1 + n].copy()

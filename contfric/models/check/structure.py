@@ -124,6 +124,41 @@ def _goes_on(
     return False
 
 
+def check_resets(report: ModelReport, probe: Probe) -> None:
+    """Check that a reset leaves the state on its surface, and that it moves away from there."""
+    model = probe.model
+    for name in model.reset_by_surface:
+        for t, y in probe.on(name, _ON_SURFACE // 2):
+            signs = probe.signs(t, y)
+            inside = {d.signs[name] for d in model.domains} - {0}
+            before = model.domain_at({**signs, name: min(inside)}) if len(inside) == 1 else None
+            if before is None:
+                continue
+            side, mode = min(inside), model.domain_by_name[before].mode
+            if not side * probe.rate(mode, name, t, y) < -_STILL:
+                continue
+            report.count(Topic.RESETS)
+            behind = probe.reset(name, t, y)
+            if not abs(probe.height(name, t, behind)) <= _SAME * (1.0 + np.abs(y).max()):
+                report.error(
+                    Topic.RESETS,
+                    f"the reset at '{name}' takes the state {_place(probe, t, y)} off the surface: it may "
+                    "not change what the surface's observable depends on",
+                )
+                return
+            after = model.domain_at({**probe.signs(t, behind), name: side})
+            if after is None or not (
+                side * probe.rate(model.domain_by_name[after].mode, name, t, behind) > 0.0
+            ):
+                report.error(
+                    Topic.RESETS,
+                    f"behind the reset at '{name}' the motion from {_place(probe, t, y)} still runs into "
+                    "the surface, or is in no domain: a reset must turn the rate of "
+                    f"'{model.surface_by_name[name].observable}' around, such as v: -e*v",
+                )
+                return
+
+
 def check_sliding(report: ModelReport, probe: Probe) -> None:
     """Check that a sliding mode does not change the observables of its surfaces."""
     model = probe.model

@@ -1,0 +1,365 @@
+"""Exploration of a plane: from sections to curves, from curves through their points of codimension two.
+
+A section is a one-parameter diagram. Each of its bifurcations starts a curve; each point of codimension two on
+a curve starts those that leave it, until nothing new is found. Then the regions between the curves are
+looked at: where no section has passed a region, one is laid through it, and what it shows that is new
+starts further curves.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from contfric.atlas.diagram import Diagram
+from contfric.atlas.explore import explore
+from contfric.atlas.plane import Plane
+from contfric.atlas.plane_matching import is_known, twins_of
+from contfric.atlas.plane_regions import regions_of
+from contfric.atlas.seeds import Seeds
+from contfric.continuation.events import Bifurcation, Kind
+from contfric.continuation.points import LARGEST_STEP, MOST_POINTS
+from contfric.curves.assembly import join_sides
+from contfric.curves.curve import Curve
+from contfric.curves.going_on import Start
+from contfric.curves.leaving import leaving
+from contfric.curves.points import CurvePoint
+from contfric.curves.problem import Box, Problem, box_of, problem_of
+from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
+from contfric.curves.trace import CurveSide, start_of_curve, trace_curve_side
+from contfric.errors import ContfricError, ConvergenceError, ParameterError, whole_number
+from contfric.models.definition import FloatArray
+from contfric.orbit.find import find_orbit
+from contfric.orbit.orbit import Orbit
+
+Progress = Callable[[str], None]
+
+#: Kinds of curves that are followed by default: T changes labels, and nothing else.
+KINDS = ("SN", "BP", "PD", "CS", "SS", "AS", "GS")
+#: Simulations along each section: families that nothing else reaches have to be met by chance.
+_SEEDS = Seeds(values=8, states=2)
+#: A curve shorter than this (relative to the ranges) leaves its start in no direction.
+_NOWHERE = 1e-5
+#: A region smaller than this share of the plane gets no section of its own.
+_SMALL = 2e-4
+
+
+@dataclass(eq=False)
+class PlaneExploration:
+    """State of one exploration of a plane."""
+
+    box: Box
+    vector: FloatArray
+    kinds: frozenset[Kind]
+    max_periods: int
+    max_curves: int
+    largest: float
+    progress: Progress | None
+    curves: list[Curve] = field(default_factory=list)
+    sections: list[Diagram] = field(default_factory=list)
+    waiting: deque[tuple[SpecialPoint, Problem]] = field(default_factory=deque)
+    notes: list[str] = field(default_factory=list)
+    complete: bool = True
+
+    def say(self, text: str) -> None:
+        """Report progress."""
+        if self.progress is not None:
+            self.progress(text)
+
+    @property
+    def full(self) -> bool:
+        """Whether no more curves may be computed."""
+        return len(self.curves) >= self.max_curves
+
+    def add(self, curve: Curve, sides: Sequence[CurveSide]) -> None:
+        """Register a curve, and let what leaves its points of codimension two wait."""
+        self.curves.append(curve)
+        self.say(f"curve {len(self.curves)}: {curve!r}")
+        for side in sides:
+            piece: CurveSide | None = side
+            while piece is not None:
+                self.waiting.extend((special, piece.problem) for special in piece.special)
+                piece = piece.following
+
+    def wants(self, problem: Problem) -> bool:
+        """Tell whether a curve is of the kinds and periods asked for."""
+        return problem.kind in self.kinds and problem.system.periods <= self.max_periods
+
+
+def explore_plane(
+    orbit: Orbit,
+    parameters: tuple[str, str],
+    ranges: Mapping[str, tuple[float, float]],
+    sections: Mapping[str, Sequence[float]] | None = None,
+    *,
+    kinds: Sequence[str | Kind] = KINDS,
+    max_step: float | None = None,
+    max_periods: int = 2,
+    max_curves: int = 200,
+    max_sections: int = 12,
+    seeds: Seeds | None = _SEEDS,
+    progress: Progress | None = None,
+) -> Plane:
+    """Find the bifurcation curves of a plane, the points at which they meet, and its regions.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        Gives the model and the other parameters; sections find their own orbits by simulation.
+    parameters, ranges
+        The plane, as for :func:`contfric.continue_bifurcation`.
+    sections : dict, optional
+        Values of one or of both parameters at which the other one is varied; by default that of
+        the orbit for the second parameter.
+    kinds : sequence of str
+        Kinds of curves to follow; T is left out by default.
+    max_periods : int
+        Longest orbit, in periods of the excitation, whose curves are followed.
+    max_curves, max_sections : int
+        Most curves, and most sections, those asked for among them; reached, the notes say so.
+    seeds : Seeds, optional
+        Simulations along each section.
+
+    Returns
+    -------
+    Plane
+        On Ctrl-C what was found so far, with ``complete`` False.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not valid.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> ranges = {"Omega": (0.52, 0.56), "S": (0.3, 0.39)}
+    >>> plane = cf.explore_plane(orbit, ("Omega", "S"), ranges, max_sections=1)
+    >>> sorted({curve.label for curve in plane.curves})
+    ['CS_s', 'SN_1a']
+    """
+    if not isinstance(orbit, Orbit):
+        raise ParameterError(f"a plane is explored from an Orbit, got {type(orbit).__name__}")
+    box = box_of(orbit.model, parameters, ranges)
+    for name, value in (("max_periods", max_periods), ("max_curves", max_curves)):
+        whole_number(name, value, least=1)
+    whole_number("max_sections", max_sections, least=1)
+    wanted = frozenset(Kind(k) for k in kinds)
+    largest = LARGEST_STEP if max_step is None else float(max_step)
+    state = PlaneExploration(
+        box, orbit.vector.copy(), wanted, max_periods, max_curves, largest, progress
+    )
+    asked = _sections(orbit, box, sections)
+    try:
+        for name, value in asked[:max_sections]:
+            _follow_section(state, orbit, name, value, seeds)
+        _sample_regions(state, orbit, seeds, max_sections)
+    except KeyboardInterrupt:
+        state.complete = False
+        state.notes.append(CurveEndReason.INTERRUPTED.value)
+    return _result(state, orbit)
+
+
+def _result(state: PlaneExploration, orbit: Orbit) -> Plane:
+    regions, cells = regions_of(
+        orbit.model, state.vector, state.box, state.curves, state.sections, state.max_periods
+    )
+    return Plane(
+        orbit.model,
+        state.box.names,
+        np.column_stack([state.box.low, state.box.high]),
+        state.vector,
+        tuple(state.curves),
+        twins_of(state.curves),
+        regions,
+        cells,
+        tuple(state.sections),
+        state.complete,
+        tuple(state.notes),
+    )
+
+
+def _sections(
+    orbit: Orbit, box: Box, sections: Mapping[str, Sequence[float]] | None
+) -> list[tuple[str, float]]:
+    """Return the sections as (parameter that is fixed, value)."""
+    if sections is None:
+        second = box.names[1]
+        return [(second, orbit.params[second])]
+    found = []
+    for name, values in sections.items():
+        if name not in box.names:
+            raise ParameterError(f"sections are values of {' and '.join(box.names)}, got '{name}'")
+        for value in values:
+            k = box.names.index(name)
+            if not box.low[k] <= float(value) <= box.high[k]:
+                raise ParameterError(
+                    f"the section {name} = {value:g} is outside of its range "
+                    f"({box.low[k]:g}, {box.high[k]:g})"
+                )
+            found.append((name, float(value)))
+    return found
+
+
+# ---------------------------------------------------------------------------------- sections
+
+
+def _follow_section(
+    state: PlaneExploration, orbit: Orbit, fixed: str, value: float, seeds: Seeds | None
+) -> None:
+    """Compute the diagram of a section, and follow its bifurcations."""
+    diagram = _section(state, orbit, fixed, value, seeds)
+    if diagram is None:
+        state.notes.append(f"no periodic orbit was found on the section {fixed} = {value:g}")
+        return
+    state.sections.append(diagram)
+    for branch in diagram.branches:
+        if branch.bridge or branch.mirrored:
+            continue
+        for bifurcation in branch.bifurcations:
+            if bifurcation.located:
+                _follow_bifurcation(state, bifurcation)
+    _follow_special(state)
+
+
+def _section(
+    state: PlaneExploration, orbit: Orbit, fixed: str, value: float, seeds: Seeds | None
+) -> Diagram | None:
+    box = state.box
+    varies = next(n for n in box.names if n != fixed)
+    k = box.names.index(varies)
+    state.say(f"section {fixed} = {value:g}")
+    for share in (0.5, 0.3, 0.7, 0.1, 0.9):
+        params = {**orbit.params, fixed: value}
+        bottom, top, _, _ = orbit.model.limits(varies, params)
+        low, high = max(box.low[k], bottom), min(box.high[k], top)
+        params[varies] = float(low + share * (high - low))
+        try:
+            start = find_orbit(orbit.model, params, longest=4000)
+            return explore(
+                start,
+                varies,
+                (float(box.low[k]), float(box.high[k])),
+                bridges=False,
+                max_periods=state.max_periods,
+                seeds=seeds,
+            )
+        except ContfricError:
+            continue
+    return None
+
+
+def _follow_bifurcation(state: PlaneExploration, bifurcation: Bifurcation) -> None:
+    """Continue a bifurcation of a section both ways, unless its curve is known."""
+    if state.full or bifurcation.kind not in state.kinds:
+        return
+    try:
+        problem = problem_of(bifurcation, state.box)
+        if not state.wants(problem):
+            return
+        problem, start, border = start_of_curve(problem, bifurcation, state.largest)
+    except (ParameterError, ConvergenceError) as error:
+        state.notes.append(f"{bifurcation.label}: {error}")
+        return
+    if is_known(problem, start, state.curves) is not None:
+        return
+    ahead = trace_curve_side(problem, start, border, state.largest, MOST_POINTS)
+    if ahead.end.reason is CurveEndReason.CLOSED:
+        state.add(join_sides(None, ahead), [ahead])
+        return
+    behind = trace_curve_side(problem, start.reversed(), border, state.largest, MOST_POINTS)
+    state.add(join_sides(behind, ahead), [behind, ahead])
+
+
+# --------------------------------------------------------------------- points of codimension two
+
+
+def _follow_special(state: PlaneExploration) -> None:
+    """Follow what leaves the points that wait."""
+    while state.waiting:
+        special, problem = state.waiting.popleft()
+        if special.meets is Kind.T or special.kind in (CodimTwo.CUSP, CodimTwo.R1, CodimTwo.R2):
+            continue
+        for starts in _paired(leaving(special, problem, state.largest)):
+            if state.full:
+                state.complete = False
+                state.notes.append(f"stopped at max_curves = {state.max_curves}")
+                state.waiting.clear()
+                return
+            if state.wants(starts[0][0]):
+                _follow_starts(state, starts, special)
+
+
+def _paired(starts: Iterable[Start]) -> Iterator[list[Start]]:
+    """Yield the two directions of one curve together."""
+    waiting: list[Start] = []
+    for start in starts:
+        if waiting and not _same_curve(waiting[0][0], start[0]):
+            yield waiting
+            waiting = []
+        waiting.append(start)
+    if waiting:
+        yield waiting
+
+
+def _same_curve(a: Problem, b: Problem) -> bool:
+    return a.system is b.system and a.kind is b.kind and a.test == b.test
+
+
+def _follow_starts(state: PlaneExploration, starts: list[Start], special: SpecialPoint) -> None:
+    """Trace a curve that leaves a point in one or two directions, unless it is known."""
+    sides = []
+    for problem, point, border in starts[:2]:
+        side = trace_curve_side(problem, point, border, state.largest, MOST_POINTS)
+        tip = side
+        while tip.following is not None:
+            tip = tip.following
+        if tip.tip.arc - side.points[0].arc > _NOWHERE:
+            sides.append(side)
+    if not sides or all(
+        is_known(side.problem, _inner(side), state.curves) is not None for side in sides
+    ):
+        return
+    if len(sides) == 2:
+        state.add(join_sides(sides[1], sides[0]), sides)
+        return
+    problem, start = sides[0].problem, sides[0].points[0]
+    there = replace(special, orbit=problem.orbit(start.joints, start.w), tests=())
+    first = CurveEnd(CurveEndReason.START, special=there)
+    state.add(join_sides(None, sides[0], first), sides)
+
+
+def _inner(side: CurveSide) -> CurvePoint:
+    """Return a point of a side away from its ends, where curves meet."""
+    return side.points[len(side.points) // 2]
+
+
+# ----------------------------------------------------------------------------------- regions
+
+
+def _sample_regions(
+    state: PlaneExploration, orbit: Orbit, seeds: Seeds | None, max_sections: int
+) -> None:
+    """Lay sections through regions that none has crossed, largest first, while there are any."""
+    tried: set[float] = set()
+    while not state.full:
+        regions, _ = regions_of(
+            orbit.model, state.vector, state.box, state.curves, state.sections, state.max_periods
+        )
+        open_ = [r for r in regions if not r.sampled and r.share > _SMALL]
+        second = state.box.names[1]
+        values = [r.point[second] for r in open_ if round(r.point[second], 9) not in tried]
+        if not values:
+            return
+        if len(state.sections) >= max_sections:
+            state.notes.append(f"{len(open_)} regions are not sampled (max_sections)")
+            return
+        tried.add(round(values[0], 9))
+        before = len(state.sections)
+        _follow_section(state, orbit, second, values[0], seeds)
+        if len(state.sections) == before and len(tried) > 2 * max_sections:
+            return

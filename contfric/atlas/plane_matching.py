@@ -1,0 +1,129 @@
+"""Curves that are known already: no curve is computed twice."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.atlas.matching import identity, stops_distance
+from contfric.continuation.events import TERMINAL, Kind
+from contfric.curves.curve import Curve, CurvePart
+from contfric.curves.points import CurvePoint, solve_point
+from contfric.curves.problem import Problem, border_of
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
+
+#: A point farther than this from a polyline (relative to the ranges) is not on its curve: a step bends by
+#: an eighth of its length times its angle, 5e-4.
+_NEAR = 3e-3
+#: A point solved on a known curve is the same if parameters (relative) and stops agree to this; where
+#: two curves meet they are located to about 1e-8.
+_SAME = 1e-6
+
+
+def group_of(kind: Kind) -> Kind:
+    """Return the kind under which curves are compared: a CS turns into an SS."""
+    return Kind.CS if kind is Kind.SS else kind
+
+
+def is_known(problem: Problem, point: CurvePoint, curves: list[Curve], same_word: bool = True) -> int | None:
+    """Return the index of the curve that a point lies on; None if on none.
+
+    Without ``same_word`` the motions are compared, whatever their words.
+    """
+    orbit = problem.orbit(point.joints, point.w)
+    for index, curve in enumerate(curves):
+        for part in curve.parts:
+            if group_of(part.kind) is not group_of(problem.kind):
+                continue
+            if same_word and not _same_word(orbit, part):
+                continue
+            if _on_part(orbit, point.w, part, problem):
+                return index
+    return None
+
+
+def _same_word(orbit: Orbit, part: CurvePart) -> bool:
+    system = part.system
+    if system.periods != orbit.periods or system.half != orbit.system.half:
+        return False
+    there = Orbit(system, part.joints[0], orbit.vector, 0.0)
+    return identity(orbit) == identity(there)
+
+
+def _on_part(orbit: Orbit, w: FloatArray, part: CurvePart, problem: Problem) -> bool:
+    """Tell whether an orbit is on a piece of a curve: solve for the curve beside it, and compare."""
+    widths = problem.box.widths
+    scaled = (part.values - w) / widths
+    mirror = orbit.model.symmetry is not None
+    near = np.hypot(scaled[:, 0], scaled[:, 1]) < _SAME
+    for k in np.flatnonzero(near):
+        there = Orbit(part.system, part.joints[k], orbit.vector, 0.0)
+        if stops_distance(orbit.stops, there.stops, mirror) < np.sqrt(_SAME):
+            return True
+    if part.problem is None or len(part) < 2:
+        return False
+    for k, share, gap in _nearby(scaled):
+        if gap < _NEAR and _solved_there(orbit, w, part, k, share, mirror):
+            return True
+    return False
+
+
+def _nearby(scaled: FloatArray) -> list[tuple[int, float, float]]:
+    """Return the segments of a polyline nearest to the origin: (index, share, distance)."""
+    chords = np.diff(scaled, axis=0)
+    squares = np.maximum(np.sum(chords**2, axis=1), 1e-300)
+    shares = np.clip(-np.sum(scaled[:-1] * chords, axis=1) / squares, 0.0, 1.0)
+    gaps = np.linalg.norm(scaled[:-1] + shares[:, None] * chords, axis=1)
+    order = np.argsort(gaps)[:4]
+    return [(int(k), float(shares[k]), float(gaps[k])) for k in order]
+
+
+def _solved_there(
+    orbit: Orbit, w: FloatArray, part: CurvePart, k: int, share: float, mirror: bool
+) -> bool:
+    """Solve for the point of a piece on the normal through w in the plane, and compare it."""
+    problem = part.problem
+    assert problem is not None
+    joints = part.joints[k] + share * (part.joints[k + 1] - part.joints[k])
+    chord = (part.values[k + 1] - part.values[k]) / problem.box.widths
+    if not np.any(chord):
+        return False
+    vector = problem.vector.copy()
+    guess = part.values[k] + share * (part.values[k + 1] - part.values[k])
+    vector[problem.which] = guess
+    border = border_of(problem, joints, vector)
+    found = solve_point(
+        problem, joints, guess, np.zeros_like(joints), chord * problem.box.widths, border
+    )
+    if found is None or np.max(np.abs(found.w - w) / problem.box.widths) > _SAME:
+        return False
+    there = problem.orbit(found.joints, found.w)
+    return stops_distance(orbit.stops, there.stops, mirror) < np.sqrt(_SAME)
+
+
+def twins_of(curves: list[Curve]) -> tuple[int, ...]:
+    """Return for each curve the first one of the same motions, in whatever words."""
+    found: list[int] = []
+    for index, curve in enumerate(curves):
+        part = max(curve.parts, key=lambda p: float(p.arc[-1] - p.arc[0]))
+        first = index
+        if part.problem is not None and group_of(part.kind) in TERMINAL:
+            known = is_known(part.problem, _middle(part), curves[:index], same_word=False)
+            first = index if known is None else found[known]
+        found.append(first)
+    return tuple(found)
+
+
+def _middle(part: CurvePart) -> CurvePoint:
+    k = len(part) // 2
+    none = np.empty(0)
+    return CurvePoint(
+        part.joints[k],
+        part.values[k],
+        none,
+        none,
+        none,
+        part.labels[k],
+        part.turn_multipliers[k],
+        float(part.arc[k]),
+    )

@@ -1,0 +1,213 @@
+"""The regions that curves cut a plane into, and the orbits that live in each.
+
+The plane is a grid of cells; those that a curve passes are walls, and what hangs together between walls is
+a region. So regions narrower than a cell are not told apart. Orbits are not inferred from rules of
+crossing: the one-parameter diagrams along the sections say which branches pass a region, and where two
+sections disagree the region says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.atlas.diagram import Diagram
+from contfric.atlas.matching import identity
+from contfric.atlas.plane import Family, Region
+from contfric.curves.curve import Curve
+from contfric.curves.problem import Box
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.system import Word
+
+#: Cells along each side: a cell is finer than a line in a printed figure.
+CELLS = 400
+#: A region of fewer cells than this is the room between walls that touch.
+_LEAST = 12
+#: Points of a branch nearer than this to a wall (cells) may lie on its other side.
+_AWAY = 1.5
+
+
+@dataclass(frozen=True)
+class Living:
+    """Orbits of one word in a region; the name does not count, for T changes it."""
+
+    word: Word
+    half: bool
+    stable: bool
+    name: str = field(compare=False)
+
+    @property
+    def key(self) -> tuple[Word, bool]:
+        """What one name belongs to: the word, and whether the orbits are symmetric."""
+        return self.word, self.half
+
+
+def regions_of(
+    model: Model,
+    vector: FloatArray,
+    box: Box,
+    curves: Sequence[Curve],
+    sections: Sequence[Diagram],
+    max_periods: int,
+) -> tuple[tuple[Region, ...], NDArray[np.int64]]:
+    """Return the regions, largest first, and the number of each cell's (-1 on walls and outside).
+
+    Orbits of more than ``max_periods`` periods, whose curves are not followed, are not listed.
+    """
+    from scipy import ndimage
+
+    passed = [cells_of(box, curve) for curve in curves]
+    walls = np.zeros((CELLS, CELLS), dtype=np.int64)
+    for rows, columns in passed:
+        walls[rows, columns] += 1
+    inside = _allowed(model, vector, box)
+    free = (walls == 0) & inside
+    numbers, count = ndimage.label(free)
+    sizes = np.bincount(numbers.ravel(), minlength=count + 1)
+    kept = [k for k in range(1, count + 1) if sizes[k] >= _LEAST]
+    kept.sort(key=lambda k: -sizes[k])
+    cells = np.full(numbers.shape, -1, dtype=np.int64)
+    for index, k in enumerate(kept):
+        cells[numbers == k] = index
+    depth = ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]
+    shown = [_short(section, max_periods) for section in sections]
+    lives = _families(box, shown, cells, depth, len(kept))
+    regions = []
+    for index in range(len(kept)):
+        mask = cells == index
+        at = np.unravel_index(int(np.argmax(np.where(mask, depth, -1.0))), mask.shape)
+        sampled, families, disputed = lives[index]
+        regions.append(
+            Region(
+                _centre(box, int(at[0]), int(at[1])),
+                float(np.sum(mask) / mask.size),
+                _bounds(mask, passed),
+                families,
+                sampled,
+                disputed,
+            )
+        )
+    return tuple(regions), cells
+
+
+def _short(section: Diagram, max_periods: int) -> Diagram:
+    """Return a section without its longer orbits."""
+    kept = tuple(b for b in section.branches if b.system.periods <= max_periods)
+    return replace(section, branches=kept)
+
+
+def cells_of(box: Box, curve: Curve) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the cells that a curve passes, without gaps, each once."""
+    found = []
+    for part in curve.parts:
+        at = (part.values - box.low) / box.widths * CELLS
+        along = np.concatenate([[0.0], np.cumsum(np.max(np.abs(np.diff(at, axis=0)), axis=1))])
+        places = np.linspace(0.0, along[-1], 2 + int(3.0 * along[-1]))
+        found.append(np.column_stack([np.interp(places, along, at[:, k]) for k in (0, 1)]))
+    cells = np.clip(np.concatenate(found).astype(np.int64), 0, CELLS - 1)
+    cells = np.unique(cells, axis=0)
+    return cells[:, 0], cells[:, 1]
+
+
+def _allowed(model: Model, vector: FloatArray, box: Box) -> NDArray[np.bool_]:
+    """Return the cells whose middles obey the model's constraints."""
+    params = dict(model.mapping(vector))
+    middle = (np.arange(CELLS) + 0.5) / CELLS
+    one = box.low[0] + middle * box.widths[0]
+    other = box.low[1] + middle * box.widths[1]
+    inside = np.ones((CELLS, CELLS), dtype=np.bool_)
+    for constraint in model.constraints:
+        c = constraint.coefficients
+        rest = constraint.value({**params, box.names[0]: 0.0, box.names[1]: 0.0})
+        value = rest + c.get(box.names[0], 0.0) * one[:, None] + c.get(box.names[1], 0.0) * other
+        inside &= value >= 0.0
+    return inside
+
+
+def _centre(box: Box, i: int, j: int) -> dict[str, float]:
+    at = box.low + (np.array([i, j]) + 0.5) / CELLS * box.widths
+    return {name: float(value) for name, value in zip(box.names, at, strict=True)}
+
+
+def _bounds(
+    mask: NDArray[np.bool_], passed: Sequence[tuple[NDArray[np.int64], NDArray[np.int64]]]
+) -> tuple[int, ...]:
+    """Return the curves whose cells touch a region."""
+    from scipy import ndimage
+
+    rim = ndimage.binary_dilation(mask, np.ones((3, 3))) & ~mask
+    return tuple(k for k, cells in enumerate(passed) if np.any(rim[cells]))
+
+
+def _families(
+    box: Box,
+    sections: Sequence[Diagram],
+    cells: NDArray[np.int64],
+    depth: FloatArray,
+    count: int,
+) -> list[tuple[bool, tuple[Family, ...], tuple[Family, ...]]]:
+    """Return for each region whether a section passes it, what lives there, and what is disputed."""
+    seen: list[list[set[Living]]] = [[] for _ in range(count)]
+    for section in sections:
+        for index, living in _along(box, section, cells, depth):
+            seen[index].append(living)
+    names = _names(one for sets in seen for living in sets for one in living)
+    found = []
+    for sets in seen:
+        every = set().union(*sets) if sets else set()
+        common = set.intersection(*sets) if sets else set()
+        found.append((bool(sets), _named(every, names), _named(every - common, names)))
+    return found
+
+
+def _names(orbits: Iterable[Living]) -> dict[tuple[Word, bool], str]:
+    """Return the shortest name of the orbits of each word: T changes labels, and nothing else."""
+    names: dict[tuple[Word, bool], str] = {}
+    for living in orbits:
+        known = names.get(living.key, living.name)
+        names[living.key] = min(known, living.name, key=lambda name: (len(name), name))
+    return names
+
+
+def _named(orbits: set[Living], names: dict[tuple[Word, bool], str]) -> tuple[Family, ...]:
+    return tuple(sorted({Family(names[one.key], one.stable) for one in orbits}))
+
+
+def _along(
+    box: Box, section: Diagram, cells: NDArray[np.int64], depth: FloatArray
+) -> list[tuple[int, set[Living]]]:
+    """Return the stretches of a section in regions, each with the orbits on it."""
+    varies = box.names.index(section.parameter)
+    fixed = 1 - varies
+    value = float(section.branches[0].params[box.names[fixed]][0]) if section.branches else np.nan
+    place = int((value - box.low[fixed]) / box.widths[fixed] * CELLS)
+    if not 0 <= place < CELLS:
+        return []
+    line = cells[:, place] if varies == 0 else cells[place, :]
+    deep = depth[:, place] if varies == 0 else depth[place, :]
+    edges = np.flatnonzero(np.diff(line)) + 1
+    stretches = []
+    for start, stop in zip([0, *edges.tolist()], [*edges.tolist(), CELLS], strict=True):
+        index = int(line[start])
+        inner = [k for k in range(start, stop) if deep[k] >= _AWAY]
+        if index >= 0 and inner:
+            stretches.append((index, _living(box, section, varies, inner[len(inner) // 2])))
+    return stretches
+
+
+def _living(box: Box, section: Diagram, varies: int, cell: int) -> set[Living]:
+    """Return the orbits at the middle of a cell of a section: of the branches that pass its value."""
+    value = box.low[varies] + (cell + 0.5) / CELLS * box.widths[varies]
+    found = set()
+    for branch in section.branches:
+        if branch.mirrored or branch.bridge:
+            continue
+        word = min(identity(branch[0]))
+        below = branch.values - value
+        for k in np.flatnonzero(below[:-1] * below[1:] <= 0.0):
+            stable = branch.stable is not None and bool(branch.stable[k])
+            found.add(Living(word, branch.system.half, stable, branch[int(k)].name))
+    return found

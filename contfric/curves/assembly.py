@@ -1,0 +1,101 @@
+"""Curves from the sides of their starts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contfric.continuation.events import Kind, kind_of_margin
+from contfric.curves.curve import Curve, CurvePart
+from contfric.curves.points import CurvePoint
+from contfric.curves.problem import Problem
+from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
+
+if TYPE_CHECKING:
+    from contfric.curves.trace import CurveSide
+
+
+def join_sides(
+    behind: CurveSide | None, ahead: CurveSide, first: CurveEnd | None = None
+) -> Curve:
+    """Return one curve from the two sides of its start, or from one that begins at ``first``."""
+    pieces = _pieces(ahead)
+    place = None if first is None else first.special
+    first = first or CurveEnd(CurveEndReason.CLOSED)
+    if place is not None:
+        pieces[0] = replace(pieces[0])
+        at = replace(place, position=pieces[0].points[0].arc)
+        pieces[0].special = [at, *pieces[0].special]
+    if behind is not None:
+        back = _pieces(behind)
+        first = back[-1].end
+        joined = replace(pieces[0])
+        joined.points = [*(replace(p, arc=-p.arc) for p in back[0].points[:0:-1]), *joined.points]
+        joined.special = [*_turned(back[0].special), *joined.special]
+        pieces = [*(_reversed(piece) for piece in back[:0:-1]), joined, *pieces[1:]]
+    shift = -pieces[0].points[0].arc
+    special = [s for piece in pieces for s in piece.special]
+    moved = tuple(replace(s, position=s.position + shift) for s in special)
+    parts = [part for piece in pieces for part in _parts(piece.problem, _shifted(piece, shift), moved)]
+    ends = tuple(
+        end if end.special is None else replace(end, special=moved[place])
+        for end, place in ((first, 0), (_pieces(ahead)[-1].end, -1))
+    )
+    problem = ahead.problem
+    return Curve(problem.box.names, problem.vector, tuple(parts), moved, (ends[0], ends[1]))
+
+
+def _pieces(side: CurveSide) -> list[CurveSide]:
+    """Return a side and what it goes on as, in order."""
+    found = [side]
+    while found[-1].following is not None:
+        found.append(found[-1].following)
+    return found
+
+
+def _turned(special: list[SpecialPoint]) -> list[SpecialPoint]:
+    return [replace(s, position=-s.position) for s in special[::-1]]
+
+
+def _reversed(piece: CurveSide) -> CurveSide:
+    turned = replace(piece)
+    turned.points = [replace(p, arc=-p.arc) for p in piece.points[::-1]]
+    turned.special = _turned(piece.special)
+    return turned
+
+
+def _shifted(piece: CurveSide, shift: float) -> list[CurvePoint]:
+    return [replace(p, arc=p.arc + shift) for p in piece.points]
+
+
+def _parts(
+    problem: Problem, points: list[CurvePoint], special: tuple[SpecialPoint, ...]
+) -> tuple[CurvePart, ...]:
+    """Cut the points where the kind changes."""
+    arc = np.array([p.arc for p in points])
+    cuts = [s.position for s in special if s.kind is CodimTwo.TURNOVER]
+    inner = [int(np.searchsorted(arc, cut)) for cut in cuts if arc[0] < cut < arc[-1]]
+    edges = [0, *inner, len(points)]
+    return tuple(
+        _part(problem, points[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a
+    )
+
+
+def _part(problem: Problem, points: list[CurvePoint]) -> CurvePart:
+    kind = problem.kind
+    if kind in (Kind.CS, Kind.SS) and problem.test is not None:
+        middle = points[len(points) // 2]
+        kind = kind_of_margin(problem.system, problem.test, problem.orbit(middle.joints, middle.w))
+    return CurvePart(
+        kind,
+        problem,
+        problem.system,
+        problem.test,
+        np.array([p.w for p in points]),
+        np.array([p.joints for p in points]),
+        np.array([p.arc for p in points]),
+        np.array([p.labels for p in points], dtype=np.int64).reshape(len(points), -1),
+        np.array([p.mu for p in points]),
+    )

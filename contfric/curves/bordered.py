@@ -1,0 +1,338 @@
+"""The bordered function of SN, BP and PD with its exact gradient, compiled.
+
+Let J be the Jacobian of the chain with respect to its joints, closed by ``v_N = sigma K v_0``: sigma = 1
+for a multiplier 1 of the turn, sigma = -1 for a multiplier -1 (a period doubling; on the half of a
+symmetric orbit the breaking of its symmetry). With two fixed vectors b and c
+
+    [ J    b ] [ v ]   [ 0 ]          [ J^T  c ] [ u ]   [ 0 ]
+    [ c^T  0 ] [ g ] = [ 1 ],         [ b^T  0 ] [ g ] = [ 1 ],
+
+g is zero exactly where J is singular, and ``dg = -u^T (dJ) v``: the directional second derivatives of the
+segments (A. Griewank and G. W. Reddien, IMA J. Numer. Anal. 4 (1984) 295-303; W. Govaerts, Numerical
+Methods for Bifurcations of Dynamical Equilibria, SIAM 2000, chapter 4). b and c follow u and v from point to
+point, so that the bordered matrices stay well conditioned.
+
+The transposed chain is a chain again: its row r links ``u_r`` and ``u_{r+1}`` by ``B_r^T`` and
+``A_{r+1}^T``, and closes with ``u_N = u_0``. The same elimination solves both.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from contfric.compiled import allocating_helper, helper
+from contfric.models.definition import FloatArray
+from contfric.orbit.cyclic import Elimination, finish, next_rows, room_for, start_border, take_out
+from contfric.orbit.equations import segment_rows
+
+#: Step of the differences where a flow has no second derivatives of its own, against the size of the
+#: direction: the cube root of rounding.
+_DIFFERENCE = 6e-6
+#: Step of the third derivatives along a null vector of size 1: with Richardson's extrapolation its error
+#: and its rounding are both about 1e-11.
+_THIRD = 2e-3
+
+
+class BorderedRoom(NamedTuple):
+    """Room for the bordered solves of one chain; allocated once.
+
+    Attributes
+    ----------
+    a, b : blocks of the Jacobian on both joints of each segment, shape (N, m, m)
+    v, u : null vectors of the chain and of its transpose, shape (N, m)
+    even : second-order response of the orbit to its null vector, shape (N, m)
+    work, d, e, s, close, close_w : for the elimination with one border row
+    along, other : a direction of a segment, shape (2 + n,)
+    bent, plus : derivatives of the flow's and of an observable's in a direction, shape (n, 2 + n + q)
+    start, after : displaced joints, shape (m,)
+    numbers : scratch for the flow, shape (8,)
+    """
+
+    a: FloatArray
+    b: FloatArray
+    v: FloatArray
+    u: FloatArray
+    even: FloatArray
+    work: Elimination
+    d: FloatArray
+    e: FloatArray
+    s: FloatArray
+    close: FloatArray
+    close_w: FloatArray
+    along: FloatArray
+    other: FloatArray
+    bent: FloatArray
+    plus: FloatArray
+    start: FloatArray
+    after: FloatArray
+    numbers: FloatArray
+
+
+@allocating_helper
+def bordered_room(count, m, free):  # type: ignore[no-untyped-def]
+    """Return the room for chains of ``count`` segments and ``free`` parameters."""
+    one = max(1 - count, 1)  # 1, but no literal
+    return BorderedRoom(
+        np.empty((count, m, m)),
+        np.empty((count, m, m)),
+        np.empty((count, m)),
+        np.empty((count, m)),
+        np.empty((count, m)),
+        room_for(count, m, one, one),
+        np.empty((1, count, m)),
+        np.empty((1, 1)),
+        np.empty((1, 1)),
+        np.empty((m, m)),
+        np.zeros((m, 1)),
+        np.empty(1 + m),
+        np.empty(1 + m),
+        np.empty((m - 1, 1 + m + free)),
+        np.empty((m - 1, 1 + m + free)),
+        np.empty(m),
+        np.empty(m),
+        np.empty(8),
+    )
+
+
+@helper
+def fill_blocks(functions, layout, z, p, which, room):  # type: ignore[no-untyped-def]
+    """Write the blocks of the Jacobian on both joints of each segment."""
+    count, m = z.shape
+    rows, bordered = room.elimination.rows, room.bordered
+    for i in range(count):
+        after = z[i + 1] if i + 1 < count else room.equations.last
+        worst = segment_rows(functions, layout, i, m, z[i], after, p, which, room.equations, rows)
+        if worst == np.inf:
+            return False
+        for j in range(m):
+            for k in range(m):
+                bordered.a[i, j, k] = rows[m + j, m + k]
+                bordered.b[i, j, k] = rows[m + j, 2 * m + k]
+    return True
+
+
+@helper
+def chain_solve(bordered, sign, column, rhs, transposed, close, pencil):  # type: ignore[no-untyped-def]
+    """Solve the chain (its transpose) with one border row, which is in d, e, s of the room.
+
+    ``column`` stands beside the rows, shape (N, m); ``rhs`` on their right-hand sides. False if singular.
+    """
+    work, rows = bordered.work, bordered.work.rows
+    count, m = column.shape
+    for i in range(m):
+        for j in range(m):
+            unit = 1.0 if i == j else 0.0
+            bordered.close[i, j] = unit if transposed else sign * close[i, j]
+    start_border(work.border, bordered.d, bordered.e, bordered.s, m)
+    for i in range(count):
+        if i > 0:
+            next_rows(rows, work.border, bordered.d, i, m)
+        at = 0 if i == 0 else m
+        after = i + 1 if i + 1 < count else 0
+        for j in range(m):
+            for k in range(rows.shape[1]):
+                rows[m + j, k] = 0.0
+            for k in range(m):
+                if not transposed:
+                    rows[m + j, at + k] = bordered.a[i, j, k]
+                    rows[m + j, 2 * m + k] = bordered.b[i, j, k]
+                    continue
+                value = bordered.b[i, k, j]
+                if i + 1 == count:
+                    value = 0.0
+                    for n in range(m):
+                        value += bordered.b[i, k, n] * sign * close[n, j]
+                rows[m + j, at + k] = value
+                rows[m + j, 2 * m + k] = bordered.a[after, k, j]
+            row = after if transposed else i
+            rows[m + j, 3 * m] = column[row, j]
+            rows[m + j, 3 * m + 1] = rhs[row, j]
+        if i > 0 and not take_out(work, i, m):
+            return False
+    return finish(work, bordered.close, bordered.close_w, pencil[0], pencil[1])
+
+
+@helper
+def set_border(bordered, row, corner, value):  # type: ignore[no-untyped-def]
+    """Set the border row: on the unknowns (times ``1 - corner``), on the extra one, right-hand side."""
+    for i in range(row.shape[0]):
+        for j in range(row.shape[1]):
+            bordered.d[0, i, j] = (1.0 - corner) * row[i, j]
+    bordered.e[0, 0] = corner
+    bordered.s[0, 0] = value
+
+
+@helper
+def null_vectors(border, sign, room):  # type: ignore[no-untyped-def]
+    """Fill v and u from the blocks; return g, NaN where even the bordered matrix is singular."""
+    bordered = room.bordered
+    v, u, close = bordered.v, bordered.u, room.equations.close
+    count, m = v.shape
+    bordered.even[:, :] = 0.0
+    set_border(bordered, border[1], 0.0, 1.0)
+    plain, turned = count < 0, count > 0  # flags, but no literals
+    if not chain_solve(bordered, sign, border[0], bordered.even, plain, close, room.pencil):
+        return np.nan
+    for i in range(count):
+        for j in range(m):
+            v[i, j] = bordered.work.z[i, j, 0]
+    g = bordered.work.w[0, 0]
+    set_border(bordered, border[0], 0.0, 1.0)
+    if not chain_solve(bordered, sign, border[1], bordered.even, turned, close, room.pencil):
+        return np.nan
+    for i in range(count):
+        for j in range(m):
+            u[i, j] = bordered.work.z[i, j, 0]
+    return g
+
+
+@helper
+def segment_direction(vectors, i, sign, close, along):  # type: ignore[no-untyped-def]
+    """Write the direction of segment i's (t0, y0, duration); return that of its end in ``along`` of m."""
+    count, m = vectors.shape
+    along[0] = vectors[i, 0]
+    for j in range(1, m):
+        along[j] = vectors[i, j]
+    along[m] = end_of(vectors, i, sign, close, 0) - vectors[i, 0]
+
+
+@helper
+def end_of(vectors, i, sign, close, j):  # type: ignore[no-untyped-def]
+    """Return component j of a direction at the end of segment i."""
+    count, m = vectors.shape
+    if i + 1 < count:
+        return vectors[i + 1, j]
+    value = 0.0
+    for k in range(m):
+        value += close[j, k] * vectors[0, k]
+    return sign * value
+
+
+@helper
+def bend_flow(functions, second, mode, start, duration, p, which, along, out, bordered, equations):  # type: ignore[no-untyped-def]
+    """Write the derivative of the flow's jacobian in a direction."""
+    none = min(mode, 0) - 1  # -1, but no literal
+    if second(
+        mode, none, start[0], start[1:], duration, p, which, along, out, bordered.numbers
+    ):
+        return
+    m = start.shape[0]
+    step = _DIFFERENCE
+    displaced = bordered.start
+    for side in range(2):
+        h = step if side == 0 else -step
+        for j in range(m):
+            displaced[j] = start[j] + h * along[j]
+        jac = out if side == 0 else bordered.plus
+        functions[0](
+            mode, displaced[0], displaced[1:], duration + h * along[m], p, which, equations.state, jac
+        )
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = (out[i, j] - bordered.plus[i, j]) / (2.0 * step)
+
+
+@helper
+def bend_observable(functions, second, c, at, p, which, along, out, bordered, equations):  # type: ignore[no-untyped-def]
+    """Write the derivative of an observable's gradient in a direction of (t, y) to the first row."""
+    if second(0, c, at[0], at[1:], 0.0, p, which, along, out, bordered.numbers):
+        return
+    m, step = at.shape[0], _DIFFERENCE
+    displaced, grad = bordered.start, equations.grad
+    for side in range(2):
+        h = step if side == 0 else -step
+        for j in range(m):
+            displaced[j] = at[j] + h * along[j]
+        functions[1](c, displaced[0], displaced[1:], p, which, grad)
+        for j in range(grad.shape[0]):
+            out[0, j] = grad[j] if side == 0 else (out[0, j] - grad[j]) / (2.0 * step)
+
+
+@helper
+def add_curvature(functions, second, layout, i, sign, z, p, which, room):  # type: ignore[no-untyped-def]
+    """Add what segment i contributes to the gradient ``-u^T dJ v``."""
+    from_ = z[i]
+    bordered, equations = room.bordered, room.equations
+    count, m = z.shape
+    n, free = m - 1, which.shape[0]
+    after = z[i + 1] if i + 1 < count else equations.last
+    along, u, grad = bordered.along, bordered.u, equations.grad
+    segment_direction(bordered.v, i, sign, equations.close, along)
+    bend_flow(
+        functions,
+        second,
+        layout.modes[i],
+        from_,
+        after[0] - from_[0],
+        p,
+        which,
+        along,
+        bordered.bent,
+        bordered,
+        equations,
+    )
+    for k in range(grad.shape[0]):
+        grad[k] = 0.0
+    for k in range(2 + n + free):
+        value = 0.0
+        for j in range(n):
+            value -= u[i, j] * bordered.bent[j, k]
+        if k == 0:
+            room.d[1, i, 0] += value
+        elif k < 1 + n:
+            room.d[1, i, k] += value
+        elif k == 1 + n:
+            room.d[1, i, 0] -= value
+            grad[0] += value
+        else:
+            grad[m + k - 2 - n] += value
+    for j in range(m):
+        along[j] = end_of(bordered.v, i, sign, equations.close, j)
+    flow_part = bordered.other  # the gradient so far: differences use the room's gradient
+    flow_part[0] = grad[0]
+    params = bordered.plus[0]
+    for k in range(free):
+        params[k] = grad[m + k]
+    c = layout.observables[layout.exits[i]]
+    bend_observable(
+        functions, second, c, after, p, which, along, bordered.bent, bordered, equations
+    )
+    for k in range(m):
+        grad[k] = (flow_part[0] if k == 0 else 0.0) - u[i, n] * bordered.bent[0, k]
+    for k in range(free):
+        grad[m + k] = params[k] - u[i, n] * bordered.bent[0, m + k]
+    spread_end(grad, i, room)
+
+
+@helper
+def spread_end(grad, i, room):  # type: ignore[no-untyped-def]
+    """Add a gradient with respect to the end of segment i and the parameters to the second border row."""
+    d, e, close, close_w = room.d, room.e, room.equations.close, room.equations.close_w
+    count, m = d.shape[1], d.shape[2]
+    free = e.shape[1]
+    for j in range(m):
+        if i + 1 < count:
+            d[1, i + 1, j] += grad[j]
+            continue
+        for k in range(m):
+            d[1, 0, k] += grad[j] * close[j, k]
+        for k in range(free):
+            e[1, k] += grad[j] * close_w[j, k]
+    for k in range(free):
+        e[1, k] += grad[m + k]
+
+
+@helper
+def spectral_value(functions, second, layout, sign, z, p, which, border, room):  # type: ignore[no-untyped-def]
+    """Return g, with its gradient in the second border row (cleared before)."""
+    if not fill_blocks(functions, layout, z, p, which, room):
+        return np.nan
+    g = null_vectors(border, sign, room)
+    if not math.isfinite(g):
+        return np.nan
+    for i in range(z.shape[0]):
+        add_curvature(functions, second, layout, i, sign, z, p, which, room)
+    return g

@@ -1,0 +1,163 @@
+"""The event's own equation with its gradient, compiled: what a curve adds to the equations of an orbit.
+
+==========  ==================================================================================
+condition   what vanishes
+==========  ==================================================================================
+JOINT       observable less level at the end of a segment (CS, SS, T)
+START       the same at its start (T)
+EXIT        rate of the exit's observable at the end of a segment: a tangential exit (AS, GS)
+INTERIOR    value of a stationary point inside a segment, less the level (AS, GS, T)
+SPECTRAL    the bordered function of the chain's Jacobian (SN, BP, PD), in
+            :mod:`contfric.curves.bordered`
+==========  ==================================================================================
+
+At a stationary point the derivative with respect to its time is zero, so the gradient of its value is
+that of the state at a fixed time after the start. All gradients are exact.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+
+from contfric.compiled import allocating_helper, f8, helper, i8, indices
+from contfric.curves.bordered import BorderedRoom, bordered_room, spectral_value, spread_end
+from contfric.models.definition import FloatArray
+from contfric.orbit.cyclic import Elimination, room_for
+from contfric.orbit.equations import Room, equation_room
+from contfric.orbit.monitor import Turnings, find_turnings, turning_room
+from contfric.orbit.spectrum import SpectralRoom, spectral_room
+from contfric.orbit.system import IntArray
+
+JOINT, START, EXIT, INTERIOR, SPECTRAL = range(5)
+
+
+class Condition(NamedTuple):
+    """What vanishes along a curve, as the compiled engine takes it.
+
+    Attributes
+    ----------
+    kind, segment, surface : which condition, and where
+    sign : of the multiplier (1 or -1) for SPECTRAL; else 1
+    rest : mode of rest whose rate at a stop is watched (it tells CS from SS); -1 if none
+    pinned : margins that vanish with the condition, and are not watched
+    quiet : rows of labels that a pinned joint makes arbitrary
+    """
+
+    kind: int
+    segment: int
+    surface: int
+    sign: float
+    rest: int
+    pinned: IntArray
+    quiet: IntArray
+
+
+ConditionType = types.NamedTuple([i8, i8, i8, f8, i8, indices, indices], Condition)
+
+
+class CurveRoom(NamedTuple):
+    """Room for the points of one curve: all that corrector and watch need, allocated once.
+
+    ``d`` and ``e`` are border rows on joints and parameters: arclength, and the condition's gradient.
+    """
+
+    equations: Room
+    elimination: Elimination
+    spectral: SpectralRoom
+    turnings: Turnings
+    bordered: BorderedRoom
+    pencil: FloatArray
+    d: FloatArray
+    e: FloatArray
+    s: FloatArray
+    z_ref: FloatArray
+    p_ref: FloatArray
+
+
+@allocating_helper
+def curve_room(count, m, parameters):  # type: ignore[no-untyped-def]
+    """Return the room for a curve of chains of ``count`` segments."""
+    free = max(2 - count, 2)  # two parameters, but no literal
+    return CurveRoom(
+        equation_room(count, m, free),
+        room_for(count, m, free, free),
+        spectral_room(m),
+        turning_room(),
+        bordered_room(count, m, free),
+        np.empty((2, m, m)),
+        np.empty((2, count, m)),
+        np.empty((2, 2)),
+        np.empty((2, 2)),
+        np.empty((count, m)),
+        np.empty(parameters),
+    )
+
+
+@helper
+def interior_value(functions, layout, condition, z, p, which, room):  # type: ignore[no-untyped-def]
+    """Return the stationary value nearest to the level; NaN if the segment has none."""
+    equations, turnings = room.equations, room.turnings
+    i, surface = condition.segment, condition.surface
+    c, n = layout.observables[surface], z.shape[1] - 1
+    level_grad, grad, jac = equations.level_grad, equations.grad, equations.jac
+    found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
+    target = functions[2](surface, p, which, level_grad)
+    best = -1
+    for k in range(found):
+        if best < 0 or abs(turnings.values[k] - target) < abs(turnings.values[best] - target):
+            best = k
+    if best < 0:
+        return np.nan
+    time, state = turnings.times[best], equations.state
+    functions[0](layout.modes[i], z[i, 0], z[i, 1:], time, p, which, state, jac)
+    value = functions[1](c, z[i, 0] + time, state, p, which, grad) - target
+    room.d[1, i, 0] += grad[0]
+    for a in range(n):
+        for k in range(1 + n):
+            room.d[1, i, k] += grad[1 + a] * jac[a, k]
+        for k in range(which.shape[0]):
+            room.e[1, k] += grad[1 + a] * jac[a, 2 + n + k]
+    for k in range(which.shape[0]):
+        room.e[1, k] += grad[1 + n + k] - level_grad[k]
+    return value
+
+
+@helper
+def condition_value(functions, second, layout, condition, z, p, which, border, room):  # type: ignore[no-untyped-def]
+    """Return what vanishes along the curve, and write its gradient to the second border row.
+
+    The closure of the chain is in ``room``.
+    """
+    room.d[1, :, :] = 0.0
+    room.e[1, :] = 0.0
+    if condition.kind == SPECTRAL:
+        return spectral_value(
+            functions, second, layout, condition.sign, z, p, which, border, room
+        )
+    if condition.kind == INTERIOR:
+        return interior_value(functions, layout, condition, z, p, which, room)
+    equations = room.equations
+    i, surface, grad = condition.segment, condition.surface, equations.grad
+    c = layout.observables[surface]
+    after = z[i + 1] if i + 1 < z.shape[0] else equations.last
+    if condition.kind == EXIT:
+        value = functions[6](layout.modes[i], c, after[0], after[1:], p, which, grad)
+        spread_end(grad, i, room)
+        return value
+    level_grad = equations.level_grad
+    target = functions[2](surface, p, which, level_grad)
+    for k in range(which.shape[0]):
+        room.e[1, k] -= level_grad[k]
+    if condition.kind == JOINT:
+        value = functions[1](c, after[0], after[1:], p, which, grad) - target
+        spread_end(grad, i, room)
+        return value
+    value = functions[1](c, z[i, 0], z[i, 1:], p, which, grad) - target
+    for j in range(z.shape[1]):
+        room.d[1, i, j] += grad[j]
+    for k in range(which.shape[0]):
+        room.e[1, k] += grad[z.shape[1] + k]
+    return value

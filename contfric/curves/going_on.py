@@ -1,0 +1,187 @@
+"""What a curve becomes behind another sliding event: the same condition in an edited word.
+
+At the event the motion is known, and every word that can follow it solves the same equations there
+(:mod:`contfric.continuation.candidates`). The condition is found again in the new word by its place: the
+same surface at the same time. SN, BP and PD go on if the new word has the multiplier as well: where the
+motion is differentiable through the event.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from contfric.continuation.candidates import candidates
+from contfric.continuation.events import TERMINAL, Bifurcation, kind_of_margin
+from contfric.curves.points import CurvePoint, CurveRows, first_curve_point, march_rows
+from contfric.curves.problem import Box, Problem, problem_of
+from contfric.curves.special import SpecialPoint
+from contfric.errors import ContfricError
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Margin, Test
+
+#: Times of a joint in two words for one motion agree to this (nondimensional): located events are good to
+#: 1e-9 where two of them meet.
+_SAME_TIME = 1e-6
+#: The first point of a curve is the point that it leaves to this (relative to the ranges).
+_SAME_POINT = 1e-4
+#: Margins this small after the proof still vanish: they belong to the condition.
+_STILL = 1e-10
+#: Lengths of the steps by which a new word is proved, in largest steps. Margins may leave zero with the
+#: square of the distance: the longer one tells them from rounding.
+_PROOFS = (0.1, 0.01)
+#: A segment that lasts less than minus this does not exist.
+_NO_TIME = 1e-9
+
+Start = tuple[Problem, CurvePoint, FloatArray]
+
+
+def place_of(orbit: Orbit, test: Test) -> tuple[float, str]:
+    """Return when and on which surface a margin of an orbit vanishes."""
+    if test.margin is not Margin.INTERIOR:
+        return float(orbit.ends[test.segment, 0]), test.surface
+    return _touch_time(orbit, test), test.surface
+
+
+def _touch_time(orbit: Orbit, test: Test) -> float:
+    """Return the time at which an observable is stationary nearest to a surface inside a segment."""
+    model, i = orbit.model, test.segment
+    surface = model.surface_by_name[test.surface]
+    c = [o.name for o in model.observables].index(surface.observable)
+    mode = [m.name for m in model.modes].index(orbit.word[i][0])
+    times, values = np.empty(256), np.empty(256)
+    start = orbit.cycle[i]
+    found = model.flow.turning(
+        mode,
+        c,
+        float(start[0]),
+        np.ascontiguousarray(start[1:]),
+        float(orbit.ends[i, 0] - start[0]),
+        orbit.vector,
+        times,
+        values,
+    )
+    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
+    level = model.flow.level(model.surfaces.index(surface), orbit.vector, none, empty)
+    if found < 1:
+        return float("nan")
+    return float(start[0] + times[int(np.argmin(np.abs(values[:found] - level)))])
+
+
+def same_place(one: Orbit, a: Test, other: Orbit, b: Test) -> bool:
+    """Tell whether margins of two words for one motion vanish at the same place, or its mirror image."""
+    time, surface = place_of(one, a)
+    there, on = place_of(other, b)
+    period = one.period
+    gap = abs((time - there + 0.5 * period) % period - 0.5 * period)
+    if on == surface and gap < _SAME_TIME:
+        return True
+    symmetry = one.model.symmetry
+    if symmetry is None or not (one.system.half or other.system.half):
+        return False
+    gap = abs((time - there + period) % period - 0.5 * period)
+    return symmetry.surfaces[on] == surface and gap < _SAME_TIME
+
+
+def words_at(special: SpecialPoint) -> Iterator[Orbit]:
+    """Yield the orbits of all words without holds that can follow the sliding event of a point."""
+    event = special.bifurcation()
+    if event is None or event.kind not in TERMINAL:
+        return
+    for candidate in candidates(event):
+        if candidate.orbit is not None and not candidate.has_hold and candidate.away is None:
+            yield candidate.orbit
+
+
+def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation | None:
+    """Return the condition of a curve in another word for the motion at a point; None if it is none."""
+    if problem.test is None:
+        return Bifurcation(problem.kind, orbit.params, orbit)
+    for test in orbit.system.tests:
+        if test.margin is not problem.test.margin:
+            continue
+        if same_place(special.orbit, problem.test, orbit, test):
+            kind = kind_of_margin(orbit.system, test, orbit)
+            return Bifurcation(kind, orbit.params, orbit, (test,))
+    return None
+
+
+def goes_on(problem: Problem, tip: CurvePoint, special: SpecialPoint, largest: float) -> Start | None:
+    """Return where a curve goes on behind a sliding event, in the direction that it has; None if nowhere.
+
+    What goes on happens at as many places as before: a curve that is asymmetric does not go on as the
+    symmetric one that it has met.
+    """
+    ahead = tip.slope / problem.box.widths
+    for orbit in words_at(special):
+        event = again(problem, special, orbit)
+        if event is None:
+            continue
+        for start in starts_of(event, problem.box, largest):
+            forward = float(np.sum(start[1].slope / problem.box.widths * ahead)) > 0.0
+            if forward and _places(start[0]) == _places(problem):
+                return start
+    return None
+
+
+def _places(problem: Problem) -> int:
+    """Return the number of places of the whole orbit at which a curve's event happens."""
+    return len(problem.condition.pinned) * (2 if problem.system.half else 1)
+
+
+def starts_of(event: Bifurcation, box: Box, largest: float) -> Iterator[Start]:
+    """Yield the directions in which an event's curve leaves a point with admissible orbits."""
+    try:
+        problem = problem_of(event, box)
+    except ContfricError:
+        return
+    orbit = event.orbit if event.orbit.system is problem.system else event.orbit.as_half()
+    found = first_curve_point(problem, orbit)
+    if found is None:
+        return
+    point, border = found
+    gap = np.max(np.abs(point.w - orbit.vector[problem.which]) / box.widths)
+    if gap > _SAME_POINT:
+        return
+    for start in (point, point.reversed()):
+        proved = prove(problem, start, border, largest)
+        if proved is not None:
+            yield proved, start, border
+
+
+def prove(
+    problem: Problem, start: CurvePoint, border: FloatArray, largest: float
+) -> Problem | None:
+    """Return a curve's problem if its orbits are admissible a short step away from a point.
+
+    Margins that vanish at the point but not beside it are watched from there on.
+    """
+    for share in _PROOFS:
+        beside = _step_away(problem, start, border, share * largest)
+        if beside is None:
+            continue
+        orbit = problem.orbit(beside.joints, beside.w)
+        margins, pinned = orbit.margins, problem.condition.pinned
+        free = np.array([k for k in pinned if not abs(margins[k]) < _STILL], dtype=np.int64)
+        still = np.setdiff1d(pinned, free)
+        others = np.setdiff1d(np.arange(len(margins)), still)
+        lasts = bool(np.all(orbit.ends[:, 0] - orbit.cycle[:, 0] > -_NO_TIME))
+        if not lasts or not np.all(margins[others] > 0.0):
+            continue
+        if len(free):
+            start.tests[free] = np.maximum(0.0, problem.orbit(start.joints, start.w).margins[free])
+        return replace(problem, condition=problem.condition._replace(pinned=still))
+    return None
+
+
+def _step_away(
+    problem: Problem, start: CurvePoint, border: FloatArray, step: float
+) -> CurvePoint | None:
+    """Return the point a step away from the first one; None if there is none."""
+    rows = CurveRows.room_for(problem, 2)
+    rows.put(0, start)
+    _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), step, step, 3e-13)
+    return rows.point(1) if last == 1 else None

@@ -1,0 +1,183 @@
+"""The curves that leave a point of codimension two.
+
+==================================  ============================================================
+point                               curves that leave
+==================================  ============================================================
+a smooth event on a sliding one     the curve of SN, BP or PD
+a sliding event on a smooth one     the curve of the sliding event, both ways
+two sliding events                  in every word that can follow either or both of them: the
+                                    curve of each margin that vanishes there, where admissible
+SN-PD, SN-BP                        the curve of the other one
+degenerate BP, PD                   from the symmetric (undoubled) side the fold curve of the
+                                    asymmetric (doubled) orbits, from that the BP or PD
+turnover of CS and SS               the AS of the short stick whose release is tangential
+==================================  ============================================================
+
+The last two start beside the point, where their own equations are singular: a small distance away along
+the direction in which the new orbits differ (the null vector; the length of the stick).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from contfric.continuation.candidates import edited_orbit
+from contfric.continuation.events import TERMINAL, Bifurcation, Kind, kind_of_margin
+from contfric.continuation.outcomes import outcome_at
+from contfric.continuation.vertices import symmetric_part, undoubled_part
+from contfric.curves.going_on import Start, prove, starts_of, words_at
+from contfric.curves.points import CurvePoint, solve_point
+from contfric.curves.problem import Box, Problem, border_of, problem_of
+from contfric.curves.special import CodimTwo, SpecialPoint
+from contfric.errors import ContfricError, NotationError
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Margin, Test
+
+#: Distances beside a degenerate point at which the curve that leaves is started: as for branches.
+_BESIDE = (1e-2, 3e-3, 1e-3)
+#: Margins below this vanish at a located point; those of two located events agree to about 1e-8.
+_VANISHES = 1e-6
+
+
+def leaving(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:
+    """Yield the starts of the curves that leave a point, each in one direction."""
+    box = problem.box
+    if special.kind in (CodimTwo.DBP, CodimTwo.GPD):
+        yield from _born(special, problem, largest)
+    elif special.kind is CodimTwo.TURNOVER:
+        yield from _tangential_release(special, problem, largest)
+    elif special.meets in (Kind.SN, Kind.BP, Kind.PD) or special.kind in (
+        CodimTwo.SN_PD,
+        CodimTwo.SN_BP,
+    ):
+        event = special.bifurcation()
+        if event is not None:
+            yield from starts_of(event, box, largest)
+    elif special.meets in TERMINAL:
+        yield from _sliding(special, problem, largest)
+
+
+def _sliding(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:
+    """Yield the curves of all margins that vanish at a point, in all words for the motion there."""
+    seen: set[tuple[int, Test]] = set()  # systems are built once each
+    for orbit in (special.orbit, *words_at(special), *_words_of_own(special, problem)):
+        for test, value in zip(orbit.system.tests, orbit.margins, strict=True):
+            if not abs(value) < _VANISHES or (id(orbit.system), test) in seen:
+                continue
+            seen.add((id(orbit.system), test))
+            kind = kind_of_margin(orbit.system, test, orbit)
+            event = Bifurcation(kind, orbit.params, orbit, (test,))
+            yield from starts_of(event, problem.box, largest)
+
+
+def _words_of_own(special: SpecialPoint, problem: Problem) -> Iterator[Orbit]:
+    """Yield the words that follow the curve's own event, and those that follow both."""
+    if problem.test is None:
+        return
+    kind = kind_of_margin(problem.system, problem.test, special.orbit)
+    own = replace(special, meets=kind, tests=(problem.test,))
+    for orbit in words_at(own):
+        yield orbit
+        for test, value in zip(orbit.system.tests, orbit.margins, strict=True):
+            if abs(value) < _VANISHES:
+                meets = kind_of_margin(orbit.system, test, orbit)
+                both = replace(own, orbit=orbit, meets=meets, tests=(test,))
+                with suppress(ContfricError):
+                    yield from words_at(both)
+
+
+def _born(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:
+    """Yield the curve of the other side of a degenerate branch point or doubling."""
+    if problem.kind is Kind.SN:
+        active = special.orbit.model.index_of(problem.box.names[0])
+        part = symmetric_part if special.kind is CodimTwo.DBP else undoubled_part
+        simple = part(special.orbit, active)
+        if simple is not None:
+            kind = Kind.BP if special.kind is CodimTwo.DBP else Kind.PD
+            yield from starts_of(Bifurcation(kind, simple.params, simple), problem.box, largest)
+        return
+    whole = special.orbit.as_whole() if special.kind is CodimTwo.DBP else special.orbit.doubled()
+    phi = _odd_null_vector(special.orbit, problem, whole)
+    fold = fold_problem(whole, problem.box)
+    if fold is None:
+        return
+    for distance in _BESIDE:
+        start = beside(fold, whole, phi, distance)
+        if start is not None:
+            point, border = start
+            proved = prove(fold, point, border, largest)
+            if proved is not None:
+                yield proved, point, border
+                return
+
+
+def _odd_null_vector(orbit: Orbit, problem: Problem, whole: Orbit) -> FloatArray:
+    """Return the null vector of a multiplier -1 over two turns, of size 1: (v, -K v)."""
+    v = border_of(problem, orbit.joints, orbit.vector)[1]
+    close = np.eye(v.shape[1])
+    close[1:, 1:] = orbit.system.layout.closure
+    phi: FloatArray = np.vstack([v, -v @ close.T])
+    return phi / float(np.sqrt(np.sum(phi**2) / len(phi)))
+
+
+def fold_problem(orbit: Orbit, box: Box) -> Problem | None:
+    """Return the problem of the fold curve of an orbit that has a multiplier 1."""
+    with suppress(ContfricError):
+        return problem_of(Bifurcation(Kind.SN, orbit.params, orbit), box)
+    return None
+
+
+def beside(problem: Problem, orbit: Orbit, direction: FloatArray, distance: float) -> tuple[CurvePoint, FloatArray] | None:
+    """Solve for a point of a curve a distance away from an orbit along a direction of its joints."""
+    border = border_of(problem, orbit.joints, orbit.vector)
+    guess = orbit.joints + distance * direction
+    point = solve_point(problem, guess, orbit.vector[problem.which], direction, np.zeros(2), border)
+    if point is None or not np.all(np.isfinite(point.joints)):
+        return None
+    moved = float(np.sqrt(np.sum((point.joints - orbit.joints) ** 2) / len(guess)))
+    if not 0.3 * distance < moved < 3.0 * distance:
+        return None
+    if float(np.sum(point.tangent * (point.joints - orbit.joints))) < 0.0:
+        point = point.reversed()
+    return point, border
+
+
+def _tangential_release(
+    special: SpecialPoint, problem: Problem, largest: float
+) -> Iterator[Start]:
+    """Yield the AS that begins where the load at a stop stands still: a short stick, left tangentially."""
+    assert problem.test is not None
+    orbit = special.orbit.as_whole()
+    try:
+        outcome = outcome_at(orbit, problem.test, Kind.CS)
+        edited, _ = edited_orbit(orbit, [outcome])
+    except NotationError:
+        return
+    sticks = [
+        i
+        for i, (mode, _) in enumerate(edited.system.word)
+        if edited.model.mode_by_name[mode].sliding
+        and abs(edited.ends[i, 0] - edited.cycle[i, 0]) < _VANISHES
+    ]
+    for i in sticks:
+        test = Test(Margin.EXIT, i, edited.system.word[i][1])
+        try:
+            own = problem_of(Bifurcation(Kind.AS, edited.params, edited, (test,)), problem.box)
+        except ContfricError:
+            continue
+        longer = np.zeros_like(edited.joints)
+        longer[i, 0] = -1.0  # it begins earlier: the release stays where it is
+        own = replace(own, condition=own.condition._replace(pinned=np.array([own.system.tests.index(test)])))
+        for distance in _BESIDE:
+            start = beside(own, edited, longer, distance)
+            if start is None:
+                continue
+            proved = prove(own, start[0], start[1], largest)
+            if proved is not None:
+                yield proved, start[0], start[1]
+                break

@@ -1,0 +1,122 @@
+"""Coefficients of the normal forms along a curve, compiled: where they vanish a curve changes its nature.
+
+* Along a fold curve, ``a = u^T F_zz v v``: the parameters turn back where it is zero, a cusp.
+* Along a curve of multiplier -1 (period doubling; the breaking of a symmetry) Lyapunov-Schmidt reduction
+  of the doubled orbit, ``F(z + eps v, ..)`` with v changing sign after one turn, leaves an odd equation in
+  eps. Its cubic coefficient is
+
+      b = u^T [ F_zzz v v v / 6 + F_zz v h / 2 ],      J_1 h = -F_zz v v,
+
+  where h is periodic (sigma = 1), for the product of two odd parts is even. Where b is zero the
+  bifurcation changes between super- and subcritical, and a fold curve of the doubled orbits begins
+  (Yu. A. Kuznetsov, Elements of Applied Bifurcation Theory, sections 8.2 and 9.4).
+
+F_zzz v v v is the central difference of the exact second derivatives along v, with Richardson's
+extrapolation; everything is local to a segment.
+"""
+
+from __future__ import annotations
+
+from contfric.compiled import helper
+from contfric.curves.bordered import (
+    _THIRD,
+    bend_flow,
+    bend_observable,
+    chain_solve,
+    end_of,
+    segment_direction,
+    set_border,
+)
+
+
+@helper
+def second_order(functions, second, layout, i, start, after, p, which, sign, others, twist, room, out):  # type: ignore[no-untyped-def]
+    """Write F_i,zz v w (m numbers); w is ``others``, closed by ``twist``."""
+    bordered, equations = room.bordered, room.equations
+    m = start.shape[0]
+    n, close, along, other = m - 1, equations.close, bordered.along, bordered.other
+    segment_direction(bordered.v, i, sign, close, along)
+    segment_direction(others, i, twist, close, other)
+    bend_flow(
+        functions,
+        second,
+        layout.modes[i],
+        start,
+        after[0] - start[0],
+        p,
+        which,
+        along,
+        bordered.bent,
+        bordered,
+        equations,
+    )
+    for j in range(n):
+        out[j] = 0.0
+        for k in range(1 + m):
+            out[j] += bordered.bent[j, k] * other[k]
+    for j in range(m):
+        along[j] = end_of(bordered.v, i, sign, close, j)
+    c = layout.observables[layout.exits[i]]
+    bend_observable(
+        functions, second, c, after, p, which, along, bordered.bent, bordered, equations
+    )
+    out[n] = 0.0
+    for k in range(m):
+        out[n] += bordered.bent[0, k] * end_of(others, i, twist, close, k)
+
+
+@helper
+def third_order(functions, second, layout, i, z, p, which, sign, room, out):  # type: ignore[no-untyped-def]
+    """Return ``u_i^T F_i,zzz v v v``."""
+    bordered, close = room.bordered, room.equations.close
+    v, u = bordered.v, bordered.u
+    count, m = z.shape
+    start, after = room.z_ref[i], bordered.after
+    slopes = 0.0
+    for level in range(2):
+        step = _THIRD if level == 0 else 0.5 * _THIRD
+        weight = -1.0 / 3.0 if level == 0 else 4.0 / 3.0
+        for side in range(2):
+            h = step if side == 0 else -step
+            for j in range(m):
+                end = z[i + 1, j] if i + 1 < count else room.equations.last[j]
+                start[j] = z[i, j] + h * v[i, j]
+                after[j] = end + h * end_of(v, i, sign, close, j)
+            second_order(
+                functions, second, layout, i, start, after, p, which, sign, v, sign, room, out
+            )
+            for j in range(m):
+                slopes += weight * u[i, j] * out[j] / (2.0 * h)
+    return slopes
+
+
+@helper
+def cubic_coefficient(functions, second, layout, sign, z, p, which, room):  # type: ignore[no-untyped-def]
+    """Return b; the blocks of the Jacobian and the null vectors are in the room."""
+    bordered, equations = room.bordered, room.equations
+    v, u, even = bordered.v, bordered.u, bordered.even
+    count, m = z.shape
+    spare = room.pencil[0, 0]
+    total = 0.0
+    for i in range(count):
+        after = z[i + 1] if i + 1 < count else equations.last
+        second_order(functions, second, layout, i, z[i], after, p, which, sign, v, sign, room, spare)
+        for j in range(m):
+            even[i, j] = -spare[j]
+    room.z_ref[:, :] = 0.0
+    set_border(bordered, v, 1.0, 0.0)
+    plain, periodic = count < 0, 1.0
+    if not chain_solve(bordered, periodic, room.z_ref, even, plain, equations.close, room.pencil):
+        return 0.0
+    for i in range(count):
+        for j in range(m):
+            even[i, j] = bordered.work.z[i, j, 0]
+    for i in range(count):
+        after = z[i + 1] if i + 1 < count else equations.last
+        second_order(
+            functions, second, layout, i, z[i], after, p, which, sign, even, periodic, room, spare
+        )
+        for j in range(m):
+            total += 0.5 * u[i, j] * spare[j]
+        total += third_order(functions, second, layout, i, z, p, which, sign, room, spare) / 6.0
+    return total

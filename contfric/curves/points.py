@@ -1,0 +1,177 @@
+"""Points of a curve while it is traced, and the calls of the compiled march."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.continuation.points import EXTRA, SMALLEST_STEP
+from contfric.curves.problem import Problem, border_of
+from contfric.models.definition import FloatArray
+from contfric.orbit.counts import TALLY
+from contfric.orbit.linear import assembled
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import IntArray
+
+#: Points that one call of the march may write: limits of the parameters are looked at after each.
+CHUNK = 128
+#: The first point is the orbit of the bifurcation to this: located events are good to about 1e-6 at worst.
+_SAME_ORBIT = 1e-3
+
+
+@dataclass(eq=False)
+class CurvePoint:
+    """One solved point with its unit tangent and everything that is watched."""
+
+    joints: FloatArray
+    w: FloatArray
+    tangent: FloatArray
+    slope: FloatArray
+    tests: FloatArray
+    labels: IntArray
+    mu: NDArray[np.complex128]
+    arc: float = 0.0
+
+    def reversed(self) -> CurvePoint:
+        """Return the same point with the opposite tangent."""
+        return CurvePoint(
+            self.joints,
+            self.w,
+            -self.tangent,
+            -self.slope,
+            self.tests,
+            self.labels,
+            self.mu,
+            self.arc,
+        )
+
+
+@dataclass(eq=False)
+class CurveRows:
+    """Arrays that the compiled march writes to, a point in each row."""
+
+    joints: FloatArray
+    values: FloatArray
+    tangents: FloatArray
+    slopes: FloatArray
+    arc: FloatArray
+    tests: FloatArray
+    labels: IntArray
+    mu: NDArray[np.complex128]
+
+    @classmethod
+    def room_for(cls, problem: Problem, room: int) -> CurveRows:
+        """Return empty rows."""
+        system = problem.system
+        shape = (system.segments, 1 + len(system.model.states))
+        labels = len(system.layout.labels)
+        return cls(
+            np.empty((room, *shape)),
+            np.empty((room, 2)),
+            np.empty((room, *shape)),
+            np.empty((room, 2)),
+            np.zeros(room),
+            np.zeros((room, len(system.tests) + labels + EXTRA)),
+            np.zeros((room, labels), dtype=np.int64),
+            np.zeros((room, len(system.model.states)), dtype=np.complex128),
+        )
+
+    def arrays(self) -> tuple[Any, ...]:
+        """Return the arrays in the order in which the march takes them."""
+        return tuple(vars(self).values())
+
+    def point(self, k: int) -> CurvePoint:
+        """Return one row as a point of its own."""
+        return CurvePoint(
+            *(a[k].copy() for a in (self.joints, self.values, self.tangents, self.slopes)),
+            self.tests[k].copy(),
+            self.labels[k].copy(),
+            self.mu[k].copy(),
+            float(self.arc[k]),
+        )
+
+    def put(self, k: int, point: CurvePoint) -> None:
+        """Write a point to one row."""
+        self.joints[k], self.values[k] = point.joints, point.w
+        self.tangents[k], self.slopes[k] = point.tangent, point.slope
+        self.tests[k], self.labels[k] = point.tests, point.labels
+        self.mu[k], self.arc[k] = point.mu, point.arc
+
+
+def march_rows(
+    problem: Problem,
+    rows: CurveRows,
+    k: int,
+    start: CurvePoint,
+    taken: int,
+    border: FloatArray,
+    step: float,
+    largest: float,
+    accuracy: float,
+) -> tuple[int, int, float]:
+    """March on from row k; return (why it stopped, last row, next step)."""
+    from contfric.curves.march import march_curve
+
+    box = problem.box
+    why, last, step = march_curve(
+        problem.system.functions(),
+        problem.model.flow.second_derivatives,
+        problem.system.layout,
+        problem.condition,
+        problem.vector,
+        problem.which,
+        np.array([min(step, largest), largest, SMALLEST_STEP, accuracy]),
+        np.array([box.low, box.high, box.widths]),
+        k,
+        np.array([start.joints, start.tangent]),
+        np.array([start.w, start.slope]),
+        taken,
+        border,
+        rows.arrays(),
+        TALLY,
+    )
+    return int(why), int(last), float(step)
+
+
+def solve_point(
+    problem: Problem,
+    joints: FloatArray,
+    w: FloatArray,
+    tangent: FloatArray,
+    slope: FloatArray,
+    border: FloatArray,
+) -> CurvePoint | None:
+    """Solve for one point normal to a direction; ``border`` is made to follow it. None if Newton fails."""
+    from contfric.continuation.march import BROKEN
+    from contfric.continuation.steps import AT_EVENT
+
+    rows = CurveRows.room_for(problem, 1)
+    rows.joints[0], rows.values[0] = joints, w
+    rows.tangents[0], rows.slopes[0] = tangent, slope
+    why, _, _ = march_rows(
+        problem, rows, -1, rows.point(0), 0, border, 0.0, 1.0, AT_EVENT
+    )
+    return None if why == BROKEN else rows.point(0)
+
+
+def first_curve_point(problem: Problem, orbit: Orbit) -> tuple[CurvePoint, FloatArray] | None:
+    """Return the first point of a curve with its border, solved with one of the parameters fixed.
+
+    Where an exit is tangential the orbit may move although neither parameter does: then the point is
+    solved normal to that direction.
+    """
+    which, flat = problem.which, np.zeros_like(orbit.joints)
+    widths = problem.box.widths
+    directions = [(flat, widths * np.array([1.0, 0.0])), (flat, widths * np.array([0.0, 1.0]))]
+    if problem.test is not None:
+        null = np.linalg.svd(assembled(problem.system, orbit.joints, orbit.vector))[2][-1]
+        directions.append((null.reshape(orbit.joints.shape), np.zeros(2)))
+    for tangent, slope in directions:
+        border = border_of(problem, orbit.joints, orbit.vector)
+        point = solve_point(problem, orbit.joints, orbit.vector[which], tangent, slope, border)
+        if point is not None and np.max(np.abs(point.joints - orbit.joints)) < _SAME_ORBIT:
+            return point, border
+    return None

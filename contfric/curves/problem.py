@@ -1,0 +1,292 @@
+"""From a bifurcation to the problem of its curve: what varies, what vanishes, what is not watched."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from contfric.continuation.events import TERMINAL, Bifurcation, Kind
+from contfric.errors import ParameterError, did_you_mean
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.linear import jacobian_blocks
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import IntArray, Margin, System, Test
+
+#: Margins below this at the start (nondimensional) vanish along the curve, with its condition: located
+#: events are zero to about 1e-12, and those of a group agree to their conditioning.
+_VANISHES = 1e-6
+#: A multiplier this far from +-1 is none of a located bifurcation.
+_MULTIPLIER = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """The plane: two parameters with their ranges.
+
+    Attributes
+    ----------
+    names : the two parameters
+    low, high : corners, shape (2,)
+    """
+
+    names: tuple[str, str]
+    low: FloatArray
+    high: FloatArray
+
+    @property
+    def widths(self) -> FloatArray:
+        """Widths of the ranges, in which arclength is measured."""
+        return self.high - self.low
+
+    def contains(self, w: FloatArray, slack: float = 1e-9) -> bool:
+        """Tell whether a point lies in the box."""
+        room = slack * self.widths
+        return bool(np.all(w >= self.low - room) and np.all(w <= self.high + room))
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A curve to follow: the equations of its orbits, and the condition.
+
+    Attributes
+    ----------
+    kind : the bifurcation
+    system : boundary-value problem of its orbits
+    vector : all parameters at the start
+    box : the plane
+    condition : what vanishes, as the compiled engine takes it
+    test : the margin that vanishes; None for SN, BP and PD
+    """
+
+    kind: Kind
+    system: System
+    vector: FloatArray
+    box: Box
+    condition: Any
+    test: Test | None
+
+    @property
+    def model(self) -> Model:
+        """The model that moves."""
+        return self.system.model
+
+    @cached_property
+    def which(self) -> IntArray:
+        """Indices of the two parameters."""
+        return np.array([self.model.index_of(n) for n in self.box.names], dtype=np.int64)
+
+    def within_limits(self, values: FloatArray) -> FloatArray:
+        """Return the least left-hand side of the model's constraints at points (k, 2) of the plane."""
+        params = self.model.mapping(self.vector)
+        one, other = self.box.names
+        least = np.full(len(values), np.inf)
+        for constraint in self.model.constraints:
+            rest = constraint.value({**params, one: 0.0, other: 0.0})
+            slopes = [constraint.coefficients.get(name, 0.0) for name in (one, other)]
+            least = np.minimum(least, rest + values @ np.array(slopes))
+        return least
+
+    def orbit(self, joints: FloatArray, w: FloatArray) -> Orbit:
+        """Return a point as an orbit."""
+        vector = self.vector.copy()
+        vector[self.which] = w
+        return Orbit(self.system, joints.copy(), vector, 0.0)
+
+
+def box_of(
+    model: Model, parameters: tuple[str, str], ranges: Mapping[str, tuple[float, float]]
+) -> Box:
+    """Check two parameters with their ranges.
+
+    Raises
+    ------
+    ParameterError
+        For anything but two different parameters of the model with a finite range each.
+    """
+    if isinstance(parameters, str) or len(tuple(parameters)) != 2:
+        raise ParameterError(f"a curve needs a pair of parameters, got {parameters!r}")
+    one, other = parameters
+    for name in (one, other):
+        model.index_of(name)
+    if one == other:
+        raise ParameterError(f"a curve needs two different parameters, got '{one}' twice")
+    for name in ranges:
+        if name not in (one, other):
+            raise ParameterError(
+                f"'{name}' is none of the two parameters{did_you_mean(str(name), (one, other))}"
+            )
+    corners = [_range_of(name, ranges) for name in (one, other)]
+    low, high = (np.array(side) for side in zip(*corners, strict=True))
+    return Box((one, other), low, high)
+
+
+def _range_of(name: str, ranges: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
+    if name not in ranges:
+        raise ParameterError(f"the range of '{name}' is missing: {{'{name}': (lower, upper), ..}}")
+    try:
+        low, high = (float(value) for value in ranges[name])
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"the range of '{name}' is a pair of numbers (lower, upper), got {ranges[name]!r}"
+        ) from None
+    if not (math.isfinite(low) and math.isfinite(high)) or not low < high:
+        raise ParameterError(
+            f"the range of '{name}' must be two finite numbers, lower first, got ({low}, {high})"
+        )
+    return low, high
+
+
+def problem_of(bifurcation: Bifurcation, box: Box) -> Problem:
+    """Return the problem of a bifurcation's curve.
+
+    Raises
+    ------
+    ParameterError
+        If the bifurcation has no curve of its own, or is not what it says.
+    """
+    if not isinstance(bifurcation, Bifurcation):
+        raise ParameterError(
+            f"a curve starts from a Bifurcation, got {type(bifurcation).__name__}: take one of "
+            "branch.bifurcations or diagram.bifurcations"
+        )
+    if not bifurcation.located:
+        raise ParameterError(f"{bifurcation!r} is not located: its curve has no start")
+    kind, orbit = bifurcation.kind, bifurcation.orbit
+    if kind is Kind.NS:
+        raise ParameterError("curves of NS are not continued: SN, BP, PD, CS, SS, AS, GS and T are")
+    if orbit.system.holds:
+        raise ParameterError(f"{bifurcation!r} lies on a bridge: curves of orbits with holds are not")
+    here = np.array([orbit.params[name] for name in box.names])
+    if not box.contains(here):
+        where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(box.names, here, strict=True))
+        raise ParameterError(f"{kind.value} is at {where}, outside of the ranges")
+    make = _sliding_problem if kind in TERMINAL or kind is Kind.T else _spectral_problem
+    return make(bifurcation, orbit, box)
+
+
+def _spectral_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Problem:
+    from contfric.curves.conditions import SPECTRAL, Condition
+
+    kind = bifurcation.kind
+    orbit = orbit.as_half() if kind is Kind.BP else orbit
+    sign = 1.0 if kind is Kind.SN else -1.0
+    if kind is Kind.BP and not orbit.system.half:
+        raise ParameterError(
+            f"{bifurcation!r} breaks no symmetry: such a point is of codimension two, and has no curve"
+        )
+    mu = orbit.turn_multipliers
+    if not np.any(np.abs(mu - sign) < _MULTIPLIER):
+        raise ParameterError(
+            f"{bifurcation!r} is no {kind.value}: the multipliers of a turn are "
+            f"{', '.join(f'{m:.6g}' for m in mu)}, and none is {sign:g}"
+        )
+    none = np.empty(0, dtype=np.int64)
+    condition = Condition(SPECTRAL, 0, 0, sign, -1, none, none)
+    return Problem(kind, orbit.system, orbit.vector.copy(), box, condition, None)
+
+
+def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Problem:
+    from contfric.curves.conditions import EXIT, INTERIOR, JOINT, Condition
+
+    kind, system, model = bifurcation.kind, orbit.system, orbit.model
+    if not bifurcation.tests:
+        raise ParameterError(f"{bifurcation!r} does not say which margin vanishes")
+    surfaces = [s.name for s in model.surfaces]
+    test = bifurcation.tests[0]
+    if kind is Kind.T:
+        place, segment, surface = _tangency(orbit, test)
+    else:
+        if test not in system.tests:
+            raise ParameterError(f"{bifurcation!r}: its orbit has no margin {test}")
+        margin = float(orbit.margins[system.tests.index(test)])
+        if not abs(margin) < _VANISHES:
+            raise ParameterError(f"{bifurcation!r} is none: its margin is {margin:.3g}, not zero")
+        places = {Margin.JOINT: JOINT, Margin.EXIT: EXIT, Margin.INTERIOR: INTERIOR}
+        place, segment, surface = places[test.margin], test.segment, test.surface
+    pinned = [] if kind is Kind.T else _vanishing(orbit)
+    rest = _rest_mode(model) if kind in (Kind.CS, Kind.SS) and place == JOINT else -1
+    condition = Condition(
+        place,
+        segment,
+        surfaces.index(surface),
+        1.0,
+        rest,
+        np.array(pinned, dtype=np.int64),
+        _quiet(system, kind, segment, [system.tests[k] for k in pinned]),
+    )
+    return Problem(kind, system, orbit.vector.copy(), box, condition, test)
+
+
+def _vanishing(orbit: Orbit) -> list[int]:
+    return [int(k) for k in np.flatnonzero(np.abs(orbit.margins) < _VANISHES)]
+
+
+def _rest_mode(model: Model) -> int:
+    return next((i for i, mode in enumerate(model.modes) if mode.sliding), -1)
+
+
+def _quiet(system: System, kind: Kind, segment: int, pinned: list[Test]) -> IntArray:
+    """Return the rows of labels that say nothing along the curve: a joint lies on the surface."""
+    count = system.segments
+    near = {segment} if kind is Kind.T else set()
+    for test in pinned:
+        near |= {test.segment, (test.segment + 1) % count}
+    rows = [k for k, row in enumerate(system.layout.labels) if int(row[0]) in near]
+    return np.array(rows, dtype=np.int64)
+
+
+def _tangency(orbit: Orbit, test: Test) -> tuple[int, int, str]:
+    """Return (place, segment, surface) of a tangency: where an observable is nearest to a surface."""
+    from contfric.curves.conditions import INTERIOR, JOINT, START
+
+    model, segment = orbit.model, test.segment
+    named = [s for s in model.surfaces if s.observable == test.surface]
+    c = [o.name for o in model.observables].index(test.surface)
+    start, end = orbit.cycle[segment], orbit.ends[segment]
+    times, values = np.empty(256), np.empty(256)
+    mode = [m.name for m in model.modes].index(orbit.word[segment][0])
+    duration = float(end[0] - start[0])
+    state = np.ascontiguousarray(start[1:])
+    found = model.flow.turning(
+        mode, c, float(start[0]), state, duration, orbit.vector, times, values
+    )
+    reached: list[tuple[float, int, str]] = []
+    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
+    entry, exit_ = orbit.word[segment - 1][1], orbit.word[segment][1]
+    ends = {START: (start, entry), JOINT: (end, exit_)}
+    for surface in named:
+        k = model.surfaces.index(surface)
+        level = model.flow.level(k, orbit.vector, none, empty)
+        reached += [(abs(v - level), INTERIOR, surface.name) for v in values[: max(found, 0)]]
+        for place, (joint, on) in ends.items():
+            if on != surface.name:
+                y = np.ascontiguousarray(joint[1:])
+                value = model.flow.observe(c, float(joint[0]), y, orbit.vector, none, empty)
+                reached.append((abs(value - level), place, surface.name))
+    gap, place, name = min(reached)
+    if gap > _VANISHES:
+        raise ParameterError(f"there is no tangency in segment {segment + 1}: the gap is {gap:.3g}")
+    return place, segment, name
+
+
+def border_of(problem: Problem, joints: FloatArray, vector: FloatArray) -> FloatArray:
+    """Return the vectors b and c for a first point, shape (2, N, m): the singular vectors of the chain."""
+    border = np.zeros((2, *joints.shape))
+    if problem.test is not None:
+        return border
+    a, b, _, close = jacobian_blocks(problem.system, joints, vector)
+    count, m = joints.shape
+    full = np.zeros((count * m, count * m))
+    for i in range(count):
+        rows = slice(i * m, (i + 1) * m)
+        full[rows, rows] += a[i]
+        after = slice((i + 1) * m, (i + 2) * m) if i + 1 < count else slice(0, m)
+        full[rows, after] += b[i] if i + 1 < count else problem.condition.sign * (b[i] @ close)
+    u, _, vh = np.linalg.svd(full)
+    border[0], border[1] = u[:, -1].reshape(count, m), vh[-1].reshape(count, m)
+    return border

@@ -1,0 +1,375 @@
+"""One curve, both ways, to its ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.continuation.events import Bifurcation, Kind
+from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS
+from contfric.continuation.vertices import passed_vertex
+from contfric.curves.assembly import join_sides
+from contfric.curves.curve import Curve
+from contfric.curves.going_on import Start, goes_on, prove
+from contfric.curves.locating import locate_zero
+from contfric.curves.naming import crossings
+from contfric.curves.points import (
+    CHUNK,
+    CurvePoint,
+    CurveRows,
+    first_curve_point,
+    march_rows,
+)
+from contfric.curves.problem import Problem, box_of, problem_of
+from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
+from contfric.errors import ConvergenceError, ParameterError, whole_number
+from contfric.models.definition import FloatArray
+
+#: A first point farther than this from the bifurcation (in widths of the ranges) is another one.
+_SAME_START = 1e-4
+#: A point of codimension two this near to the start of a curve that leaves it is that start.
+AT_START = 1e-6
+#: Share of a range within which a curve that gets no farther has come to a physical limit, where
+#: conditions degenerate together.
+_NEAR_LIMIT = 1e-3
+#: A segment that lasts less than minus this does not exist.
+_NO_TIME = 1e-9
+#: Most changes of the signature along one side of a curve: a chain longer than this goes round.
+_MOST_CHANGES = 24
+
+Progress = Callable[[str], None]
+
+
+@dataclass(eq=False)
+class CurveSide:
+    """One side of a curve: its points, what it has met, why it ended.
+
+    Attributes
+    ----------
+    problem : what is followed
+    points : rows of points, in order
+    special : points of codimension two
+    end : why it ended
+    tip : the last point, with its tangent
+    border : the vectors b and c there
+    following : what it goes on as behind its end, where its signature changes
+    """
+
+    problem: Problem
+    points: list[CurvePoint]
+    border: FloatArray
+    special: list[SpecialPoint] = field(default_factory=list)
+    end: CurveEnd = field(default_factory=lambda: CurveEnd(CurveEndReason.POINTS))
+    following: CurveSide | None = None
+
+    @property
+    def tip(self) -> CurvePoint:
+        """The last point."""
+        return self.points[-1]
+
+
+def continue_bifurcation(
+    bifurcation: Bifurcation,
+    parameters: tuple[str, str],
+    ranges: Mapping[str, tuple[float, float]],
+    *,
+    max_step: float | None = None,
+    max_points: int = MOST_POINTS,
+    progress: Progress | None = None,
+) -> Curve:
+    """Continue a bifurcation in two parameters, both ways, to the ends of its curve.
+
+    Parameters
+    ----------
+    bifurcation : Bifurcation
+        An SN, BP, PD, CS, SS, AS, GS or T of a branch or of a diagram.
+    parameters : (str, str)
+        The two parameters, such as ``("Omega", "S")``.
+    ranges : dict
+        Where each of them may go.
+    max_step : float, optional
+        Largest step along the curve, as a share of the ranges (times 1 + the size of the state); 0.01
+        by default.
+    max_points : int
+        Most points of each side; a curve that reaches it says so.
+
+    Raises
+    ------
+    ParameterError
+        If the parameters, the ranges or the step are not valid, or the bifurcation has no curve.
+    ConvergenceError
+        If the curve has no unique direction at the start.
+
+    Notes
+    -----
+    SN, BP and PD are zeros of a bordered function of the chain's Jacobian (Govaerts 2000); CS, SS,
+    AS, GS and T of their own margins. ``docs/curves.md`` has the derivation.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> fold = cf.continue_orbit(orbit, "Omega", (0.4, 0.6)).bifurcations[-2]
+    >>> cf.continue_bifurcation(fold, ("Omega", "S"), {"Omega": (0.5, 0.6), "S": (0.2, 0.4)}).label
+    'SN_1a'
+    """
+    if not isinstance(bifurcation, Bifurcation):
+        raise ParameterError(
+            f"a curve starts from a Bifurcation, got {type(bifurcation).__name__}: take one of "
+            "branch.bifurcations or diagram.bifurcations"
+        )
+    model = bifurcation.orbit.model
+    if model.resets or model.filippov or model.autonomous:
+        raise ParameterError(
+            f"model '{model.name}': curves in two parameters are offered for excited models without "
+            "impacts whose slides cannot shrink to nothing"
+        )
+    box = box_of(model, parameters, ranges)
+    largest = _largest_step(max_step)
+    whole_number("max_points", max_points, least=2)
+    problem = problem_of(bifurcation, box)
+    problem, start, border = start_of_curve(problem, bifurcation, largest)
+    ahead = trace_curve_side(problem, start, border, largest, max_points, progress)
+    if ahead.end.reason is CurveEndReason.CLOSED:
+        return join_sides(None, ahead)
+    behind = trace_curve_side(problem, start.reversed(), border, largest, max_points, progress)
+    return join_sides(behind, ahead)
+
+
+def _largest_step(max_step: Any) -> float:
+    if max_step is None:
+        return LARGEST_STEP
+    if isinstance(max_step, bool) or not isinstance(max_step, (int, float)):
+        raise ParameterError(f"max_step is a share of the ranges, in (0, 1], got {max_step!r}")
+    if not 1e-8 <= max_step <= 1.0:
+        raise ParameterError(f"max_step is a share of the ranges, from 1e-8 to 1, got {max_step!r}")
+    return float(max_step)
+
+
+def start_of_curve(problem: Problem, bifurcation: Bifurcation, largest: float) -> Start:
+    """Return the problem of a curve, its first point and the border there.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton fails there, ends somewhere else, or no orbit beside it is admissible.
+    """
+    orbit = problem.orbit(_joints(problem, bifurcation), bifurcation.orbit.vector[problem.which])
+    found = first_curve_point(problem, orbit)
+    if found is None:
+        raise ConvergenceError(f"{bifurcation!r} has no curve with a unique direction", orbit)
+    point, border = found
+    moved = np.max(np.abs(point.w - orbit.vector[problem.which]) / problem.box.widths)
+    if moved > _SAME_START:
+        raise ConvergenceError(
+            f"the curve found near {bifurcation!r} is {moved:.2g} of the ranges away: it is another one",
+            orbit,
+        )
+    if problem.test is None or problem.kind is Kind.T:
+        return problem, point, border
+    for start in (point, point.reversed()):
+        proved = prove(problem, start, border, largest)
+        if proved is not None:
+            point.tests = start.tests
+            return proved, point, border
+    raise ConvergenceError(f"no orbit on the curve beside {bifurcation!r} is admissible", orbit)
+
+
+def _joints(problem: Problem, bifurcation: Bifurcation) -> FloatArray:
+    orbit = bifurcation.orbit
+    return orbit.joints if orbit.system is problem.system else orbit.as_half().joints
+
+
+def trace_curve_side(
+    problem: Problem,
+    start: CurvePoint,
+    border: FloatArray,
+    largest: float,
+    max_points: int,
+    progress: Progress | None = None,
+    changes: int = _MOST_CHANGES,
+) -> CurveSide:
+    """Follow a curve from a point along its tangent until it ends, through changes of its signature."""
+    side = CurveSide(problem, [start], border.copy())
+    step = FIRST_STEP * largest
+    while True:
+        try:
+            finished, step = _advance(side, step, largest, max_points)
+        except KeyboardInterrupt:  # keep what was found
+            side.end = CurveEnd(CurveEndReason.INTERRUPTED)
+            return side
+        if progress is not None:
+            where = ", ".join(
+                f"{n} = {v:.6g}" for n, v in zip(problem.box.names, side.tip.w, strict=True)
+            )
+            progress(f"{problem.kind.value}: {len(side.points)} points, {where}")
+        if finished:
+            break
+    special = side.end.special
+    if side.end.reason is CurveEndReason.MEETS and special is not None and changes > 0:
+        on = goes_on(problem, side.tip, special, largest)
+        if on is not None:
+            other, point, border = on
+            point.arc = side.tip.arc
+            side.following = trace_curve_side(
+                other, point, border, largest, max_points, progress, changes - 1
+            )
+    return side
+
+
+def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[bool, float]:
+    """March once and deal with what stopped it; (whether the side is finished, next step)."""
+    from contfric.continuation import march as codes
+
+    if len(side.points) >= most:
+        side.end = CurveEnd(CurveEndReason.POINTS)
+        return True, step
+    problem, last = side.problem, min(2, len(side.points))
+    rows = CurveRows.room_for(problem, last + min(CHUNK, most - len(side.points)))
+    for k in range(last):
+        rows.put(k, side.points[len(side.points) - last + k])
+    border = side.border.copy()
+    why, k, step = march_rows(
+        problem, rows, last - 1, side.points[0], len(side.points) - 1, border, step, largest, 3e-13
+    )
+    fresh = [rows.point(j) for j in range(last, k + 1)]
+    located = 1 if why == codes.EVENT else 0  # the last point lies behind an event
+    lasts = np.all(np.diff(rows.joints[last : k + 1 - located, :, 0]) > -_NO_TIME, axis=1)
+    gone = _first(~lasts)
+    if gone is not None:
+        side.points += fresh[:gone]
+        side.end = CurveEnd(CurveEndReason.LOST)
+        return True, step
+    limit = _first(problem.within_limits(rows.values[last : k + 1]) < 0.0)
+    vertex = _vertex(side, fresh)
+    if vertex is not None and (limit is None or vertex <= limit):
+        return _end_at_birth(side, fresh, vertex), step
+    if limit is not None:
+        side.points += fresh[:limit]
+        return _end_at_limit(side, fresh[limit]), step
+    if why in (codes.EVENT, codes.OUTSIDE):
+        side.points += fresh[:-1]
+        return _resolve(side, fresh[-1], border), step
+    side.points += fresh
+    side.border = border
+    ends = {
+        codes.STEP: CurveEndReason.STEP,
+        codes.BROKEN: CurveEndReason.LOST,
+        codes.CLOSED: CurveEndReason.CLOSED,
+        codes.UNBOUNDED: CurveEndReason.UNBOUNDED,
+    }
+    if why in ends:
+        side.end = _near_limit(problem, side.tip) or CurveEnd(ends[why])
+        return True, step
+    return False, step
+
+
+def _first(flags: NDArray[np.bool_]) -> int | None:
+    """Return the first index that is true; None if none is."""
+    places = np.flatnonzero(flags)
+    return int(places[0]) if len(places) else None
+
+
+def _beyond(problem: Problem, point: CurvePoint) -> float:
+    """Return the least value of the model's constraints at a point."""
+    return float(problem.within_limits(point.w[None, :])[0])
+
+
+def _end_at_limit(side: CurveSide, after: CurvePoint) -> bool:
+    """End a side where the model's parameters end."""
+    problem = side.problem
+    point, _ = locate_zero(
+        problem, side.tip, after, side.border, lambda p: _beyond(problem, p) + 1e-15
+    )
+    if point is not side.tip:
+        side.points.append(point)
+    side.end = CurveEnd(CurveEndReason.LIMIT)
+    return True
+
+
+def _near_limit(problem: Problem, point: CurvePoint) -> CurveEnd | None:
+    near = _beyond(problem, point) < _NEAR_LIMIT * float(np.min(problem.box.widths))
+    return CurveEnd(CurveEndReason.LIMIT) if near else None
+
+
+def _vertex(side: CurveSide, fresh: list[CurvePoint]) -> int | None:
+    """Return the first new point behind which orbits have become their own images: a curve is born there."""
+    if side.problem.kind is not Kind.SN or side.problem.system.half or not fresh:
+        return None
+    chain = [*side.points[-1:], *fresh]
+    passed = passed_vertex(side.problem.system, np.array([p.joints for p in chain]))
+    return None if passed is None or not np.isfinite(passed[1]) else passed[0]
+
+
+def _end_at_birth(side: CurveSide, fresh: list[CurvePoint], at: int) -> bool:
+    """End a fold curve of asymmetric (doubled) orbits where they become symmetric (undoubled)."""
+    side.points += fresh[:at]
+    before, after = side.tip, fresh[at]
+    problem = side.problem
+    reference = _odd_part(problem, before)
+
+    def value(p: CurvePoint) -> float:
+        return float(np.sum(_odd_part(problem, p) * reference))
+
+    point, fine = locate_zero(problem, before, after, side.border, value)
+    orbit = problem.orbit(point.joints, point.w)
+    symmetric = problem.system.periods % 2 == 1 or orbit.mirror_distance < 1e-5
+    kind = CodimTwo.DBP if symmetric else CodimTwo.GPD
+    special = SpecialPoint(kind, kind.name, orbit.params, orbit, None, (), point.arc, fine)
+    side.points.append(point)
+    side.special.append(special)
+    side.end = CurveEnd(CurveEndReason.BIRTH, special=special)
+    return True
+
+
+def _odd_part(problem: Problem, point: CurvePoint) -> FloatArray:
+    """Return the states of the second half less the image of the first."""
+    n = len(problem.system.word) // 2
+    symmetry = problem.model.symmetry
+    image = np.eye(len(problem.model.states))
+    if symmetry is not None and problem.system.word[:n] != problem.system.word[n:]:
+        image = symmetry.array()
+    return np.asarray(point.joints[n:, 1:] @ image - point.joints[:n, 1:])
+
+
+def _resolve(side: CurveSide, after: CurvePoint, border: FloatArray) -> bool:
+    """Locate what happened over the last step; True if the side ends there."""
+    problem, before = side.problem, side.tip
+    at_start = len(side.points) == 1
+    limit = _range_crossed(side, after)
+    for crossing in crossings(problem, before, after, side.border):
+        if limit is not None and crossing.point.arc > limit.arc:
+            break
+        if at_start and crossing.point.arc - side.points[0].arc < AT_START and not crossing.terminal:
+            continue
+        side.special.append(crossing.special)
+        if crossing.terminal:
+            side.points.append(crossing.point)
+            side.end = CurveEnd(CurveEndReason.MEETS, special=crossing.special)
+            return True
+    if limit is not None:
+        side.points.append(limit)
+        side.end = CurveEnd(CurveEndReason.RANGE)
+        return True
+    side.points.append(after)
+    side.border = border
+    return False
+
+
+def _range_crossed(side: CurveSide, after: CurvePoint) -> CurvePoint | None:
+    """Return the point on the edge of the box that the last step has crossed."""
+    box, before = side.problem.box, side.tip
+    if np.all(after.w >= box.low) and np.all(after.w <= box.high):
+        return None
+
+    def inside(p: CurvePoint) -> float:
+        return float(np.min(np.minimum(p.w - box.low, box.high - p.w) / box.widths))
+
+    if inside(before) <= 0.0:
+        return before
+    point, _ = locate_zero(side.problem, before, after, side.border, inside)
+    return point

@@ -1,0 +1,90 @@
+"""How motion leaves a surface that it slides on, at sampled states."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping
+
+from contfric.models.definition import Domain
+from contfric.models.description import Description
+from contfric.models.evaluate import Sampler
+
+#: A rate this small, at a place that Newton's method found, is zero.
+_STILL = 1e-7
+#: Places at which a verdict is asked for: what a single one says may be an accident.
+_PLACES, _TRIES = 6, 60
+
+
+def departing_side(
+    sampler: Sampler, beside: Mapping[int, str], surface: str, sides: Mapping[str, int]
+) -> int:
+    """Return the side that motion on a surface leaves to in a region, 0 if that is not clear.
+
+    Parameters
+    ----------
+    beside : the mode on each side, by +1 and -1
+    """
+    verdicts = set()
+    # 12 states: what a single one says may be an accident of the region's edge
+    for t, y in sampler.on(surface, sides, 12):
+        away = [
+            side
+            for side, mode in beside.items()
+            if side * sampler.rate(mode, surface, side, t, y) > 0.0
+        ]
+        verdicts.add(away[0] if len(away) == 1 else 0)
+    return verdicts.pop() if len(verdicts) == 1 else 0
+
+
+def leaves_at_rest(sampler: Sampler, description: Description, domains: tuple[Domain, ...]) -> bool:
+    """Return whether every sliding mode is left without acceleration: the flow then never jumps.
+
+    That is so where the limit under which a mode slides is the very place at which the field beside it
+    turns around (static and kinetic limits agree); it must be so for other parameters, too.
+    """
+    verdicts: set[bool] = set()
+    for domain in domains:
+        on = [name for name, side in domain.signs.items() if side == 0]
+        limits = {
+            name
+            for mode in description.modes
+            if mode.name == domain.mode
+            for name, side in mode.sides.items()
+            if side != 0
+        }
+        for limit in limits if len(on) == 1 else ():
+            verdicts.update(_left_at_rest(sampler, domain, on[0], limit, domains))
+    return verdicts == {True}
+
+
+def _left_at_rest(
+    sampler: Sampler, domain: Domain, on: str, limit: str, domains: tuple[Domain, ...]
+) -> set[bool]:
+    beyond = {**domain.signs, limit: -domain.signs[limit]}
+    beside = [d for d in domains if d.signs[on] != 0 and {**d.signs, on: 0} == beyond]
+    found: set[bool] = set()
+    for other in (sampler, _moved(sampler)):
+        places = 0
+        for t, y in other.states(_TRIES):
+            place = other.landed(on, t, y)
+            for _ in range(20):  # one after the other, until both surfaces are met
+                second = place and other.landed(limit, *place)
+                place = second and other.landed(on, *second)
+            if place is None or other.sides(*place, (on, limit)) != {on: 0, limit: 0}:
+                continue
+            rest = {k: v for k, v in domain.signs.items() if k not in (on, limit)}
+            if other.sides(*place, rest) != rest or not beside:
+                continue
+            rates = [other.rate(d.mode, on, d.signs[on], *place) for d in beside]
+            found.add(min(abs(rate) for rate in rates) <= _STILL)
+            places += 1
+            if places == _PLACES:
+                break
+    return found
+
+
+def _moved(sampler: Sampler) -> Sampler:
+    """Return the sampler at other parameters, each moved by its own share."""
+    draw = random.Random(sampler.seed)
+    params = {name: value * (1.0 + 0.2 * draw.random()) for name, value in sampler.params.items()}
+    return Sampler(sampler.evaluator, params, sampler.seed)

@@ -1,0 +1,124 @@
+"""The parts of a model's definition: parameters, observables, surfaces, modes, domains, resets, symmetry."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A real parameter: its name, default value and meaning (nondimensional)."""
+
+    name: str
+    default: float
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A linear inequality ``constant + sum(c * p) >= 0`` (``> 0`` if strict) that parameters obey."""
+
+    text: str
+    coefficients: Mapping[str, float]
+    strict: bool = False
+    meaning: str = ""
+    constant: float = 0.0
+
+    def value(self, params: Mapping[str, float]) -> float:
+        """Return the left-hand side of the inequality."""
+        return self.constant + sum(c * params[name] for name, c in self.coefficients.items())
+
+
+@dataclass(frozen=True)
+class Observable:
+    """A scalar function of time and state whose level sets are surfaces."""
+
+    name: str
+    formula: str
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A level set of an observable; ``switching`` if motion is cut there, as the field changes.
+
+    A switching surface has another mode on each side (their fields may agree: a section).
+    """
+
+    name: str
+    observable: str
+    level: str
+    switching: bool = False
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One smooth vector field.
+
+    ``rank`` is the number of independent directions that survive it (a stick keeps one of two:
+    one multiplier becomes exactly zero); ``sliding`` says that motion stays on a surface.
+    """
+
+    name: str
+    rank: int
+    sliding: bool = False
+
+
+@dataclass(frozen=True)
+class Domain:
+    """A region of one mode: the sign of (observable - level) for every surface, 0 = on it."""
+
+    name: str
+    mode: str
+    signs: Mapping[str, int]
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Departure:
+    """Where a state at rest on a switching surface cannot stay, and the side it leaves to."""
+
+    where: Mapping[str, int]
+    leaves: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class Reset:
+    """A map of the state where it meets a surface, ``y+ = R(t, y; p)``: an impact on a wall.
+
+    The region is one-sided: before and behind the reset the state is on the same side of the surface,
+    and it never passes. The flow has the map (:data:`contfric.compiled.reset_signature`).
+
+    Attributes
+    ----------
+    surface : the surface, not switching
+    formula : the map, for the reader
+    changes : observables whose values the map changes, by default all but that of the surface; the
+        domains that can follow are those that differ in the signs of these
+    """
+
+    surface: str
+    formula: str
+    changes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """The map ``(t, y) -> (t + fraction * T, matrix @ y)`` that takes solutions to solutions.
+
+    Of an autonomous model it is a map of states only, and the fraction means nothing.
+    ``surfaces`` names the image of each surface; the sign of (observable - level) is reversed.
+    """
+
+    matrix: tuple[tuple[float, ...], ...]
+    fraction: float
+    surfaces: Mapping[str, str]
+
+    def array(self) -> FloatArray:
+        """Return the state matrix, shape (n, n)."""
+        return np.array(self.matrix, dtype=np.float64)

@@ -1,0 +1,78 @@
+"""How the segments of a word begin: behind a reset, on their own exit surface, or as any."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.models.definition import Model
+from contfric.orbit.holds import Hold
+from contfric.orbit.structure import mirror_mode, mode_domains
+from contfric.signature.holds import is_hold, mirror_exit
+
+#: In the array of departures: a segment that begins as any, and one that begins on its exit surface.
+PLAIN, RETURNS = -1, -2
+
+Word = tuple[tuple[str, str], ...]
+
+
+def first_entry(model: Model, word: Word, half: bool) -> str:
+    """Return the surface through which the first segment of a turn is entered."""
+    if not half or model.symmetry is None:
+        return word[-1][1]
+    inverse = {image: name for name, image in model.symmetry.surfaces.items()}
+    return mirror_exit(word[-1][1], inverse)
+
+
+def departures(
+    model: Model,
+    word: Word,
+    exits: list[str],
+    entered: list[str],
+    half: bool,
+    held: dict[int, Hold],
+) -> NDArray[np.int64]:
+    """How holds are left, and other segments begin, as a layout has it."""
+    names = [mode.name for mode in model.modes]
+    modes = [mode for mode, _ in word]
+    before = [mirror_mode(model)[modes[-1]] if half else modes[-1], *modes[:-1]]
+    resets = {
+        s.name: k + 1 for k, s in enumerate(model.surfaces) if s.name in model.reset_by_surface
+    }
+    rows = zip(modes, before, exits, entered, strict=True)
+    found = [PLAIN - 2 * resets.get(row[3], 0) - _returns(model, *row) for row in rows]
+    for i, hold in held.items():
+        found[i] = names.index(hold.departs)
+    return np.array(found, dtype=np.int64)
+
+
+def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> int:
+    """Tell whether a segment begins on the surface that it ends on: it came there, or rested on it."""
+    if model.mode_by_name[mode].sliding:
+        return 0
+    if is_hold(entered):
+        return 1
+    rest = any(domain.signs[exit_] == 0 for domain in model.domains)
+    if rest and not model.filippov:  # rest is left, and a stop reversed, with an acceleration
+        return 0
+    rested = model.domain_by_name[mode_domains(model, before)[0]].signs[exit_] == 0
+    return int(exit_ == entered or rested)
+
+
+def entry_rows(
+    model: Model, word: Word, entered: list[str], domains: tuple[str, ...]
+) -> list[tuple[int, ...]]:
+    """Rows of the entry margins: surfaces that a reset may lead across, and that bound the mode behind it."""
+    rows: list[tuple[int, ...]] = []
+    for i, surface in enumerate(entered):
+        reset = model.reset_by_surface.get(surface)
+        if reset is None:
+            continue
+        for k, other in enumerate(model.surfaces):
+            signs = {
+                model.domain_by_name[d].signs[other.name]
+                for d in (domains[i : i + 1] or mode_domains(model, word[i][0]))
+            }
+            if model.changed_by(reset, other.name) and len(signs) == 1:
+                rows.append((i, k, signs.pop(), 1))
+    return rows

@@ -1,0 +1,83 @@
+"""The signature of an orbit, read off its solved segments: domains, holds and impacts in order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from contfric.orbit.simulation import signs_at
+from contfric.orbit.words import decode, end_domain, passed_domains
+from contfric.signature import Signature
+from contfric.signature.holds import TOUCH, domain_after, is_hold
+from contfric.signature.impacts import impact_at, mirror_name
+
+if TYPE_CHECKING:
+    from contfric.orbit.orbit import Orbit
+    from contfric.orbit.system import IntArray
+
+
+def read_signature(orbit: Orbit, labels: IntArray) -> Signature:
+    """Return the signature of an orbit.
+
+    Parameters
+    ----------
+    labels : the transparent surfaces that its segments cross, as the engine codes them
+    """
+    model, system = orbit.model, orbit.system
+    names = system.domains or _domains(orbit, labels)  # in full form each segment is one of them
+    plain = Signature(model, tuple(names), orbit.periods, symmetric=orbit.symmetric)
+    return replace(plain, name=plain.auto_name(orbit.symmetric))
+
+
+def _domains(orbit: Orbit, labels: IntArray) -> list[str]:
+    """Domains of the whole orbit, with its holds and impacts between them."""
+    model, system = orbit.model, orbit.system
+    surfaces = [s.name for s in model.surfaces]
+    ends, word = _end_domains(orbit), orbit.word
+    crossed: list[list[str]] = [[] for _ in system.word]
+    for row, code in zip(system.layout.labels, labels, strict=True):
+        crossed[row[0]] += decode(int(code), surfaces)
+    domains: list[str] = []
+    for i, passed in enumerate(crossed):
+        if is_hold(word[i][1]):
+            domains.append(word[i][1])
+            continue
+        domains += passed_domains(model, _start_domain(orbit, i, ends), ends[i], passed)
+        if word[i][1] in model.reset_by_surface:
+            domains.append(impact_at(word[i][1]))
+    if system.half:
+        assert model.symmetry is not None
+        image = {**model.symmetry.surfaces, **model.mirror_domain}
+        domains += [mirror_name(d, image) for d in domains]
+    return domains
+
+
+def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
+    """Domain in which a segment of the whole orbit begins."""
+    model, word = orbit.model, orbit.word
+    mode, entry = word[i - 1]  # of the whole word: its last exit leads into the first
+    if is_hold(entry):
+        return str(domain_after(model, mode, word[i][0]))
+    if entry not in model.reset_by_surface:
+        return model.transitions[ends[i - 1], entry]
+    begin = orbit.begins[i]
+    signs = signs_at(model, float(begin[0]), begin[1:].copy(), orbit.vector)
+    del signs[entry]  # the joint lies on it to rounding, on the side of every domain
+    own = [d for d in model.domains if d.mode == word[i][0]]
+    return min(own, key=lambda d: sum(d.signs[s] * sign < 0 for s, sign in signs.items())).name
+
+
+def _end_domains(orbit: Orbit) -> list[str]:
+    """Domain in which each segment of the whole orbit ends."""
+    found, word, model = [], orbit.word, orbit.model
+    for i, (mode, exit_) in enumerate(word):
+        end = orbit.ends[i]
+        signs = signs_at(model, float(end[0]), end[1:].copy(), orbit.vector)
+        after, following = word[(i + 1) % len(word)]
+        if is_hold(exit_):
+            found.append(next(d.name for d in model.domains if d.mode == mode))
+            continue
+        if is_hold(following) and (mode == after or following != TOUCH):  # it leads beyond the hold
+            after = word[(i + 2) % len(word)][0]
+        found.append(end_domain(model, mode, exit_, after, signs))
+    return found

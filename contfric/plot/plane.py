@@ -1,0 +1,194 @@
+"""Curves of bifurcations in the plane of two parameters, with their points of codimension two."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from contfric.models.definition import FloatArray
+from contfric.plot.labels import Anchor, place_labels, settle
+from contfric.plot.protocols import CurveLike, PlaneLike, SpecialLike
+from contfric.plot.save import axes_or_new
+from contfric.plot.style import (
+    BESIDE,
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    SMALL,
+    STABLE,
+    TEXT,
+    UNSTABLE,
+    VERMILLION,
+    event_label,
+    parameter_label,
+)
+
+#: Colour and width of each kind: what bounds smooth families is strong, where the flow jumps it is fine.
+_LOOKS = {
+    "SN": (VERMILLION, 1.7),
+    "BP": (BLUE, 1.7),
+    "PD": (GREEN, 1.7),
+    "CS": (BLACK, 1.5),
+    "SS": (ORANGE, 1.1),
+    "AS": (PURPLE, 1.1),
+    "GS": (SKY, 1.1),
+    "T": (GREY, 0.7),
+}
+#: A plane with more points of codimension two than this does not write their names, one with more curves
+#: does not label them all: the longest only.
+_MOST_NAMES, _MOST_LABELS = 24, 24
+#: A point at which a curve is relabelled is marked small and not named.
+_RELABELS = "T"
+
+
+def plot_curves(
+    curves: Sequence[CurveLike], ax: Axes | None = None, *, special: bool = True
+) -> Axes:
+    r"""Draw curves of bifurcations in their plane.
+
+    The colour is that of the kind. A line is solid where stable orbits are bounded, dashed elsewhere.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+    ax : Axes, optional
+        Where to draw; new axes by default.
+    special : bool
+        Whether to mark and name the points of codimension two.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> fold = cf.continue_orbit(orbit, "Omega", (0.4, 0.6)).bifurcations[-2]
+    >>> ranges = {"Omega": (0.5, 0.6), "S": (0.2, 0.4)}
+    >>> plot_curves([cf.continue_bifurcation(fold, ("Omega", "S"), ranges)]).get_ylabel()
+    '$S$'
+    """
+    points = [s for curve in curves for s in curve.special] if special else []
+    return _draw(axes_or_new(ax), curves, range(len(curves)), points, outside=ax is None)
+
+
+def plot_plane(plane: PlaneLike, ax: Axes | None = None, *, special: bool = True) -> Axes:
+    """Draw the curves of a plane, as Figs. 8 to 11 of the reference.
+
+    Parameters
+    ----------
+    plane : Plane
+    ax : Axes, optional
+        Where to draw; new axes by default.
+    special : bool
+        Whether to mark and name the points of codimension two.
+    """
+    new = axes_or_new(ax)
+    new.set_xlim(*plane.ranges[0])
+    new.set_ylim(*plane.ranges[1])
+    points = plane.special if special else ()
+    return _draw(new, plane.curves, plane.twins, points, outside=ax is None)
+
+
+def _draw(
+    ax: Axes,
+    curves: Sequence[CurveLike],
+    twins: Sequence[int],
+    special: Sequence[SpecialLike],
+    outside: bool,
+) -> Axes:
+    for index, curve in enumerate(curves):
+        first = index == twins[index]
+        for kind, values, stable in _pieces(curve):
+            colour, width = _LOOKS.get(kind, (GREY, 1.0))
+            if stable or first:  # another word for the same motion shows where it is stable, no more
+                style = STABLE if stable else UNSTABLE
+                (line,) = ax.plot(*values.T, color=colour, linewidth=width, linestyle=style)
+                line.set_gid(curve.label)
+    names = curves[0].parameters if curves else ("", "")
+    ax.set_xlabel(parameter_label(names[0]), fontsize=TEXT + 1)
+    ax.set_ylabel(parameter_label(names[1]), fontsize=TEXT + 1)
+    ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
+    _mark(ax, special, names)
+    _legend(ax, curves, special, outside)
+    settle(ax)
+    shown = [c for k, c in enumerate(curves) if twins[k] == k]
+    shown.sort(key=lambda c: -float(c.arc[-1] - c.arc[0]))
+    anchors = [a for a in (_label_of(ax, c) for c in shown[:_MOST_LABELS]) if a is not None]
+    named = [s for s in special if not s.name.endswith(_RELABELS)]
+    if len(named) <= _MOST_NAMES:
+        anchors += [Anchor(*_place(s, names), s.name) for s in named]
+    place_labels(ax, anchors)
+    return ax
+
+
+def _pieces(curve: CurveLike) -> list[tuple[str, FloatArray, bool]]:
+    """Return the stretches of one kind and stability; each reaches to the start of the next one."""
+    kinds = [kind.value for kind in curve.kinds]
+    values, stable = curve.values, curve.stable
+    change = [k for k in range(1, len(kinds)) if kinds[k] != kinds[k - 1] or stable[k] != stable[k - 1]]
+    edges = [0, *change, len(kinds)]
+    return [
+        (kinds[a], values[a : b + 1], bool(stable[a]))
+        for a, b in zip(edges[:-1], edges[1:], strict=True)
+    ]
+
+
+def _place(special: SpecialLike, names: tuple[str, str]) -> tuple[float, float]:
+    return special.params[names[0]], special.params[names[1]]
+
+
+def _mark(ax: Axes, special: Sequence[SpecialLike], names: tuple[str, str]) -> None:
+    """Mark points of codimension two; small where segments are relabelled only."""
+    for point in special:
+        relabels = point.name.endswith(_RELABELS)
+        (line,) = ax.plot(
+            *_place(point, names),
+            linestyle="none",
+            marker="." if relabels else "o",
+            markersize=3.0 if relabels else 4.5,
+            markerfacecolor=GREY if relabels else "white",
+            markeredgecolor=GREY if relabels else BLACK,
+            markeredgewidth=0.8,
+            zorder=5,
+        )
+        line.set_gid(point.name)
+
+
+def _label_of(ax: Axes, curve: CurveLike) -> Anchor | None:
+    """Return the label of a curve at the middle of what is seen of it."""
+    values = curve.values
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    inside = (values[:, 0] >= left) & (values[:, 0] <= right)
+    inside &= (values[:, 1] >= low) & (values[:, 1] <= high)
+    places = np.flatnonzero(inside)
+    if len(places) == 0:
+        return None
+    arc = curve.arc[places]
+    middle = places[int(np.searchsorted(arc, 0.5 * (arc[0] + arc[-1])))]
+    return Anchor(float(values[middle, 0]), float(values[middle, 1]), event_label(curve.label))
+
+
+def _legend(
+    ax: Axes, curves: Sequence[CurveLike], special: Sequence[SpecialLike], outside: bool
+) -> None:
+    """Say what colours and dashes mean: beside new axes, inside given ones."""
+    kinds = {kind.value: kind for curve in curves for kind in curve.kinds}
+    handles = [
+        Line2D([], [], color=colour, linewidth=width, label=f"{name}: {kinds[name].meaning}")
+        for name, (colour, width) in _LOOKS.items()
+        if name in kinds
+    ]
+    handles.append(Line2D([], [], color=GREY, linestyle=STABLE, label="stable orbits are bounded"))
+    handles.append(Line2D([], [], color=GREY, linestyle=UNSTABLE, label="unstable ones only"))
+    if special:
+        look = {"marker": "o", "markerfacecolor": "white", "markeredgecolor": BLACK}
+        handles.append(
+            Line2D([], [], linestyle="none", markersize=4.5, label="codimension two", **look)  # type: ignore[arg-type]
+        )
+    where = BESIDE if outside else {"loc": "best"}
+    ax.legend(handles=handles, fontsize=SMALL, frameon=False, **where)

@@ -1,0 +1,75 @@
+"""What a run returns: what was found, how it ended, and where it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from contfric.atlas.diagram import Diagram
+from contfric.continuation.branch import Branch
+from contfric.errors import ResultFileError
+from contfric.orbit.orbit import Orbit
+from contfric.study.read import Study
+
+if TYPE_CHECKING:
+    from contfric.atlas.plane import Plane
+    from contfric.chaos.map import LyapunovMap
+
+
+class RunStatus(str, Enum):
+    """How a run ended."""
+
+    DONE = "done"
+    INTERRUPTED = "interrupted"
+    UNWRITTEN = "some files could not be written"
+
+
+@dataclass(frozen=True, eq=False)
+class StudyResult:
+    """What a run found and where it is.
+
+    Attributes
+    ----------
+    study : Study
+    out : Path
+        The folder of the results.
+    status : RunStatus
+    orbit : Orbit or None
+        The orbit of the start; None if nothing needs it, or the run was interrupted before.
+    branch : Branch or None
+        The branch, if the study continues one.
+    diagram : Diagram or None
+        The diagram, if the study has a task.
+    plane : Plane or None
+        The curves of a plane, if the study has one.
+    lyapunov : LyapunovMap or None
+        The map of Lyapunov exponents, if the study asks for one.
+    info : dict
+        The content of ``run.json``.
+    files : tuple of Path
+        The files written.
+    """
+
+    study: Study
+    out: Path
+    status: RunStatus
+    orbit: Orbit | None
+    branch: Branch | None
+    diagram: Diagram | None
+    plane: Plane | None
+    lyapunov: LyapunovMap | None
+    info: dict[str, Any]
+    files: tuple[Path, ...]
+
+    def __repr__(self) -> str:
+        return f"<StudyResult {self.study.name}: {self.status.value}, in {self.out}>"
+
+
+class UnwrittenError(ResultFileError):
+    """Some files could not be written; ``result`` holds everything that was computed."""
+
+    def __init__(self, message: str, result: StudyResult) -> None:
+        super().__init__(message)
+        self.result = result

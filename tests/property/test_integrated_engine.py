@@ -1,0 +1,48 @@
+"""The engine does not notice whether a motion is a closed form or integrated."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import contfric as cf
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "integrated"))
+
+import coulomb_integrated
+
+PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
+
+
+@pytest.fixture(scope="module")
+def orbits():
+    closed = cf.load_model("coulomb")
+    integrated = replace(closed, flow_factory=coulomb_integrated.compiled_flow)
+    return [cf.find_orbit(model, PARAMS) for model in (closed, integrated)]
+
+
+def test_orbit(orbits):
+    closed, integrated = orbits
+    assert integrated.signature == closed.signature
+    assert integrated.x_max == pytest.approx(closed.x_max, abs=1e-11)
+    assert np.abs(np.abs(integrated.multipliers) - np.abs(closed.multipliers)).max() < 1e-10
+
+
+def test_diagram_of_figure_5(orbits):
+    closed, integrated = (cf.explore(orbit, "Omega", (0.40, 0.60)) for orbit in orbits)
+    assert len(integrated.branches) == len(closed.branches)
+    assert len(integrated.loose_ends) == len(closed.loose_ends) == 0
+    found, expected = (
+        sorted((b.kind.value, b.params["Omega"]) for b in diagram.bifurcations)
+        for diagram in (integrated, closed)
+    )
+    assert [kind for kind, _ in found] == [kind for kind, _ in expected]
+    assert np.array([w for _, w in found]) == pytest.approx([w for _, w in expected], abs=1e-9)
+    for one, other in zip(integrated.branches, closed.branches, strict=True):
+        # in the middle: at an event itself rounding decides on which side of a surface a joint is
+        assert one[len(one) // 2].signature == other[len(other) // 2].signature
+        assert [end.reason for end in one.ends] == [end.reason for end in other.ends]
