@@ -31,7 +31,7 @@ from contfric.continuation.events import (
 )
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side, first_point
-from contfric.continuation.switching import NEARER, leave_branch_point, settings_value
+from contfric.continuation.switching import NEARER, leaps, leave_branch_point, settings_value
 from contfric.continuation.trace import continue_orbit, trace_side
 from contfric.continuation.walked import walked
 from contfric.models.definition import FloatArray
@@ -292,6 +292,8 @@ def _follow_departure(state: Exploration, orbit: Orbit, event: Event, reason: En
         if known is not None:
             state.judge(event, text, Verdict.KNOWN, known)
             return
+        if distance != NEARER[-1] and leaps(orbit, settings, departure, distance):
+            continue
         side = trace_side(orbit, departure.point, settings, progress=state.progress)
         if _went_somewhere(side, event):
             first = _first_end(reason, event, side, settings)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contfric.continuation.points import Point, Settings
+from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.side import first_point
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import assembled
@@ -23,7 +23,9 @@ from contfric.orbit.orbit import Orbit
 #: still a parabola there.
 LEAVE = 1e-3
 #: Where the branch ends sooner than that, the start is taken nearer.
-NEARER = (LEAVE, 1e-4, 1e-5)
+NEARER = (LEAVE, 1e-4, 1e-5, 1e-6)
+#: Share of that distance at which nothing else has happened yet.
+_AT_ONCE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +71,21 @@ def leave_branch_point(
     origin.joints, origin.value = orbit.joints, settings_value(orbit, settings)
     point.arc = distance
     return Departure(orbit, point, origin, reason)
+
+
+def leaps(orbit: Orbit, settings: Settings, departure: Departure, distance: float) -> bool:
+    """Tell whether a start lies behind a period doubling that belongs to the branch, too.
+
+    What watches a multiplier -1 has another sign there than beside the branch point. Multipliers may
+    change so fast beside a touch of a kink.
+    """
+    from contfric.continuation.steps import CHI_MINUS
+
+    nearer = leave_branch_point(orbit, settings, departure.reason, _AT_ONCE * distance)
+    if nearer is None:
+        return False
+    watched = [float(p.tests[CHI_MINUS - EXTRA]) for p in (departure.point, nearer.point)]
+    return watched[0] * watched[1] < 0.0
 
 
 def settings_value(orbit: Orbit, settings: Settings) -> float:

@@ -23,7 +23,7 @@ from contfric.continuation.side import Side, first_point
 from contfric.continuation.sliding import ROUGHLY_REACHED, nearly_reached
 from contfric.continuation.smooth import SAME_PLACE, leapt_vertex, vertex_at
 from contfric.continuation.trial import locate_value
-from contfric.continuation.vertices import at_vertex, passed_vertex
+from contfric.continuation.vertices import at_vertex, left_at, passed_vertex
 from contfric.errors import ConvergenceError
 from contfric.orbit.orbit import Orbit
 
@@ -191,6 +191,15 @@ def _leaps_over_vertex(orbit: Orbit, side: Side, settings: Settings, written: in
     before = side.rows.point(first + passed[0])
     after = side.rows.point(first + passed[0] + 1)
     if not np.isfinite(passed[1]):
+        active = orbit.model.index_of(settings.parameter)
+        near = left_at(before, after.orbit(orbit.system, orbit.vector, active), active)
+        vertex = None if near is None else vertex_at(orbit, near, settings)
+        if near is not None and vertex is not None:
+            side.rewind(first + passed[0] + 1)
+            _end_at_vertex(orbit, side, settings, vertex, near)
+            return True
+        if passed[1] < 0.0:
+            return False
         side.rewind(first + passed[0])
         side.largest = (after.arc - before.arc) / _SHORTER
         return side.largest < _NEAREST and _stuck_at_vertex(orbit, side, settings)

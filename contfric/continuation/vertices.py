@@ -31,10 +31,21 @@ _OPENS = 1e-4
 _BESIDE = 1e-6
 #: Odd parts below this (nondimensional) are what a singular system leaves undetermined.
 _ODD = 1e-5
+#: Odd parts below this are rounding: away from a vertex the orbit is symmetric (undoubled). Orbits with
+#: a small odd part may be truly asymmetric, where a vertex lies beside a fold.
+_EVEN = 1e-9
+#: Halvings of a step to the resolution of the parameter.
+_HALVINGS = 40
 
 
 def symmetric_part(orbit: Orbit, active: int) -> Orbit | None:
     """Return the symmetric orbit that an orbit has come to, solved on its half; None if far."""
+    part = _symmetrised(orbit)
+    return None if part is None else _vertex(part, active)
+
+
+def _symmetrised(orbit: Orbit) -> Orbit | None:
+    """Return the symmetric part of an orbit, not solved; None if it is far from its mirror image."""
     system = orbit.system
     half = None if system.half else half_of(orbit.model, system.word, system.periods)
     if half is None or orbit.model.symmetry is None:
@@ -48,7 +59,32 @@ def symmetric_part(orbit: Orbit, active: int) -> Orbit | None:
     middle = 0.5 * (image + orbit.joints[:n])
     middle = clocked(orbit.model, middle, float(middle[0, 0]) + 0.5 * orbit.period)
     part = build_system(orbit.model, half, system.periods, half=True)
-    return _vertex(replace(orbit, system=part, joints=middle), active)
+    return replace(orbit, system=part, joints=middle)
+
+
+def left_at(before: Point, after: Orbit, active: int) -> Point | None:
+    """Return the vertex at which a step went over from asymmetric orbits to symmetric ones, if it did.
+
+    The symmetric orbits between its ends are known from the far one; the vertex is where their multiplier
+    passes -1. For vertices with a sharp tip, where orbits become symmetric too fast to be met by shorter
+    steps: beside a touch of a kink multipliers change with the root of the parameter.
+    """
+    part = _symmetrised(after)
+    if part is None:
+        return None
+    low, high = (_moved(part, active, w) for w in (before.value, float(after.vector[active])))
+    if not (low.converged and high.converged and _opening(low) * _opening(high) < 0.0):
+        return None
+    side = _opening(low)
+    for _ in range(_HALVINGS):
+        middle = _moved(high, active, 0.5 * float(low.vector[active] + high.vector[active]))
+        if not middle.converged:
+            return None
+        if side * _opening(middle) > 0.0:
+            low = middle
+        else:
+            high = middle
+    return replace(before, joints=high.as_whole().joints, value=float(high.vector[active]))
 
 
 def undoubled_part(orbit: Orbit, active: int) -> Orbit | None:
@@ -82,7 +118,7 @@ def passed_vertex(system: System, joints: FloatArray) -> tuple[int, float] | Non
     -------
     (int, float) or None
         Index of the point before it, and the share of the step at which it is; infinite if the step has
-        gone over to the simpler orbits, and tells nothing of it.
+        gone over to the simpler orbits, and tells nothing of it (minus infinity: from near ones).
     """
     image = _image_of_second_half(system)
     if image is None or len(joints) < 2:
@@ -93,11 +129,14 @@ def passed_vertex(system: System, joints: FloatArray) -> tuple[int, float] | Non
     ahead = np.sum(odd[1:] * odd[:-1], axis=1)
     turned = (ahead < 0.0) & (np.minimum(size[1:], size[:-1]) > _ODD**2)
     fallen = (size[1:] < _ODD**2) & (size[:-1] > (10.0 * _ODD) ** 2)
-    places = np.flatnonzero(turned | fallen)
+    gone = (size[1:] < _EVEN**2) & (size[:-1] > (100.0 * _EVEN) ** 2)
+    places = np.flatnonzero(turned | fallen | gone)
     if not len(places):
         return None
     k = int(places[0])
-    return k, float(size[k] / (size[k] - ahead[k])) if turned[k] else np.inf
+    if turned[k]:
+        return k, float(size[k] / (size[k] - ahead[k]))
+    return k, float(np.inf if fallen[k] else -np.inf)
 
 
 def _image_of_second_half(system: System) -> FloatArray | None:

@@ -97,6 +97,8 @@ def integrated_motion(
     method: Method | str = Method.EXPLICIT,
     relative: float = TOLERANCE,
     absolute: float = TOLERANCE,
+    kinks: int = 0,
+    kink: Callable[..., Any] | None = None,
 ) -> Bundle:
     """Bundle the helpers of a model, as the kernels of its flow take them.
 
@@ -106,6 +108,8 @@ def integrated_motion(
     method : ``explicit`` (order 8), or ``automatic`` where a mode is stiff: it changes to the implicit
         method and back as the motion asks for it, and takes longer to compile
     relative, absolute : error that a step may make relative to a state, and to its scale
+    kinks, kink : number of kinks of the field, and a helper from a kink to the observable that vanishes
+        there (:mod:`contfric.flow.kinked`)
 
     Raises
     ------
@@ -126,6 +130,8 @@ def integrated_motion(
         probe=probe,
         stages=stages,
         looseness=(max(relative, absolute) / 1e-12) ** (1.0 / POWER),
+        kinks=int(kinks),
+        kink=kink or observe,
     )
 
 

@@ -143,7 +143,7 @@ def make_room(n, observed, columns, stages, implicit):  # type: ignore[no-untype
         np.empty((n, 1 + n)),
         np.empty(1 + n),
         np.zeros(CONTROLS),
-        np.empty((DEPTH if observed > 0 else 0, 4)),
+        np.empty((DEPTH, 4)),
         np.empty((implicit, n)),
         np.empty((implicit, n)),
         np.empty((implicit, n)),

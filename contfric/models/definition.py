@@ -73,7 +73,7 @@ class Model:
     surfaces : tuple of Surface
         Those of one observable from the highest level down.
     stop_surface : str
-        Surface on which the displacement is stationary: stops and extrema lie on it.
+        Surface (or kink) on which the displacement is stationary: stops and extrema lie on it.
     flow_factory : callable
         Returns the :class:`~contfric.flow.interface.CompiledFlow`; called at first use only.
     spread : callable
@@ -84,6 +84,9 @@ class Model:
     autonomous : bool
         Whether there is no excitation: the flow's ``period`` returns 0, the period of an orbit is found
         with it, and ``periods`` of a simulation are units of time.
+    kinks : tuple of str
+        Observables at whose zeros the fields have kinks and no jumps: no joints, labels or events
+        (:mod:`contfric.flow.kinked`).
     filippov : bool
         Whether rest is left without acceleration everywhere (static and kinetic limit agree), so that the
         flow never jumps: slides may then shrink to nothing, and are solved for accordingly.
@@ -109,6 +112,7 @@ class Model:
     references: tuple[str, ...] = ()
     resets: tuple[Reset, ...] = ()
     autonomous: bool = False
+    kinks: tuple[str, ...] = ()
     filippov: bool = False
     definition: str = field(default="", repr=False)
 
@@ -167,6 +171,8 @@ class Model:
 
     def cuts(self, surface: str) -> bool:
         """Return whether motion is cut at a surface: it is switching, or has a reset."""
+        if surface in self.kinks:
+            return False
         return self.surface_by_name[surface].switching or surface in self.reset_by_surface
 
     @cached_property

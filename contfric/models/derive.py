@@ -92,6 +92,7 @@ def model_from(description: Description) -> Model:
         references=description.references,
         resets=tuple(_reset(description, name) for name in description.resets),
         autonomous=not description.period,
+        kinks=description.kinks,
         filippov=leaves_at_rest(sampler, description, domains),
         definition=description.text,
     )

@@ -15,7 +15,7 @@ from contfric.models.names import Names
 KEYS = (
     *("name", "title", "references", "states", "parameters", "constraints", "period"),
     *("autonomous", "define", "observables", "surfaces", "field", "modes", "domains"),
-    *("departures", "resets", "symmetry", "stop_surface", "spread", "integration"),
+    *("departures", "resets", "symmetry", "stop_surface", "kinks", "spread", "integration"),
 )
 _PARAMETER = ("default", "meaning")
 _SURFACE = ("observable", "level", "switching")
@@ -82,6 +82,7 @@ def describe(data: Mapping[str, Any]) -> Description:
         resets=_resets(top, states, surfaces),
         symmetry=_symmetry(top, states),
         stop_surface=_stop_surface(top, surfaces),
+        kinks=top.texts("kinks"),
         spread=_spread(top, states),
         method=method,
         tolerance=tolerance,
@@ -168,6 +169,12 @@ def _surfaces(
         surfaces.append(Surface(name, observable, level, bool(entry.flag("switching"))))
     if not surfaces:
         top.fail("surfaces", "a model has at least one surface")
+    for name in top.texts("kinks"):
+        if name not in (*formulas, *states):
+            top.fail(
+                "kinks", f"a kink is where an observable or a state is 0, and '{name}' is none"
+            )
+        formulas.setdefault(name, name)
     return tuple(Observable(name, text) for name, text in formulas.items()), tuple(surfaces)
 
 
@@ -270,7 +277,8 @@ def _symmetry(top: Part, states: tuple[str, ...]) -> dict[str, str] | None:
 def _stop_surface(top: Part, surfaces: tuple[Surface, ...]) -> str:
     if top.data.get("stop_surface") is None:
         return ""
-    return top.one_of("stop_surface", [s.name for s in surfaces], "surface")
+    valid = [*(s.name for s in surfaces), *top.texts("kinks")]
+    return top.one_of("stop_surface", valid, "surface or kink")
 
 
 def _spread(top: Part, states: tuple[str, ...]) -> tuple[str, ...]:

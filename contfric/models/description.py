@@ -50,6 +50,7 @@ class Description:
     resets : surface -> state -> expression
     symmetry : name (a state or t) -> expression of its image; None if there is none
     stop_surface : empty if it is to be found
+    kinks : observables at whose zeros the fields have kinks, and are continuous
     spread : expression of the half-width of starts, one a state
     method, tolerance : how motion is integrated (:mod:`contfric.flow.integrated`)
     """
@@ -70,6 +71,7 @@ class Description:
     resets: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     symmetry: Mapping[str, str] | None = None
     stop_surface: str = ""
+    kinks: tuple[str, ...] = ()
     spread: tuple[str, ...] = ()
     method: str = "explicit"
     tolerance: float = 1e-12
@@ -106,6 +108,8 @@ class Description:
         found.update({"period": self.period} if self.period else {"autonomous": True})
         if self.symmetry is not None:
             found["symmetry"] = dict(self.symmetry)
+        if self.kinks:
+            found["kinks"] = list(self.kinks)
         if self.stop_surface:
             found["stop_surface"] = self.stop_surface
         return found

@@ -9,6 +9,7 @@ This module imports sympy; it is loaded when a model is built for the first time
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import sympy
@@ -19,7 +20,7 @@ from contfric.models.description import Description
 from contfric.models.entries import EntryError
 from contfric.models.formulas import FORMULAS, formula, resolved
 from contfric.models.grammar import TIME, parse
-from contfric.models.motion import motion_code
+from contfric.models.motion import motion_code, piece_code
 from contfric.models.regions import engine_order, known_sides
 from contfric.yaml_lines import Address
 
@@ -30,7 +31,10 @@ Digest of the sources that it was generated with: {digest}
 
 import math
 
+import numpy as np
+
 from contfric.compiled import (
+    allocating_helper,
     flow_signature,
     helper,
     hit_signature,
@@ -71,7 +75,7 @@ def observe(c, t, y, p, which, grad):
 
 @kernel(rate_signature)
 def rate(mode, c, t, y, p, which, grad):
-    return rate_at(mode, c, t, y, p, which, grad)
+    return rate_at(piece_of(mode, t, y, p), c, t, y, p, which, grad)
 
 
 @kernel(level_signature)
@@ -86,7 +90,7 @@ def period(p, which, grad):
 
 @kernel(reset_signature)  # the same types
 def field_of(mode, t, y, p, which, out, jac):
-    field(mode, t, y, p, which, out, jac)
+    field(piece_of(mode, t, y, p), t, y, p, which, out, jac)
 
 
 @kernel(reset_signature)
@@ -135,13 +139,17 @@ class Formulas:
         return self.read(("period",), self.description.period or "0")
 
     def fields(self) -> list[list[Any]]:
-        """Return the field of each mode, without the kinks that the mode does not see."""
+        """Return the field of each piece of each mode, without the kinks that the piece does not see."""
         observables = {
             o.name: f for o, f in zip(self.description.observables, self.observables(), strict=True)
         }
         found = []
-        for mode in self.description.modes:
-            signs, known = {}, known_sides(mode, self.surfaces)
+        for mode, bits in itertools.product(self.description.modes, self.pieces):
+            signs = {
+                observables[name]: bit
+                for name, bit in zip(self.description.kinks, bits, strict=True)
+            }
+            known = known_sides(mode, self.surfaces)
             for surface, level in zip(self.description.surfaces, self.levels(), strict=True):
                 side = known.get(surface.name, 0)
                 above = observables[surface.observable] - level
@@ -155,8 +163,16 @@ class Formulas:
             )
         return found
 
+    @property
+    def pieces(self) -> list[tuple[int, ...]]:
+        """Signs of the kinks in each piece of a mode, in the order of their bits."""
+        count = len(self.description.kinks)
+        return [
+            tuple(1 if piece >> k & 1 else -1 for k in range(count)) for piece in range(1 << count)
+        ]
+
     def rates(self) -> list[list[Any]]:
-        """Return the rate of each observable along each mode."""
+        """Return the rate of each observable along each piece of each mode."""
         return [
             [
                 sympy.expand_mul(o.diff(self.t))
@@ -233,8 +249,13 @@ def module_source(description: Description, digest: str) -> str:
     writer.vectors("reset_at", "k", "y1", [resets[names.index(n)] for n in order])
     writer.vectors("onto", "mode", "y1", formulas.projections())
     writer.scales(formulas.scales())
+    kinks = [[o.name for o in description.observables].index(name) for name in description.kinks]
+    code.add(piece_code(kinks))
     code.add(_KERNELS)
-    code.add(motion_code(description, _idle(description, formulas.rates())))
+    timed = [
+        c for c, o in enumerate(formulas.observables()) if not o.free_symbols & set(formulas.y)
+    ]
+    code.add(motion_code(description, _idle(description, formulas.rates()), timed))
     return str(code)
 
 
@@ -243,11 +264,14 @@ def _idle(description: Description, rates: list[list[Any]]) -> list[tuple[int, i
 
     Only a mode that slides can hide a zero in a long formula.
     """
+    pieces = 1 << len(description.kinks)
     return [
         (m, c)
-        for m, (mode, row) in enumerate(zip(description.modes, rates, strict=True))
-        for c, rate in enumerate(row)
-        if rate == 0 or (0 in mode.sides.values() and sympy.simplify(rate) == 0)
+        for m, mode in enumerate(description.modes)
+        for c, every in enumerate(zip(*rates[m * pieces : (m + 1) * pieces], strict=True))
+        if all(
+            rate == 0 or (0 in mode.sides.values() and sympy.simplify(rate) == 0) for rate in every
+        )
     ]
 
 
@@ -335,12 +359,15 @@ class _Writer:
         columns: list[str],
         result: str | None,
     ) -> None:
-        """Write one block for each index; the last one stands for all that are left."""
+        """Write one block for each index, or for each few that share it; the last for all that are left."""
         self._define(head, blocks)
-        for i, outputs in enumerate(blocks):
-            last = i == len(blocks) - 1
+        same: dict[tuple[Output, ...], list[int]] = {}
+        for i, outputs in enumerate(blocks):  # two modes with one field share a block
+            same.setdefault(tuple(outputs), []).append(i)
+        for row, (outputs, places) in enumerate(same.items()):
+            last = row == len(same) - 1
             if not last:
-                self.code.open(f"if {index} == {i}:")
+                self.code.open("if " + " or ".join(f"{index} == {i}" for i in places) + ":")
             write_block(self.code, outputs, room, columns, result)
             if not last:
                 self.code.close()

@@ -298,7 +298,7 @@ class Orbit:
     @cached_property
     def stops(self) -> FloatArray:
         """Displacements at the stops and impacts in the order of the orbit, shape (stops,)."""
-        if not self.model.surface_by_name[self.model.stop_surface].switching:
+        if not self.model.cuts(self.model.stop_surface):
             return displacements(self, self.model.stop_surface)
         return self.ends[stopping_segments(self.model, self.word), 1]
 

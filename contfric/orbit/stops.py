@@ -23,21 +23,24 @@ def stopping_segments(model: Model, word: Word) -> list[int]:
 
 
 def displacements(orbit: Orbit, surface: str) -> FloatArray:
-    """Return the displacement wherever an orbit crosses a surface, in order, shape (crossings,).
+    """Return the displacement wherever an orbit crosses a surface or kink, in order, shape (crossings,).
 
     Inside its segments and at its joints, impacts among them; by the first roots of the flow. For models
     whose motion is not cut at its stops.
     """
     model, flow = orbit.model, orbit.model.flow
     none, empty = np.empty(0, dtype=np.int64), np.empty(0)
-    k = [s.name for s in model.surfaces].index(surface)
-    c = [o.name for o in model.observables].index(model.surfaces[k].observable)
-    level = flow.level(k, orbit.vector, none, empty)
+    observable, level = surface, 0.0
+    if surface in model.surface_by_name:
+        k = [s.name for s in model.surfaces].index(surface)
+        observable = model.surfaces[k].observable
+        level = flow.level(k, orbit.vector, none, empty)
+    c = [o.name for o in model.observables].index(observable)
     modes = [m.name for m in model.modes]
     found: list[float] = []
     for i, (mode, exit_) in enumerate(orbit.word):
         if model.mode_by_name[mode].sliding and exit_ in model.surface_by_name:
-            lies = {d.signs[surface] for d in model.domains if d.mode == mode}
+            lies = {d.signs.get(surface) for d in model.domains if d.mode == mode}
             if lies == {0}:
                 continue  # it rests there
         start, end = float(orbit.begins[i, 0]), float(orbit.ends[i, 0])

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import shutil
+import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +29,11 @@ PAGES: dict[str, tuple[str, ...]] = {
     "fig06": ("fig06",),
     "fig07": ("fig07",),
     "fig13": ("fig13",),
+    "fig17": ("fig17",),
+    "fig18": ("fig18",),
 }
+#: Studies that take minutes: motion is integrated there.
+LONG = ("fig17", "fig18")
 STUDIES = tuple(study for studies in PAGES.values() for study in studies)
 #: Digits behind the point in the tables: events are located to about 1e-10.
 DIGITS = 9
@@ -133,10 +138,12 @@ def with_table(page: str, name: str, lines: list[str]) -> str:
     return before + begin + "\n".join(lines) + "\n" + end + after
 
 
-def main() -> None:
-    """Run every study, write its figures and put its table into its page."""
+def main(pages: list[str]) -> None:
+    """Run every study of some pages (by default all); write its figures, put its table into its page."""
     IMAGES.mkdir(parents=True, exist_ok=True)
     for page, names in PAGES.items():
+        if pages and page not in pages:
+            continue
         path = HERE / f"{page}.md"
         text = path.read_text(encoding="utf-8")
         for name in names:
@@ -158,4 +165,4 @@ def _first_figure(result: cf.StudyResult) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

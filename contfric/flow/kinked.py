@@ -1,0 +1,236 @@
+"""Motion through kinks: one mode of the engine, integrated piece by piece.
+
+At a *kink* the field is continuous and its derivatives are not: ``|v|`` at v = 0. With f- and f+ the
+fields before and behind a surface with normal n, the derivatives of the flow are multiplied there by the
+saltation matrix (Leine, Nijmeijer, "Dynamics and Bifurcations of Non-Smooth Mechanical Systems", 2004,
+section 7.1)
+
+    I + (f+ - f-) n^T / (n . f-) = I        as f+ = f-,
+
+so that the variations pass a kink unchanged. A kink is therefore no joint of the boundary-value problem, and
+the number of crossings may change along a branch without a bifurcation. But a step of an integrator over
+a kink is of low order: each crossing is found as a certified first root (:mod:`contfric.flow.hits`), the
+step is taken again up to it, and the integration goes on in the next piece. An error d of the place of
+a crossing changes the state by the second order of d, since the slopes are the same.
+
+Where v touches 0 from one side it does not cross, and nothing happens. The number of crossings changes
+there by two; the state at the end of the motion is continuously differentiable by its start, with a
+derivative that changes like the square root of the distance from the touch, on the side that crosses.
+
+For K kinks the fields of the pieces are numbered ``mode * 2**K + bits``; bit k is set where the observable
+``kink(k)`` is positive.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from contfric.compiled import allocating_helper, helper
+from contfric.flow.dense import is_flat, node, probed, write
+from contfric.flow.dop853 import STAGES
+from contfric.flow.hits import _FLAT, first_hit, first_in_step, leaving
+from contfric.flow.integrated import folded, hand_back
+from contfric.flow.stepping import FRESH, REMEMBERED, first_step, next_step, settle
+from contfric.flow.turnings import all_turnings
+from contfric.flow.variations import begin, make_room, slope
+
+#: Rates below this, relative to 1 + the next one, vanish at a crossing: the crossing is a stationary point.
+_STATIONARY = 1e-9
+
+
+@helper
+def piece_at(motion, mode, t, y, on, p, room):  # type: ignore[no-untyped-def]
+    """Return the piece that a state lies in, or enters if it lies on a kink (on kink ``on`` it does)."""
+    bits = 0
+    first = mode << motion.kinks
+    n = room.scales.shape[0]
+    for k in range(motion.kinks):
+        side = motion.observe(motion.kink(k), t, y, p, room.none, room.empty)
+        if side == 0.0 or k == on:  # the fields of both sides are the same here
+            motion.field(first, t, y, p, room.none, room.stage[:n], room.nothing)
+            c = motion.kink(k)
+            _, side, second = node(motion, first, c, 0.0, t, y, room.stage, p, room)
+            side = second if side == 0.0 else side
+        bits |= (1 << k) if side > 0.0 else 0
+    return first | bits
+
+
+@helper
+def first_crossing(motion, piece, t, h, on, p, room):  # type: ignore[no-untyped-def]
+    """Return the first crossing of a kink in the last step and which one it is; (-1, -1) if there is none.
+
+    ``on`` is the kink that the step starts on, -1 if none. No number if the search does not come to an end.
+    """
+    found, which = -1.0, -1
+    for k in range(motion.kinks):
+        c = motion.kink(k)
+        left = node(motion, piece, c, 0.0, t, room.start, room.slopes[0], p, room)
+        right = node(motion, piece, c, 0.0, t + h, room.end, room.last, p, room)
+        if is_flat(left, right, h):
+            continue
+        if on == k:
+            left = (0.0, left[1], left[2])
+        sign, multiple = leaving(left, on == k)
+        begins = 0.0
+        if sign == 0.0:
+            begins = _FLAT * h
+            left = probed(motion, piece, c, 0.0, t, begins, p, room)
+            sign = 1.0 if left[0] > 0.0 else -1.0
+        at = first_in_step(
+            motion, piece, c, 0.0, sign, multiple, t, begins, h, left, right, p, room
+        )
+        if math.isnan(at):
+            return math.nan, k
+        if at >= 0.0 and (which < 0 or at < found):
+            found, which = at, k
+    return found, which
+
+
+@helper
+def restart(motion, piece, t, p, which, room):  # type: ignore[no-untyped-def]
+    """Start again from ``room.trial`` in another piece, with steps as long as they were."""
+    for k in range(room.start.shape[0]):
+        room.start[k] = room.trial[k]
+    slope(motion, piece, -1, t, room.start, p, which, room, room.slopes[0])
+    room.control[FRESH], room.control[REMEMBERED] = 0.0, 0.0
+
+
+@helper
+def advance_through(motion, mode, t0, dt, y0, p, which, room):  # type: ignore[no-untyped-def]
+    """Integrate over ``dt`` through all kinks; return the number of crossings, -1 if that fails.
+
+    Backwards in time (which only iterates of Newton's method far from a solution ask for) kinks are not
+    looked for.
+    """
+    begin(motion, y0, p, which, room)
+    piece = piece_at(motion, mode, t0, y0, -1, p, room)
+    first_step(motion, piece, -1, t0, dt, p, which, room)
+    if not math.isfinite(t0 + dt):
+        return -1
+    done, on, crossings = 0.0, -1, 0
+    while done != dt:
+        left, t = dt - done, t0 + done
+        h = next_step(motion, piece, -1, t, left, p, which, room)
+        if math.isnan(h):
+            return -1
+        at, k = (-1.0, -1) if h < 0.0 else first_crossing(motion, piece, t, h, on, p, room)
+        if math.isnan(at):
+            return -1
+        on = k
+        if k < 0:
+            done = dt if h == left else done + h
+            settle(room)
+            continue
+        if not motion.probe(motion, piece, -1, t, at, p, which, room):
+            return -1
+        done = dt if at >= left else done + at
+        piece ^= 1 << k
+        restart(motion, piece, t0 + done, p, which, room)
+        crossings += 1
+    return crossings
+
+
+@allocating_helper
+def kinked_flow(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
+    """Advance a state by ``dt`` through all kinks, with derivatives where ``jac`` has room."""
+    n, free = y0.shape[0], which.shape[0]
+    columns = 1 + n + free if jac.shape[0] > 0 else 0
+    grad = np.empty(free)
+    period = motion.period(p, which, grad)
+    cycles = folded(t0, period)
+    room = make_room(n, 0, columns, STAGES, motion.stages)
+    fine = advance_through(motion, mode, t0 - cycles * period, dt, y0, p, which, room) >= 0
+    hand_back(room, fine, y1, jac)
+    if columns > 0 and cycles != 0.0:
+        for i in range(n):
+            for k in range(free):
+                jac[i, 2 + n + k] -= cycles * grad[k] * jac[i, 0]
+
+
+@helper
+def next_kink(motion, piece, t, y, on, left, p, room, behind):  # type: ignore[no-untyped-def]
+    """Return the time to the next crossing and which kink it is, with the state there in ``behind``."""
+    n = y.shape[0]
+    found, which = -1.0, -1
+    for k in range(motion.kinks):
+        c = motion.kink(k)
+        at = first_hit(motion, piece, c, 0.0, on == k, t, y, left, p, room, room.stage[:n])
+        if at >= 0.0 and (which < 0 or at < found):
+            write(room.stage[:n], behind)
+            found, which = at, k
+    return found, which
+
+
+@allocating_helper
+def kinked_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-untyped-def]
+    """Return the first time at which an observable takes a value, through all kinks (``hit_signature``)."""
+    if not dt_max > 0.0:
+        return -1.0
+    n = y0.shape[0]
+    room = make_room(n, 1, 0, STAGES, motion.stages)
+    here, behind = y0.copy(), np.empty(n)
+    period = motion.period(p, room.none, room.empty)
+    phase = t0 - folded(t0, period) * period
+    kink = -1
+    for k in range(motion.kinks):
+        if on and target == 0.0 and c == motion.kink(k):
+            kink = k
+    piece = piece_at(motion, mode, phase, here, kink, p, room)
+    done = 0.0
+    while done < dt_max:
+        t, left = phase + done, dt_max - done
+        until, k = next_kink(motion, piece, t, here, kink, left, p, room, behind)
+        span = left if k < 0 else until
+        itself = k >= 0 and c == motion.kink(k) and target == 0.0
+        if not itself:
+            at = first_hit(motion, piece, c, target, on, t, here, span, p, room, y1)
+            if at >= 0.0:
+                return done + at
+        if k < 0:
+            return -1.0
+        if itself or not math.isfinite(behind[0]):
+            write(behind, y1)
+            return done + until
+        write(behind, here)
+        done, kink, piece, on = done + until, k, piece ^ (1 << k), False
+    return -1.0
+
+
+@allocating_helper
+def kinked_turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
+    """Write the stationary points of an observable through all kinks (``turning_signature``)."""
+    if not dt > 0.0:
+        return 0
+    n = y0.shape[0]
+    room = make_room(n, 1, 0, STAGES, motion.stages)
+    here, behind = y0.copy(), np.empty(n)
+    period = motion.period(p, room.none, room.empty)
+    phase = t0 - folded(t0, period) * period
+    piece = piece_at(motion, mode, phase, here, -1, p, room)
+    done, kink, count = 0.0, -1, 0
+    while done < dt:
+        t, left = phase + done, dt - done
+        until, k = next_kink(motion, piece, t, here, kink, left, p, room, behind)
+        span = left if k < 0 else until
+        found = all_turnings(
+            motion, piece, c, t, here, span, p, room, times[count:], values[count:]
+        )
+        if found < 0 or (k >= 0 and not math.isfinite(behind[0])):
+            return -1
+        for i in range(count, count + found):
+            times[i] += done
+        count += found
+        if k < 0:
+            return count
+        write(behind, here)
+        done, kink, piece = done + until, k, piece ^ (1 << k)
+        motion.field(piece, phase + done, here, p, room.none, room.stage[:n], room.nothing)
+        q, q1, q2 = node(motion, piece, c, 0.0, phase + done, here, room.stage, p, room)
+        if abs(q1) <= _STATIONARY * (1.0 + abs(q2)) and done < dt:
+            if count == times.shape[0]:
+                return -1
+            times[count], values[count] = done, q
+            count += 1
+    return count

@@ -1,0 +1,151 @@
+"""The LuGre oscillator: its motion against scipy's, its orbits against each other and simulation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import contfric as cf
+from contfric.orbit.solve import polish
+
+WHERE = {"Omega": 0.5, "S0": 0.4}
+#: Events of the symmetric branch of Fig. 17 between S = 0.374 and S = 0.378 (docs/gallery/fig17.md).
+FOLDS = (0.3750595439839, 0.3757051387250)
+BREAKING = 0.3757014024
+NONE, NOTHING = np.empty(0, dtype=np.int64), np.empty((0, 0))
+
+
+@pytest.fixture(scope="module")
+def model():
+    return cf.load_model("lugre")
+
+
+@pytest.fixture(scope="module")
+def orbit(model):
+    return cf.find_orbit(model, {**WHERE, "S": 0.38})
+
+
+def advance(model, t, y, dt, p):
+    out = np.empty(3)
+    model.flow.flow(0, t, np.array(y), dt, p, NONE, out, NOTHING)
+    return out
+
+
+def lugre_by_scipy(t0, y0, dt, omega, s, s0, sigma0=1000.0, vs=0.05):
+    """Integrate piece by piece with scipy; the sign of v is held in each piece."""
+    sign, t, y = math.copysign(1.0, y0[1]), t0, np.array(y0)
+
+    def field(t, y):
+        x, v, z = y
+        g = s + (s0 - s) * math.exp(-sign * v / vs)
+        return [v, math.cos(omega * t) - x - sigma0 * z, v - sigma0 * sign * v / g * z]
+
+    def stop(t, y):
+        return y[1]
+
+    stop.terminal = True
+    while True:
+        stop.direction = -sign
+        found = solve_ivp(
+            field, (t, t0 + dt), y, method="DOP853", rtol=1e-12, atol=[1e-12, 1e-12, 1e-15],
+            events=stop,
+        )  # fmt: skip
+        t, y = float(found.t[-1]), found.y[:, -1]
+        if found.status == 0:
+            return y
+        sign, y[1] = -sign, 0.0
+
+
+def test_motion_through_many_kinks_is_that_of_scipy(model):
+    start, dt = [1.2, -0.3, 0.0], 5.0  # a slide, a stop and micro-oscillations
+    p = model.vector({**WHERE, "S": 0.3})
+    mine = advance(model, 4.0, start, dt, p)
+    theirs = lugre_by_scipy(4.0, start, dt, 0.5, 0.3, 0.4)
+    assert np.abs((mine - theirs) / [1.0, 1.0, 1e-3]).max() < 2e-9
+
+
+def test_derivatives_pass_kinks(model):
+    which = np.array([model.index_of("S"), model.index_of("Omega")], dtype=np.int64)
+    params = {**WHERE, "S": 0.3}
+    p, start = model.vector(params), np.array([1.2, -0.3, 0.0])
+    out, jac = np.empty(3), np.empty((3, 7))
+    model.flow.flow(0, 4.0, start, 5.0, p, which, out, jac)
+    for column, (name, h) in enumerate((("t", 1e-6), (0, 1e-6), (1, 1e-6), (2, 1e-9), ("dt", 1e-6),
+                                        ("S", 1e-6), ("Omega", 1e-6))):  # fmt: skip
+        ends = []
+        for side in (h, -h):
+            y = start.copy()
+            if isinstance(name, int):
+                y[name] += side
+            q = model.vector({**params, name: params[name] + side}) if name in params else p
+            t, dt = 4.0 + side * (name == "t"), 5.0 + side * (name == "dt")
+            ends.append(advance(model, t, y, dt, q))
+        difference = (ends[0] - ends[1]) / (2.0 * h)
+        assert jac[:, column] == pytest.approx(difference, abs=3e-6 * np.abs(jac[:, column]).max())
+
+
+def test_hits_of_a_kink_follow_each_other(model, orbit):
+    stops = orbit.stops
+    assert len(stops) == 6
+    assert stops[:3] == pytest.approx(-stops[3:], abs=1e-12)
+    c = [o.name for o in model.observables].index("v")
+    times, values = np.empty(64), np.empty(64)
+    start = orbit.begins[0]
+    span = float(orbit.ends[0, 0] - start[0])
+    found = model.flow.turning(0, c, start[0], start[1:].copy(), span, orbit.vector, times, values)
+    assert found >= 3
+    for tau, value in zip(times[:found], values[:found], strict=True):
+        h = 1e-5
+        around = [
+            advance(model, start[0], start[1:], tau + side, orbit.vector)[1] for side in (-h, h)
+        ]
+        assert advance(model, start[0], start[1:], tau, orbit.vector)[1] == pytest.approx(
+            value, abs=1e-10
+        )
+        assert (around[0] - value) * (around[1] - value) > 0.0
+
+
+def test_multipliers_are_those_of_the_stroboscopic_map(model, orbit):
+    period, y = 4.0 * math.pi, orbit.state(1.0)
+    columns = []
+    for j, h in enumerate((1e-6, 1e-6, 1e-9)):
+        unit = np.eye(3)[j] * h
+        ends = [advance(model, 1.0, y + side * unit, period, orbit.vector) for side in (1, -1)]
+        columns.append((ends[0] - ends[1]) / (2.0 * h))
+    mine = orbit.multipliers[:2]
+    theirs = np.linalg.eigvals(np.column_stack(columns))
+    theirs = theirs[np.argsort(-np.abs(theirs))][:2]
+    for e in (1, 2):  # what does not depend on their order
+        assert np.sum(mine**e) == pytest.approx(np.sum(theirs**e), abs=1e-6)
+
+
+def test_events_do_not_depend_on_where_orbits_are_cut(model, orbit):
+    other = cf.find_orbit(model, {**WHERE, "S": 0.38, "phi0": 2.1})
+    for start, max_step in ((orbit, 0.002), (other, 0.001)):
+        branch = cf.continue_orbit(start, "S", (0.374, 0.385), max_step=max_step)
+        found = {kind: [] for kind in cf.Kind}
+        for event in branch.bifurcations:
+            found[event.kind].append(event.params["S"])
+        assert sorted(found[cf.Kind.SN]) == pytest.approx(FOLDS, abs=1e-11)
+        assert found[cf.Kind.BP] == pytest.approx([BREAKING], abs=3e-11)
+        assert len(branch.bifurcations) == 3
+
+
+@pytest.mark.parametrize(("offset", "symmetric"), [(1e-6, True), (-1e-6, False)])
+def test_simulation_settles_on_what_the_symmetry_breaking_says(model, orbit, offset, symmetric):
+    """Symmetric orbits are stable in a window of 3.7e-6 between the branch point and a fold."""
+    branch = cf.continue_orbit(orbit, "S", (0.374, 0.385), max_step=0.002)
+    breaking = next(b for b in branch.bifurcations if b.kind is cf.Kind.BP)
+    at = {**WHERE, "S": BREAKING + offset}
+    beside = polish(replace(breaking.orbit, vector=model.vector(at)))
+    assert beside.converged
+    assert beside.stable == symmetric
+    shift = np.array([1e-8, 0.0, 0.0])
+    settled = cf.find_orbit(model, at, state=beside.state(0.0) + shift, longest=20_000)
+    assert settled.stable
+    assert settled.symmetric == symmetric
+    assert (settled.asymmetry < 1e-9) == symmetric
