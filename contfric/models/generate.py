@@ -364,11 +364,11 @@ class _Writer:
         same: dict[tuple[Output, ...], list[int]] = {}
         for i, outputs in enumerate(blocks):  # two modes with one field share a block
             same.setdefault(tuple(outputs), []).append(i)
-        for row, (outputs, places) in enumerate(same.items()):
+        for row, (block, places) in enumerate(same.items()):
             last = row == len(same) - 1
             if not last:
                 self.code.open("if " + " or ".join(f"{index} == {i}" for i in places) + ":")
-            write_block(self.code, outputs, room, columns, result)
+            write_block(self.code, block, room, columns, result)
             if not last:
                 self.code.close()
         self.code.close()
