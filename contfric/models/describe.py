@@ -278,7 +278,7 @@ def _stop_surface(top: Part, surfaces: tuple[Surface, ...]) -> str:
     if top.data.get("stop_surface") is None:
         return ""
     valid = [*(s.name for s in surfaces), *top.texts("kinks")]
-    return top.one_of("stop_surface", valid, "surface or kink")
+    return top.one_of("stop_surface", valid, "surface or kink" if top.texts("kinks") else "surface")
 
 
 def _spread(top: Part, states: tuple[str, ...]) -> tuple[str, ...]:
