@@ -129,8 +129,8 @@ def _is_vertical(before: Point, after: Point, settings: Settings) -> bool:
 def _is_idle(orbit: Orbit, point: Point, settings: Settings) -> bool:
     """Tell whether a parameter turns with no multiplier near 1: no fold.
 
-    Where a slide begins at rest in its equilibrium, its duration is arbitrary: a vertical line that the branch
-    meets at its end, and on which the sign of the slope is rounding.
+    Where a slide begins at rest in its equilibrium, its duration is arbitrary: a vertical line that
+    the branch meets at its end, and on which the sign of the slope is rounding.
     """
     known = settings.stability and not orbit.system.holds and point.mu.size > 0
     return bool(known and np.all(np.abs(point.mu - 1.0) > _NEAR_ONE))

@@ -1,7 +1,7 @@
-"""Models of the literature: what their diagrams find, by equations that share nothing with the library.
+"""Models of the literature: their diagrams by equations that share nothing with the library.
 
-Piecewise linear motions are in closed form (mpmath), the others are integrated by scipy; each bifurcation is a
-root of its own condition.
+Piecewise linear motions are in closed form (mpmath), the others are integrated by scipy; each
+bifurcation is a root of its own condition.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def test_dead_band_in_closed_form() -> None:
     turn = lambda a, x: DeadBand.beyond(a, DeadBand.across(a, x))  # noqa: E731
     at = next(b for b in diagram("dead-band").bifurcations if b.kind.value == "SN").orbit
     start = max(s[1] for s, (_, e) in zip(at.ends, at.word, strict=True) if e == "v+")
-    a, x = mp.findroot(
+    a, _ = mp.findroot(
         lambda a, x: [turn(a, x) - x, mp.diff(lambda u: turn(a, u), x) - 1], (fold, start)
     )
     assert fold == pytest.approx(float(a), abs=1e-10)
@@ -192,6 +192,13 @@ def test_popp_grazing_and_doubling_by_another_integrator() -> None:
     assert found.params["omega"] == pytest.approx(omega, abs=1e-9)
 
 
+def test_popp_has_each_orbit_once() -> None:
+    """Three events lead to the orbit of period 2 with a stick; twice around is no orbit of its own."""
+    found = [b for b in diagram("popp").branches if b.name.startswith(("1a", "2a"))]
+    assert sorted((b.name, b[0].periods) for b in found) == [("1a, 5seg", 2), ("1a, 9seg", 4)]
+    assert not diagram("popp").loose_ends
+
+
 #: Of the model with impacts and friction: closed forms of what one turn does.
 FF, B, E = 0.7961, 0.8471, 0.9
 
@@ -208,6 +215,28 @@ def test_impact_with_friction_in_closed_form() -> None:
     x = 4 * FF / (1 + E) ** 2 - B
     fold = 8 * FF**2 / (speed_squared(x, B) + 8 * FF * x)
     assert value("impact-friction", "SN", 4.95) == pytest.approx(fold, abs=1e-11)
+
+
+def test_impact_with_friction_codimension_two_by_runs() -> None:
+    """On the curve of SS the multiplier comes to 1 where fold and SS meet: a root in b over runs in k."""
+    bs, shares = np.array([0.936, 0.938, 0.94, 0.942, 0.943, 0.944]), (1 + E) ** 2
+    ks, multipliers = [], []
+    for b in bs:
+        half = 4 * FF / shares - b
+        fold = 8 * FF**2 / (speed_squared(half, b) + 8 * FF * half)
+        k = 1.00002 * fold  # a little above the fold, on its stable side
+        x = half - ((half**2) - (8 * FF**2 / k - shares * (1 - b * b)) / shares) ** 0.5
+        orbit = cf.find_orbit("impact-friction", {"k": k, "b": b}, state=[x, 0.0], time=-1.5)
+        events = cf.continue_orbit(orbit, "k", (0.9 * fold, 1.5 * fold)).bifurcations
+        (event,) = [e for e in events if e.kind.value == "SS" and e.orbit.multipliers[0].real < 1]
+        ks.append(event.params["k"])
+        multipliers.append(event.orbit.multipliers[0].real)
+        assert multipliers[-1] == pytest.approx(shares * (b - FF / ks[-1]) / (4 * FF), abs=1e-9)
+    past = np.array(multipliers) - 1.0  # no such orbit exists beyond: the root by extrapolation
+    b, k = (float(np.polyfit(past, values, len(bs) - 1)[-1]) for values in (bs, np.array(ks)))
+    s = 4 * FF / shares
+    exact = 16 * FF**2 / (shares * (1 - s * s))
+    assert k == pytest.approx(exact, abs=1e-6) and b == pytest.approx(s + FF / exact, abs=1e-8)
 
 
 def test_impact_with_friction_signature() -> None:
