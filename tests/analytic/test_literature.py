@@ -171,16 +171,17 @@ def test_popp_grazing_and_doubling_by_another_integrator() -> None:
         )
 
     def grazes(u: Any) -> list[float]:
-        """The period-4 orbit touches the belt's speed from below, where its acceleration vanishes."""
+        """It touches the belt's speed from below, without acceleration; closed after four periods."""
         start = [1.5 + 0.1 * cos(u[1] * u[0]), 1.0]
         return list(after(u[1], u[0], start, 4)[:2] - start)
 
-    found = next(b for b in diagram("popp").bifurcations if b.kind.value == "GS")
-    times = np.linspace(0.0, found.orbit.period, 4001) + found.orbit.cycle[0, 0]
-    top = max(times, key=lambda t: found.orbit.state(t)[1])
-    _, omega = fsolve(grazes, [top, found.params["omega"] + 1e-6], xtol=1e-13)
-    assert found.params["omega"] == pytest.approx(omega, abs=1e-9)
-    assert found.params["omega"] == pytest.approx(1.7077997, abs=5e-8)
+    for near in (1.66769, 1.70780):
+        at = value("popp", "GS", near)
+        found = next(b for b in diagram("popp").bifurcations if b.params["omega"] == at)
+        times = np.linspace(0.0, found.orbit.period, 4001) + found.orbit.cycle[0, 0]
+        top = max(times, key=lambda t: found.orbit.state(t)[1])
+        _, omega = fsolve(grazes, [top, at + 1e-6], xtol=1e-13)
+        assert at == pytest.approx(omega, abs=1e-9) and abs(at - near) < 1e-5
 
     def doubles(u: Any) -> list[float]:
         end = after(u[2], 0.0, u[:2], 2)
@@ -190,6 +191,24 @@ def test_popp_grazing_and_doubling_by_another_integrator() -> None:
     start = found.orbit.state(2 * 2 * pi / found.params["omega"])
     omega = fsolve(doubles, [*start, found.params["omega"] + 1e-6], xtol=1e-13)[2]
     assert found.params["omega"] == pytest.approx(omega, abs=1e-9)
+
+
+def test_popp_grazing_of_period_one() -> None:
+    orbit = cf.find_orbit("popp", {"omega": 0.9})
+    events = cf.continue_orbit(orbit, "omega", (0.8, 1.0)).bifurcations
+    (found,) = [e for e in events if e.kind.value == "GS"]
+    omega, times = found.params["omega"], np.linspace(0.0, found.orbit.period, 4001)
+    times += found.orbit.cycle[0, 0]
+    top = max(times, key=lambda t: found.orbit.state(t)[1])
+
+    def grazes(u: Any) -> np.ndarray:
+        start = np.array([1.5 + 0.1 * cos(u[1] * u[0]), 1.0])
+        span = (u[0], u[0] + 2 * pi / u[1])
+        end = integrated(lambda s, y: _popp(u[1], y, s), [*start, 1, 0, 0, 1], span)
+        return end[:2] - start
+
+    assert omega == pytest.approx(fsolve(grazes, [top, omega + 1e-6], xtol=1e-13)[1], abs=1e-9)
+    assert omega == pytest.approx(0.85146070765, abs=1e-9) and orbit.periods == 1
 
 
 def test_popp_has_each_orbit_once() -> None:
