@@ -317,7 +317,7 @@ def _through(state: Exploration, orbit: Orbit) -> Branch | None:
         solved = polish(Orbit(orbit.system, orbit.joints, vector, np.inf))
         if solved.converged and solved.admissible:
             return continue_orbit(
-                solved,
+                shortest(solved),
                 settings.parameter,
                 (settings.low, settings.high),
                 max_step=settings.largest,

@@ -323,7 +323,7 @@ def follow_cell(functions, tables, ranks, mode, on, t, p, period, limits, rooms,
         total += growth[0] if live > 0 else 0.0
         lowest = min(lowest, total)
         rise = max(rise, total - lowest)
-        on = (1 << surface) | tables.lies_on[mode]
+        on = (1 << surface) | (tables.lies_on[mode] & tables.kept[surface])
         mode, joint, cycle = following, joint + 1, cycle + turns
         key = mode * surfaces + surface
         timeless = walk.at_once[1] & 1 != 0

@@ -227,7 +227,7 @@ def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, room)
         for k in range(rank):
             cycle.logs[k] += cycle.growth[k]
         turns += more
-        on = (1 << surface) | tables.lies_on[mode]
+        on = (1 << surface) | (tables.lies_on[mode] & tables.kept[surface])
         mode = following
         key = mode * tables.observables.shape[0] + surface
     return key, rank, turns, t, lasted

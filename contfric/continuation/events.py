@@ -237,7 +237,8 @@ def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
         if model.mode_by_name[mode].sliding:
             return Kind.AS
         return Kind.T if inside_sign(model, mode, test.surface) == 0 else Kind.GS
-    return Kind.CS if outward_rate(system, test, orbit) >= 0.0 else Kind.SS
+    # a load that stands still at rest: from beyond the limit the slide leads back into it, as at SS
+    return Kind.CS if outward_rate(system, test, orbit) > 0.0 else Kind.SS
 
 
 def hold_of_test(test: Test, orbit: Orbit) -> Hold | None:

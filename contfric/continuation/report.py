@@ -9,7 +9,8 @@ from contfric.continuation.points import Point, Settings
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Test
 
-#: Accuracy of an event (relative to the range) where CS and AS coincide: the root of rounding.
+#: Accuracy of an event (relative to the range) where CS and AS, or the two ends of a slide, coincide: the
+#: root of rounding.
 ROUGH = 1e-6
 #: A load that changes this slowly at a stop stands still there.
 _STILL = 1e-4
@@ -38,8 +39,8 @@ def bifurcation_at(
 
 
 def _is_rough(kind: Kind, here: Orbit, tests: tuple[Test, ...]) -> bool:
-    """Tell whether an event is located to the root of rounding only: CS where the load stands still."""
-    return kind is Kind.CS and any(
+    """Tell whether an event is located to the root of rounding only: where the load stands still."""
+    return kind in (Kind.CS, Kind.SS) and any(
         abs(outward_rate(here.system, test, here)) < _STILL for test in tests
     )
 

@@ -27,6 +27,8 @@ SAME_PLACE = 1e-7
 _VERTICAL = 1e-3
 #: A multiplier of a continuum is 1 to the root of rounding and a little.
 _MARGINAL = 1e-5
+#: A fold has a multiplier 1, located to far better than this.
+_NEAR_ONE = 0.1
 #: What it may change by over a step, relative to the range: the root of rounding.
 _CONSTANT = 1e-7
 #: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
@@ -71,7 +73,8 @@ def smooth_events(
         if column == FOLD:
             folded = True
             vertex = _fold(orbit, before, beyond, point, settings)
-            if vertex[0].kind is not Kind.SN or not _is_vertical(before, after, settings):
+            vertical = _is_vertical(before, after, settings) or _is_idle(orbit, point, settings)
+            if vertex[0].kind is not Kind.SN or not vertical:
                 found.append(vertex)
             continue
         kind = Kind.BP
@@ -121,6 +124,16 @@ def _is_vertical(before: Point, after: Point, settings: Settings) -> bool:
     if not settings.stability:
         return True
     return all(float(np.min(np.abs(point.mu - 1.0))) < _MARGINAL for point in (before, after))
+
+
+def _is_idle(orbit: Orbit, point: Point, settings: Settings) -> bool:
+    """Tell whether a parameter turns with no multiplier near 1: no fold.
+
+    Where a slide begins at rest in its equilibrium, its duration is arbitrary: a vertical line that
+    the branch meets at its end, and on which the sign of the slope is rounding.
+    """
+    known = settings.stability and not orbit.system.holds and point.mu.size > 0
+    return bool(known and np.all(np.abs(point.mu - 1.0) > _NEAR_ONE))
 
 
 def _is_vertex(here: Orbit, active: int) -> bool:

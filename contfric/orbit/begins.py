@@ -55,6 +55,9 @@ def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> 
     rest = any(domain.signs[exit_] == 0 for domain in model.domains)
     if rest and not model.filippov:  # rest is left, and a stop reversed, with an acceleration
         return 0
+    reset = model.reset_by_surface.get(entered)
+    if reset is not None and model.changed_by(reset, exit_):
+        return 0  # thrown off the surface that it rested on
     rested = model.domain_by_name[mode_domains(model, before)[0]].signs[exit_] == 0
     return int(exit_ == entered or rested)
 

@@ -41,6 +41,7 @@ class Tables(NamedTuple):
     following : mode after (mode, surface, signs of the other surfaces as bits); -1 if there is none
     sliding : whether a mode slides on a surface; 2 if it may do so for long, without excitation
     lies_on : surfaces that a mode moves on, as bits
+    kept : surfaces that the state stays on where a surface is met, as bits: a reset takes it off others
     """
 
     observables: IntArray
@@ -48,6 +49,7 @@ class Tables(NamedTuple):
     following: IntArray
     sliding: IntArray
     lies_on: IntArray
+    kept: IntArray
 
 
 class EventRows(NamedTuple):
@@ -155,6 +157,7 @@ def tables(model: Model) -> Tables:
             [int(m.sliding) * (1 + int(model.autonomous)) for m in model.modes], dtype=np.int64
         ),
         np.array([_surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
+        np.array([_surfaces_kept(model, s.name) for s in model.surfaces], dtype=np.int64),
     )
 
 
@@ -164,6 +167,16 @@ def _surfaces_under(model: Model, mode: str) -> int:
         1 << k
         for k, surface in enumerate(model.surfaces)
         if any(d.mode == mode and d.signs[surface.name] == 0 for d in model.domains)
+    )
+
+
+def _surfaces_kept(model: Model, met: str) -> int:
+    """Return the surfaces that the state stays on where one is met, as bits."""
+    reset = model.reset_by_surface.get(met)
+    return sum(
+        1 << k
+        for k, surface in enumerate(model.surfaces)
+        if reset is None or not model.changed_by(reset, surface.name)
     )
 
 
@@ -312,7 +325,7 @@ def run(
         left -= cycle + (phase - time) / period
         base, time = base + cycle, phase
         last, surface = written.joints[-1]
-        on = (1 << int(surface)) | int(model_tables.lies_on[last])
+        on = (1 << int(surface)) | int(model_tables.lies_on[last] & model_tables.kept[surface])
     found = joined(pieces)
     last_mode = model.modes[mode].name if mode >= 0 else ""
     return Trajectory(

@@ -21,7 +21,7 @@ from contfric.orbit.simulation import EventRows, Tables
 from contfric.orbit.system import IntArray
 
 #: Types of the model's tables and of the rows of events, as kernels take them.
-TablesType = types.NamedTuple([indices, table, indices, indices, indices], Tables)
+TablesType = types.NamedTuple([indices, table, indices, indices, indices, indices], Tables)
 RowsType = types.NamedTuple([table, indices, vector, matrix], EventRows)
 
 
@@ -164,7 +164,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
         rows.times[event] = t
         if not reset:
             copy_state(y, rows.states[event])
-        on |= tables.lies_on[mode]
+        on |= tables.lies_on[mode] & tables.kept[surface]
         mode = target
         event += 1
     return ALL_EVENTS, joints.shape[0], mode, cycle, t

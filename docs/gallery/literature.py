@@ -1,0 +1,65 @@
+"""Models of the literature: runs their studies, writes figures and tables; ``make gallery``.
+
+Each page has its table between ``<!-- events: STUDY -->`` and ``<!-- end -->``; all else is written by hand.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import contfric as cf
+from contfric.study.tables import listed_nodes
+
+HERE = Path(__file__).resolve().parent
+IMAGES = HERE.parent / "images" / "gallery"
+#: Studies, each with a page of the same name.
+STUDIES = ("dead-band", "impact", "impact-friction", "belt", "popp", "bang-bang")
+#: Digits behind the point: what is located to rounding, and confirmed in the tests.
+DIGITS = 11
+
+
+def rows_of(diagram: cf.Diagram) -> list[tuple[str, float, str]]:
+    """Return the events of a diagram, tangencies apart: name, value, branches that meet there."""
+    rows = []
+    for node in listed_nodes(diagram):
+        event = node.bifurcation
+        if event.kind is not cf.Kind.T:
+            names = sorted({diagram.branches[i].name for i in node.branches})
+            rows.append((event.label, event.params[diagram.parameter], "; ".join(names)))
+    return rows
+
+
+def table_of(diagram: cf.Diagram) -> list[str]:
+    """Return the events of a diagram as a table."""
+    rows = [f"| {event} | {at:.{DIGITS}f} | {names} |" for event, at, names in rows_of(diagram)]
+    head = f"| event | {diagram.parameter} | branches that meet there |"
+    return [head, "|---|---|---|", *rows]
+
+
+def with_table(page: str, name: str, lines: list[str]) -> str:
+    """Return the text of a page with its table put in its place."""
+    before, begin, rest = page.partition(f"<!-- events: {name} -->\n")
+    _, end, after = rest.partition("<!-- end -->")
+    if not end:
+        raise ValueError(f"the page has no place for the table of {name}")
+    return before + begin + "\n".join(lines) + "\n" + end + after
+
+
+def main(names: tuple[str, ...] = STUDIES) -> None:
+    """Run the studies, copy their figures and put the tables into the pages."""
+    for name in names:
+        page = HERE / f"{name}.md"
+        with tempfile.TemporaryDirectory() as folder:
+            result = cf.run_study(name, Path(folder) / "out")
+            assert result.diagram is not None
+            shutil.copyfile(result.out / "diagram.png", IMAGES / f"{name}.png")
+            shutil.copyfile(result.out / "orbit.png", IMAGES / f"{name}-orbit.png")
+        text = page.read_text(encoding="utf-8")
+        page.write_text(with_table(text, name, table_of(result.diagram)), encoding="utf-8")
+        print(f"{name}: {result.diagram!r}, {result.info['timings']}")
+
+
+if __name__ == "__main__":
+    main()
