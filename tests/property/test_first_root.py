@@ -258,7 +258,14 @@ def test_a_grazing_is_neither_missed_nor_invented(case) -> None:
         assert found == -1.0, "v stays above zero"
     else:
         assert found > 0.0, "v falls below zero"
-        assert found - duration == pytest.approx(-ahead, abs=0.2 * ahead + 2 * ahead**2)
+        if height > -1e-8:  # so near to the minimum that a parabola is all there is
+            assert found - duration == pytest.approx(-ahead, abs=0.2 * ahead + 2 * ahead**2)
+            return
+        motion = Motion(mode, p, t0, y0)
+        way = np.linspace(0.0, duration, 2001)
+        left = way[np.flatnonzero(motion.observable(SPEED, way) * (1 - 2 * mode) > 0.0)[-1]]
+        wanted = brentq(lambda tau: motion.observable(SPEED, tau), left, duration, xtol=1e-14)
+        assert found == pytest.approx(wanted, abs=1e-6 * ahead)
 
 
 def stationary_phases(h: float) -> list[float]:
