@@ -40,10 +40,10 @@ def test_the_line_at_one_half() -> None:
     assert "0.0545, a ratio of 7.3" in PAGE
 
 
-@pytest.mark.parametrize("row", table("maps"), ids=lambda row: f"S0={row[0]}, h={row[1]}")
-def test_no_chaos_at_twice_the_largest_friction_of_chaos(row: list[str]) -> None:
-    if row[1] != "0":
-        return
+@pytest.mark.parametrize(
+    "row", [row for row in table("maps") if row[1] == "0"], ids=lambda row: f"S0={row[0]}"
+)
+def test_no_chaos_far_above_the_largest_friction_of_chaos(row: list[str]) -> None:
     S0, largest = float(row[0]), float(row[3])
     beyond = np.linspace(largest, S0, 6)[2:]
     assert not motions(np.linspace(0.1, 0.9, 9), beyond, S0, 0).chaotic.any()
