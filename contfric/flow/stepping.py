@@ -38,6 +38,9 @@ INTEGRAL = 0.04
 #: Change of the step after one that failed altogether, and the share of what is left below which that is
 #: given up.
 FAILED, HOPELESS = 0.2, 1e-14
+#: A state counts as at least this share of its scale when the first step is chosen: one that starts next
+#: to zero would ask for a step that does not move the time.
+_SIZED = 1e-4
 #: Errors below this are taken for it: the step grows as far as it may anyhow.
 _LEAST = 1e-10
 #: Steps below this many units in the last place of the time do not move it.
@@ -50,12 +53,12 @@ def first_step(motion, mode, c, t, left, p, which, room):  # type: ignore[no-unt
     start, slopes, control, allowed = room.start, room.slopes, room.control, room.allowed
     size = start.shape[0]
     slope(motion, mode, c, t, start, p, which, room, slopes[0])
-    d0, d1 = 0.0, 0.0
+    d0, d1 = _SIZED / motion.absolute, 0.0
     for k in range(size):
         here = allowed[k] + motion.relative * abs(start[k])
         d0 = max(d0, abs(start[k]) / here)
         d1 = max(d1, abs(slopes[0, k]) / here)
-    h = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+    h = 1e-6 if d1 < 1e-5 else 0.01 * d0 / d1
     h = min(h, abs(left))
     step = math.copysign(h, left)
     for k in range(size):

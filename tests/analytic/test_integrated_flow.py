@@ -122,6 +122,17 @@ def test_no_time_little_time_and_backwards():
     assert integrated.turning(0, SPEED, 0.3, y, -1.0, p, times, times) == 0
 
 
+@pytest.mark.parametrize("tiny", [0.0, 1e-300, -1.15e-15, 1e-12])
+def test_starts_next_to_zero(tiny):
+    # the first step is not in proportion to the state: from -1.15e-15 it would not have moved the time
+    p, y = np.array([0.7, 0.0, 0.4, 0.2, 0.05]), np.array([tiny, 0.0])
+    for t0 in (0.3, 9.581815299, -200.0):
+        a, b = np.empty(2), np.empty(2)
+        integrated.flow(0, t0, y, 1.7, p, NONE, a, NOTHING)
+        closed.flow(0, t0, y, 1.7, p, NONE, b, NOTHING)
+        assert np.abs(a - b).max() < 1e-12
+
+
 def test_what_is_no_number_stays_none():
     p, y1, jac = np.array([0.5, 0.3, 0.4, 0.0, 0.0]), np.empty(2), np.empty((2, 5))
     for t0, y, dt in (
