@@ -36,6 +36,8 @@ from numba import types
 from numba.core import config
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
+from contfric.inlined import part_options
+
 # First-class functions are what makes the cache possible; numba still calls them experimental.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
@@ -236,7 +238,7 @@ def kernel(signature: Any) -> Callable[[Callable[..., Any]], Kernel]:
 
 
 #: A helper is never called from Python or C: its wrappers would take a quarter of the time to compile.
-_INSIDE = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_INSIDE = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **part_options()}
 
 
 def helper(function: F) -> F:
