@@ -70,7 +70,9 @@ def follow(state: Exploration, event: Event) -> None:
 
 def _follow_sliding(state: Exploration, event: Event) -> None:
     accepted = jumps = False
-    for proposed in (candidates, wider_candidates):
+    model = event.bifurcation.orbit.model
+    edits = bool(model.resets) or any(mode.sliding for mode in model.modes)  # else nothing rests
+    for proposed in (candidates, wider_candidates) if edits else ():
         for candidate in proposed(event.bifurcation):
             jumps = jumps or candidate.has_hold
             accepted = _judge(state, event, candidate) or accepted
