@@ -135,10 +135,16 @@ def has_settled(size, before, worst, floor):  # type: ignore[no-untyped-def]
 
 
 @helper
+def is_noise(size, worst):  # type: ignore[no-untyped-def]
+    """Tell whether a residual may be rounding, and the correction what it asks for."""
+    return worst < _NOISE and size < 1e-6
+
+
+@helper
 def at_floor(size, before, worst, worst_before):  # type: ignore[no-untyped-def]
     """Tell whether neither corrections nor residual fall any more: what is left is rounding."""
     stands = size >= 0.5 * before and worst >= _STILL_FALLS * worst_before
-    return stands and worst < _NOISE and size < 1e-6
+    return stands and is_noise(size, worst)
 
 
 @helper
@@ -183,7 +189,7 @@ def correct(  # type: ignore[no-untyped-def]
         ):
             return CONVERGED, step + 1, first, worst
         residual_before = worst
-        if not damped and step > 1 and size > 2.0 * before:
+        if not damped and step > 1 and size > 2.0 * before and not is_noise(size, worst):
             return NOT_CONVERGED, step + 1, first, worst
         before = (
             size if share == 1.0 else np.inf
