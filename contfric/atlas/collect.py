@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from contfric.atlas.diagram import Diagram, LooseEnd, Node
-from contfric.atlas.matching import same_event
+from contfric.atlas.matching import same_event, telling_kind
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation, End, EndReason, Proposal, Verdict
 from contfric.continuation.points import Settings
@@ -93,8 +93,9 @@ def _with_proposals(model: Model, computed: list[Branch], events: list[Event]) -
         proposals = tuple(
             p if p.branch is None else replace(p, branch=place[p.branch]) for p in event.proposals
         )
+        kind = telling_kind(member.kind for member in event.members)
         for member in event.members:
-            changed[id(member)] = replace(member, proposals=proposals)
+            changed[id(member)] = replace(member, kind=kind, proposals=proposals)
         event.bifurcation = changed[id(event.bifurcation)]
         event.members = [changed[id(member)] for member in event.members]
     return [_renewed(branch, changed, rests) for branch in computed]
@@ -109,7 +110,9 @@ def _renewed(branch: Branch, changed: dict[int, Bifurcation], rests: set[int]) -
         elif id(b) in rests:
             ends.append(End(EndReason.REST, bifurcation=changed[id(b)]))
         else:
-            ends.append(replace(end, bifurcation=changed.get(id(b), b)))
+            now = changed.get(id(b), b)
+            reason = end.reason if now.kind is b.kind else EndReason[now.kind.name]
+            ends.append(replace(end, reason=reason, bifurcation=now))
     found = tuple(changed.get(id(b), b) for b in branch.bifurcations)
     return replace(branch, bifurcations=found, ends=(ends[0], ends[1]))
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation
+from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import polish
@@ -18,6 +19,8 @@ from contfric.signature import ReducedWord, canonical_word
 SAME_MOTION = 1e-4
 #: Orbits solved at the same parameter are one if their stops agree to this.
 _SAME_ORBIT = 1e-8
+#: Names of one and the same sliding event, those that say more first.
+_TELLING = {kind: rank for rank, kind in enumerate((Kind.GS, Kind.AS, Kind.SS, Kind.CS))}
 
 
 def identity(orbit: Orbit) -> frozenset[ReducedWord]:
@@ -58,7 +61,7 @@ def stops_distance(a: FloatArray, b: FloatArray, mirror: bool) -> float:
 
 def same_event(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> bool:
     """Tell whether two branches have met the same event (or its mirror image)."""
-    if a.kind is not b.kind:
+    if not same_kind(a, b):
         return False
     if abs(a.params[parameter] - b.params[parameter]) > max(a.accuracy, b.accuracy) * width:
         return False
@@ -69,6 +72,28 @@ def same_event(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> 
         return True
     images = (b.orbit, b.orbit.mirror()) if mirror else (b.orbit,)
     return any(motions_distance(a.orbit, image) < SAME_MOTION for image in images)
+
+
+def same_kind(a: Bifurcation, b: Bifurcation) -> bool:
+    """Tell whether two events may be one by what branches call them.
+
+    Where nothing jumps, what is a grazing for one word may be a stop at the boundary of rest for another:
+    the sliding events are compared by their motions alone.
+    """
+    if a.kind is b.kind:
+        return True
+    return a.orbit.model.filippov and a.kind in TERMINAL and b.kind in TERMINAL
+
+
+def telling_kind(kinds: Iterable[Kind]) -> Kind:
+    """Return the name of an event that branches have different names for: how its stick is born.
+
+    Examples
+    --------
+    >>> telling_kind([Kind.CS, Kind.GS]).value
+    'GS'
+    """
+    return min(kinds, key=lambda kind: _TELLING.get(kind, len(_TELLING)))
 
 
 def motions_distance(a: Orbit, b: Orbit) -> float:

@@ -6,7 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.continuation.events import Bifurcation, Kind, hold_of_test, kind_of_margin
+from contfric.continuation.events import (
+    Bifurcation,
+    Kind,
+    hold_of_test,
+    kind_of_margin,
+    rate_along,
+)
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import bifurcation_at
 from contfric.continuation.trial import locate_change
@@ -85,7 +91,7 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
     tests = here.system.tests
     test = tests[first]
     if test.margin in (Margin.ENTRY, Margin.JOINT):
-        return _grazed_wall(here, point, first)
+        return _grazed_stop(here, point, _grazed_wall(here, point, first))
     if test.margin is not Margin.EXIT or hold_of_test(test, here) is not None:
         return first
     i = test.segment
@@ -114,6 +120,31 @@ def _grazed_wall(here: Orbit, point: Point, first: int) -> int:
             and other.surface in here.model.reset_by_surface
             and abs(point.tests[k]) < _NEARLY_REACHED
         ):
+            return k
+    return first
+
+
+def _grazed_stop(here: Orbit, point: Point, first: int) -> int:
+    """Return the margin of a tangential stop, if the load at a stop is at its limit for that reason.
+
+    Where nothing jumps, a slide that comes to rest without acceleration has the load that rest is left
+    with: both margins are one function, and which of them is located first is rounding. It is a grazing;
+    but not where the slide begins in its equilibrium, and goes nowhere.
+    """
+    tests = here.system.tests
+    test = tests[first]
+    if not here.model.filippov or test.margin is not Margin.JOINT:
+        return first
+    i = test.segment
+    if here.ends[i, 0] - here.cycle[i, 0] <= _VANISHED * here.period:
+        return first
+    modes = [mode.name for mode in here.model.modes]
+    at_start = rate_along(here, modes.index(here.word[i][0]), here.word[i][1], here.begins[i])
+    if abs(at_start) < _NEARLY_REACHED:
+        return first
+    for k, other in enumerate(tests):
+        tangential = other.margin is Margin.EXIT and abs(point.tests[k]) < _NEARLY_REACHED
+        if tangential and other.segment == i:
             return k
     return first
 

@@ -29,7 +29,7 @@ _VERTICAL = 1e-3
 _MARGINAL = 1e-5
 #: A fold has a multiplier 1, located to far better than this.
 _NEAR_ONE = 0.1
-#: What it may change by over a step, relative to the range: the root of rounding.
+#: What it may change by over a step, relative to the range, where it is constant: the root of rounding.
 _CONSTANT = 1e-7
 #: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
 _COMPLEX = 1e-6
@@ -73,7 +73,9 @@ def smooth_events(
         if column == FOLD:
             folded = True
             vertex = _fold(orbit, before, beyond, point, settings)
-            vertical = _is_vertical(before, after, settings) or _is_idle(orbit, point, settings)
+            vertical = _is_vertical(before, after, settings) or _is_idle(
+                orbit, before, point, after, settings
+            )
             if vertex[0].kind is not Kind.SN or not vertical:
                 found.append(vertex)
             continue
@@ -126,12 +128,17 @@ def _is_vertical(before: Point, after: Point, settings: Settings) -> bool:
     return all(float(np.min(np.abs(point.mu - 1.0))) < _MARGINAL for point in (before, after))
 
 
-def _is_idle(orbit: Orbit, point: Point, settings: Settings) -> bool:
-    """Tell whether a parameter turns with no multiplier near 1: no fold.
+def _is_idle(orbit: Orbit, before: Point, point: Point, after: Point, settings: Settings) -> bool:
+    """Tell whether a parameter comes to a stand with no multiplier near 1: no fold.
 
-    Where a slide begins at rest in its equilibrium, its duration is arbitrary: a vertical line that
-    the branch meets at its end, and on which the sign of the slope is rounding.
+    Where a slide begins at rest in its equilibrium, or grazes, its duration is arbitrary: a vertical line
+    that the branch meets at its end, and on which the sign of the slope is rounding. At a fold the
+    parameter turns: its values on both sides lie on one side of that at the fold, and away from it. So
+    one that turns is a fold whatever the multipliers are.
     """
+    leaves = min(abs(side.value - point.value) for side in (before, after))
+    if leaves > _CONSTANT * settings.width:
+        return False
     known = settings.stability and not orbit.system.holds and point.mu.size > 0
     return bool(known and np.all(np.abs(point.mu - 1.0) > _NEAR_ONE))
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import ast
 import keyword
 import math
+import re
 import unicodedata
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -114,7 +115,9 @@ def _syntax(source: str, error: SyntaxError) -> str:
         return f"'{foreign[0]}' is a word of Python: use another name"
     place = source[max((error.offset or 1) - 1, 0) :]
     where = f" near '{_short(place)}'" if place else " at its end"
-    return f"{error.msg or 'no expression'}{where}"
+    product = re.search(r"(?<![\w.])\d+(?:\.\d*)?\s*[A-Za-z_(]|\w\s+\w|\)\s*[\w(]", source)
+    hint = f": a product needs its * (in '{product.group()}')" if product else ""
+    return f"{error.msg or 'no expression'}{where}{hint}"
 
 
 def _short(text: str) -> str:

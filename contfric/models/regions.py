@@ -137,6 +137,12 @@ def _renamed(domains: list[Domain], named: tuple[DomainText, ...]) -> tuple[Doma
                 f"it holds for: {names}",
             )
         d = domains[fits[0]]
+        if found[fits[0]] is not d:
+            raise EntryError(
+                ("domains", text.name),
+                f"'in' of domain '{text.name}' holds for the region of domain "
+                f"'{found[fits[0]].name}': each region has one name",
+            )
         found[fits[0]] = Domain(text.name, d.mode, d.signs, text.label or text.name)
     every = [d.name for d in found]
     twice = [name for name in every if every.count(name) > 1]

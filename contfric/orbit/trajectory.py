@@ -41,6 +41,10 @@ ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE, QUIET, CHATTER = range(7)
 #: any mode of an autonomous model, gets far more (periods, or units of time).
 HOLD_PERIODS, SLIDE_PERIODS = 1.001, 1e4
 
+#: Over which the next surface is looked for first where there is no period (units of time), and how much
+#: farther then: what is integrated twice is a third of the whole.
+FIRST_SPAN, LONGER_SPAN = 8.0, 4.0
+
 #: Events within this share of a period follow each other at once; more of them in a row than this do
 #: not come to an end (a stop, a release and a reversal may fall together, twice).
 NO_TIME, MOST_AT_ONCE = 1e-12, 16
@@ -78,20 +82,29 @@ def sign_code(functions, observables, surface, t, y, p, none, empty):  # type: i
 def first_hit(functions, tables, mode, on, t, y, p, longest, room):  # type: ignore[no-untyped-def]
     """Return (time, surface) of the first bounding surface that is met; (-1, -1) if none.
 
-    The state there is written to ``room.after``.
+    The state there is written to ``room.after``. All surfaces are looked for over one period, then over
+    spans that grow: one that a motion never meets would else be looked for until the end of a simulation
+    at every event.
     """
     observables, bounds, none, empty = tables.observables, tables.bounds, room.none, room.empty
-    best, which = longest, -1
-    for k in range(observables.shape[0]):
-        if bounds[mode, k] == 0:
-            continue
-        target = functions[2](k, p, none, empty)
-        started = (on >> k) & 1 == 1
-        tau = functions[4](mode, observables[k], target, started, t, y, best, p, room.trial)
-        if tau >= 0.0 and (which < 0 or tau < best):
-            best, which = tau, k
-            copy_state(room.trial, room.after)
-    return (best, which) if which >= 0 else (-1.0, -1)
+    period = functions[5](p, none, empty)
+    span = period if period > 0.0 else FIRST_SPAN
+    while True:
+        best, which = min(span, longest), -1
+        for k in range(observables.shape[0]):
+            if bounds[mode, k] == 0:
+                continue
+            target = functions[2](k, p, none, empty)
+            started = (on >> k) & 1 == 1
+            tau = functions[4](mode, observables[k], target, started, t, y, best, p, room.trial)
+            if tau >= 0.0 and (which < 0 or tau < best):
+                best, which = tau, k
+                copy_state(room.trial, room.after)
+        if which >= 0:
+            return best, which
+        if not span < longest:
+            return -1.0, -1
+        span *= LONGER_SPAN
 
 
 @helper

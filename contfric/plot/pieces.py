@@ -24,6 +24,7 @@ _BISECTIONS = 45
 class Piece:
     """Part of an orbit inside one domain: times (k,) and states (k, n), both ends included.
 
+    Behind an impact the first two rows are the states before and behind it, at the same time.
     ``exit`` is the surface through which it leaves; ``segment`` counts the orbit's own segments.
     """
 
@@ -59,9 +60,10 @@ def level(orbit: OrbitLike, surface: Surface) -> float:
 def pieces_of(orbit: OrbitLike, points: int = 400) -> list[Piece]:
     """Cut one period of an orbit at its joints and where it crosses a surface in between."""
     found: list[Piece] = []
-    for i, ((mode, exit_), start, end) in enumerate(
-        zip(orbit.word, orbit.cycle, orbit.ends, strict=True)
+    for i, ((mode, exit_), joint, start, end) in enumerate(
+        zip(orbit.word, orbit.cycle, orbit.begins, orbit.ends, strict=True)
     ):
+        struck = not np.array_equal(joint, start)
         count = max(9, int(np.ceil(points * (end[0] - start[0]) / orbit.period)))
         times = np.linspace(start[0], end[0], count)
         states = np.array([start[1:], *(orbit.state(t) for t in times[1:-1]), end[1:]])
@@ -74,7 +76,10 @@ def pieces_of(orbit: OrbitLike, points: int = 400) -> list[Piece]:
             last = end[1:] if time == end[0] else orbit.state(time)
             middle = 0.5 * (before + time)
             domain = _domain(orbit, mode, middle)
-            found.append(Piece(domain, i, own, np.array([first, *states[inside], last]), surface))
+            rows = [first, *states[inside], last]
+            if struck and before == start[0]:
+                own, rows = np.array([before, *own]), [joint[1:], *rows]
+            found.append(Piece(domain, i, own, np.array(rows), surface))
             before = time
     return found
 

@@ -55,6 +55,10 @@ class OrbitLike(Protocol):
         """Start time and state of each segment, shape (segments, 1 + n)."""
 
     @property
+    def begins(self) -> FloatArray:
+        """The same behind resets."""
+
+    @property
     def ends(self) -> FloatArray:
         """End time and state of each segment, shape (segments, 1 + n)."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,10 +19,15 @@ GREY = "#6E6E6E"
 
 #: Colours of the four typical branches; the others take `_OTHERS` in the order of their names.
 _TYPICAL = {"2s": BLUE, "0s": BLACK, "1a": VERMILLION, "2a": GREEN}
+#: Brightness of a colour that is used a second time.
+_DARKER = 0.6
 _OTHERS = (PURPLE, ORANGE, SKY, "#8B6B00", "#7A3E9D", "#A50F15", GREY)
 
 #: Dark and light of one hue for a domain and its mirror image.
 _DOMAIN_PAIRS = ((BLUE, SKY), (VERMILLION, "#F2A45C"), (GREEN, "#7BCBA9"), (PURPLE, "#EBC3D8"))
+
+#: Where no domain has an image, the light ones follow the dark ones.
+_SINGLES = tuple(pair[k] for k in (0, 1) for pair in _DOMAIN_PAIRS)
 
 STABLE, UNSTABLE, UNKNOWN = "-", (0, (4.0, 2.2)), "-"
 LINE_WIDTH, MIRROR_WIDTH, UNKNOWN_WIDTH = 1.7, 1.1, 0.9
@@ -162,6 +167,11 @@ def _mixed(colour: str, other: float, share: float) -> str:
     return to_hex((red, green, blue))
 
 
+def _nth(palette: Sequence[str], k: int) -> str:
+    """Return the k-th colour; each further round of a palette is darker."""
+    return _mixed(palette[k % len(palette)], 0.0, 1.0 - _DARKER ** (k // len(palette)))
+
+
 def branch_colours(names: Iterable[str]) -> dict[str, str]:
     """Return a colour for each name of a branch, the same in every row of a diagram.
 
@@ -172,7 +182,7 @@ def branch_colours(names: Iterable[str]) -> dict[str, str]:
     """
     distinct = list(dict.fromkeys(names))
     others = iter(sorted(set(distinct) - set(_TYPICAL)))
-    cycle = {name: _OTHERS[k % len(_OTHERS)] for k, name in enumerate(others)}
+    cycle = {name: _nth(_OTHERS, k) for k, name in enumerate(others)}
     return {name: _TYPICAL.get(name) or cycle[name] for name in distinct}
 
 
@@ -196,8 +206,10 @@ def domain_colours(model: Model) -> dict[str, str]:
         if image == domain.name:
             found[domain.name] = BLACK
             continue
-        dark, light = _DOMAIN_PAIRS[next(hues) % len(_DOMAIN_PAIRS)]
-        found[domain.name] = dark
-        if image is not None:
-            found[image] = light
+        k = next(hues)
+        if image is None:
+            found[domain.name] = _nth(_SINGLES, k)
+            continue
+        dark, light = zip(*_DOMAIN_PAIRS, strict=True)
+        found[domain.name], found[image] = _nth(dark, k), _nth(light, k)
     return {domain.name: found[domain.name] for domain in model.domains}

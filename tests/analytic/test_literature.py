@@ -264,30 +264,71 @@ def test_impact_with_friction_signature() -> None:
     assert [mode for mode, _ in branch[0].word] == ["stick", "slide+", "slide-"]
 
 
-def _half(A: float, y: Any) -> np.ndarray:
-    """Return the state and tangent map after half a period of the bang-bang force, mirrored."""
+def _half_turns(A: float, y: Any, count: int) -> np.ndarray:
+    """Return state and tangent map after half periods of the bang-bang force, each mirrored."""
 
     def f(_: float, y: np.ndarray) -> list[float]:
         tangent = y[2:].reshape(2, 2)
         grown = np.array([tangent[1], -0.2 * tangent[1] - (1 + 3 * y[0] ** 2) * tangent[0]])
         return [y[1], A - 0.2 * y[1] - y[0] - y[0] ** 3, *grown.ravel()]
 
-    return -integrated(f, [*y, 1, 0, 0, 1], (0.0, pi))
+    there = np.array([*y, 1, 0, 0, 1])
+    for _ in range(count):
+        there = -integrated(f, there, (0.0, pi))
+    return there
 
 
 @pytest.mark.parametrize(
-    "kind, near, sign",
-    [("SN", 9.4, -1), ("SN", 4.36, -1), ("BP", 2.88, 1), ("BP", 5.69, 1), ("BP", 20.89, 1)],
+    "kind, near, halves",
+    [
+        *[("SN", near, 1) for near in (4.357, 9.408, 20.944, 48.633)],
+        *[("BP", near, 1) for near in (2.880, 5.691, 20.887, 40.178, 43.544, 46.706, 69.852)],
+        *[("SN", near, 2) for near in (21.868, 24.742)],
+        *[("PD", near, 2) for near in (26.660, 41.691, 73.128)],
+        ("PD", 27.518, 4),
+    ],
 )
-def test_bang_bang_by_another_integrator(kind: str, near: float, sign: int) -> None:
-    """A symmetric orbit folds where its half map has the multiplier 1, and breaks at -1."""
+def test_bang_bang_by_another_integrator(kind: str, near: float, halves: int) -> None:
+    """An orbit folds where the map of its turn has the multiplier 1; it breaks or doubles at -1."""
     at = value("bang-bang", kind, near)
     events = diagram("bang-bang").bifurcations
     orbit = next(e.orbit for e in events if e.kind.value == kind and e.params["A"] == at)
+    assert halves == (1 if orbit.symmetric else 2 * orbit.periods) and abs(at - near) < 6e-4
+    critical = 1.0 if kind == "SN" else -1.0
 
     def singular(u: Any) -> list[float]:
-        end = _half(u[2], u[:2])
-        return [*(end[:2] - u[:2]), np.linalg.det(end[2:].reshape(2, 2) + sign * np.eye(2))]
+        end = _half_turns(u[2], u[:2], halves)
+        tangent = end[2:].reshape(2, 2)
+        return [*(end[:2] - u[:2]), np.linalg.det(tangent - critical * np.eye(2))]
 
-    found = fsolve(singular, [*orbit.state(2 * pi), at * (1 + 1e-7)], xtol=1e-13)
+    found = fsolve(singular, [*orbit.state(0.0), at * (1 + 1e-7)], xtol=1e-13)
     assert at == pytest.approx(found[2], abs=2e-9)
+
+
+def test_bang_bang_is_found_from_one_start() -> None:
+    """Four pairs of asymmetric branches and both cascades hang together with the orbit at A = 1."""
+    found = diagram("bang-bang")
+    assert found.connected and not found.loose_ends and found.complete
+    own = [b for b in found.branches if not b.mirrored]
+    assert sorted(b.system.periods for b in own) == [1, 1, 1, 1, 1, 2, 2, 4, 4, 8, 8]
+    upper = next(b for b in own if 40.0 < b.values.min() < 41.0)
+    assert bool(np.all(upper.stable[1:-1])) and upper.values.max() < 46.8
+
+
+def test_events_that_branches_share_are_listed_once() -> None:
+    """The grazing of the orbit of period 2 is met by three branches, one of which stops there."""
+    for name in ("popp", "impact-friction", "impact", "belt", "dead-band", "bang-bang"):
+        found = diagram(name)
+        events = [b for b in found.bifurcations if b.kind is not cf.Kind.T]
+        values = np.array([b.params[found.parameter] for b in events])
+        assert np.all(np.diff(values) > 1e-7), name
+    (node,) = [
+        n
+        for n in diagram("popp").nodes
+        if abs(n.bifurcation.params["omega"] - 1.66769) < 1e-5
+    ]
+    names = {diagram("popp").branches[i].name for i in node.branches}
+    assert node.bifurcation.kind is cf.Kind.GS and names == {"0a, 4seg", "1a, 5seg", "1a, 9seg"}
+    for branch in diagram("popp").branches:
+        for end in branch.ends:
+            assert end.bifurcation is None or end.reason.name == end.bifurcation.kind.value

@@ -6,7 +6,7 @@ import numpy as np
 
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.definition import FloatArray, Surface
+from contfric.models.definition import FloatArray, Mode, Model, Surface
 
 #: States on each surface, and in the whole region.
 _ON_SURFACE, _EVERYWHERE = 200, 400
@@ -165,6 +165,7 @@ def check_sliding(report: ModelReport, probe: Probe) -> None:
     for mode in model.modes:
         if not mode.sliding:
             continue
+        _check_left(report, model, mode)
         domain = next(d for d in model.domains if d.mode == mode.name)
         surfaces = tuple(name for name, side in domain.signs.items() if side == 0)
         for t, y in probe.states(_ON_SURFACE):
@@ -182,6 +183,21 @@ def check_sliding(report: ModelReport, probe: Probe) -> None:
                         f"'{model.surface_by_name[name].observable}' is {rate:.6g}, it must be 0",
                     )
                     return
+
+
+def _check_left(report: ModelReport, model: Model, mode: Mode) -> None:
+    """Warn of a sliding mode that nothing ends: motion would stay in it for ever."""
+    own = {d.name for d in model.domains if d.mode == mode.name}
+    left = any(
+        source in own and not own.issuperset(targets)
+        for (source, _), targets in model.targets.items()
+    )
+    if not left:
+        report.warn(
+            Topic.SLIDING,
+            f"mode '{mode.name}' is never left: no surface ends it. Add the limits between which it can "
+            "stay to its 'in', such as F+: -, F-: +",
+        )
 
 
 def check_symmetry(report: ModelReport, probe: Probe) -> None:
