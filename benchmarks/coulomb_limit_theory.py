@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+from scipy.optimize import brentq, fsolve
 
 #: The constant of the release with stiff bristles, A = 1 + RELEASE kappa^(-2/3) + ...
 RELEASE = 1.424670
@@ -119,7 +119,7 @@ class Slide:
 
     def end(self) -> tuple[float, float]:
         """Time and place of its stop."""
-        times = self.time + np.linspace(1e-3, 2.0 * math.pi, SAMPLES)
+        times = self.time + np.linspace(1e-3, 4.0 * math.pi, SAMPLES)
         rest = np.flatnonzero(self.way * self.state(times)[1] <= 0.0)[0]
         stop = brentq(lambda t: float(self.state(t)[1]), times[rest - 1], times[rest], xtol=1e-15)
         return stop, float(self.state(stop)[0])
@@ -152,3 +152,32 @@ def _behind(stop: float, x: float, Omega: float, law: Law, delays: bool) -> Slid
     rate = side * Omega * math.sin(Omega * free)
     late = law.release(rate) if delays else 0.0
     return Slide(free + late, x, -side, Omega, law.S)
+
+
+def held(law: Law, length: float, guess: np.ndarray, delays: bool = True) -> np.ndarray:
+    """Omega, x_max and -x_min of the orbit of one stick, one slide to a pinned stop and a hold of a length.
+
+    Under a law with ``delays`` the pin is that of its canard, which creeps while it is held.
+    """
+
+    def turn(unknown: np.ndarray) -> tuple[np.ndarray, float]:
+        Omega, rest = map(float, unknown)
+        phase = -math.acos(rest + law.S0)
+        late = law.release(-Omega * math.sin(phase)) if delays else 0.0
+        stop, x = Slide(phase / Omega + late, rest, 1.0, Omega, law.S).end()
+        early = law.stop(x - math.cos(Omega * stop)) if delays else 0.0
+        stop -= early
+        beyond = law.pin(-Omega * math.sin(Omega * stop)) if delays else 0.0
+        crept = _creep(law, x, Omega, stop, length) if delays else 0.0
+        _, back = Slide(stop + length, x - crept, -1.0, Omega, law.S).end()
+        return np.array([x - math.cos(Omega * stop) - law.S0 - beyond, back - rest]), x
+
+    solution = fsolve(lambda unknown: turn(unknown)[0], guess, xtol=1e-13)
+    return np.array([solution[0], turn(solution)[1], -solution[1]])
+
+
+def _creep(law: Law, x: float, Omega: float, stop: float, length: float) -> float:
+    """Way of a hold, along g(v) = |u|: vS log(D / (|u| - S)) integrated."""
+    times = np.linspace(stop, stop + length, 201)
+    speed = np.log(law.drop / (x - np.cos(Omega * times) - law.S))
+    return law.vS * float(np.trapezoid(speed, times))
