@@ -14,6 +14,7 @@ from functools import cache
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
+from scipy.special import lambertw
 
 #: The constant of the release with stiff bristles, A = 1 + RELEASE kappa^(-2/3) + ...
 RELEASE = 1.424670
@@ -29,6 +30,7 @@ class Law:
     S0: float
     vS: float
     sigma0: float = math.inf
+    sigma1: float = 0.0
 
     @property
     def drop(self) -> float:
@@ -45,9 +47,24 @@ class Law:
         return self.sigma0 * self.vS**3 * rate / (self.S0 * self.drop**3)
 
     def release(self, rate: float) -> float:
-        """Delay of a release: tau (log(D^2 / (a vS)) - log A(kappa))."""
+        """Delay of a release: tau (log(D^2 / (a vS)) - log A(kappa)) - sigma1 / sigma0."""
         early = 0.0 if math.isinf(self.sigma0) else math.log(amplification(self.kappa(rate)))
-        return self.tau * (math.log(self.drop**2 / (rate * self.vS)) - early)
+        delay = self.tau * (math.log(self.drop**2 / (rate * self.vS)) - early)
+        return delay - self.sigma1 / self.sigma0
+
+    @property
+    def rebound(self) -> float:
+        """Speed with which bristles throw the mass back at a stop with \|u\| = S0.
+
+        S0 y / sqrt(sigma0) with y + log(1 - m y) / m = -2 m, m = sigma1 / sqrt(sigma0); y = 2 for m = 0.
+        """
+        if math.isinf(self.sigma0):
+            return 0.0
+        m = self.sigma1 / math.sqrt(self.sigma0)
+        y = 2.0
+        if m > 0.0:
+            y = (1.0 + float(np.real(lambertw(-math.exp(-1.0 - 2.0 * m * m))))) / m
+        return self.S0 * y / math.sqrt(self.sigma0)
 
     def stop(self, load: float) -> float:
         """Time by which a slide ends earlier that comes to rest under the load u (signed with the motion)."""
@@ -58,14 +75,12 @@ class Law:
         """Time by which a slide starts later that leaves under \\|u\\| > S0 at once."""
         b = load - self.S
         delay = self.vS / b * math.log(b / (b - self.drop))
-        if math.isinf(self.sigma0):
-            return delay
-        root = math.sqrt(self.sigma0)
-        return delay + math.log(2.0) / root - 2.0 * self.S0 / (root * (load - self.S0))
+        bristles = math.log(2.0) / math.sqrt(self.sigma0)
+        return delay + bristles - self.rebound / (load - self.S0)
 
     def pin(self, rate: float) -> float:
         """\\|u\\| - S0 at the stop that begins a canard under a load that falls at the rate a."""
-        return rate * self.tau - 2.0 * self.S0 / (math.sqrt(self.sigma0) * self.tau)
+        return rate * self.tau - self.rebound / self.tau
 
 
 @cache
