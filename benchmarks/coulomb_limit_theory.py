@@ -47,10 +47,15 @@ class Law:
         return self.sigma0 * self.vS**3 * rate / (self.S0 * self.drop**3)
 
     def release(self, rate: float) -> float:
-        """Delay of a release: tau (log(D^2 / (a vS)) - log A(kappa)) - sigma1 / sigma0."""
+        """Delay of a release: (tau - nu) (log(D^2 / (a vS)) - log A(kappa)) + nu."""
         early = 0.0 if math.isinf(self.sigma0) else math.log(amplification(self.kappa(rate)))
-        delay = self.tau * (math.log(self.drop**2 / (rate * self.vS)) - early)
-        return delay - self.sigma1 / self.sigma0
+        logarithm = math.log(self.drop**2 / (rate * self.vS)) - early
+        return (self.tau - self.nu) * logarithm + self.nu
+
+    @property
+    def nu(self) -> float:
+        """Time by which damping makes friction lead the force of the bristles, sigma1 / sigma0."""
+        return self.sigma1 / self.sigma0
 
     @property
     def rebound(self) -> float:
@@ -69,12 +74,12 @@ class Law:
     def stop(self, load: float) -> float:
         """Time by which a slide ends earlier that comes to rest under the load u (signed with the motion)."""
         b = load + self.S
-        return self.vS / b * math.log1p(self.drop / b)
+        return (self.vS / b + self.nu) * math.log1p(self.drop / b)
 
     def departure(self, load: float) -> float:
         """Time by which a slide starts later that leaves under \\|u\\| > S0 at once."""
         b = load - self.S
-        delay = self.vS / b * math.log(b / (b - self.drop))
+        delay = (self.vS / b - self.nu) * math.log(b / (b - self.drop))
         bristles = math.log(2.0) / math.sqrt(self.sigma0)
         return delay + bristles - self.rebound / (load - self.S0)
 
