@@ -1,8 +1,8 @@
 """The Coulomb limit: how the orbits and branches of `stribeck` and `lugre` approach those of `coulomb`.
 
-``python benchmarks/coulomb_limit.py [NAME ...]`` writes the tables of docs/coulomb-limit.md, each between
-``<!-- limit: NAME -->`` and ``<!-- end -->``, and its picture; without names all of them. The formulas that they are
-compared with are in ``coulomb_limit_theory.py``.
+``python benchmarks/coulomb_limit.py [NAME ...]`` writes the tables of docs/coulomb-limit.md, each
+between ``<!-- limit: NAME -->`` and ``<!-- end -->``, and its picture; without names all of them. The
+formulas that they are compared with are in ``coulomb_limit_theory.py``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from coulomb_limit_theory import Law, amplitudes, held
+from coulomb_limit_theory import Law, amplitudes, exponent, held
 from scipy.integrate import solve_ivp
 
 import contfric as cf
@@ -30,6 +30,10 @@ S = 0.2
 BRIDGE, LONGEST, INNER = (0.40, 0.456), 1.0635, (0.3, 1.0)
 #: Velocities of the table of bridges, where simulation finds 1a there, and the end that Newton reaches.
 BRIDGES = ((0.02, 0.44), (0.01, 0.44), (0.005, 0.446), (0.0025, 0.45))
+#: Multipliers beyond about this one are lost in the rounding of the others.
+SEEN = 1e24
+#: Columns of the tables of bridges.
+COMPARED = "all of it | holds 0.3 to 1 | formulas | largest multiplier | growth"
 #: vS, sigma0, sigma1 / sqrt(sigma0), Omega of the start.
 BRISTLES = ((0.02, 1e5, 0.0, 0.44), (0.02, 1e5, 2.0, 0.44), (0.01, 1e6, 2.0, 0.442))
 
@@ -56,9 +60,7 @@ def released(law: Law, rate: float) -> float:
     ahead = 0.0 if math.isinf(s0) else 0.5 * law.S0  # creep under half the load, slaved to it
     start = [0.0] if ahead == 0.0 else [2.0 * rate / s0, 0.5 * law.S0 / s0]
     field = bristles if ahead else lambda t, y: [law.S0 + rate * t - g(y[0])]
-    run = solve_ivp(
-        field, (-ahead / rate, 9.0), start, "Radau", rtol=1e-9, atol=1e-14, events=gone
-    )
+    run = solve_ivp(field, (-ahead / rate, 9.0), start, "Radau", rtol=1e-9, atol=1e-14, events=gone)
     t, v = float(run.t[-1]), float(run.y[0, -1])
     c = v - D * t - 0.5 * rate * t * t  # v = D (t - d) + rate (t^2 - d^2) / 2 behind the delay d
     return (math.sqrt(D * D - 2.0 * rate * c) - D) / rate
@@ -78,9 +80,7 @@ def releases() -> list[str]:
                 laws = laws[:1]
             cells = [f"{d:.5f}" for law in laws for d in (released(law, rate), law.release(rate))]
             kappa = f"{laws[0].kappa(rate):.3g}" if len(laws) == 2 else "inf"
-            lines.append(
-                f"| {vS:g} | {sigma0:g} | {kappa} | {' | '.join((*cells, '', '')[:4])} |"
-            )
+            lines.append(f"| {vS:g} | {sigma0:g} | {kappa} | {' | '.join((*cells, '', '')[:4])} |")
     return lines
 
 
@@ -94,8 +94,14 @@ def extrema(orbit: cf.Orbit) -> np.ndarray:
 
 def stable() -> list[str]:
     """Table: Stribeck's stable orbits at Omega = 1/2."""
-    lines = ["| S | orbit | vS | difference | derived | what is left |", "|---|---|---|---|---|---|"]
-    for kinetic, speeds in ((0.38, (2e-4, 1e-4, 5e-5, 2.5e-5)), (S, (8e-3, 4e-3, 2e-3, 1e-3, 5e-4))):
+    lines = [
+        "| S | orbit | vS | difference | derived | what is left |",
+        "|---|---|---|---|---|---|",
+    ]
+    for kinetic, speeds in (
+        (0.38, (2e-4, 1e-4, 5e-5, 2.5e-5)),
+        (S, (8e-3, 4e-3, 2e-3, 1e-3, 5e-4)),
+    ):
         params = {"Omega": 0.5, "S": kinetic, "S0": S0}
         limit = cf.find_orbit("coulomb", params)
         for vS in speeds:
@@ -186,9 +192,17 @@ def bristled(vS: float, sigma0: float, damping: float, Omega: float) -> cf.Branc
     return cf.continue_orbit(start, "Omega", (0.37, 0.4635), max_step=0.003)
 
 
-def growth(branch: cf.Branch) -> float:
-    """Logarithm (base 10) of the largest multiplier along a branch."""
-    return max(math.log10(float(np.max(np.abs(orbit.multipliers)))) for orbit in branch)
+def growth(law: Law, branch: cf.Branch) -> str:
+    """Largest multiplier, and its growth along the meander over that of the formula."""
+    lengths = np.linspace(*INNER, 36)
+    multipliers = np.array([np.max(np.abs(orbit.multipliers)) for orbit in branch])
+    line, points = curve(branch), holds(law, lengths)
+    nearest = [int(np.argmin(np.sum((line - point) ** 2, axis=1))) for point in points]
+    measured = np.log(multipliers[nearest])
+    derived = np.array([exponent(law, p, n) for p, n in zip(points, lengths, strict=True)])
+    clear = derived < 0.5 * math.log(SEEN)
+    slope = np.polyfit(derived[clear], measured[clear], 1)[0] if clear.sum() > 4 else math.nan
+    return f"{multipliers.max():.0e} | {slope:.3f}"
 
 
 def row(law: Law, line: np.ndarray) -> list[str]:
@@ -203,12 +217,13 @@ def row(law: Law, line: np.ndarray) -> list[str]:
 def meander() -> list[str]:
     """Table: Stribeck's meander and the bridge."""
     lines = [
-        "| vS | all of the bridge | holds 0.3 to 1 | formulas, holds 0.3 to 1 | log10 of the multiplier, at most |",
-        "|---|---|---|---|---|",
+        f"| vS | {COMPARED} |",
+        "|---|---|---|---|---|---|",
     ]
     for vS, Omega in BRIDGES:
         branch = steep(vS, Omega)
-        cells = [*row(Law(S, S0, vS), curve(branch)), f"{growth(branch):.1f}"]
+        law = Law(S, S0, vS)
+        cells = [*row(law, curve(branch)), growth(law, branch)]
         lines.append(f"| {vS:g} | {' | '.join(cells)} |")
     return lines
 
@@ -216,13 +231,13 @@ def meander() -> list[str]:
 def bristles() -> list[str]:
     """Table: LuGre's meander and the bridge."""
     lines = [
-        "| vS | sigma0 | sigma1 | all of the bridge | holds 0.3 to 1 | formulas, holds 0.3 to 1 | log10 of the multiplier, at most |",
-        "|---|---|---|---|---|---|---|",
+        f"| vS | sigma0 | sigma1 | {COMPARED} |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for vS, sigma0, damping, Omega in BRISTLES:
         branch = bristled(vS, sigma0, damping, Omega)
         law = Law(S, S0, vS, sigma0, damping * math.sqrt(sigma0))
-        cells = [*row(law, curve(branch)), f"{growth(branch):.1f}"]
+        cells = [*row(law, curve(branch)), growth(law, branch)]
         lines.append(f"| {vS:g} | {sigma0:.0e} | {law.sigma1:g} | {' | '.join(cells)} |")
     return lines
 

@@ -1,6 +1,6 @@
-"""What a steep friction law does at a release, a stop and a reversal, to leading order (docs/coulomb-limit.md).
+"""What a steep friction law does at a release, a stop and a reversal, to leading order.
 
-Nothing here is taken from the library: formulas, an ordinary differential equation of scipy's, and the slides
+docs/coulomb-limit.md derives it. Nothing here is taken from the library: formulas, an ordinary differential equation of scipy's, and the slides
 of Coulomb's oscillator in closed form. D = S0 - S, tau = vS / D; a stick is released under a load that grows
 at the rate a.
 """
@@ -59,7 +59,7 @@ class Law:
 
     @property
     def rebound(self) -> float:
-        """Speed with which bristles throw the mass back at a stop with \|u\| = S0.
+        """Speed with which bristles throw the mass back at a stop with abs(u) = S0.
 
         S0 y / sqrt(sigma0) with y + log(1 - m y) / m = -2 m, m = sigma1 / sqrt(sigma0); y = 2 for m = 0.
         """
@@ -77,14 +77,14 @@ class Law:
         return (self.vS / b + self.nu) * math.log1p(self.drop / b)
 
     def departure(self, load: float) -> float:
-        """Time by which a slide starts later that leaves under \\|u\\| > S0 at once."""
+        """Time by which a slide starts later that leaves under abs(u) > S0 at once."""
         b = load - self.S
         delay = (self.vS / b - self.nu) * math.log(b / (b - self.drop))
         bristles = math.log(2.0) / math.sqrt(self.sigma0)
         return delay + bristles - self.rebound / (load - self.S0)
 
     def pin(self, rate: float) -> float:
-        """\\|u\\| - S0 at the stop that begins a canard under a load that falls at the rate a."""
+        """abs(u) - S0 at the stop that begins a canard under a load that falls at the rate a."""
         return rate * self.tau - self.rebound / self.tau
 
 
@@ -201,3 +201,11 @@ def _creep(law: Law, x: float, Omega: float, stop: float, length: float) -> floa
     times = np.linspace(stop, stop + length, 201)
     speed = np.log(law.drop / (x - np.cos(Omega * times) - law.S))
     return law.vS * float(np.trapezoid(speed, times))
+
+
+def exponent(law: Law, point: np.ndarray, length: float) -> float:
+    """Logarithm of the growth along a hold of a bridge: the integral of (abs(u) - S) / vS."""
+    Omega, x = float(point[0]), float(point[1])
+    stop = -math.acos(min(1.0, x - law.S0)) / Omega
+    times = np.linspace(stop, stop + length, 201)
+    return float(np.trapezoid(x - np.cos(Omega * times) - law.S, times)) / law.vS
