@@ -23,6 +23,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "coulomb-limit.md"
 #: The model stribeck with further joints inside of the hold.
 CUT = Path(__file__).with_name("stribeck-cut.yaml")
+#: What takes long is kept here, and computed anew if the folder is deleted.
+KEPT = ROOT / "build" / "coulomb_limit"
 S0 = 0.4
 #: Kinetic friction at which 1a attracts at Omega = 1/2, and ends in a bridge 0.053 wide.
 S = 0.2
@@ -78,7 +80,11 @@ def releases() -> list[str]:
             laws = [Law(S, S0, vS, sigma0, m * math.sqrt(sigma0) if m else 0.0) for m in (0, 2)]
             if math.isinf(sigma0):
                 laws = laws[:1]
-            cells = [f"{d:.5f}" for law in laws for d in (released(law, rate), law.release(rate))]
+            cells = [
+                f"{d:.5f}" if law.nu < law.tau else "-"  # damping holds no release back
+                for law in laws
+                for d in (released(law, rate), law.release(rate))
+            ]
             kappa = f"{laws[0].kappa(rate):.3g}" if len(laws) == 2 else "inf"
             lines.append(f"| {vS:g} | {sigma0:g} | {kappa} | {' | '.join((*cells, '', '')[:4])} |")
     return lines
@@ -185,11 +191,19 @@ def steep(vS: float, Omega: float) -> cf.Branch:
 
 @cache
 def bristled(vS: float, sigma0: float, damping: float, Omega: float) -> cf.Branch:
-    """LuGre's branch, cut in the middle of the hold."""
+    """LuGre's branch, cut in the middle of the hold; kept in a file, as it takes minutes."""
+    kept = KEPT / f"lugre-{vS:g}-{sigma0:.0e}-{damping:g}.npz"
+    if kept.exists():
+        branch = cf.load(kept)
+        assert isinstance(branch, cf.Branch)
+        return branch
     sigma1 = damping * math.sqrt(sigma0)
     law = {"vS": vS, "sigma0": sigma0, "sigma1": sigma1, "phi0": 6.2}
     start = cf.find_orbit("lugre", {"Omega": Omega, "S": S, "S0": S0, **law}, longest=400)
-    return cf.continue_orbit(start, "Omega", (0.37, 0.4635), max_step=0.003)
+    branch = cf.continue_orbit(start, "Omega", (0.37, 0.4635), max_step=0.004)
+    KEPT.mkdir(parents=True, exist_ok=True)
+    cf.save(branch, kept)
+    return branch
 
 
 def growth(law: Law, branch: cf.Branch) -> str:

@@ -1,8 +1,8 @@
 """What a steep friction law does at a release, a stop and a reversal, to leading order.
 
-docs/coulomb-limit.md derives it. Nothing here is taken from the library: formulas, an ordinary differential equation of scipy's, and the slides
-of Coulomb's oscillator in closed form. D = S0 - S, tau = vS / D; a stick is released under a load that grows
-at the rate a.
+docs/coulomb-limit.md derives it. Nothing here is taken from the library: formulas, an ordinary
+differential equation of scipy's, and the slides of Coulomb's oscillator in closed form. D = S0 - S,
+tau = vS / D; a stick is released under a load that grows at the rate a.
 """
 
 from __future__ import annotations
