@@ -33,6 +33,7 @@ from contfric.chaos.endings import (
     PERIODIC,
     TRANSIENT,
     averaged,
+    starts_at_rest,
     write_end,
     write_equilibrium,
     write_nothing,
@@ -314,7 +315,12 @@ def follow_cells(functions, tables, starting, time, vectors, states, limits, row
             period = 1.0  # periods are units of time
         mode, on = start_mode(functions, tables, starting, time, rooms.walk.y, p, rooms.state)
         if mode < 0:
-            write_nothing(NO_MOTION, rows, cell)
+            ranks, cycle = starting.ranks, rooms.cycle
+            if not (
+                timeless
+                and starts_at_rest(functions, tables, ranks, time, p, rooms.walk, cycle, rows, cell)
+            ):
+                write_nothing(NO_MOTION, rows, cell)
             continue
         phase = time - math.floor(time / period) * period
         follow_cell(

@@ -170,6 +170,17 @@ def speed(functions, mode, t, p, walk, rows):  # type: ignore[no-untyped-def]
 
 
 @helper
+def starts_at_rest(functions, tables, ranks, t, p, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+    """Write the exponents of an equilibrium that a motion starts on; tell whether it is one."""
+    for mode in range(ranks.shape[0]):
+        if tables.sliding[mode] == 0 and speed(functions, mode, t, p, walk, rows) == 0.0:
+            write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, cell)
+            rows.motions[cell] = AT_REST  # even if it repels
+            return True
+    return False
+
+
+@helper
 def write_quiet(functions, tables, ranks, mode, t, p, period, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
     """Write what a motion is that no surface cuts any more: at rest, of one period, or nothing."""
     n, excited = walk.y.shape[0], walk.at_once[1] & 1 == 0

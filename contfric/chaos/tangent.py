@@ -132,7 +132,9 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
             turns += 1
         for j in range(y.shape[0]):
             if not abs(y[j]) < TOO_LARGE:
-                why = too_large(functions, mode, duration, p, walk, room)
+                why = CHATTER  # flights too short to be resolved
+                if walk.at_once[2] == 0:
+                    why = too_large(functions, mode, duration, p, walk, room)
                 return why, surface, mode, duration, turns, t
         reset = tables.bounds[mode, surface] == 2
         walk.at_once[0] = walk.at_once[0] + 1 if tau <= at_most * period else 0

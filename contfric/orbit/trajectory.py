@@ -156,8 +156,8 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
             t -= period
             cycle += 1
         for j in range(y.shape[0]):
-            if not abs(y[j]) < TOO_LARGE:
-                return INFINITE, event, mode, cycle, t
+            if not abs(y[j]) < TOO_LARGE:  # or flights too short to be resolved
+                return (CHATTER if struck else INFINITE), event, mode, cycle, t
         reset = tables.bounds[mode, surface] == 2
         if reset:  # rows keep the state before it, as the joints of orbits do
             copy_state(y, rows.states[event])
