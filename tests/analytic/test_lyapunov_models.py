@@ -61,7 +61,9 @@ def test_periodic_motion_has_the_exponents_of_its_multipliers(name: str) -> None
 # ------------------------------------------------------------------------- impacts, independently
 
 
-def dop853_growth(params: dict[str, float], state: list[float], periods: int) -> tuple[float, float]:
+def dop853_growth(
+    params: dict[str, float], state: list[float], periods: int
+) -> tuple[float, float]:
     """Return the time of the first joint after some periods of the impact oscillator, and ln |(dt, dy)|.
 
     By scipy: the variational equation along the motion, and at an impact the map of perturbations written
@@ -211,7 +213,11 @@ def test_an_equilibrium_that_repels_is_one_all_the_same() -> None:
 @pytest.mark.parametrize(
     ("state", "params", "motion"),
     [
-        ([3.0, 3.0, 0.0], {}, Motion.UNBOUNDED),  # in a finite time, as a power of what is left of it
+        (
+            [3.0, 3.0, 0.0],
+            {},
+            Motion.UNBOUNDED,
+        ),  # in a finite time, as a power of what is left of it
         ([0.0, 1.0, 1.0], {"a": -1.0, "k": 0.0, "q": 0.0}, Motion.UNBOUNDED),  # as an exponential
         ([0.0, 1.0, 0.0], {"a": 0.0, "k": 0.0, "q": 0.0}, Motion.UNCUT),  # on and on
         ([0.0, 1.0, 0.0], {"k": 0.0, "q": 0.0, "s": 1.0, "r": 2.0}, Motion.BROKEN),  # root of < 0

@@ -292,6 +292,40 @@ def test_maps_in_several_processes(damped: cf.Model) -> None:
             assert spread.values[i, j] == pytest.approx(closed.values[0, 0], abs=1e-8)
 
 
+WORKERS = """\
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+
+import contfric as cf
+
+if __name__ == "__main__":
+    axes = {"Omega": [0.5, 0.7], "S": [0.1, 0.2]}
+    said = []
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as executor:
+        spread = cf.lyapunov_map(
+            "damped", axes, executor=executor, periods=60, tile=1, progress=said.append
+        )
+    here = cf.lyapunov_map("damped", axes, periods=60)
+    assert spread.exponents.tobytes() == here.exponents.tobytes()
+    assert not [text for text in said if "lost" in text], said
+    print(*spread.values.ravel())
+"""
+
+
+def test_workers_find_the_model_of_another_package(
+    site: Path, damped: cf.Model, tmp_path: Path
+) -> None:
+    """By its name alone, as an entry point of what is installed there; nothing is lost and computed here."""
+    script = tmp_path / "workers.py"
+    script.write_text(WORKERS)
+    done = in_site(site, f"import runpy; runpy.run_path({str(script)!r}, run_name='__main__')")
+    assert done.returncode == 0, done.stderr
+    values = cf.lyapunov_map(damped, {"Omega": [0.5, 0.7], "S": [0.1, 0.2]}, periods=60).values
+    assert [float(text) for text in done.stdout.split()] == values.ravel().tolist()
+
+
 def test_models_work_without_a_cache(tmp_path: Path) -> None:
     """Where no folder can be written, the module of a model belongs to its process."""
     (tmp_path / "file").write_text("no folder")
