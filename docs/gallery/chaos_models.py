@@ -31,7 +31,6 @@ CHAOS = (
 )
 #: Period doublings of Popp's oscillator (popp.md): F and omega.
 DOUBLINGS = (
-    (0.09, 1.67255088341),
     (0.1, 1.71298103623),
     (0.11, 1.74206308478),
     (0.12, 1.76610218792),
