@@ -14,17 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from contfric.chaos.averaging import (
-    Averages,
-    clear,
-    close_periods,
-    gather,
-    grows,
-    mean_rate,
-    new_averages,
-    sign_of,
-)
+from contfric.chaos.averaging import Averages, clear, gather, new_averages
 from contfric.chaos.cycle import (
+    AT_A_POINT,
     CycleRoom,
     Memory,
     doubt,
@@ -34,6 +26,18 @@ from contfric.chaos.cycle import (
     returned,
     shortest,
     solve_cycle,
+)
+from contfric.chaos.endings import (
+    BROKEN,
+    NO_MOTION,
+    PERIODIC,
+    TRANSIENT,
+    averaged,
+    starts_at_rest,
+    write_end,
+    write_equilibrium,
+    write_nothing,
+    write_quiet,
 )
 from contfric.chaos.rows import CellRows, Limits, Starting
 from contfric.chaos.tangent import (
@@ -51,17 +55,11 @@ from contfric.chaos.tangent import (
 from contfric.compiled import allocating_helper, f8, helper, i8, indices, kernel, matrix
 from contfric.models.definition import FloatArray
 from contfric.orbit.equations import FunctionsType
-from contfric.orbit.spectrum import spectrum
-from contfric.orbit.trajectory import HELD, IMPOSSIBLE, QUIET, StateRoom, TablesType
+from contfric.orbit.trajectory import QUIET, StateRoom, TablesType
 
-#: The motions, by their numbers in :class:`contfric.chaos.status.Motion`.
-PERIODIC, TRANSIENT, CHAOTIC, SETTLING, UNDECIDED, AT_REST, UNBOUNDED, NO_MOTION = range(8)
 #: A separation that grew by this factor has grown from rounding to the size of the motion: the motion
 #: forgot where it started, which one that only settles never does.
 _FORGOTTEN = -math.log(np.finfo(np.float64).eps)
-#: Units of time after which an autonomous motion that meets no surface any more has settled, if it moves by
-#: less than this (relative) in one more.
-_SETTLES, _STILL = 1e4, 1e-9
 
 StartingType = types.NamedTuple([indices, indices, indices], Starting)
 LimitsType = types.NamedTuple([i8, i8, f8, i8], Limits)
@@ -144,50 +142,10 @@ def start_mode(functions, tables, starting, t, y, p, room):  # type: ignore[no-u
 
 
 @helper
-def write_quiet(functions, mode, t, p, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
-    """Write the exponents of an equilibrium that an autonomous motion settles on inside of a mode."""
-    n = walk.y.shape[0]
-    functions[0](mode, t, walk.y, _SETTLES, p, rows.turns[:0], walk.image, walk.jac[:0])
-    functions[0](mode, t, walk.image, 1.0, p, rows.turns[:0], walk.end, walk.jac)
-    still = True
-    for j in range(n):
-        still = still and abs(walk.end[j] - walk.image[j]) <= _STILL * (1.0 + abs(walk.image[j]))
-    if not still:
-        write_nothing(NO_MOTION, rows, cell)
-        return
-    for i in range(n):
-        for j in range(n):
-            cycle.work[i, j] = walk.jac[i, 1 + j]
-    spectrum(cycle.work[:n, :n], n, cycle.mu, cycle.symmetric, cycle.left, cycle.product)
-    for k in range(n):
-        size = abs(cycle.mu[k])
-        rows.exponents[cell, k] = math.log(size) if size > 0.0 else -np.inf
-        rows.errors[cell, k] = 0.0
-    rows.motions[cell] = AT_REST
-
-
-@helper
-def write_rest(functions, rank, mode, t, p, period, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
-    """Write the exponents of a mode that is never left: those of its flow over one period."""
-    n = walk.y.shape[0]
-    functions[0](mode, t, walk.y, period, p, rows.turns[:0], walk.end, walk.jac)
-    for i in range(n):
-        for j in range(n):
-            cycle.work[i, j] = walk.jac[i, 1 + j]
-    square = cycle.work[:n, :n]
-    spectrum(square, rank, cycle.mu, cycle.symmetric, cycle.left, cycle.product)
-    for k in range(n):
-        size = abs(cycle.mu[k]) if k < rank else 0.0
-        rows.exponents[cell, k] = math.log(size) / period if size > 0.0 else -np.inf
-        rows.errors[cell, k] = 0.0
-    rows.motions[cell] = AT_REST
-
-
-@helper
 def try_cycle(  # type: ignore[no-untyped-def]
-    functions, tables, ranks, mode, on, key, t, joints, turns, p, period, rooms, rows, cell
+    functions, tables, ranks, mode, on, key, t, joints, turns, p, period, rise, rooms, rows, cell
 ):
-    """Solve for the cycle that the last joint seems to be on, and write its exponents if it is."""
+    """Solve for the cycle that the last joint seems to be on, and write what the motion is if it is."""
     cycle, walk = rooms.cycle, rooms.walk
     n = walk.y.shape[0]
     cycle.z[0] = t
@@ -198,9 +156,15 @@ def try_cycle(  # type: ignore[no-untyped-def]
     error = solve_cycle(
         functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, rooms.state
     )
+    if error == AT_A_POINT:
+        for j in range(n):
+            cycle.walk.y[j] = cycle.z[1 + j]
+        if write_equilibrium(functions, tables, ranks, mode, t, p, cycle.walk, cycle, rows, cell):
+            return True
     if error < 0.0:
         doubt(rooms.memory)
         return False
+    rows.motions[cell] = TRANSIENT if rise > _FORGOTTEN else PERIODIC
     for k in range(n):
         rows.exponents[cell, k] = cycle.rates[k]
         rows.errors[cell, k] = error
@@ -210,41 +174,6 @@ def try_cycle(  # type: ignore[no-untyped-def]
             functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, rooms.state
         )
     return True
-
-
-@helper
-def write_means(averages, live, rows, cell):  # type: ignore[no-untyped-def]
-    """Write the averaged exponents, their errors, and what they say of the motion."""
-    for k in range(rows.exponents.shape[1]):
-        rate, error = -np.inf, 0.0
-        if k < live:
-            rate, error = mean_rate(averages, k)
-        rows.exponents[cell, k], rows.errors[cell, k] = rate, error
-    sign = sign_of(averages, rows.exponents[cell, 0], rows.errors[cell, 0]) if live > 0 else 0
-    rows.motions[cell] = CHAOTIC if sign > 0 else (SETTLING if sign < 0 else UNDECIDED)
-
-
-@helper
-def write_nothing(motion, rows, cell):  # type: ignore[no-untyped-def]
-    """Write that there are no exponents."""
-    for k in range(rows.exponents.shape[1]):
-        rows.exponents[cell, k], rows.errors[cell, k] = np.nan, np.nan
-    rows.motions[cell] = motion
-
-
-@helper
-def averaged(averages, live, turns, over, tolerance, rows, cell):  # type: ignore[no-untyped-def]
-    """Close some periods; return whether the average is good enough, or over, and written."""
-    filled = close_periods(averages, turns)
-    if filled and not over:
-        rate, error = mean_rate(averages, 0)
-        # a motion whose exponent is negative may yet settle
-        over = error <= tolerance * rate and sign_of(averages, rate, error) > 0
-    if over:
-        write_means(averages, live, rows, cell)
-        if grows(averages):
-            write_nothing(UNBOUNDED, rows, cell)
-    return over
 
 
 @helper
@@ -266,7 +195,7 @@ def carry_on(functions, tables, ranks, mode, on, t, p, period, live, rooms):  # 
         live = min(live, ranks[mode])
         push(rooms.frame, live, rate, walk.jac, walk.grad, walk.image)
         if not orthonormalise(rooms.frame, live, rooms.growth):
-            outcome = IMPOSSIBLE
+            outcome = BROKEN
     return outcome, surface, following, duration, turns, t, live
 
 
@@ -286,7 +215,7 @@ def carry_behind(functions, tables, ranks, mode, on, t, p, period, live, rooms):
         if reset or walk.at_once[1] & 1 != 0:
             behind(functions, surface, t, p, rooms.frame, live, walk, room, reset)
         if not orthonormalise(rooms.frame, live, rooms.growth):
-            outcome = IMPOSSIBLE
+            outcome = BROKEN
     return outcome, surface, following, duration, turns, t, live
 
 
@@ -295,7 +224,7 @@ def follow_cell(functions, tables, ranks, mode, on, t, p, period, limits, rooms,
     """Follow one motion from ``rooms.walk.y`` and write what it is and its exponents."""
     walk, growth, averages = rooms.walk, rooms.growth, rooms.averages
     surfaces, n = tables.observables.shape[0], growth.shape[0]
-    live, cycle, joint, walk.at_once[0] = n, 0, 0, 0
+    live, cycle, joint, walk.at_once[0], walk.at_once[2] = n, 0, 0, 0, 0
     total, lowest, rise = 0.0, 0.0, 0.0
     averaging, done, end = limits.transient == 0, False, limits.periods
     seed(rooms.frame, 0)
@@ -311,14 +240,12 @@ def follow_cell(functions, tables, ranks, mode, on, t, p, period, limits, rooms,
                 functions, tables, ranks, mode, on, t, p, period, live, rooms
             )
         if outcome == QUIET:
-            write_quiet(functions, mode, t, p, walk, rooms.cycle, rows, cell)
-            break
-        if outcome == HELD:
-            rank = ranks[mode]
-            write_rest(functions, rank, mode, t, p, period, walk, rooms.cycle, rows, cell)
+            room = rooms.cycle
+            write_quiet(functions, tables, ranks, mode, t, p, period, walk, room, rows, cell)
             break
         if outcome != ARRIVED:
-            write_nothing(NO_MOTION if outcome == IMPOSSIBLE else UNBOUNDED, rows, cell)
+            room = rooms.cycle
+            write_end(functions, outcome, ranks, mode, t, p, period, walk, room, rows, cell)
             break
         total += growth[0] if live > 0 else 0.0
         lowest = min(lowest, total)
@@ -329,9 +256,22 @@ def follow_cell(functions, tables, ranks, mode, on, t, p, period, limits, rooms,
         timeless = walk.at_once[1] & 1 != 0
         joints, lag = returned(rooms.memory, key, cycle, joint, t, walk.y, period, timeless)
         if joints > 0 and try_cycle(
-            functions, tables, ranks, mode, on, key, t, joints, lag, p, period, rooms, rows, cell
+            functions,
+            tables,
+            ranks,
+            mode,
+            on,
+            key,
+            t,
+            joints,
+            lag,
+            p,
+            period,
+            rise,
+            rooms,
+            rows,
+            cell,
         ):
-            rows.motions[cell] = TRANSIENT if rise > _FORGOTTEN else PERIODIC
             break
         if averaging:
             gather(averages.pending, growth, live, duration, walk.y)
@@ -375,7 +315,12 @@ def follow_cells(functions, tables, starting, time, vectors, states, limits, row
             period = 1.0  # periods are units of time
         mode, on = start_mode(functions, tables, starting, time, rooms.walk.y, p, rooms.state)
         if mode < 0:
-            write_nothing(NO_MOTION, rows, cell)
+            ranks, cycle = starting.ranks, rooms.cycle
+            if not (
+                timeless
+                and starts_at_rest(functions, tables, ranks, time, p, rooms.walk, cycle, rows, cell)
+            ):
+                write_nothing(NO_MOTION, rows, cell)
             continue
         phase = time - math.floor(time / period) * period
         follow_cell(

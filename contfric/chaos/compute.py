@@ -189,7 +189,7 @@ def _compile(model: Model) -> None:
     """Compile before tiles are spread, so that it is done once and found in the cache."""
     from contfric.chaos.cells import follow_cells
 
-    model.flow.functions()
+    model.flow.following()
     assert follow_cells.dispatcher is not None
 
 

@@ -54,6 +54,9 @@ _REACH = 1e-3
 _ATTRACTS = 1.0 + 1e-6
 #: What rounding adds to the logarithm of a multiplier at each joint.
 _ROUNDING = 1e-15
+#: What the solution of a cycle returns where the motion stands still; the speed (relative to 1 + state)
+#: below which it does. At a cycle as small as that, rounding would be all there is.
+AT_A_POINT, _SLOW = -2.0, 1e-5
 #: Below this share of the largest multiplier the others of a matrix are rounding.
 _RESOLVED = 1e-8
 
@@ -272,6 +275,17 @@ def cycle_rates(cycle, rank, time):  # type: ignore[no-untyped-def]
 
 
 @helper
+def stands_still(functions, mode, p, cycle, room):  # type: ignore[no-untyped-def]
+    """Tell whether hardly anything moves at the joint ``cycle.z``: a motion shrinks to an equilibrium."""
+    walk, z, still = cycle.walk, cycle.z, True
+    n = walk.y.shape[0]
+    functions[0](mode, z[0], z[1:], 0.0, p, room.none, walk.end, walk.jac)
+    for j in range(n):
+        still = still and abs(walk.jac[j, 1 + n]) <= _SLOW * (1.0 + abs(z[1 + j]))
+    return still
+
+
+@helper
 def solve_cycle(functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, room):  # type: ignore[no-untyped-def]
     """Solve for the cycle through the joint ``cycle.z``.
 
@@ -279,13 +293,15 @@ def solve_cycle(functions, tables, ranks, mode, on, key, joints, turns, p, perio
     -------
     float
         An estimate of the error of the largest exponent; negative if there is no such cycle, or it
-        repels. ``cycle.rates`` holds the exponents.
+        repels; ``AT_A_POINT`` if it has shrunk to one. ``cycle.rates`` holds the exponents.
     """
     n, time = cycle.walk.y.shape[0], turns * period
     timeless = cycle.walk.at_once[1] & 1 != 0
     before, moved, rate_before = np.inf, 0.0, 0.0
     sensitivity, amplified = 0.0, 0.0
     for step in range(_PASSES):
+        if timeless and stands_still(functions, mode, p, cycle, room):
+            return AT_A_POINT
         last, rank, done, t, lasted = go_round(
             functions, tables, ranks, mode, on, joints, p, period, cycle, room
         )

@@ -26,7 +26,8 @@ class LyapunovExponents:
     params : dict
     exponents : ndarray, shape (n,)
         Largest first; ``-inf`` where sticks leave nothing of a direction. The exponent 0 along the flow
-        of an autonomous model is left out: the last one is ``-inf`` there.
+        is left out (:attr:`spectrum` has it). In an autonomous model that leaves n - 1, and the last one
+        is ``-inf``; at rest there is no such direction, and all n are given.
     errors : ndarray, shape (n,)
         Standard errors of averages; for a periodic orbit the error of its solution.
     motion : Motion
@@ -63,6 +64,19 @@ class LyapunovExponents:
     def converged(self) -> bool:
         """Whether the largest exponent is exact, or an average within the tolerance."""
         return self.motion.exact or self.error <= self.tolerance * abs(self.largest)
+
+    @property
+    def spectrum(self) -> FloatArray:
+        """All exponents of the flow, that of a shift along it (0) among them, largest first.
+
+        They are n of an autonomous model, and 1 + n with excitation, where time is a state more. A stable
+        periodic orbit has 0 as its largest one; ``exponents`` tell how fast it attracts.
+        """
+        if self.model.autonomous and self.motion is Motion.HELD:
+            return self.exponents
+        across = self.exponents[: len(self.exponents) - int(self.model.autonomous)]
+        missing = np.nan if np.isnan(self.largest) else 0.0
+        return np.sort(np.append(across, missing))[::-1]
 
     @property
     def dimension(self) -> float:

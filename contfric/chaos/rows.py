@@ -114,7 +114,7 @@ def follow(
 
     rows = empty_rows(len(vectors), len(model.states))
     follow_cells(
-        model.flow.functions(),
+        model.flow.following(),
         tables(model),
         starting(model),
         float(time),

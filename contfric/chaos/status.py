@@ -21,11 +21,14 @@ class Motion(str, Enum):
     CHAOTIC = "no period found, and the largest exponent is positive beyond doubt"
     SETTLING = "not periodic yet, but the largest exponent is negative beyond its error"
     UNDECIDED = "no period found, and the sign of the largest exponent is not certain"
-    HELD = "the mass stays at rest for ever; the exponents are those of the rest position"
+    HELD = "the motion ends at rest, for ever; the exponents are those of the rest position"
     UNBOUNDED = "the motion grew with no bound in sight; there are no exponents"
     NO_MOTION = "no motion starts there, or its events follow each other at once; no exponents"
     OUTSIDE = "the model is not defined at these parameters; there are no exponents"
     MISSING = "not computed: the map was interrupted"
+    BROKEN = "the integration of the motion or of its tangent broke off; there are no exponents"
+    CHATTER = "impacts follow each other faster and faster, and motion does not go on; no exponents"
+    UNCUT = "the motion meets no surface any more and does not settle: the model needs a section"
 
     @property
     def code(self) -> int:

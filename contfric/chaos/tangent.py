@@ -37,6 +37,7 @@ from contfric.compiled import allocating_helper, helper
 from contfric.models.definition import FloatArray
 from contfric.orbit.system import IntArray
 from contfric.orbit.trajectory import (
+    CHATTER,
     HELD,
     HOLD_PERIODS,
     IMPOSSIBLE,
@@ -53,8 +54,12 @@ from contfric.orbit.trajectory import (
     sign_code,
 )
 
-#: A walk has come to the next joint; otherwise it ended as a simulation does (HELD, IMPOSSIBLE, INFINITE).
-ARRIVED = 0
+#: A walk has come to the next joint; otherwise it ended as a simulation does (HELD, IMPOSSIBLE, INFINITE,
+#: QUIET, CHATTER), or the integration broke down.
+ARRIVED, BROKEN = 0, 10
+#: Shares of the time to a place where the integration breaks down, and the factor by which a motion that
+#: grows without bound in a finite time, as 1/(time left) or faster than its root, has grown in between.
+_EARLY, _LATE, _ESCAPES = 1.0 - 1e-3, 1.0 - 1e-6, 10.0
 
 
 class Walk(NamedTuple):
@@ -65,8 +70,8 @@ class Walk(NamedTuple):
     y, start : state, and start (t, y) of the segment, shapes (n,) and (1 + n,)
     jac, grad : derivatives of the segment's flow and of the observable at its end
     end, image : room for a state and for the image of a perturbation, shape (n,)
-    at_once : number of events in a row that followed each other at once, and 1 if the model is
-        autonomous, plus 2 if it has resets, shape (2,)
+    at_once : number of events in a row that followed each other at once; 1 if the model is autonomous,
+        plus 2 if it has resets; whether there was an impact among those events; shape (3,)
     """
 
     y: FloatArray
@@ -88,7 +93,7 @@ def new_walk(n):  # type: ignore[no-untyped-def]
         np.empty(1 + n),
         np.empty(n),
         np.empty(n),
-        np.zeros(2, dtype=np.int64),
+        np.zeros(3, dtype=np.int64),
     )
 
 
@@ -116,11 +121,10 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
     at_most = NO_FLIGHT if walk.at_once[1] & 2 != 0 else NO_TIME
     longest = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * period
     while True:
-        tau, surface = first_hit(functions, tables, mode, on, t, y, p, longest, room)
-        if surface < 0:  # a slide that is never left would be an error, if there is an excitation
-            quiet = QUIET if walk.at_once[1] & 1 != 0 else IMPOSSIBLE
+        tau, surface = first_hit(functions, tables, mode, on, t, y, p, longest, period, room)
+        if surface < 0:
             held = tables.sliding[mode] != 0
-            return HELD if held else quiet, surface, mode, duration, turns, t
+            return HELD if held else QUIET, surface, mode, duration, turns, t
         copy_state(room.after, y)
         t, duration = t + tau, duration + tau
         while t >= period:
@@ -128,11 +132,16 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
             turns += 1
         for j in range(y.shape[0]):
             if not abs(y[j]) < TOO_LARGE:
-                return INFINITE, surface, mode, duration, turns, t
-        walk.at_once[0] = walk.at_once[0] + 1 if tau <= at_most * period else 0
-        if walk.at_once[0] > MOST_AT_ONCE:
-            return IMPOSSIBLE, surface, mode, duration, turns, t
+                why = CHATTER  # flights too short to be resolved
+                if walk.at_once[2] == 0:
+                    why = too_large(functions, mode, duration, p, walk, room)
+                return why, surface, mode, duration, turns, t
         reset = tables.bounds[mode, surface] == 2
+        walk.at_once[0] = walk.at_once[0] + 1 if tau <= at_most * period else 0
+        struck = reset or (walk.at_once[2] != 0 and walk.at_once[0] > 0)
+        walk.at_once[2] = 1 if struck else 0
+        if walk.at_once[0] > MOST_AT_ONCE:
+            return CHATTER if struck else IMPOSSIBLE, surface, mode, duration, turns, t
         if reset:  # the state before it stays where the hit has left it
             functions[7](surface, t, room.after, p, room.none, y, room.nothing)
         code = sign_code(functions, observables, surface, t, y, p, room.none, room.empty)
@@ -143,6 +152,22 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
         if reset:
             return IMPOSSIBLE, surface, mode, duration, turns, t
         on = 1 << surface
+
+
+@helper
+def too_large(functions, mode, duration, p, walk, room):  # type: ignore[no-untyped-def]
+    """Tell a motion that grew beyond all numbers, also in a finite time, from one that breaks off."""
+    y, start, early, late = walk.y, walk.start, 1.0, 0.0
+    for j in range(y.shape[0]):
+        if abs(y[j]) >= TOO_LARGE:
+            return INFINITE
+    functions[0](mode, start[0], start[1:], _EARLY * duration, p, room.none, walk.end, room.nothing)
+    for j in range(y.shape[0]):
+        early = max(early, abs(walk.end[j]))
+    functions[0](mode, start[0], start[1:], _LATE * duration, p, room.none, walk.end, room.nothing)
+    for j in range(y.shape[0]):
+        late = max(late, abs(walk.end[j]))
+    return INFINITE if late > _ESCAPES * early else BROKEN
 
 
 @helper

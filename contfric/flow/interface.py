@@ -11,6 +11,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+#: Place of ``turning`` among the functions.
+_TURNING = 3
+
 
 @dataclass(frozen=True)
 class CompiledFlow:
@@ -44,6 +47,14 @@ class CompiledFlow:
         """Return the functions as kernels take them."""
         return self._first_class
 
+    def following(self) -> tuple[Any, ...]:
+        """Return the functions for kernels that only follow motions: without ``turning``.
+
+        Where motion is integrated, ``turning`` takes half of the time of compilation; the orbits ask for
+        it, but neither a simulation nor a Lyapunov exponent does.
+        """
+        return self._without_turning
+
     @cached_property
     def second_derivatives(self) -> Any:
         """Return the second derivatives as kernels take them; one that says that there is none by default."""
@@ -53,18 +64,26 @@ class CompiledFlow:
         return FirstClass(no_second if self.second is None else self.second)
 
     @cached_property
-    def _first_class(self) -> tuple[Any, ...]:
+    def _without_turning(self) -> tuple[Any, ...]:
         from contfric.compiled import FirstClass
         from contfric.flow.resets import no_reset
+        from contfric.flow.without import no_turning
 
         order = (
             self.flow,
             self.observe,
             self.level,
-            self.turning,
+            no_turning,
             self.hit,
             self.period,
             self.rate,
             self.reset or no_reset,
         )
         return tuple(FirstClass(kernel) for kernel in order)
+
+    @cached_property
+    def _first_class(self) -> tuple[Any, ...]:
+        from contfric.compiled import FirstClass
+
+        before, after = self._without_turning[:_TURNING], self._without_turning[_TURNING + 1 :]
+        return (*before, FirstClass(self.turning), *after)

@@ -1,11 +1,17 @@
-"""What stands in for an optional function that a flow does not have."""
+"""What stands in for a function that a flow does not have, or that nobody will ask for."""
 
 from __future__ import annotations
 
-from contfric.compiled import kernel, second_signature
+from contfric.compiled import kernel, second_signature, turning_signature
 
 
 @kernel(second_signature)
 def no_second(mode, c, t0, y0, d, p, which, along, jac, room):  # type: ignore[no-untyped-def]
     """Say that there are no second derivatives: the engine takes differences of the first ones."""
     return 0
+
+
+@kernel(turning_signature)
+def no_turning(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
+    """Say that the search failed: motion is only followed, and who asks is mistaken."""
+    return -1

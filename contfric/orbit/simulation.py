@@ -314,7 +314,7 @@ def run(
             np.empty((rows, y.shape[0])),
         )
         end, count, mode, cycle, phase = kernel(
-            model.flow.functions(), model_tables, mode, on, time, y, vector, left, written
+            model.flow.following(), model_tables, mode, on, time, y, vector, left, written
         )
         TALLY[3] += count
         written.cycles[:count] += base

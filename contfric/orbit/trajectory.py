@@ -40,10 +40,8 @@ ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE, QUIET, CHATTER = range(7)
 #: A sliding mode that is not left within this many periods of the excitation is never left; a slide, and
 #: any mode of an autonomous model, gets far more (periods, or units of time).
 HOLD_PERIODS, SLIDE_PERIODS = 1.001, 1e4
-
-#: Over which the next surface is looked for first where there is no period (units of time), and how much
-#: farther then: what is integrated twice is a third of the whole.
-FIRST_SPAN, LONGER_SPAN = 8.0, 4.0
+#: Factor by which the search of a hit is extended: what was searched in vain costs a third more.
+_WIDER = 4.0
 
 #: Events within this share of a period follow each other at once; more of them in a row than this do
 #: not come to an end (a stop, a release and a reversal may fall together, twice).
@@ -79,32 +77,36 @@ def sign_code(functions, observables, surface, t, y, p, none, empty):  # type: i
 
 
 @helper
-def first_hit(functions, tables, mode, on, t, y, p, longest, room):  # type: ignore[no-untyped-def]
+def first_hit(functions, tables, mode, on, t, y, p, longest, unit, room):  # type: ignore[no-untyped-def]
     """Return (time, surface) of the first bounding surface that is met; (-1, -1) if none.
 
-    The state there is written to ``room.after``. All surfaces are looked for over one period, then over
-    spans that grow: one that a motion never meets would else be looked for until the end of a simulation
-    at every event.
+    The state there is written to ``room.after``. The search covers a period (``unit``) at first, then longer
+    and longer times: a surface that is never met is searched for no further than another one is.
     """
+    within = HOLD_PERIODS * unit
+    while within < longest:
+        tau, surface = hit_within(functions, tables, mode, on, t, y, p, within, room)
+        if surface >= 0:
+            return tau, surface
+        within *= _WIDER
+    return hit_within(functions, tables, mode, on, t, y, p, longest, room)
+
+
+@helper
+def hit_within(functions, tables, mode, on, t, y, p, longest, room):  # type: ignore[no-untyped-def]
+    """Do the same over one time."""
     observables, bounds, none, empty = tables.observables, tables.bounds, room.none, room.empty
-    period = functions[5](p, none, empty)
-    span = period if period > 0.0 else FIRST_SPAN
-    while True:
-        best, which = min(span, longest), -1
-        for k in range(observables.shape[0]):
-            if bounds[mode, k] == 0:
-                continue
-            target = functions[2](k, p, none, empty)
-            started = (on >> k) & 1 == 1
-            tau = functions[4](mode, observables[k], target, started, t, y, best, p, room.trial)
-            if tau >= 0.0 and (which < 0 or tau < best):
-                best, which = tau, k
-                copy_state(room.trial, room.after)
-        if which >= 0:
-            return best, which
-        if not span < longest:
-            return -1.0, -1
-        span *= LONGER_SPAN
+    best, which = longest, -1
+    for k in range(observables.shape[0]):
+        if bounds[mode, k] == 0:
+            continue
+        target = functions[2](k, p, none, empty)
+        started = (on >> k) & 1 == 1
+        tau = functions[4](mode, observables[k], target, started, t, y, best, p, room.trial)
+        if tau >= 0.0 and (which < 0 or tau < best):
+            best, which = tau, k
+            copy_state(room.trial, room.after)
+    return (best, which) if which >= 0 else (-1.0, -1)
 
 
 @helper
@@ -134,7 +136,9 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
         if period <= 0.0:
             left = periods - (t - first_time)
         allowance = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * unit
-        tau, surface = first_hit(functions, tables, mode, on, t, y, p, min(left, allowance), room)
+        tau, surface = first_hit(
+            functions, tables, mode, on, t, y, p, min(left, allowance), unit, room
+        )
         if surface < 0:
             if left > allowance:
                 return never_left(tables, mode), event, mode, cycle, t
@@ -152,8 +156,8 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
             t -= period
             cycle += 1
         for j in range(y.shape[0]):
-            if not abs(y[j]) < TOO_LARGE:
-                return INFINITE, event, mode, cycle, t
+            if not abs(y[j]) < TOO_LARGE:  # or flights too short to be resolved
+                return (CHATTER if struck else INFINITE), event, mode, cycle, t
         reset = tables.bounds[mode, surface] == 2
         if reset:  # rows keep the state before it, as the joints of orbits do
             copy_state(y, rows.states[event])

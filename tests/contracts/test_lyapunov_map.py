@@ -87,21 +87,24 @@ def test_tiles_do_not_matter(lmap: cf.LyapunovMap, side: int) -> None:
 
 
 def test_codes_of_the_kernel_are_those_of_the_enumeration() -> None:
-    from contfric.chaos import cells
+    from contfric.chaos import endings, tangent
 
     numbers = {
-        Motion.PERIODIC: cells.PERIODIC,
-        Motion.TRANSIENT: cells.TRANSIENT,
-        Motion.CHAOTIC: cells.CHAOTIC,
-        Motion.SETTLING: cells.SETTLING,
-        Motion.UNDECIDED: cells.UNDECIDED,
-        Motion.HELD: cells.AT_REST,
-        Motion.UNBOUNDED: cells.UNBOUNDED,
-        Motion.NO_MOTION: cells.NO_MOTION,
+        Motion.PERIODIC: endings.PERIODIC,
+        Motion.TRANSIENT: endings.TRANSIENT,
+        Motion.CHAOTIC: endings.CHAOTIC,
+        Motion.SETTLING: endings.SETTLING,
+        Motion.UNDECIDED: endings.UNDECIDED,
+        Motion.HELD: endings.AT_REST,
+        Motion.UNBOUNDED: endings.UNBOUNDED,
+        Motion.NO_MOTION: endings.NO_MOTION,
+        Motion.BROKEN: endings.BROKEN,
+        Motion.CHATTER: endings.CHATTERS,
+        Motion.UNCUT: endings.UNCUT,
     }
-    assert {motion.code: number for motion, number in numbers.items()} == {
-        k: k for k in range(len(numbers))
-    }
+    assert all(motion.code == number for motion, number in numbers.items())
+    assert set(Motion) - set(numbers) == {Motion.OUTSIDE, Motion.MISSING}  # not of the kernel
+    assert tangent.BROKEN == endings.BROKEN
 
 
 # ----------------------------------------------------------------------------------- starts

@@ -6,6 +6,7 @@ import json
 import multiprocessing
 import os
 import pickle
+import re
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
@@ -290,6 +291,61 @@ def test_maps_in_several_processes(damped: cf.Model) -> None:
             values = {"Omega": omega, "S": s, "S0": s, "zeta": 0.05}
             closed = cf.lyapunov_map("coulomb", {"Omega": [omega], "S": [s]}, values, periods=60)
             assert spread.values[i, j] == pytest.approx(closed.values[0, 0], abs=1e-8)
+
+
+def test_a_map_of_a_users_model_goes_on_from_its_tiles(damped: cf.Model, tmp_path: Path) -> None:
+    axes = {"Omega": [0.5, 0.6, 0.7], "S": [0.1, 0.2]}
+
+    def stop(text: str) -> None:
+        if "2 of 6 tiles" in text:
+            raise KeyboardInterrupt
+
+    how = {"periods": 60, "tile": 1}
+    part = cf.lyapunov_map(damped, axes, folder=tmp_path / "tiles", progress=stop, **how)
+    assert not part.complete
+    said: list[str] = []
+    whole = cf.lyapunov_map(damped, axes, folder=tmp_path / "tiles", progress=said.append, **how)
+    assert whole.complete
+    assert re.match(r"[23] of 6 tiles are in", said[0])
+    assert whole.exponents.tobytes() == cf.lyapunov_map(damped, axes, **how).exponents.tobytes()
+    other = tmp_path / "damped.yaml"
+    other.write_text(YAML.format(name="damped").replace("2*zeta*v", "3*zeta*v"))
+    with pytest.raises(cf.ResultFileError, match="definition differs"):
+        cf.lyapunov_map(other, axes, folder=tmp_path / "tiles", **how)
+
+
+WORKERS = """\
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+
+import contfric as cf
+
+if __name__ == "__main__":
+    axes = {"Omega": [0.5, 0.7], "S": [0.1, 0.2]}
+    said = []
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as executor:
+        spread = cf.lyapunov_map(
+            "damped", axes, executor=executor, periods=60, tile=1, progress=said.append
+        )
+    here = cf.lyapunov_map("damped", axes, periods=60)
+    assert spread.exponents.tobytes() == here.exponents.tobytes()
+    assert not [text for text in said if "lost" in text], said
+    print(*spread.values.ravel())
+"""
+
+
+def test_workers_find_the_model_of_another_package(
+    site: Path, damped: cf.Model, tmp_path: Path
+) -> None:
+    """By its name alone, as an entry point of what is installed there; nothing is lost and computed here."""
+    script = tmp_path / "workers.py"
+    script.write_text(WORKERS)
+    done = in_site(site, f"import runpy; runpy.run_path({str(script)!r}, run_name='__main__')")
+    assert done.returncode == 0, done.stderr
+    values = cf.lyapunov_map(damped, {"Omega": [0.5, 0.7], "S": [0.1, 0.2]}, periods=60).values
+    assert [float(text) for text in done.stdout.split()] == values.ravel().tolist()
 
 
 def test_models_work_without_a_cache(tmp_path: Path) -> None:

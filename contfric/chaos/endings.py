@@ -1,0 +1,220 @@
+"""How the following of a motion ends, and what is then written for it; compiled.
+
+A motion that becomes periodic, and one that is averaged, end in :mod:`contfric.chaos.cells`. Here are those
+that come to rest, that no surface cuts any more, and that have no exponents.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from contfric.chaos.averaging import close_periods, grows, mean_rate, sign_of
+from contfric.compiled import helper
+from contfric.orbit.cyclic import dense_solve
+from contfric.orbit.spectrum import spectrum
+from contfric.orbit.trajectory import HELD, IMPOSSIBLE, INFINITE, TOO_LARGE
+
+#: The motions, by their numbers in :class:`contfric.chaos.status.Motion`; 8 and 9 are given elsewhere.
+PERIODIC, TRANSIENT, CHAOTIC, SETTLING, UNDECIDED, AT_REST, UNBOUNDED, NO_MOTION = range(8)
+BROKEN, CHATTERS, UNCUT = range(10, 13)
+#: Periods (units of time without excitation) after which a motion that meets no surface any more has
+#: settled, if it moves by less than this (relative) in one more.
+_SETTLES, _STILL = 1e4, 1e-9
+#: An equilibrium is polished this often, by corrections of at most this (relative): the motion is near it.
+_POLISHES, _NEARBY = 4, 1e-3
+#: An equilibrium that attracts, to the accuracy of its exponents.
+_ATTRACTS = 1e-8
+#: A multiplier of a mode's flow below this share of the largest is taken from a shorter time: the
+#: integration leaves 1e-12. Most times tried, each a quarter of the one before: rates up to 1e11.
+_LARGE_ENOUGH, _TIMES = 1e-2, 20
+#: Exponents of two modes that differ by more than this (relative) are not those of one smooth field.
+_SAME = 1e-6
+#: Speed (relative to 1 + state) below which modes are compared at an equilibrium.
+_SLOW = 1e-4
+
+
+@helper
+def write_nothing(motion, rows, cell):  # type: ignore[no-untyped-def]
+    """Write that there are no exponents."""
+    for k in range(rows.exponents.shape[1]):
+        rows.exponents[cell, k], rows.errors[cell, k] = np.nan, np.nan
+    rows.motions[cell] = motion
+
+
+@helper
+def write_means(averages, live, rows, cell):  # type: ignore[no-untyped-def]
+    """Write the averaged exponents, their errors, and what they say of the motion."""
+    for k in range(rows.exponents.shape[1]):
+        rate, error = -np.inf, 0.0
+        if k < live:
+            rate, error = mean_rate(averages, k)
+        rows.exponents[cell, k], rows.errors[cell, k] = rate, error
+    sign = sign_of(averages, rows.exponents[cell, 0], rows.errors[cell, 0]) if live > 0 else 0
+    rows.motions[cell] = CHAOTIC if sign > 0 else (SETTLING if sign < 0 else UNDECIDED)
+
+
+@helper
+def averaged(averages, live, turns, over, tolerance, rows, cell):  # type: ignore[no-untyped-def]
+    """Close some periods; return whether the average is good enough, or over, and written."""
+    filled = close_periods(averages, turns)
+    if filled and not over:
+        rate, error = mean_rate(averages, 0)
+        # a motion whose exponent is negative may yet settle
+        over = error <= tolerance * rate and sign_of(averages, rate, error) > 0
+    if over:
+        write_means(averages, live, rows, cell)
+        if grows(averages):
+            write_nothing(UNBOUNDED, rows, cell)
+    return over
+
+
+@helper
+def flow_spectrum(functions, rank, mode, t, p, time, walk, cycle, rows):  # type: ignore[no-untyped-def]
+    """Write the multipliers of a mode's flow over some time to ``cycle.mu``."""
+    n = walk.y.shape[0]
+    functions[0](mode, t, walk.y, time, p, rows.turns[:0], walk.end, walk.jac)
+    for i in range(n):
+        for j in range(n):
+            cycle.work[i, j] = walk.jac[i, 1 + j]
+    spectrum(cycle.work[:n, :n], rank, cycle.mu, cycle.symmetric, cycle.left, cycle.product)
+
+
+@helper
+def write_period(functions, rank, mode, t, p, period, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+    """Write the exponents of a mode that is never left: those of its flow over one period."""
+    flow_spectrum(functions, rank, mode, t, p, period, walk, cycle, rows)
+    for k in range(walk.y.shape[0]):
+        size = abs(cycle.mu[k]) if k < rank else 0.0
+        rows.exponents[cell, k] = math.log(size) / period if size > 0.0 else -np.inf
+        rows.errors[cell, k] = 0.0
+
+
+@helper
+def write_rates(functions, rank, mode, t, p, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+    """Write the exponents of an equilibrium of a mode, each from a time in which it does not vanish."""
+    for k in range(walk.y.shape[0]):
+        rows.exponents[cell, k], rows.errors[cell, k] = -np.inf, 0.0
+    known, time = 0, 1.0
+    for _ in range(_TIMES):
+        flow_spectrum(functions, rank, mode, t, p, time, walk, cycle, rows)
+        while known < rank and abs(cycle.mu[known]) > _LARGE_ENOUGH * abs(cycle.mu[0]):
+            rows.exponents[cell, known] = math.log(abs(cycle.mu[known])) / time
+            known += 1
+        if known == rank:
+            return
+        time *= 0.25
+
+
+@helper
+def polish(functions, mode, t, p, walk, cycle, rows):  # type: ignore[no-untyped-def]
+    """Move ``walk.y`` to the equilibrium of a mode beside it, where there is one and no continuum."""
+    n = walk.y.shape[0]
+    for _ in range(_POLISHES):
+        functions[0](mode, t, walk.y, 1.0, p, rows.turns[:0], walk.end, walk.jac)
+        for i in range(n):
+            for j in range(n):
+                cycle.left[i, j] = (1.0 if i == j else 0.0) - walk.jac[i, 1 + j]
+            cycle.right[i, 0] = walk.end[i] - walk.y[i]
+        if not dense_solve(cycle.left[:n, :n], cycle.right[:n]):
+            return
+        for i in range(n):
+            if not abs(cycle.right[i, 0]) <= _NEARBY * (1.0 + abs(walk.y[i])):
+                return
+        for i in range(n):
+            walk.y[i] += cycle.right[i, 0]
+
+
+@helper
+def write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+    """Write the exponents of the equilibrium beside ``walk.y``; tell whether it attracts.
+
+    It may lie on a surface. If the fields of two modes vanish there, but their derivatives differ, no
+    matrix has its exponents: there are none.
+    """
+    n = walk.y.shape[0]
+    polish(functions, mode, t, p, walk, cycle, rows)
+    write_rates(functions, ranks[mode] + 1, mode, t, p, walk, cycle, rows, cell)
+    if not rows.exponents[cell, 0] <= _ATTRACTS:
+        return False
+    rows.motions[cell] = AT_REST
+    for k in range(n):  # kept, as the room of the other modes is the row itself
+        cycle.rates[k] = rows.exponents[cell, k]
+    smooth = True
+    for other in range(ranks.shape[0]):
+        if other == mode or tables.sliding[other] != 0:
+            continue
+        if speed(functions, other, t, p, walk, rows) > _SLOW:
+            continue
+        write_rates(functions, ranks[other] + 1, other, t, p, walk, cycle, rows, cell)
+        for k in range(n):
+            apart = abs(rows.exponents[cell, k] - cycle.rates[k])
+            smooth = smooth and apart <= _SAME * (1.0 + abs(cycle.rates[k]))
+    for k in range(n):
+        rows.exponents[cell, k] = cycle.rates[k]
+    if not smooth:
+        write_nothing(AT_REST, rows, cell)
+    return True
+
+
+@helper
+def speed(functions, mode, t, p, walk, rows):  # type: ignore[no-untyped-def]
+    """Return how fast a state changes in a mode, relative to 1 + its size."""
+    n, fastest = walk.y.shape[0], 0.0
+    functions[0](mode, t, walk.y, 0.0, p, rows.turns[:0], walk.end, walk.jac)
+    for j in range(n):
+        share = abs(walk.jac[j, 1 + n]) / (1.0 + abs(walk.y[j]))
+        fastest = share if not share <= fastest else fastest
+    return fastest
+
+
+@helper
+def starts_at_rest(functions, tables, ranks, t, p, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+    """Write the exponents of an equilibrium that a motion starts on; tell whether it is one."""
+    for mode in range(ranks.shape[0]):
+        if tables.sliding[mode] == 0 and speed(functions, mode, t, p, walk, rows) == 0.0:
+            write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, cell)
+            rows.motions[cell] = AT_REST  # even if it repels
+            return True
+    return False
+
+
+@helper
+def write_quiet(functions, tables, ranks, mode, t, p, period, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+    """Write what a motion is that no surface cuts any more: at rest, of one period, or nothing."""
+    n, excited = walk.y.shape[0], walk.at_once[1] & 1 == 0
+    functions[0](mode, t, walk.y, _SETTLES * period, p, rows.turns[:0], walk.image, walk.jac[:0])
+    for j in range(n):
+        walk.y[j] = walk.image[j]
+    functions[0](mode, t, walk.y, period, p, rows.turns[:0], walk.end, walk.jac)
+    still, large = True, False
+    for j in range(n):
+        still = still and abs(walk.end[j] - walk.y[j]) <= _STILL * (1.0 + abs(walk.y[j]))
+        large = large or abs(walk.y[j]) > TOO_LARGE
+    if not still:
+        broken = math.isnan(walk.end[0])
+        write_nothing(UNBOUNDED if large else (BROKEN if broken else UNCUT), rows, cell)
+    elif excited:
+        write_period(functions, ranks[mode], mode, t, p, period, walk, cycle, rows, cell)
+        rows.motions[cell], rows.turns[cell] = PERIODIC, 1
+    elif not write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, cell):
+        write_nothing(UNCUT, rows, cell)
+
+
+@helper
+def write_end(functions, outcome, ranks, mode, t, p, period, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+    """Write what a motion is that did not come to another joint."""
+    if outcome == HELD:  # in an autonomous model a rank counts no shift in time
+        rank = ranks[mode] + (1 if walk.at_once[1] & 1 != 0 else 0)
+        write_period(functions, rank, mode, t, p, period, walk, cycle, rows, cell)
+        rows.motions[cell] = AT_REST
+        return
+    motion = CHATTERS
+    if outcome == IMPOSSIBLE:
+        motion = NO_MOTION
+    elif outcome == INFINITE:
+        motion = UNBOUNDED
+    elif outcome == BROKEN:
+        motion = BROKEN
+    write_nothing(motion, rows, cell)
