@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ WHERE = {"Omega": 0.5, "S0": 0.4}
 #: Events of the symmetric branch of Fig. 17 between S = 0.374 and S = 0.378 (docs/gallery/fig17.md).
 FOLDS = (0.3750595439839, 0.3757051387250)
 BREAKING = 0.3757014024
+GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 NONE, NOTHING = np.empty(0, dtype=np.int64), np.empty((0, 0))
 
 
@@ -149,3 +152,77 @@ def test_simulation_settles_on_what_the_symmetry_breaking_says(model, orbit, off
     assert settled.stable
     assert settled.symmetric == symmetric
     assert (settled.asymmetry < 1e-9) == symmetric
+
+
+def belt_by_scipy(t0, y0, dt, p):
+    """Integrate the block on the belt with scipy's Radau method; the side of the belt's speed is held."""
+    t, y = t0, np.array(y0)
+    side = math.copysign(1.0, y[1] - p["vb"])
+
+    def field(t, y):
+        x, v, z = y
+        slip = v - p["vb"]
+        dz = slip - p["sigma0"] * side * slip * (1.0 + p["delta"] * side * slip) / p["Fs"] * z
+        return [v, -x - p["sigma0"] * z - p["sigma1"] * dz, dz]
+
+    def meets(t, y):
+        return y[1] - p["vb"]
+
+    meets.terminal = True
+    while True:
+        meets.direction = -side
+        found = solve_ivp(
+            field, (t, t0 + dt), y, method="Radau", rtol=1e-9, atol=[1e-11, 1e-11, 1e-14],
+            events=meets,
+        )  # fmt: skip
+        t, y = float(found.t[-1]), found.y[:, -1]
+        if found.status == 0:
+            return y
+        side, y[1] = -side, p["vb"]
+
+
+def test_stick_slip_on_a_belt_is_that_of_scipy():
+    """One cycle of `belt-lugre` from its stop, by another integrator, ends where it began."""
+    orbit = cf.find_orbit("belt-lugre")
+    page = (GALLERY / "belt.md").read_text(encoding="utf-8")
+    period, largest, smallest = re.findall(r"^\| 1e3 \| (\S+) \| (\S+) \| (\S+) \|$", page, re.M)[0]
+    assert orbit.period == pytest.approx(float(period), abs=1e-9)
+    assert orbit.x_max == pytest.approx(float(largest), abs=1e-8)
+    assert orbit.x_min == pytest.approx(float(smallest), abs=1e-8)
+    start = orbit.joints[0]
+    there = belt_by_scipy(start[0], start[1:], orbit.period, orbit.params)
+    assert np.abs((there - start[1:]) / [1.0, 1.0, 1e-3]).max() < 2e-7
+
+
+def printed(page, low, high, orbits):
+    """Return the events of a page's table in a range: (kind, value) of those of one kind of orbits."""
+    text = (GALLERY / f"{page}.md").read_text(encoding="utf-8")
+    rows = re.findall(rf"^\| (\w\w)_{orbits}, 2seg \| (\d\.\d+) \|", text, re.M)
+    return sorted((float(value), kind) for kind, value in rows if low < float(value) < high)
+
+
+@pytest.mark.parametrize(
+    ("page", "params", "parameter", "bounds", "orbits"),
+    [
+        ("fig17", {"Omega": 0.5, "S": 0.352}, "S", (0.35, 0.377), "0a"),
+        ("fig18", {"S": 0.32, "Omega": 0.4033}, "Omega", (0.403, 0.406), "0s"),
+        ("fig18", {"S": 0.32, "Omega": 0.4808}, "Omega", (0.4805, 0.4818), "0s"),
+        ("fig18", {"S": 0.32, "Omega": 0.541}, "Omega", (0.54, 0.556), "0a"),
+    ],
+    ids=["meander", "loop", "folds", "main"],
+)
+def test_tables_of_the_gallery_are_computed_anew(model, page, params, parameter, bounds, orbits):
+    """A short run with the model's own step finds what is printed there, and nothing else."""
+    orbit = cf.find_orbit(model, {**params, "S0": 0.4})
+    branch = cf.continue_orbit(orbit, parameter, bounds)
+    assert branch.name == f"{orbits}, 2seg"
+    found = sorted(
+        (b.params[parameter], b.kind.value)
+        for b in branch.bifurcations
+        if b.orbit.symmetric == (orbits == "0s")  # an asymmetric branch begins at a symmetric orbit
+    )
+    known = printed(page, *bounds, orbits)
+    assert len(known) >= 2
+    assert [kind for _, kind in found] == [kind for _, kind in known]
+    for (value, _), (shown, _) in zip(found, known, strict=True):
+        assert value == pytest.approx(shown, abs=5.5e-10)
