@@ -13,8 +13,8 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System
 
-#: Largest step of models that declare none, where the range of the parameter counts 1 (and grows with the size of the
-#: state): about 100 points over the range.
+#: Largest step of models that declare none, where the range of the parameter counts 1 (and grows with the
+#: size of the state): about 100 points over the range.
 LARGEST_STEP = 0.01
 #: First step, in largest steps: the curvature is not known yet.
 FIRST_STEP = 0.1

@@ -85,5 +85,7 @@ def model_of(definition: str) -> Model:
     from contfric.models.derive import model_from
 
     description = from_text(definition)
-    module_path(description.motion)  # written first: what has no value is reported by formula and place
+    module_path(
+        description.motion
+    )  # written first: what has no value is reported by formula and place
     return model_from(description)

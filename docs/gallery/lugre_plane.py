@@ -1,8 +1,8 @@
 """The plane Omega-S of the LuGre oscillator: curves through the events of Figs. 17 and 18.
 
-Both diagrams are explored, and each of their events that lies on no curve yet starts one. ``lugre-plane.md`` has its
-tables between ``<!-- plane: NAME -->`` and ``<!-- end -->``; all else is written by hand. With a folder as argument
-what is finished is kept there, and taken up again.
+Both diagrams are explored, and each of their events that lies on no curve yet starts one. ``lugre-plane.md``
+has its tables between ``<!-- plane: NAME -->`` and ``<!-- end -->``; all else is written by hand. With a folder
+as argument what is finished is kept there, and taken up again.
 """
 
 from __future__ import annotations
@@ -34,7 +34,15 @@ SAME_PLACE, SAME_ORBIT = 5e-4, 3e-2
 #: Kinds in the order in which their curves are followed.
 KINDS = (cf.Kind.BP, cf.Kind.SN, cf.Kind.PD)
 #: Places that are simulated, random starts of each, and periods that a motion may take to settle.
-PLACES = ((0.56, 0.38), (0.56, 0.28), (0.51, 0.38), (0.51, 0.3), (0.48, 0.36), (0.445, 0.32), (0.45, 0.36))
+PLACES = (
+    (0.56, 0.38),
+    (0.56, 0.28),
+    (0.51, 0.38),
+    (0.51, 0.3),
+    (0.48, 0.36),
+    (0.445, 0.32),
+    (0.45, 0.36),
+)
 STARTS, LONGEST = 6, 600
 #: Digits of the tables.
 DIGITS = 9
@@ -98,7 +106,9 @@ def curves_of(found: list[cf.Bifurcation], folder: Path) -> tuple[list[cf.Curve]
         if any(lies_on(curve, event) for curve in curves):
             continue
         at = f"{event.kind.value} at Omega = {event.params['Omega']:.9f}, S = {event.params['S']:.9f}"
-        file = folder / f"{event.kind.value}-{event.params['Omega']:.9f}-{event.params['S']:.9f}.npz"
+        file = (
+            folder / f"{event.kind.value}-{event.params['Omega']:.9f}-{event.params['S']:.9f}.npz"
+        )
         try:
             if not file.is_file():
                 curve = cf.continue_bifurcation(
@@ -171,7 +181,7 @@ def draw(curves: list[cf.Curve]) -> None:
     axes = plot_curves(curves)
     axes.set_xlim(*RANGES["Omega"])
     axes.set_ylim(*RANGES["S"])
-    for name, (parameter, bounds, params) in SECTIONS.items():
+    for name, (parameter, _, params) in SECTIONS.items():
         line = axes.axvline if parameter == "S" else axes.axhline
         fixed = NAMES[1 - NAMES.index(parameter)]
         line(params[fixed] if name == "fig17" else 0.32, color="0.8", linewidth=0.8, zorder=0)

@@ -17,7 +17,7 @@ from contfric.orbit.solve import polish
 WHERE = {"Omega": 0.5, "S0": 0.4}
 #: Events of the symmetric branch of Fig. 17 between S = 0.374 and S = 0.378 (docs/gallery/fig17.md).
 FOLDS = (0.3750595439839, 0.3757051387250)
-BREAKING = 0.3757014024
+BREAKING = 0.3757014023946
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 NONE, NOTHING = np.empty(0, dtype=np.int64), np.empty((0, 0))
 
@@ -134,7 +134,7 @@ def test_events_do_not_depend_on_where_orbits_are_cut(model, orbit):
         for event in branch.bifurcations:
             found[event.kind].append(event.params["S"])
         assert sorted(found[cf.Kind.SN]) == pytest.approx(FOLDS, abs=1e-11)
-        assert found[cf.Kind.BP] == pytest.approx([BREAKING], abs=3e-11)
+        assert found[cf.Kind.BP] == pytest.approx([BREAKING], abs=1e-12)
         assert len(branch.bifurcations) == 3
 
 
@@ -152,6 +152,67 @@ def test_simulation_settles_on_what_the_symmetry_breaking_says(model, orbit, off
     assert settled.stable
     assert settled.symmetric == symmetric
     assert (settled.asymmetry < 1e-9) == symmetric
+
+
+PLANE = ("Omega", "S")
+
+
+@pytest.fixture(scope="module")
+def symmetric(orbit):
+    """The symmetric branch of Fig. 17 about its folds, with the step that the model declares."""
+    return cf.continue_orbit(orbit, "S", (0.374, 0.385))
+
+
+def test_the_models_own_step_finds_the_folds(model, symmetric):
+    assert model.max_step == 0.001
+    found = {kind: [] for kind in cf.Kind}
+    for event in symmetric.bifurcations:
+        found[event.kind].append(event.params["S"])
+    assert sorted(found[cf.Kind.SN]) == pytest.approx(FOLDS, abs=1e-11)
+    assert found[cf.Kind.BP] == pytest.approx([BREAKING], abs=1e-12)
+
+
+def at(orbit, **changed):
+    vector = orbit.model.vector({**orbit.params, **changed})
+    return polish(replace(orbit, vector=vector), damped=False)
+
+
+def test_symmetry_breaking_beside_a_touch_is_located_to_rounding(symmetric):
+    """The multiplier passes -1 at 4e6 a unit of S: within 3e-13 of the point it must change sides."""
+    (event,) = (b for b in symmetric.bifurcations if b.kind is cf.Kind.BP)
+    sides = [at(event.orbit, S=event.params["S"] + d) for d in (-3e-13, 3e-13)]
+    below, above = (np.min(o.turn_multipliers.real) + 1.0 for o in sides)
+    assert below < 0.0 < above
+    assert above - below < 1e-5
+
+
+def test_curve_of_the_symmetry_breaking_beside_a_touch(symmetric):
+    """Its points by orbits alone: 1e-9 below them the multiplier is beyond -1, 1e-9 above it is not."""
+    (event,) = (b for b in symmetric.bifurcations if b.kind is cf.Kind.BP)
+    ranges = {"Omega": (0.498, 0.502), "S": (0.36, 0.39)}
+    curve = cf.continue_bifurcation(event, PLANE, ranges, max_step=0.05, max_points=8)
+    assert len(curve) > 8
+    assert np.all(np.diff(curve.values, axis=0) > 0.0)
+    for k in (0, len(curve) // 4, -1):
+        s = float(curve.values[k, 1])
+        below, above = (at(curve[k], S=s + d).turn_multipliers for d in (-1e-9, 1e-9))
+        assert np.min(below.real) < -1.0 < np.min(above.real)
+
+
+def test_fold_curve_is_where_runs_in_one_parameter_turn(model, symmetric):
+    """Orbits are simulated above the fold, away from the curve, and continued down to it."""
+    event = min(
+        (b for b in symmetric.bifurcations if b.kind is cf.Kind.SN), key=lambda b: b.params["S"]
+    )
+    ranges = {"Omega": (0.496, 0.504), "S": (0.35, 0.39)}
+    curve = cf.continue_bifurcation(event, PLANE, ranges, max_step=0.05, max_points=6)
+    assert len(curve) > 6
+    for k in (0, -1):
+        omega, s = curve.values[k]
+        start = cf.find_orbit(model, {"Omega": omega, "S": s + 0.002, "S0": 0.4})
+        branch = cf.continue_orbit(start, "S", (s - 0.001, s + 0.003))
+        found = [b.params["S"] for b in branch.bifurcations if b.kind is cf.Kind.SN]
+        assert min(found) == pytest.approx(s, abs=1e-11)
 
 
 def belt_by_scipy(t0, y0, dt, p):
