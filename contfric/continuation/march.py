@@ -44,9 +44,8 @@ FULL, EVENT, OUTSIDE, STEP, CLOSED, BROKEN, UNBOUNDED, ENDLESS = range(8)
 _WANTED_ANGLE, _MOST_ANGLE = 0.12, 0.35
 #: Most that a step grows by: the first steps are short, and the cubic holds this far beyond its base.
 _GROWTH = 2.5
-#: Distance from predictor to orbit in units of the step: beyond it the step may have gone over to another
-#: sheet. On a curve of constant curvature it is a sixth of the cube of the angle, 0.007 at most.
-_MOST_MISS = 0.05
+#: Distance from predictor to orbit in units of the step: beyond it the step may change branches.
+_MOST_MISS = 0.3
 #: A state this large (nondimensional) is on its way to infinity: resonance without damping.
 _UNBOUNDED = 1e6
 #: A turn this long (nondimensional) of an autonomous model is on its way to an infinite one.

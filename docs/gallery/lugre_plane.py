@@ -1,8 +1,8 @@
 """The plane Omega-S of the LuGre oscillator: curves through the events of Figs. 17 and 18.
 
 Both diagrams are explored, and each of their events that lies on no curve yet starts one. ``lugre-plane.md``
-has its tables between ``<!-- plane: NAME -->`` and ``<!-- end -->``; all else is written by hand. With a folder
-as argument what is finished is kept there, and taken up again.
+has its tables between ``<!-- plane: NAME -->`` and ``<!-- end -->``; all else is written by hand. With a
+folder as argument what is finished is kept there, and taken up again.
 """
 
 from __future__ import annotations
