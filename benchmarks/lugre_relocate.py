@@ -24,12 +24,9 @@ from contfric.models.files import built
 from contfric.orbit.solve import polish
 from contfric.orbit.system import build_system
 
-#: What is varied: tolerance of the integration, phase of the cut, largest step.
-CASES = tuple(
-    (tolerance, phase, 0.001 if phase == 0.7 else 0.0007)
-    for tolerance in (1e-11, 1e-12, 1e-13)
-    for phase in (0.7, 1.9)
-)
+#: What is varied: tolerance of the integration; phase of the cut with the largest step.
+TOLERANCES = (1e-11, 1e-12, 1e-13)
+CUTS = ((0.7, 0.001), (1.9, 0.0007))
 #: Points of the diagram between the start of a short branch and its event.
 BEHIND = 3
 #: Points of each side of a short branch: the first steps are short.
@@ -110,20 +107,21 @@ def touch(orbit: cf.Orbit) -> float:
     return float(np.min(np.abs(values[:found])))
 
 
-def main(path: str, only: str) -> None:
+def main(path: str, only: str, tolerances: tuple[float, ...]) -> None:
     """Print a row for each event."""
     diagram = cf.load(path)
     base = diagram.branches[0].model
-    models = {tolerance: with_tolerance(base, tolerance) for tolerance, _, _ in CASES}
-    heads = " | ".join(f"{tolerance:.0e}, {phase}" for tolerance, phase, _ in CASES)
+    cases = [(t, phase, step) for t in tolerances for phase, step in CUTS]
+    models = {tolerance: with_tolerance(base, tolerance) for tolerance in tolerances}
+    heads = " | ".join(f"{tolerance:.0e}, {phase}" for tolerance, phase, _ in cases)
     print(f"| event | {diagram.parameter} | least speed | largest difference | {heads} |")
-    print("|---|---|---|---|" + "---|" * len(CASES))
+    print("|---|---|---|---|" + "---|" * len(cases))
     worst = 0.0
     for place in places(diagram):
         known = place.event.params[diagram.parameter]
         if only and only not in f"{place.event.label} {known:.9f}":
             continue
-        values = np.array([located(place, models[t], f, h, diagram) for t, f, h in CASES])
+        values = np.array([located(place, models[t], f, h, diagram) for t, f, h in cases])
         apart = float(np.nanmax(values) - np.nanmin(values))
         worst = max(worst, apart)
         shown = " | ".join(f"{value - known:+.1e}" for value in values)
@@ -137,5 +135,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("diagram", help="diagram.npz of a run of fig17 or fig18")
     parser.add_argument("--only", default="", help="part of the label and value of an event")
+    parser.add_argument("--tolerances", type=float, nargs="+", default=TOLERANCES)
     arguments = parser.parse_args()
-    main(arguments.diagram, arguments.only)
+    main(arguments.diagram, arguments.only, tuple(arguments.tolerances))

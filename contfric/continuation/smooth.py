@@ -34,6 +34,8 @@ _CONSTANT = 1e-7
 #: What is left of a product of 1 - mu or 1 + mu where its sign changes, against its values at the ends of the
 #: step: far above what a bracket as narrow as rounding leaves of a continuous one.
 _JUMP = 1e-3
+#: Products above this belong to a pole: multipliers are infinite where an exit becomes tangential.
+_POLE = 1e3
 #: A step shorter than this (arclength) is not taken back: there is nothing to be found in between.
 _SHORTEST_LEAP = 1e-7
 #: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
@@ -163,9 +165,11 @@ def _not_located(
 def _leaps(before: Point, after: Point, value: float, a: float, b: float) -> bool:
     """Tell whether multipliers pass +-1 over a step by a jump, not through it.
 
-    Along a branch they are continuous: the step has gone over to another sheet, behind folds in between.
+    Along a branch they are continuous, but where they are infinite: the step has gone over to another sheet,
+    behind folds in between.
     """
-    jumps = abs(value) > _JUMP * max(abs(a), abs(b))
+    largest = max(abs(a), abs(b))
+    jumps = largest < _POLE and abs(value) > _JUMP * largest
     return jumps and after.arc - before.arc > _SHORTEST_LEAP
 
 
