@@ -80,7 +80,7 @@ def main(folder: Path) -> None:
 
     print("| curve | orbits | points | compared | largest difference |\n|---|---|---|---|---|")
     worst = 0.0
-    for file in sorted(folder.glob("[BSP][PND]-*.npz")):
+    for file in sorted(folder.glob("curve-*.npz")):
         curve = cf.load(file)
         places = np.unique(np.linspace(1, len(curve) - 2, COUNT + 2).astype(int)[1:-1])
         off = np.array([difference(curve, int(k), RANGES) for k in places])

@@ -70,7 +70,15 @@ def events(diagrams: dict[str, cf.Diagram]) -> list[cf.Bifurcation]:
         for b in branch.bifurcations
         if b.kind in KINDS and (b.kind is not cf.Kind.BP or branch.symmetric)
     ]
-    return sorted(found, key=lambda b: (KINDS.index(b.kind), b.params["Omega"], b.params["S"]))
+    return sorted(
+        found,
+        key=lambda b: (
+            KINDS.index(b.kind),
+            not b.orbit.symmetric,
+            -b.params["Omega"],
+            b.params["S"],
+        ),
+    )
 
 
 def crossings(curve: cf.Curve, name: str, level: float) -> list[tuple[float, int]]:
@@ -100,23 +108,17 @@ def lies_on(curve: cf.Curve, event: cf.Bifurcation) -> bool:
 
 def curves_of(found: list[cf.Bifurcation], folder: Path) -> tuple[list[cf.Curve], list[str]]:
     """Return the curves through events, each once, and what was refused."""
-    curves: list[cf.Curve] = []
+    curves = [cf.load(file) for file in sorted(folder.glob("curve-*.npz"))]
     refused = []
     for event in found:
         if any(lies_on(curve, event) for curve in curves):
             continue
         at = f"{event.kind.value} at Omega = {event.params['Omega']:.9f}, S = {event.params['S']:.9f}"
-        file = (
-            folder / f"{event.kind.value}-{event.params['Omega']:.9f}-{event.params['S']:.9f}.npz"
-        )
         try:
-            if not file.is_file():
-                curve = cf.continue_bifurcation(
-                    event, NAMES, RANGES, max_step=STEP, max_points=POINTS
-                )
-                cf.save(curve, file)
-            curves.append(cf.load(file))
-            print(at, curves[-1], flush=True)
+            curve = cf.continue_bifurcation(event, NAMES, RANGES, max_step=STEP, max_points=POINTS)
+            curves.append(curve)
+            cf.save(curve, folder / f"curve-{at}.npz".replace(" ", ""))
+            print(at, curve, flush=True)
         except cf.ContfricError as error:
             refused.append(f"{at}: {error}")
             print(refused[-1], flush=True)
