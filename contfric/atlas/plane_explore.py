@@ -119,7 +119,7 @@ def explore_plane(
     ):
         whole_number(name, most, least=1)
     wanted = _kinds(kinds)
-    largest = largest_step(max_step)
+    largest = largest_step(max_step, orbit.model)
     state = PlaneExploration(
         box, orbit.vector.copy(), wanted, max_periods, max_curves, largest, progress
     )

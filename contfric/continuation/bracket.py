@@ -16,6 +16,7 @@ from numba import types
 
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
 from contfric.continuation.steps import (
+    ALONG,
     AT_EVENT,
     CHI_MINUS,
     CHI_ONE,
@@ -226,6 +227,9 @@ def locate(  # type: ignore[no-untyped-def]
     # margins and distances are positive before the event, the others have the sign that they have
     two_sided = kind == BY_PARAMETER or (kind == BY_TEST and index >= margins)
     noise = 0.1 * _NOISE if two_sided else _NOISE  # slopes and products of multipliers have less
+    # slopes and multipliers are those of the last Jacobian: it must be that of the orbit, not one from which
+    # Newton's method is known to end there
+    accuracy = ALONG if kind == BY_TEST and index >= margins else AT_EVENT
     sign = -1.0 if two_sided and f_low < 0.0 else 1.0
     f_low, f_high = limited(sign * f_low), limited(sign * f_high)
     low, high, x = 0.0, 1.0, 0.5
@@ -239,7 +243,7 @@ def locate(  # type: ignore[no-untyped-def]
             break
         p[active], slope = between(za, zb, ta, tb, wa, wb, sa, sb, length, x, z, t)
         fine, slope, _ = settle(
-            functions, layout, z, p, which, t, slope, scale, AT_EVENT, counts, room
+            functions, layout, z, p, which, t, slope, scale, accuracy, counts, room
         )
         f = -1.0
         if fine:

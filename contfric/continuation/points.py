@@ -13,8 +13,8 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System
 
-#: Largest step by default, where the range of the parameter counts 1 (and grows with the size of the
-#: state): about 100 points over the range.
+#: Largest step of models that declare none, where the range of the parameter counts 1 (and grows with the
+#: size of the state): about 100 points over the range.
 LARGEST_STEP = 0.01
 #: First step, in largest steps: the curvature is not known yet.
 FIRST_STEP = 0.1
@@ -159,7 +159,7 @@ def settings_of(
         why_bottom if bottom >= low else "",
         why_top if top <= high else "",
         width,
-        max_step or LARGEST_STEP,
+        max_step or model.max_step or LARGEST_STEP,
         stability and not orbit.system.holds,
         max_points,
     )

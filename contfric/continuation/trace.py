@@ -75,7 +75,7 @@ def continue_orbit(
         Where it may go; clipped to the model's limits.
     max_step : float, optional
         Largest step along the branch, as a share of the range (times 1 + the size of the
-        state); 0.01 by default.
+        state); that of the model by default, 0.01 if it declares none.
     stability : bool
         Whether multipliers are evaluated; without them PD is not detected, nor BP where no
         asymmetric branch turns.

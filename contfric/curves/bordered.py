@@ -30,7 +30,7 @@ from contfric.orbit.equations import segment_rows
 
 #: Step of the differences where a flow has no second derivatives of its own, against the size of the
 #: direction: the cube root of rounding.
-_DIFFERENCE = 6e-6
+DIFFERENCE = 6e-6
 #: Step of the third derivatives along a null vector of size 1: with Richardson's extrapolation its error
 #: and its rounding are both about 1e-11.
 _THIRD = 2e-3
@@ -49,6 +49,7 @@ class BorderedRoom(NamedTuple):
     bent, plus : derivatives of the flow's and of an observable's in a direction, shape (n, 2 + n + q)
     start, after : displaced joints, shape (m,)
     numbers : scratch for the flow, shape (8,)
+    difference : step of the differences, and whether any was taken, shape (2,)
     """
 
     a: FloatArray
@@ -69,6 +70,7 @@ class BorderedRoom(NamedTuple):
     start: FloatArray
     after: FloatArray
     numbers: FloatArray
+    difference: FloatArray
 
 
 @allocating_helper
@@ -94,6 +96,7 @@ def bordered_room(count, m, free):  # type: ignore[no-untyped-def]
         np.empty(m),
         np.empty(m),
         np.empty(8),
+        np.array([DIFFERENCE, 0.0]),
     )
 
 
@@ -218,8 +221,8 @@ def bend_flow(functions, second, mode, start, duration, p, which, along, out, bo
     if second(mode, none, start[0], start[1:], duration, p, which, along, out, bordered.numbers):
         return
     m = start.shape[0]
-    step = _DIFFERENCE
-    displaced = bordered.start
+    step, displaced = bordered.difference[0], bordered.start
+    bordered.difference[1] = 1.0
     for side in range(2):
         h = step if side == 0 else -step
         for j in range(m):
@@ -245,7 +248,7 @@ def bend_observable(functions, second, c, at, p, which, along, out, bordered, eq
     """Write the derivative of an observable's gradient in a direction of (t, y) to the first row."""
     if second(0, c, at[0], at[1:], 0.0, p, which, along, out, bordered.numbers):
         return
-    m, step = at.shape[0], _DIFFERENCE
+    m, step = at.shape[0], bordered.difference[0]
     displaced, grad = bordered.start, equations.grad
     for side in range(2):
         h = step if side == 0 else -step

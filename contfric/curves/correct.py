@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from contfric.compiled import helper
-from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, EXTRA
+from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, EXTRA, copy_to
+from contfric.curves.bordered import DIFFERENCE
 from contfric.curves.conditions import EXIT, JOINT, SPECTRAL, condition_value
 from contfric.curves.normal_form import cubic_coefficient
 from contfric.orbit.cyclic import finish, next_rows, start_border, take_out
@@ -34,6 +35,9 @@ BEND = 0
 _TOUCHES = 1e-9
 #: Newton converges quadratically from the cubic predictor; beyond this the step was too long.
 _MOST_STEPS = 12
+#: Differences that are tried, and how much shorter each is: at the third (6e-10) a derivative that is
+#: good to 1e-12 still leaves three digits, with which Newton converges and tangents are good enough.
+_ATTEMPTS, _SHORTER = 3, 1e-2
 
 
 @helper
@@ -171,9 +175,32 @@ def settle_curve(  # type: ignore[no-untyped-def]
     counts,
     room,
 ):
-    """Correct (z, p) normal to the tangent, and replace the tangent; False if Newton fails."""
+    """Correct (z, p) normal to the tangent, and replace the tangent; False if Newton fails.
+
+    Where it fails with second derivatives by differences it is tried again with shorter ones: beside a touch
+    of a kink the first derivatives change within less than the difference.
+    """
     anchor_plane(room, z, p, which, tz, tw, scale)
     counts[SOLVES] += 1
+    difference, fine = room.bordered.difference, False
+    for attempt in range(_ATTEMPTS):
+        difference[0], difference[1] = DIFFERENCE * _SHORTER**attempt, 0.0
+        if attempt > 0:
+            copy_to(z, room.z_ref)
+            for k in range(which.shape[0]):
+                p[which[k]] = room.p_ref[k]
+        fine = correct_curve(
+            functions, second, layout, condition, z, p, which, border, accuracy, room
+        )
+        if fine or difference[1] == 0.0:
+            break
+    difference[0] = DIFFERENCE
+    return fine and turn_tangent(room.elimination, tz, tw, scale)
+
+
+@helper
+def correct_curve(functions, second, layout, condition, z, p, which, border, accuracy, room):  # type: ignore[no-untyped-def]
+    """Correct (z, p) on the plane that is anchored in the room; False if Newton fails."""
     work, equations, s = room.elimination, room.equations, room.s
     before = np.inf
     for step in range(_MOST_STEPS):
@@ -192,7 +219,7 @@ def settle_curve(  # type: ignore[no-untyped-def]
         move(z, p, which, work.z, work.w, 1.0)
         if has_settled(size, before, max(worst, abs(g)), accuracy):
             close_chain(functions, layout, z, p, which, equations)
-            return turn_tangent(work, tz, tw, scale)
+            return True
         if step > 1 and size > 2.0 * before:
             return False
         before = size

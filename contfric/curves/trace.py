@@ -27,7 +27,7 @@ from contfric.curves.points import (
 from contfric.curves.problem import Problem, box_of, problem_of
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.errors import ConvergenceError, ParameterError, whole_number
-from contfric.models.definition import FloatArray
+from contfric.models.definition import FloatArray, Model
 
 #: A first point farther than this from the bifurcation (in widths of the ranges) is another one.
 _SAME_START = 1e-4
@@ -92,8 +92,8 @@ def continue_bifurcation(
     ranges : dict
         Where each of them may go.
     max_step : float, optional
-        Largest step along the curve, as a share of the ranges (times 1 + the size of the state); 0.01
-        by default.
+        Largest step along the curve, as a share of the ranges (times 1 + the size of the state); that
+        of the model by default, 0.01 if it declares none.
     max_points : int
         Most points of each side; a curve that reaches it says so.
 
@@ -129,7 +129,7 @@ def continue_bifurcation(
             "impacts whose slides cannot shrink to nothing"
         )
     box = box_of(model, parameters, ranges)
-    largest = largest_step(max_step)
+    largest = largest_step(max_step, model)
     whole_number("max_points", max_points, least=2)
     problem = problem_of(bifurcation, box)
     problem, start, border = start_of_curve(problem, bifurcation, largest)
@@ -140,8 +140,8 @@ def continue_bifurcation(
     return join_sides(behind, ahead)
 
 
-def largest_step(max_step: Any) -> float:
-    """Return the largest step as a share of the ranges.
+def largest_step(max_step: Any, model: Model) -> float:
+    """Return the largest step as a share of the ranges: what is asked for, or the model's.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def largest_step(max_step: Any) -> float:
         If it is no number in (0, 1].
     """
     if max_step is None:
-        return LARGEST_STEP
+        return model.max_step or LARGEST_STEP
     if isinstance(max_step, bool) or not isinstance(max_step, (int, float)):
         raise ParameterError(f"max_step is a share of the ranges, in (0, 1], got {max_step!r}")
     if not 1e-8 <= max_step <= 1.0:

@@ -90,6 +90,9 @@ class Model:
     filippov : bool
         Whether rest is left without acceleration everywhere (static and kinetic limit agree), so that the
         flow never jumps: slides may then shrink to nothing, and are solved for accordingly.
+    max_step : float or None
+        Largest step of a continuation, as a share of the range, where the user gives none; None for that
+        of the engine. For a model whose branches fold in less.
     definition : str
         Text from which the model can be built anywhere (:mod:`contfric.models.description`); empty if
         it is known by its name only.
@@ -114,6 +117,7 @@ class Model:
     autonomous: bool = False
     kinks: tuple[str, ...] = ()
     filippov: bool = False
+    max_step: float | None = None
     definition: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:

@@ -87,13 +87,14 @@ def model_from(description: Description) -> Model:
         departures=description.departures or _departures(sampler, surfaces, domains),
         symmetry=_symmetry(sampler, surfaces),
         stop_surface=description.stop_surface or _stop_surface(sampler),
-        flow_factory=GeneratedFlow(description.text),
+        flow_factory=GeneratedFlow(description.motion),
         spread=Spread(description.spread, description.text),
         references=description.references,
         resets=tuple(_reset(description, name) for name in description.resets),
         autonomous=not description.period,
         kinks=description.kinks,
         filippov=leaves_at_rest(sampler, description, domains),
+        max_step=description.max_step,
         definition=description.text,
     )
 

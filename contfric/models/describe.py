@@ -16,6 +16,7 @@ KEYS = (
     *("name", "title", "references", "states", "parameters", "constraints", "period"),
     *("autonomous", "define", "observables", "surfaces", "field", "modes", "domains"),
     *("departures", "resets", "symmetry", "stop_surface", "kinks", "spread", "integration"),
+    "max_step",
 )
 _PARAMETER = ("default", "meaning")
 _SURFACE = ("observable", "level", "switching")
@@ -24,6 +25,8 @@ _DOMAIN = ("mode", "in", "label")
 _METHODS = ("explicit", "implicit", "automatic")
 #: Tolerances between rounding and what Newton's method on a chain of segments still takes for smooth.
 _TOLERANCES = (1e-14, 1e-6)
+#: Shares of a range that are steps: below it a branch is millions of points long.
+_STEPS = (1e-8, 1.0)
 
 
 def from_text(text: str) -> Description:
@@ -86,6 +89,7 @@ def describe(data: Mapping[str, Any]) -> Description:
         spread=_spread(top, states),
         method=method,
         tolerance=tolerance,
+        max_step=_max_step(top),
     )
     _check_expressions(found, names)
     return found
@@ -294,14 +298,30 @@ def _integration(top: Part) -> tuple[str, float]:
     method = part.one_of("method", _METHODS, "method of integration", "explicit")
     tolerance = part.data.get("tolerance", 1e-12)
     low, high = _TOLERANCES
-    number = isinstance(tolerance, (int, float)) and not isinstance(tolerance, bool)
-    if not number or not low <= tolerance <= high:
+    if not _is_number(tolerance) or not low <= tolerance <= high:
         part.fail(
             "tolerance",
             f"'tolerance' is a number from {low:g} to {high:g}, got {tolerance!r}; YAML reads 1e-12 "
             "as text: write 1.0e-12",
         )
     return method, float(tolerance)
+
+
+def _max_step(top: Part) -> float | None:
+    step, (low, high) = top.data.get("max_step"), _STEPS
+    if step is None:
+        return None
+    if not _is_number(step) or not low <= step <= high:
+        top.fail(
+            "max_step",
+            f"'max_step' is the largest step of a continuation as a share of the range, from {low:g} to "
+            f"{high:g}, got {step!r}; YAML reads 1e-3 as text: write 1.0e-3",
+        )
+    return float(step)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def _check_expressions(found: Description, names: Names) -> None:

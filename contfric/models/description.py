@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -53,6 +53,7 @@ class Description:
     kinks : observables at whose zeros the fields have kinks, and are continuous
     spread : expression of the half-width of starts, one a state
     method, tolerance : how motion is integrated (:mod:`contfric.flow.integrated`)
+    max_step : largest step of a continuation where the user gives none; None for the engine's
     """
 
     name: str
@@ -75,6 +76,7 @@ class Description:
     spread: tuple[str, ...] = ()
     method: str = "explicit"
     tolerance: float = 1e-12
+    max_step: float | None = None
 
     def data(self) -> dict[str, Any]:
         """Return the description in the schema of the YAML files, with nothing left out."""
@@ -112,6 +114,8 @@ class Description:
             found["kinks"] = list(self.kinks)
         if self.stop_surface:
             found["stop_surface"] = self.stop_surface
+        if self.max_step is not None:
+            found["max_step"] = self.max_step
         return found
 
     def _mode(self, mode: ModeText) -> dict[str, Any]:
@@ -125,6 +129,11 @@ class Description:
     def text(self) -> str:
         """The description as one line of JSON, always the same for the same description."""
         return json.dumps(self.data(), ensure_ascii=False, allow_nan=False)
+
+    @cached_property
+    def motion(self) -> str:
+        """The same of what motion depends on: how a continuation steps is left out."""
+        return self.text if self.max_step is None else replace(self, max_step=None).text
 
     @cached_property
     def names(self) -> Names:

@@ -84,5 +84,8 @@ def model_of(definition: str) -> Model:
     from contfric.models.build import module_path
     from contfric.models.derive import model_from
 
-    module_path(definition)  # written first: what has no value is reported by formula and place
-    return model_from(from_text(definition))
+    description = from_text(definition)
+    module_path(
+        description.motion
+    )  # written first: what has no value is reported by formula and place
+    return model_from(description)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +17,8 @@ from contfric.orbit.solve import polish
 WHERE = {"Omega": 0.5, "S0": 0.4}
 #: Events of the symmetric branch of Fig. 17 between S = 0.374 and S = 0.378 (docs/gallery/fig17.md).
 FOLDS = (0.3750595439839, 0.3757051387250)
-BREAKING = 0.3757014024
+BREAKING = 0.3757014023946
+GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 NONE, NOTHING = np.empty(0, dtype=np.int64), np.empty((0, 0))
 
 
@@ -131,7 +134,7 @@ def test_events_do_not_depend_on_where_orbits_are_cut(model, orbit):
         for event in branch.bifurcations:
             found[event.kind].append(event.params["S"])
         assert sorted(found[cf.Kind.SN]) == pytest.approx(FOLDS, abs=1e-11)
-        assert found[cf.Kind.BP] == pytest.approx([BREAKING], abs=3e-11)
+        assert found[cf.Kind.BP] == pytest.approx([BREAKING], abs=1e-12)
         assert len(branch.bifurcations) == 3
 
 
@@ -149,3 +152,138 @@ def test_simulation_settles_on_what_the_symmetry_breaking_says(model, orbit, off
     assert settled.stable
     assert settled.symmetric == symmetric
     assert (settled.asymmetry < 1e-9) == symmetric
+
+
+PLANE = ("Omega", "S")
+
+
+@pytest.fixture(scope="module")
+def symmetric(orbit):
+    """The symmetric branch of Fig. 17 about its folds, with the step that the model declares."""
+    return cf.continue_orbit(orbit, "S", (0.374, 0.385))
+
+
+def test_the_models_own_step_finds_the_folds(model, symmetric):
+    assert model.max_step == 0.001
+    found = {kind: [] for kind in cf.Kind}
+    for event in symmetric.bifurcations:
+        found[event.kind].append(event.params["S"])
+    assert sorted(found[cf.Kind.SN]) == pytest.approx(FOLDS, abs=1e-11)
+    assert found[cf.Kind.BP] == pytest.approx([BREAKING], abs=1e-12)
+
+
+def at(orbit, **changed):
+    vector = orbit.model.vector({**orbit.params, **changed})
+    return polish(replace(orbit, vector=vector), damped=False)
+
+
+def test_symmetry_breaking_beside_a_touch_is_located_to_rounding(symmetric):
+    """The multiplier passes -1 at 4e6 a unit of S: within 3e-13 of the point it must change sides."""
+    (event,) = (b for b in symmetric.bifurcations if b.kind is cf.Kind.BP)
+    sides = [at(event.orbit, S=event.params["S"] + d) for d in (-3e-13, 3e-13)]
+    below, above = (np.min(o.turn_multipliers.real) + 1.0 for o in sides)
+    assert below < 0.0 < above
+    assert above - below < 1e-5
+
+
+def test_curve_of_the_symmetry_breaking_beside_a_touch(symmetric):
+    """Its points by orbits alone: 1e-9 below them the multiplier is beyond -1, 1e-9 above it is not."""
+    (event,) = (b for b in symmetric.bifurcations if b.kind is cf.Kind.BP)
+    ranges = {"Omega": (0.498, 0.502), "S": (0.36, 0.39)}
+    curve = cf.continue_bifurcation(event, PLANE, ranges, max_step=0.05, max_points=8)
+    assert len(curve) > 8
+    assert np.all(np.diff(curve.values, axis=0) > 0.0)
+    for k in (0, len(curve) // 4, -1):
+        s = float(curve.values[k, 1])
+        below, above = (at(curve[k], S=s + d).turn_multipliers for d in (-1e-9, 1e-9))
+        assert np.min(below.real) < -1.0 < np.min(above.real)
+
+
+def test_fold_curve_is_where_runs_in_one_parameter_turn(model, symmetric):
+    """Orbits are simulated above the fold, away from the curve, and continued down to it."""
+    event = min(
+        (b for b in symmetric.bifurcations if b.kind is cf.Kind.SN), key=lambda b: b.params["S"]
+    )
+    ranges = {"Omega": (0.496, 0.504), "S": (0.35, 0.39)}
+    curve = cf.continue_bifurcation(event, PLANE, ranges, max_step=0.05, max_points=6)
+    assert len(curve) > 6
+    for k in (0, -1):
+        omega, s = curve.values[k]
+        start = cf.find_orbit(model, {"Omega": omega, "S": s + 0.002, "S0": 0.4})
+        branch = cf.continue_orbit(start, "S", (s - 0.001, s + 0.003))
+        found = [b.params["S"] for b in branch.bifurcations if b.kind is cf.Kind.SN]
+        assert min(found) == pytest.approx(s, abs=1e-11)
+
+
+def belt_by_scipy(t0, y0, dt, p):
+    """Integrate the block on the belt with scipy's Radau method; the side of the belt's speed is held."""
+    t, y = t0, np.array(y0)
+    side = math.copysign(1.0, y[1] - p["vb"])
+
+    def field(t, y):
+        x, v, z = y
+        slip = v - p["vb"]
+        dz = slip - p["sigma0"] * side * slip * (1.0 + p["delta"] * side * slip) / p["Fs"] * z
+        return [v, -x - p["sigma0"] * z - p["sigma1"] * dz, dz]
+
+    def meets(t, y):
+        return y[1] - p["vb"]
+
+    meets.terminal = True
+    while True:
+        meets.direction = -side
+        found = solve_ivp(
+            field, (t, t0 + dt), y, method="Radau", rtol=1e-9, atol=[1e-11, 1e-11, 1e-14],
+            events=meets,
+        )  # fmt: skip
+        t, y = float(found.t[-1]), found.y[:, -1]
+        if found.status == 0:
+            return y
+        side, y[1] = -side, p["vb"]
+
+
+def test_stick_slip_on_a_belt_is_that_of_scipy():
+    """One cycle of `belt-lugre` from its stop, by another integrator, ends where it began."""
+    orbit = cf.find_orbit("belt-lugre")
+    page = (GALLERY / "belt.md").read_text(encoding="utf-8")
+    period, largest, smallest = re.findall(r"^\| 1e3 \| (\S+) \| (\S+) \| (\S+) \|$", page, re.M)[0]
+    assert orbit.period == pytest.approx(float(period), abs=1e-9)
+    assert orbit.x_max == pytest.approx(float(largest), abs=1e-8)
+    assert orbit.x_min == pytest.approx(float(smallest), abs=1e-8)
+    start = orbit.joints[0]
+    there = belt_by_scipy(start[0], start[1:], orbit.period, orbit.params)
+    assert np.abs((there - start[1:]) / [1.0, 1.0, 1e-3]).max() < 2e-7
+
+
+def printed(page, low, high, orbits):
+    """Return the events of a page's table in a range: (kind, value) of those of one kind of orbits."""
+    text = (GALLERY / f"{page}.md").read_text(encoding="utf-8")
+    rows = re.findall(rf"^\| (\w\w)_{orbits}, 2seg \| (\d\.\d+) \|", text, re.M)
+    return sorted((float(value), kind) for kind, value in rows if low < float(value) < high)
+
+
+@pytest.mark.parametrize(
+    ("page", "params", "parameter", "bounds", "orbits"),
+    [
+        ("fig17", {"Omega": 0.5, "S": 0.352}, "S", (0.35, 0.377), "0a"),
+        ("fig18", {"S": 0.32, "Omega": 0.4033}, "Omega", (0.403, 0.406), "0s"),
+        ("fig18", {"S": 0.32, "Omega": 0.4808}, "Omega", (0.4805, 0.4818), "0s"),
+        ("fig18", {"S": 0.32, "Omega": 0.541}, "Omega", (0.54, 0.556), "0a"),
+    ],
+    ids=["meander", "loop", "folds", "main"],
+)
+def test_tables_of_the_gallery_are_computed_anew(model, page, params, parameter, bounds, orbits):
+    """A short run with the model's own step finds what is printed there, and nothing else."""
+    orbit = cf.find_orbit(model, {**params, "S0": 0.4})
+    branch = cf.continue_orbit(orbit, parameter, bounds)
+    assert branch.name == f"{orbits}, 2seg"
+    found = sorted(
+        (b.params[parameter], b.kind.value)
+        for b in branch.bifurcations
+        if b.orbit.symmetric == (orbits == "0s")  # an asymmetric branch begins at a symmetric orbit
+    )
+    known = printed(page, *bounds, orbits)
+    assert len(known) >= 2
+    assert [kind for _, kind in found] == [kind for _, kind in known]
+    for (value, _), (shown, _) in zip(found, known, strict=True):
+        assert value == pytest.approx(shown, abs=5.5e-10)

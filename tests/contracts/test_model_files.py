@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 import contfric as cf
+from contfric.continuation.points import LARGEST_STEP
+from contfric.curves.trace import largest_step
 from contfric.models.describe import from_text
 from contfric.resources import bundled_dir
 
@@ -78,9 +80,29 @@ def test_same_definition_is_the_same_model(tmp_path: Path) -> None:
     assert cf.load_model(path) is cf.load_model(str(again))
 
 
-def test_text_of_a_description_reads_back(tmp_path: Path) -> None:
-    definition = cf.load_model(written(tmp_path, GOOD)).definition
+@pytest.mark.parametrize("more", ["", "max_step: 0.002\n"])
+def test_text_of_a_description_reads_back(tmp_path: Path, more: str) -> None:
+    definition = cf.load_model(written(tmp_path, GOOD + more)).definition
     assert from_text(definition).text == definition
+
+
+def test_a_model_declares_its_largest_step(tmp_path: Path) -> None:
+    """It holds where the user gives none, for branches and curves; motion does not depend on it."""
+    plain = cf.load_model(written(tmp_path, GOOD))
+    careful = cf.load_model(written(tmp_path, f"{GOOD}max_step: 0.002\n"))
+    assert (plain.max_step, careful.max_step) == (None, 0.002)
+    assert careful.flow_factory == plain.flow_factory
+    assert cf.load_model("lugre").max_step == 0.001
+
+    def points(model: cf.Model, **step: float) -> int:
+        orbit = cf.find_orbit(model, {"Omega": 0.5})
+        return len(cf.continue_orbit(orbit, "Omega", (0.45, 0.55), **step))
+
+    assert points(careful) == points(plain, max_step=0.002) > 3 * points(plain)
+    assert points(careful, max_step=0.01) == points(plain)
+    assert largest_step(None, careful) == 0.002
+    assert largest_step(0.1, careful) == 0.1
+    assert largest_step(None, plain) == LARGEST_STEP
 
 
 @pytest.mark.parametrize("name", sorted(p.stem for p in bundled_dir("models").glob("*.yaml")))
@@ -127,6 +149,9 @@ MISTAKES = [
     ("name: spring", "name: spring\nspread: {x: t}", 2, "only parameters"),
     ("name: spring", "name: spring\nintegration: {method: magic}", 2, "explicit, implicit"),
     ("name: spring", "name: spring\nstop_surface: w", 2, "no surface 'w'"),
+    ("name: spring", "name: spring\nmax_step: 2", 2, "largest step of a continuation"),
+    ("name: spring", "name: spring\nmax_step: 1e-3", 2, "write 1.0e-3"),
+    ("name: spring", "name: spring\nmax_step: true", 2, "got True"),
     ("name: spring", "name: spring\nresets: {v: {w: 1}}", 2, "unknown key 'w'"),
     ("name: spring", "name: spring\ndomains: {a: {mode: forward}}", 2, "it holds for: forward:u+"),
 ]

@@ -18,6 +18,7 @@ import pytest
 
 import contfric as cf
 from contfric.cli import main
+from contfric.models import functions
 from contfric.models.functions import where
 
 YAML = """\
@@ -248,6 +249,35 @@ class Walled(cf.OscillatorModel):
         return {"v": -p.e * y.v} if surface == "wall" else None
 
 
+class Bristles(cf.OscillatorModel):
+    """A mass on bristles, cut by the phase of its excitation."""
+
+    states = ("x", "v", "z")
+    parameters: ClassVar = {"Omega": 0.5, "S": 0.3, "k": 100.0}
+    surfaces: ClassVar = {"phase": ("phase", 0)}
+    modes: ClassVar = {"first": {"phase": 1}, "second": {"phase": -1}}
+    kinks = ("v",)
+    stop_surface = "v"
+    max_step = 0.002
+
+    def period(self, p):  # type: ignore[no-untyped-def]
+        return 2 * np.pi / p.Omega
+
+    def observables(self, t, y, p):  # type: ignore[no-untyped-def]
+        return {"phase": functions.sin(p.Omega * t)}
+
+    def field(self, mode, t, y, p):  # type: ignore[no-untyped-def]
+        slip = y.v - p.k * abs(y.v) / p.S * y.z
+        return y.v, functions.cos(p.Omega * t) - y.x - p.k * y.z, slip
+
+
+def test_a_class_with_kinks_and_a_step_of_its_own() -> None:
+    model = cf.load_model(Bristles)
+    assert model.kinks == ("v",)
+    assert model.stop_surface == "v"
+    assert model.max_step == 0.002
+
+
 def test_a_class_with_a_wall() -> None:
     model = cf.load_model(Walled)
     assert [r.surface for r in model.resets] == ["wall"]
@@ -269,6 +299,7 @@ WRONG = [
     ({"modes": {"free": {"wal": -1}}}, "did you mean 'wall'?"),
     ({"states": ()}, "a list of names"),
     ({"constraints": ("k > ",)}, "a constraint is such as"),
+    ({"max_step": 0}, "as a share of the range"),
 ]
 
 
