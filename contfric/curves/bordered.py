@@ -14,6 +14,23 @@ point, so that the bordered matrices stay well conditioned.
 
 The transposed chain is a chain again: its row r links ``u_r`` and ``u_{r+1}`` by ``B_r^T`` and
 ``A_{r+1}^T``, and closes with ``u_N = u_0``. The same elimination solves both.
+
+*Autonomous orbits.* The end of a turn is pinned to time 0, ``z_N = (0, K y_0)``, and so is its variation:
+``v_N = (0, sigma K v_0)``, for sigma = -1 as well. With P the map of a turn in the section, ``dy_N = P dy_0`` and
+``dt_N = dt_0 + a dy_0``; what closes is ``P dy_0 = sigma K dy_0``, and dt_0 = -a dy_0, minus the variation of the
+duration, follows. So J is singular exactly where P has the multiplier, and the trivial one is not in it. A
+period doubling has null vectors of two turns, ``(-v + s, v)`` with a shift s of the first in time; segments do
+not feel it, and nothing below changes.
+
+*Behind a reset* a segment is ``phi(t_i, R(t_i, y_i), d)``; its derivatives follow by the chain rule, and their
+change in a direction by central differences of those, which contain the second derivatives of R.
+
+*Divided exit rows.* The exit row of a short segment that begins on its exit surface is the mean of the rate,
+``q = int_0^1 r'(s d) ds`` with r the distance to the surface (:mod:`contfric.orbit.equations`). It is a function of
+``(t_i, y_i, d)`` as the flow is, and of no later state; D_v of its gradient, by differences as well, takes the place of
+the observable's. (Of r/d itself, ``D_v D_w (r/d) = D_v D_w r / d - (D_v r D_w d + D_w r D_v d) / d^2`` where r = 0: the
+cross terms do not vanish, and all of it is a quotient of zeros at d = 0; of q nothing is.) u scales with the row, g by
+a factor that is not zero.
 """
 
 from __future__ import annotations
@@ -26,7 +43,14 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import Elimination, finish, next_rows, room_for, start_border, take_out
-from contfric.orbit.equations import segment_rows
+from contfric.orbit.equations import (
+    behind_reset,
+    is_divided,
+    leap,
+    mean_rate_row,
+    segment_rows,
+)
+from contfric.orbit.system import RETURNS
 
 #: Step of the differences where a flow has no second derivatives of its own, against the size of the
 #: direction: the cube root of rounding.
@@ -47,6 +71,7 @@ class BorderedRoom(NamedTuple):
     work, d, e, s, close, close_w : for the elimination with one border row
     along, other : a direction of a segment, shape (2 + n,)
     bent, plus : derivatives of the flow's and of an observable's in a direction, shape (n, 2 + n + q)
+    divided : the same of a divided exit row, shape (2 + n + q,)
     start, after : displaced joints, shape (m,)
     numbers : scratch for the flow, shape (8,)
     """
@@ -66,6 +91,7 @@ class BorderedRoom(NamedTuple):
     other: FloatArray
     bent: FloatArray
     plus: FloatArray
+    divided: FloatArray
     start: FloatArray
     after: FloatArray
     numbers: FloatArray
@@ -91,6 +117,7 @@ def bordered_room(count, m, free):  # type: ignore[no-untyped-def]
         np.empty(1 + m),
         np.empty((m - 1, 1 + m + free)),
         np.empty((m - 1, 1 + m + free)),
+        np.empty(1 + m + free),
         np.empty(m),
         np.empty(m),
         np.empty(8),
@@ -212,10 +239,29 @@ def end_of(vectors, i, sign, close, j):  # type: ignore[no-untyped-def]
 
 
 @helper
-def bend_flow(functions, second, mode, start, duration, p, which, along, out, bordered, equations):  # type: ignore[no-untyped-def]
+def segment_jacobian(functions, layout, i, start, duration, p, which, out, equations):  # type: ignore[no-untyped-def]
+    """Write the end of segment i, from its joint, with the derivatives: behind a reset by the chain rule."""
+    mode, state = layout.modes[i], equations.state
+    if layout.departs[i] < RETURNS:
+        n = state.shape[0]
+        leap(functions, layout, i, start, p, which, equations)
+        begin = equations.behind[n, :n]
+        functions[0](mode, start[0], begin, duration, p, which, state, out)
+        behind_reset(out, equations.behind, equations.grad, n)
+    else:
+        functions[0](mode, start[0], start[1:], duration, p, which, state, out)
+
+
+@helper
+def bend_flow(  # type: ignore[no-untyped-def]
+    functions, second, layout, i, start, duration, p, which, along, out, bordered, equations
+):
     """Write the derivative of the flow's jacobian in a direction."""
+    mode = layout.modes[i]
     none = min(mode, 0) - 1  # -1, but no literal
-    if second(mode, none, start[0], start[1:], duration, p, which, along, out, bordered.numbers):
+    if layout.departs[i] >= RETURNS and second(
+        mode, none, start[0], start[1:], duration, p, which, along, out, bordered.numbers
+    ):
         return
     m = start.shape[0]
     step = _DIFFERENCE
@@ -224,17 +270,8 @@ def bend_flow(functions, second, mode, start, duration, p, which, along, out, bo
         h = step if side == 0 else -step
         for j in range(m):
             displaced[j] = start[j] + h * along[j]
-        jac = out if side == 0 else bordered.plus
-        functions[0](
-            mode,
-            displaced[0],
-            displaced[1:],
-            duration + h * along[m],
-            p,
-            which,
-            equations.state,
-            jac,
-        )
+        jac, lasts = out if side == 0 else bordered.plus, duration + h * along[m]
+        segment_jacobian(functions, layout, i, displaced, lasts, p, which, jac, equations)
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] = (out[i, j] - bordered.plus[i, j]) / (2.0 * step)
@@ -257,6 +294,29 @@ def bend_observable(functions, second, c, at, p, which, along, out, bordered, eq
 
 
 @helper
+def bend_mean_rate(functions, layout, i, start, duration, p, which, along, room):  # type: ignore[no-untyped-def]
+    """Write the derivative of a divided exit row in a direction of (t, y, duration)."""
+    bordered, equations, rows = room.bordered, room.equations, room.elimination.rows
+    m, free, step = start.shape[0], which.shape[0], _DIFFERENCE
+    row, displaced, out = 2 * m - 1, bordered.start, bordered.divided
+    for side in range(2):
+        h = step if side == 0 else -step
+        for j in range(m):
+            displaced[j] = start[j] + h * along[j]
+        if layout.departs[i] < RETURNS:
+            leap(functions, layout, i, displaced, p, which, equations)
+        lasts = duration + h * along[m]
+        mean_rate_row(functions, layout, i, m, displaced, lasts, p, which, equations, rows)
+        for k in range(1 + m + free):
+            value = rows[row, m + k]  # columns of both joints: t and the end of the duration, y, parameters
+            if k == 0:
+                value += rows[row, 2 * m]
+            elif k > m:
+                value = rows[row, 3 * m + k - m - 1]
+            out[k] = value if side == 0 else (out[k] - value) / (2.0 * step)
+
+
+@helper
 def add_curvature(functions, second, layout, i, sign, z, p, which, room):  # type: ignore[no-untyped-def]
     """Add what segment i contributes to the gradient ``-u^T dJ v``."""
     from_ = z[i]
@@ -266,25 +326,22 @@ def add_curvature(functions, second, layout, i, sign, z, p, which, room):  # typ
     after = z[i + 1] if i + 1 < count else equations.last
     along, u, grad = bordered.along, bordered.u, equations.grad
     segment_direction(bordered.v, i, sign, equations.close, along)
+    lasts = after[0] - from_[0]
+    bent = bordered.bent
     bend_flow(
-        functions,
-        second,
-        layout.modes[i],
-        from_,
-        after[0] - from_[0],
-        p,
-        which,
-        along,
-        bordered.bent,
-        bordered,
-        equations,
+        functions, second, layout, i, from_, lasts, p, which, along, bent, bordered, equations
     )
+    divided = is_divided(layout, i, lasts)
+    if divided:
+        bend_mean_rate(functions, layout, i, from_, lasts, p, which, along, room)
     for k in range(grad.shape[0]):
         grad[k] = 0.0
     for k in range(2 + n + free):
         value = 0.0
         for j in range(n):
-            value -= u[i, j] * bordered.bent[j, k]
+            value -= u[i, j] * bent[j, k]
+        if divided:
+            value -= u[i, n] * bordered.divided[k]
         if k == 0:
             room.d[1, i, 0] += value
         elif k < 1 + n:
@@ -294,6 +351,9 @@ def add_curvature(functions, second, layout, i, sign, z, p, which, room):  # typ
             grad[0] += value
         else:
             grad[m + k - 2 - n] += value
+    if divided:
+        spread_end(grad, i, room)
+        return
     for j in range(m):
         along[j] = end_of(bordered.v, i, sign, equations.close, j)
     flow_part = bordered.other  # the gradient so far: differences use the room's gradient

@@ -122,13 +122,7 @@ def continue_bifurcation(
             f"a curve starts from a Bifurcation, got {type(bifurcation).__name__}: take one of "
             "branch.bifurcations or diagram.bifurcations"
         )
-    model = bifurcation.orbit.model
-    if model.resets or model.filippov or model.autonomous:
-        raise ParameterError(
-            f"model '{model.name}': curves in two parameters are offered for excited models without "
-            "impacts whose slides cannot shrink to nothing"
-        )
-    box = box_of(model, parameters, ranges)
+    box = box_of(bifurcation.orbit.model, parameters, ranges)
     largest = largest_step(max_step)
     whole_number("max_points", max_points, least=2)
     problem = problem_of(bifurcation, box)
