@@ -9,6 +9,7 @@ starts further curves.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from contfric.atlas.plane_state import PlaneExploration, Progress
 from contfric.atlas.seeds import Seeds
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.points import MOST_POINTS
+from contfric.continuation.trace import continue_orbit
 from contfric.curves.assembly import join_sides
 from contfric.curves.going_on import Start
 from contfric.curves.leaving import leaving, other_words
@@ -208,21 +210,15 @@ def _follow_section(
 def _section(
     state: PlaneExploration, orbit: Orbit, fixed: str, value: float, seeds: Seeds | None
 ) -> Diagram | None:
-    box = state.box
-    varies = next(n for n in box.names if n != fixed)
-    k = box.names.index(varies)
+    varies = next(n for n in state.box.names if n != fixed)
+    k = state.box.names.index(varies)
     state.say(f"section {fixed} = {value:g}")
-    for share in (0.5, 0.3, 0.7, 0.1, 0.9):
-        params = {**orbit.params, fixed: value}
-        bottom, top, _, _ = orbit.model.limits(varies, params)
-        low, high = max(box.low[k], bottom), min(box.high[k], top)
-        params[varies] = float(low + share * (high - low))
+    for start in _starts(state, orbit, fixed, value):
         try:
-            start = find_orbit(orbit.model, params, longest=4000)
             return explore(
                 start,
                 varies,
-                (float(box.low[k]), float(box.high[k])),
+                (float(state.box.low[k]), float(state.box.high[k])),
                 bridges=False,
                 max_periods=state.max_periods,
                 seeds=seeds,
@@ -230,6 +226,36 @@ def _section(
         except ContfricError:
             continue
     return None
+
+
+def _starts(
+    state: PlaneExploration, orbit: Orbit, fixed: str, value: float
+) -> Iterator[Orbit]:
+    """Yield orbits on a section: those that simulations settle on, then the plane's own continued to it."""
+    box = state.box
+    varies = next(n for n in box.names if n != fixed)
+    k = box.names.index(varies)
+    params = {**orbit.params, fixed: value}
+    bottom, top, _, _ = orbit.model.limits(varies, params)
+    low, high = max(box.low[k], bottom), min(box.high[k], top)
+    for share in (0.5, 0.3, 0.7, 0.1, 0.9):
+        with suppress(ContfricError):
+            there = {**params, varies: float(low + share * (high - low))}
+            yield find_orbit(orbit.model, there, longest=4000)
+    with suppress(ContfricError):
+        yield from _continued(orbit, fixed, value)
+
+
+def _continued(orbit: Orbit, fixed: str, value: float) -> Iterator[Orbit]:
+    """Yield an orbit continued to a section; nothing if its branch ends before."""
+    here = orbit.params[fixed]
+    if here == value:
+        yield orbit
+        return
+    branch = continue_orbit(orbit, fixed, (min(here, value), max(here, value)))
+    there = branch[int(np.argmin(np.abs(branch.values - value)))]
+    if there.params[fixed] == value and there.admissible:
+        yield there
 
 
 def _follow_bifurcation(state: PlaneExploration, bifurcation: Bifurcation) -> None:

@@ -10,7 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from contfric.continuation.events import TERMINAL, Bifurcation, Kind, resting_domain
+from contfric.continuation.events import (
+    TERMINAL,
+    Bifurcation,
+    Kind,
+    kind_of_margin,
+    resting_domain,
+)
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.linear import jacobian_blocks
@@ -222,7 +228,7 @@ def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Proble
     if not bifurcation.tests:
         raise ParameterError(f"{bifurcation!r} does not say which margin vanishes")
     surfaces = [s.name for s in model.surfaces]
-    test = bifurcation.tests[0]
+    test = _chosen(bifurcation)
     if kind is Kind.T:
         place, segment, surface = _tangency(orbit, test)
     else:
@@ -231,7 +237,6 @@ def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Proble
         margin = float(orbit.margins[system.tests.index(test)])
         if not abs(margin) < _VANISHES:
             raise ParameterError(f"{bifurcation!r} is none: its margin is {margin:.3g}, not zero")
-        test = _tangential(test, orbit)
         places = {
             Margin.JOINT: JOINT,
             Margin.EXIT: EXIT,
@@ -239,6 +244,8 @@ def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Proble
             Margin.ENTRY: START,
         }
         place, segment, surface = places[test.margin], test.segment, test.surface
+        if test not in bifurcation.tests:
+            kind = kind_of_margin(system, test, orbit)
     pinned = [] if kind is Kind.T else _vanishing(orbit)
     rest = -1
     if kind in (Kind.CS, Kind.SS) and place == JOINT:
@@ -259,22 +266,33 @@ def _vanishing(orbit: Orbit) -> list[int]:
     return [int(k) for k in np.flatnonzero(np.abs(orbit.margins) < _VANISHES)]
 
 
-def _tangential(test: Test, orbit: Orbit) -> Test:
-    """Return the tangential exit where a margin at a joint vanishes with it.
+def _chosen(bifurcation: Bifurcation) -> Test:
+    """Return the margin of an event that its curve follows: one at a joint whose exit is not tangential.
 
     Where nothing jumps a stop without acceleration is one at which the load is on its limit, and an impact
     without speed is one at which the speed is zero: one condition by two names. The row of the exit is singular
-    there, and only as a tangential exit does it get its rate.
+    there, and only as a tangential exit does it get its rate. So a margin without one comes first, and where all
+    have one the exit itself is taken.
     """
-    model = orbit.model
-    if not (model.filippov or orbit.system.word[test.segment][1] in model.reset_by_surface):
-        return test
-    exits = [
+    tests = bifurcation.tests
+    exits = [_tangential(test, bifurcation.orbit) for test in tests]
+    plain = next((test for test, exit_ in zip(tests, exits, strict=True) if exit_ is None), None)
+    return plain or exits[0] or tests[0]
+
+
+def _tangential(test: Test, orbit: Orbit) -> Test | None:
+    """Return the exit whose tangency is the same condition as a margin at its joint; None if none is."""
+    model, word = orbit.model, orbit.system.word
+    if test.margin is not Margin.JOINT or not (
+        model.filippov or word[test.segment][1] in model.reset_by_surface
+    ):
+        return None
+    exits = (
         t
         for t, value in zip(orbit.system.tests, orbit.margins, strict=True)
         if t.margin is Margin.EXIT and t.segment == test.segment and abs(value) < _VANISHES
-    ]
-    return exits[0] if test.margin is Margin.JOINT and exits else test
+    )
+    return next(exits, None)
 
 
 def _rest_mode(system: System, test: Test) -> int:

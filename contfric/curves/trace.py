@@ -265,6 +265,7 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
         codes.BROKEN: CurveEndReason.LOST,
         codes.CLOSED: CurveEndReason.CLOSED,
         codes.UNBOUNDED: CurveEndReason.UNBOUNDED,
+        codes.ENDLESS: CurveEndReason.PERIOD,
     }
     if why in ends:
         side.end = _near_limit(problem, side.tip) or CurveEnd(ends[why])
