@@ -32,7 +32,7 @@ STARTS: dict[str, tuple[dict[str, float], dict[str, Any], tuple[str, float, floa
     "popp": ({"omega": 1.72}, {}, ("omega", 1.6, 1.9)),
     "belt": ({"vb": 0.2}, {}, ("vb", 0.02, 10.0)),
     "dead-band": ({"delta": 0.1}, {}, ("alpha", 0.5, 4.0)),
-    JERK: ({"A": 0.75}, {"state": [-1.0, 0.0, 0.2]}, ("A", 0.55, 1.0)),
+    JERK: ({"A": 0.75}, {"state": [-1.0, 0.0, 0.2]}, ("A", 0.5, 1.2)),
 }
 PLANES: dict[str, dict[str, tuple[float, float]]] = {
     "impact-friction": {"k": (2.0, 20.0), "b": (0.5, 1.2)},
