@@ -16,21 +16,14 @@ The transposed chain is a chain again: its row r links ``u_r`` and ``u_{r+1}`` b
 ``A_{r+1}^T``, and closes with ``u_N = u_0``. The same elimination solves both.
 
 *Autonomous orbits.* The end of a turn is pinned to time 0, ``z_N = (0, K y_0)``, and so is its variation:
-``v_N = (0, sigma K v_0)``, for sigma = -1 as well. With P the map of a turn in the section, ``dy_N = P dy_0`` and
-``dt_N = dt_0 + a dy_0``; what closes is ``P dy_0 = sigma K dy_0``, and dt_0 = -a dy_0, minus the variation of the
-duration, follows. So J is singular exactly where P has the multiplier, and the trivial one is not in it. A
-period doubling has null vectors of two turns, ``(-v + s, v)`` with a shift s of the first in time; segments do
-not feel it, and nothing below changes.
+``v_N = (0, sigma K v_0)``, for sigma = -1 as well. With P the map of a turn in the section,
+``dy_N = P dy_0`` and ``dt_N = dt_0 + a dy_0``; what closes is ``P dy_0 = sigma K dy_0``, and dt_0 = -a dy_0,
+minus the variation of the duration, follows. So J is singular exactly where P has the multiplier, and the
+trivial one is not in it. A period doubling has null vectors of two turns, ``(-v + s, v)`` with a shift s of
+the first in time; segments do not feel it, and nothing below changes.
 
-*Behind a reset* a segment is ``phi(t_i, R(t_i, y_i), d)``; its derivatives follow by the chain rule, and their
-change in a direction by central differences of those, which contain the second derivatives of R.
-
-*Divided exit rows.* The exit row of a short segment that begins on its exit surface is the mean of the rate,
-``q = int_0^1 r'(s d) ds`` with r the distance to the surface (:mod:`contfric.orbit.equations`). It is a function of
-``(t_i, y_i, d)`` as the flow is, and of no later state; D_v of its gradient, by differences as well, takes the place of
-the observable's. (Of r/d itself, ``D_v D_w (r/d) = D_v D_w r / d - (D_v r D_w d + D_w r D_v d) / d^2`` where r = 0: the
-cross terms do not vanish, and all of it is a quotient of zeros at d = 0; of q nothing is.) u scales with the row, g by
-a factor that is not zero.
+Resets and short segments are in :mod:`contfric.curves.bending`. Where an exit row is divided by the
+duration u scales with it, and g by a factor that is not zero.
 """
 
 from __future__ import annotations
@@ -41,20 +34,11 @@ from typing import NamedTuple
 import numpy as np
 
 from contfric.compiled import allocating_helper, helper
+from contfric.curves.bending import bend_flow, bend_mean_rate, bend_observable
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import Elimination, finish, next_rows, room_for, start_border, take_out
-from contfric.orbit.equations import (
-    behind_reset,
-    is_divided,
-    leap,
-    mean_rate_row,
-    segment_rows,
-)
-from contfric.orbit.system import RETURNS
+from contfric.orbit.equations import is_divided, segment_rows
 
-#: Step of the differences where a flow has no second derivatives of its own, against the size of the
-#: direction: the cube root of rounding.
-_DIFFERENCE = 6e-6
 #: Step of the third derivatives along a null vector of size 1: with Richardson's extrapolation its error
 #: and its rounding are both about 1e-11.
 _THIRD = 2e-3
@@ -236,84 +220,6 @@ def end_of(vectors, i, sign, close, j):  # type: ignore[no-untyped-def]
     for k in range(m):
         value += close[j, k] * vectors[0, k]
     return sign * value
-
-
-@helper
-def segment_jacobian(functions, layout, i, start, duration, p, which, out, equations):  # type: ignore[no-untyped-def]
-    """Write the end of segment i, from its joint, with the derivatives: behind a reset by the chain rule."""
-    mode, state = layout.modes[i], equations.state
-    if layout.departs[i] < RETURNS:
-        n = state.shape[0]
-        leap(functions, layout, i, start, p, which, equations)
-        begin = equations.behind[n, :n]
-        functions[0](mode, start[0], begin, duration, p, which, state, out)
-        behind_reset(out, equations.behind, equations.grad, n)
-    else:
-        functions[0](mode, start[0], start[1:], duration, p, which, state, out)
-
-
-@helper
-def bend_flow(  # type: ignore[no-untyped-def]
-    functions, second, layout, i, start, duration, p, which, along, out, bordered, equations
-):
-    """Write the derivative of the flow's jacobian in a direction."""
-    mode = layout.modes[i]
-    none = min(mode, 0) - 1  # -1, but no literal
-    if layout.departs[i] >= RETURNS and second(
-        mode, none, start[0], start[1:], duration, p, which, along, out, bordered.numbers
-    ):
-        return
-    m = start.shape[0]
-    step = _DIFFERENCE
-    displaced = bordered.start
-    for side in range(2):
-        h = step if side == 0 else -step
-        for j in range(m):
-            displaced[j] = start[j] + h * along[j]
-        jac, lasts = out if side == 0 else bordered.plus, duration + h * along[m]
-        segment_jacobian(functions, layout, i, displaced, lasts, p, which, jac, equations)
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            out[i, j] = (out[i, j] - bordered.plus[i, j]) / (2.0 * step)
-
-
-@helper
-def bend_observable(functions, second, c, at, p, which, along, out, bordered, equations):  # type: ignore[no-untyped-def]
-    """Write the derivative of an observable's gradient in a direction of (t, y) to the first row."""
-    if second(0, c, at[0], at[1:], 0.0, p, which, along, out, bordered.numbers):
-        return
-    m, step = at.shape[0], _DIFFERENCE
-    displaced, grad = bordered.start, equations.grad
-    for side in range(2):
-        h = step if side == 0 else -step
-        for j in range(m):
-            displaced[j] = at[j] + h * along[j]
-        functions[1](c, displaced[0], displaced[1:], p, which, grad)
-        for j in range(grad.shape[0]):
-            out[0, j] = grad[j] if side == 0 else (out[0, j] - grad[j]) / (2.0 * step)
-
-
-@helper
-def bend_mean_rate(functions, layout, i, start, duration, p, which, along, room):  # type: ignore[no-untyped-def]
-    """Write the derivative of a divided exit row in a direction of (t, y, duration)."""
-    bordered, equations, rows = room.bordered, room.equations, room.elimination.rows
-    m, free, step = start.shape[0], which.shape[0], _DIFFERENCE
-    row, displaced, out = 2 * m - 1, bordered.start, bordered.divided
-    for side in range(2):
-        h = step if side == 0 else -step
-        for j in range(m):
-            displaced[j] = start[j] + h * along[j]
-        if layout.departs[i] < RETURNS:
-            leap(functions, layout, i, displaced, p, which, equations)
-        lasts = duration + h * along[m]
-        mean_rate_row(functions, layout, i, m, displaced, lasts, p, which, equations, rows)
-        for k in range(1 + m + free):
-            value = rows[row, m + k]  # columns of both joints: t and the end of the duration, y, parameters
-            if k == 0:
-                value += rows[row, 2 * m]
-            elif k > m:
-                value = rows[row, 3 * m + k - m - 1]
-            out[k] = value if side == 0 else (out[k] - value) / (2.0 * step)
 
 
 @helper

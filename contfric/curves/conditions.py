@@ -24,13 +24,8 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import allocating_helper, f8, helper, i8, indices
-from contfric.curves.bordered import (
-    BorderedRoom,
-    bordered_room,
-    segment_jacobian,
-    spectral_value,
-    spread_end,
-)
+from contfric.curves.bending import segment_jacobian
+from contfric.curves.bordered import BorderedRoom, bordered_room, spectral_value, spread_end
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import Elimination, room_for
 from contfric.orbit.equations import Room, equation_room, leap

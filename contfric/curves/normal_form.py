@@ -11,10 +11,11 @@
   bifurcation changes between super- and subcritical, and a fold curve of the doubled orbits begins
   (Yu. A. Kuznetsov, Elements of Applied Bifurcation Theory, sections 8.2 and 9.4).
 
-Of an autonomous orbit the doubled one has its end pinned after two turns. Its null vectors, its adjoint ones and h
-are those of one turn and their images, the first turn shifted in time so that times agree between them.
-Segments and their equations do not feel a common shift, so that b is the same expression (the adjoint equations
-have no component along the shift either: ``u_i^T B_i e_t`` is the same for all i, and zero for the first).
+Of an autonomous orbit the doubled one has its end pinned after two turns. Its null vectors, its adjoint
+ones and h are those of one turn and their images, the first turn shifted in time so that times agree
+between them. Segments and their equations do not feel a common shift, so that b is the same expression (the
+adjoint equations have no component along the shift either: ``u_i^T B_i e_t`` is the same for all i, and zero
+for the first).
 
 F_zzz v v v is the central difference of the exact second derivatives along v, with Richardson's
 extrapolation; everything is local to a segment.
@@ -23,11 +24,9 @@ extrapolation; everything is local to a segment.
 from __future__ import annotations
 
 from contfric.compiled import helper
+from contfric.curves.bending import bend_flow, bend_mean_rate, bend_observable
 from contfric.curves.bordered import (
     _THIRD,
-    bend_flow,
-    bend_mean_rate,
-    bend_observable,
     chain_solve,
     end_of,
     segment_direction,

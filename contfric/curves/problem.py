@@ -269,10 +269,10 @@ def _vanishing(orbit: Orbit) -> list[int]:
 def _chosen(bifurcation: Bifurcation) -> Test:
     """Return the margin of an event that its curve follows: one at a joint whose exit is not tangential.
 
-    Where nothing jumps a stop without acceleration is one at which the load is on its limit, and an impact
-    without speed is one at which the speed is zero: one condition by two names. The row of the exit is singular
-    there, and only as a tangential exit does it get its rate. So a margin without one comes first, and where all
-    have one the exit itself is taken.
+    Where nothing jumps a stop without acceleration is one at which the load is on its limit, and an
+    impact without speed is one at which the speed is zero: one condition by two names. The row of the exit
+    is singular there, and only as a tangential exit does it get its rate. So a margin without one comes
+    first, and where all have one the exit itself is taken.
     """
     tests = bifurcation.tests
     exits = [_tangential(test, bifurcation.orbit) for test in tests]

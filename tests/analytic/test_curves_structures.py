@@ -217,7 +217,9 @@ def test_popp_curve_of_doublings_by_the_values_of_the_page() -> None:
         start = found[k].state(4 * pi / found.values[k, 0])
         solved = fsolve(lambda u, f=force: doubled(u[:2], u[2], f), [*start, omega], xtol=1e-13)
         assert omega == pytest.approx(solved[2], abs=1e-10)
-        assert crossing(found, force) == pytest.approx(omega, abs=1e-6)  # of the cubic between points
+        assert crossing(found, force) == pytest.approx(
+            omega, abs=1e-6
+        )  # of the cubic between points
 
 
 def crossing(found: cf.Curve, force: float) -> float:
@@ -314,7 +316,11 @@ def test_plane_of_the_belt() -> None:
     labels = sorted(c.label for k, c in enumerate(plane.curves) if plane.twins[k] == k)
     assert labels == ["CS_a", "SS_a"]
     assert len(plane.regions) == 3 and not any(r.disputed for r in plane.regions)
-    assert {f.name for r in plane.regions for f in r.families} == {"0a, 8seg", "1a, 5seg", "1a, 8seg"}
+    assert {f.name for r in plane.regions for f in r.families} == {
+        "0a, 8seg",
+        "1a, 5seg",
+        "1a, 8seg",
+    }
 
 
 # ---------------------------------------------------------------------- without excitation
@@ -364,7 +370,11 @@ class Pieces:
 
 @pytest.mark.parametrize(
     "kind, orbits, value, sign",
-    [("PD", "0a, 4seg", 0.7277, -1.0), ("PD", "0a, 8seg", 0.6542, -1.0), ("SN", "0a, 14seg", 0.5755, 1.0)],
+    [
+        ("PD", "0a, 4seg", 0.7277, -1.0),
+        ("PD", "0a, 8seg", 0.6542, -1.0),
+        ("SN", "0a, 14seg", 0.5755, 1.0),
+    ],
 )
 def test_autonomous_curves_by_matrix_exponentials(
     kind: str, orbits: str, value: float, sign: float
