@@ -13,11 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.atlas.diagram import Diagram
-from contfric.atlas.explore import explore
 from contfric.atlas.plane import Plane
 from contfric.atlas.plane_matching import is_known, twins_of
 from contfric.atlas.plane_regions import regions_of
+from contfric.atlas.plane_sections import section_diagram, sections_of
 from contfric.atlas.plane_state import PlaneExploration, Progress
 from contfric.atlas.seeds import Seeds
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
@@ -26,7 +25,7 @@ from contfric.curves.assembly import join_sides
 from contfric.curves.going_on import Start
 from contfric.curves.leaving import leaving, other_words
 from contfric.curves.points import CurvePoint
-from contfric.curves.problem import Box, Problem, box_of, problem_of
+from contfric.curves.problem import Problem, box_of, problem_of
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.curves.trace import (
     CurveSide,
@@ -35,13 +34,11 @@ from contfric.curves.trace import (
     trace_curve_side,
 )
 from contfric.errors import (
-    ContfricError,
     ConvergenceError,
     ParameterError,
     did_you_mean,
     whole_number,
 )
-from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
 
 #: Kinds of curves that are followed by default: T changes labels, and nothing else.
@@ -123,7 +120,7 @@ def explore_plane(
     state = PlaneExploration(
         box, orbit.vector.copy(), wanted, max_periods, max_curves, largest, progress
     )
-    asked = _sections(orbit, box, sections)
+    asked = sections_of(orbit, box, sections)
     try:
         for name, value in asked[:max_sections]:
             _follow_section(state, orbit, name, value, seeds)
@@ -162,28 +159,6 @@ def _result(state: PlaneExploration, orbit: Orbit) -> Plane:
     )
 
 
-def _sections(
-    orbit: Orbit, box: Box, sections: Mapping[str, Sequence[float]] | None
-) -> list[tuple[str, float]]:
-    """Return the sections as (parameter that is fixed, value)."""
-    if sections is None:
-        second = box.names[1]
-        return [(second, orbit.params[second])]
-    found = []
-    for name, values in sections.items():
-        if name not in box.names:
-            raise ParameterError(f"sections are values of {' and '.join(box.names)}, got '{name}'")
-        for value in values:
-            k = box.names.index(name)
-            if not box.low[k] <= float(value) <= box.high[k]:
-                raise ParameterError(
-                    f"the section {name} = {value:g} is outside of its range "
-                    f"({box.low[k]:g}, {box.high[k]:g})"
-                )
-            found.append((name, float(value)))
-    return found
-
-
 # ---------------------------------------------------------------------------------- sections
 
 
@@ -191,7 +166,7 @@ def _follow_section(
     state: PlaneExploration, orbit: Orbit, fixed: str, value: float, seeds: Seeds | None
 ) -> None:
     """Compute the diagram of a section, and follow its bifurcations."""
-    diagram = _section(state, orbit, fixed, value, seeds)
+    diagram = section_diagram(state, orbit, fixed, value, seeds)
     if diagram is None:
         state.notes.append(f"no periodic orbit was found on the section {fixed} = {value:g}")
         return
@@ -203,33 +178,6 @@ def _follow_section(
             if bifurcation.located:
                 _follow_bifurcation(state, bifurcation)
     _follow_special(state)
-
-
-def _section(
-    state: PlaneExploration, orbit: Orbit, fixed: str, value: float, seeds: Seeds | None
-) -> Diagram | None:
-    box = state.box
-    varies = next(n for n in box.names if n != fixed)
-    k = box.names.index(varies)
-    state.say(f"section {fixed} = {value:g}")
-    for share in (0.5, 0.3, 0.7, 0.1, 0.9):
-        params = {**orbit.params, fixed: value}
-        bottom, top, _, _ = orbit.model.limits(varies, params)
-        low, high = max(box.low[k], bottom), min(box.high[k], top)
-        params[varies] = float(low + share * (high - low))
-        try:
-            start = find_orbit(orbit.model, params, longest=4000)
-            return explore(
-                start,
-                varies,
-                (float(box.low[k]), float(box.high[k])),
-                bridges=False,
-                max_periods=state.max_periods,
-                seeds=seeds,
-            )
-        except ContfricError:
-            continue
-    return None
 
 
 def _follow_bifurcation(state: PlaneExploration, bifurcation: Bifurcation) -> None:

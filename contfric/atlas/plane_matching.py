@@ -9,7 +9,7 @@ from contfric.continuation.events import TERMINAL, Kind
 from contfric.curves.curve import Curve, CurvePart
 from contfric.curves.points import CurvePoint, solve_point
 from contfric.curves.problem import Problem, border_of
-from contfric.models.definition import FloatArray
+from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 
 #: A point farther than this from a polyline (relative to the ranges) is not on its curve: a step bends by
@@ -20,9 +20,14 @@ _NEAR = 3e-3
 _SAME = 1e-6
 
 
-def group_of(kind: Kind) -> Kind:
-    """Return the kind under which curves are compared: a CS turns into an SS."""
-    return Kind.CS if kind is Kind.SS else kind
+def group_of(kind: Kind, model: Model) -> Kind:
+    """Return the kind under which curves are compared: a CS turns into an SS.
+
+    Where nothing jumps one event may have a name for each of the words that meet there.
+    """
+    if kind is Kind.SS or (model.filippov and kind in TERMINAL):
+        return Kind.CS
+    return kind
 
 
 def is_known(
@@ -35,7 +40,7 @@ def is_known(
     orbit = problem.orbit(point.joints, point.w)
     for index, curve in enumerate(curves):
         for part in curve.parts:
-            if group_of(part.kind) is not group_of(problem.kind):
+            if group_of(part.kind, orbit.model) is not group_of(problem.kind, orbit.model):
                 continue
             if same_word and not _same_word(orbit, part):
                 continue
@@ -109,7 +114,7 @@ def twins_of(curves: list[Curve]) -> tuple[int, ...]:
     for index, curve in enumerate(curves):
         part = max(curve.parts, key=lambda p: float(p.arc[-1] - p.arc[0]))
         first = index
-        if part.problem is not None and group_of(part.kind) in TERMINAL:
+        if part.problem is not None and part.kind in TERMINAL:
             known = is_known(part.problem, _middle(part), curves[:index], same_word=False)
             first = index if known is None else found[known]
         found.append(first)

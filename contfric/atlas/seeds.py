@@ -11,6 +11,7 @@ from contfric.errors import AperiodicError, ConvergenceError, whole_number
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.simulation import signs_at
 
 #: Periods after which a seed that has not settled is given up: there are many seeds, and attractors that
 #: take longer are nearly marginal.
@@ -83,9 +84,17 @@ def attractors(
         for j in range(seeds.states):
             state = None if j == 0 else rng.uniform(-1.0, 1.0, spread.shape) * spread
             time = 0.0 if j == 0 else float(rng.uniform(0.0, period or 1.0))
+            if state is not None and _behind_wall(model, params, time, state):
+                continue
             try:
                 orbit = find_orbit(model, params, state=state, time=time, longest=_LONGEST)
             except (AperiodicError, ConvergenceError):
                 continue
             if orbit.converged and orbit.periods <= max_periods:
                 yield orbit
+
+
+def _behind_wall(model: Model, params: dict[str, float], time: float, state: FloatArray) -> bool:
+    """Tell whether a drawn state lies where a model with impacts has no motion."""
+    signs = signs_at(model, time, state, model.vector(params))
+    return bool(model.resets) and model.domain_at(signs) is None

@@ -14,6 +14,16 @@ point, so that the bordered matrices stay well conditioned.
 
 The transposed chain is a chain again: its row r links ``u_r`` and ``u_{r+1}`` by ``B_r^T`` and
 ``A_{r+1}^T``, and closes with ``u_N = u_0``. The same elimination solves both.
+
+*Autonomous orbits.* The end of a turn is pinned to time 0, ``z_N = (0, K y_0)``, and so is its variation:
+``v_N = (0, sigma K v_0)``, for sigma = -1 as well. With P the map of a turn in the section,
+``dy_N = P dy_0`` and ``dt_N = dt_0 + a dy_0``; what closes is ``P dy_0 = sigma K dy_0``, and dt_0 = -a dy_0,
+minus the variation of the duration, follows. So J is singular exactly where P has the multiplier, and the
+trivial one is not in it. A period doubling has null vectors of two turns, ``(-v + s, v)`` with a shift s of
+the first in time; segments do not feel it, and nothing below changes.
+
+Resets and short segments are in :mod:`contfric.curves.bending`. Where an exit row is divided by the
+duration u scales with it, and g by a factor that is not zero.
 """
 
 from __future__ import annotations
@@ -24,13 +34,11 @@ from typing import NamedTuple
 import numpy as np
 
 from contfric.compiled import allocating_helper, helper
+from contfric.curves.bending import DIFFERENCE, bend_flow, bend_mean_rate, bend_observable
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import Elimination, finish, next_rows, room_for, start_border, take_out
-from contfric.orbit.equations import segment_rows
+from contfric.orbit.equations import is_divided, segment_rows
 
-#: Step of the differences where a flow has no second derivatives of its own, against the size of the
-#: direction: the cube root of rounding.
-DIFFERENCE = 6e-6
 #: Step of the third derivatives along a null vector of size 1: with Richardson's extrapolation its error
 #: and its rounding are both about 1e-11.
 _THIRD = 2e-3
@@ -47,6 +55,7 @@ class BorderedRoom(NamedTuple):
     work, d, e, s, close, close_w : for the elimination with one border row
     along, other : a direction of a segment, shape (2 + n,)
     bent, plus : derivatives of the flow's and of an observable's in a direction, shape (n, 2 + n + q)
+    divided : the same of a divided exit row, shape (2 + n + q,)
     start, after : displaced joints, shape (m,)
     numbers : scratch for the flow, shape (8,)
     difference : step of the differences, and whether any was taken, shape (2,)
@@ -67,6 +76,7 @@ class BorderedRoom(NamedTuple):
     other: FloatArray
     bent: FloatArray
     plus: FloatArray
+    divided: FloatArray
     start: FloatArray
     after: FloatArray
     numbers: FloatArray
@@ -93,6 +103,7 @@ def bordered_room(count, m, free):  # type: ignore[no-untyped-def]
         np.empty(1 + m),
         np.empty((m - 1, 1 + m + free)),
         np.empty((m - 1, 1 + m + free)),
+        np.empty(1 + m + free),
         np.empty(m),
         np.empty(m),
         np.empty(8),
@@ -215,51 +226,6 @@ def end_of(vectors, i, sign, close, j):  # type: ignore[no-untyped-def]
 
 
 @helper
-def bend_flow(functions, second, mode, start, duration, p, which, along, out, bordered, equations):  # type: ignore[no-untyped-def]
-    """Write the derivative of the flow's jacobian in a direction."""
-    none = min(mode, 0) - 1  # -1, but no literal
-    if second(mode, none, start[0], start[1:], duration, p, which, along, out, bordered.numbers):
-        return
-    m = start.shape[0]
-    step, displaced = bordered.difference[0], bordered.start
-    bordered.difference[1] = 1.0
-    for side in range(2):
-        h = step if side == 0 else -step
-        for j in range(m):
-            displaced[j] = start[j] + h * along[j]
-        jac = out if side == 0 else bordered.plus
-        functions[0](
-            mode,
-            displaced[0],
-            displaced[1:],
-            duration + h * along[m],
-            p,
-            which,
-            equations.state,
-            jac,
-        )
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            out[i, j] = (out[i, j] - bordered.plus[i, j]) / (2.0 * step)
-
-
-@helper
-def bend_observable(functions, second, c, at, p, which, along, out, bordered, equations):  # type: ignore[no-untyped-def]
-    """Write the derivative of an observable's gradient in a direction of (t, y) to the first row."""
-    if second(0, c, at[0], at[1:], 0.0, p, which, along, out, bordered.numbers):
-        return
-    m, step = at.shape[0], bordered.difference[0]
-    displaced, grad = bordered.start, equations.grad
-    for side in range(2):
-        h = step if side == 0 else -step
-        for j in range(m):
-            displaced[j] = at[j] + h * along[j]
-        functions[1](c, displaced[0], displaced[1:], p, which, grad)
-        for j in range(grad.shape[0]):
-            out[0, j] = grad[j] if side == 0 else (out[0, j] - grad[j]) / (2.0 * step)
-
-
-@helper
 def add_curvature(functions, second, layout, i, sign, z, p, which, room):  # type: ignore[no-untyped-def]
     """Add what segment i contributes to the gradient ``-u^T dJ v``."""
     from_ = z[i]
@@ -269,25 +235,22 @@ def add_curvature(functions, second, layout, i, sign, z, p, which, room):  # typ
     after = z[i + 1] if i + 1 < count else equations.last
     along, u, grad = bordered.along, bordered.u, equations.grad
     segment_direction(bordered.v, i, sign, equations.close, along)
+    lasts = after[0] - from_[0]
+    bent = bordered.bent
     bend_flow(
-        functions,
-        second,
-        layout.modes[i],
-        from_,
-        after[0] - from_[0],
-        p,
-        which,
-        along,
-        bordered.bent,
-        bordered,
-        equations,
+        functions, second, layout, i, from_, lasts, p, which, along, bent, bordered, equations
     )
+    divided = is_divided(layout, i, lasts)
+    if divided:
+        bend_mean_rate(functions, layout, i, from_, lasts, p, which, along, room)
     for k in range(grad.shape[0]):
         grad[k] = 0.0
     for k in range(2 + n + free):
         value = 0.0
         for j in range(n):
-            value -= u[i, j] * bordered.bent[j, k]
+            value -= u[i, j] * bent[j, k]
+        if divided:
+            value -= u[i, n] * bordered.divided[k]
         if k == 0:
             room.d[1, i, 0] += value
         elif k < 1 + n:
@@ -297,6 +260,9 @@ def add_curvature(functions, second, layout, i, sign, z, p, which, room):  # typ
             grad[0] += value
         else:
             grad[m + k - 2 - n] += value
+    if divided:
+        spread_end(grad, i, room)
+        return
     for j in range(m):
         along[j] = end_of(bordered.v, i, sign, equations.close, j)
     flow_part = bordered.other  # the gradient so far: differences use the room's gradient

@@ -4,7 +4,7 @@
 condition   what vanishes
 ==========  ==================================================================================
 JOINT       observable less level at the end of a segment (CS, SS, T)
-START       the same at its start (T)
+START       the same at its start, behind its reset (T; CS where another mode follows an impact)
 EXIT        rate of the exit's observable at the end of a segment: a tangential exit (AS, GS)
 INTERIOR    value of a stationary point inside a segment, less the level (AS, GS, T)
 SPECTRAL    the bordered function of the chain's Jacobian (SN, BP, PD), in
@@ -12,7 +12,8 @@ SPECTRAL    the bordered function of the chain's Jacobian (SN, BP, PD), in
 ==========  ==================================================================================
 
 At a stationary point the derivative with respect to its time is zero, so the gradient of its value is
-that of the state at a fixed time after the start. All gradients are exact.
+that of the state at a fixed time after the start. All gradients are exact; behind a reset they follow by the
+chain rule.
 """
 
 from __future__ import annotations
@@ -23,13 +24,14 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import allocating_helper, f8, helper, i8, indices
+from contfric.curves.bending import segment_jacobian
 from contfric.curves.bordered import BorderedRoom, bordered_room, spectral_value, spread_end
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import Elimination, room_for
-from contfric.orbit.equations import Room, equation_room
-from contfric.orbit.monitor import Turnings, find_turnings, turning_room
+from contfric.orbit.equations import Room, equation_room, leap
+from contfric.orbit.monitor import Turnings, find_behind, find_turnings, turning_room
 from contfric.orbit.spectrum import SpectralRoom, spectral_room
-from contfric.orbit.system import IntArray
+from contfric.orbit.system import RETURNS, IntArray
 
 JOINT, START, EXIT, INTERIOR, SPECTRAL = range(5)
 
@@ -103,7 +105,10 @@ def interior_value(functions, layout, condition, z, p, which, room):  # type: ig
     i, surface = condition.segment, condition.surface
     c, n = layout.observables[surface], z.shape[1] - 1
     level_grad, grad, jac = equations.level_grad, equations.grad, equations.jac
-    found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
+    if layout.departs[i] < RETURNS:
+        found = find_behind(functions, layout, i, c, z, p, equations, turnings)
+    else:
+        found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
     target = functions[2](surface, p, which, level_grad)
     best = -1
     for k in range(found):
@@ -112,7 +117,7 @@ def interior_value(functions, layout, condition, z, p, which, room):  # type: ig
     if best < 0:
         return np.nan
     time, state = turnings.times[best], equations.state
-    functions[0](layout.modes[i], z[i, 0], z[i, 1:], time, p, which, state, jac)
+    segment_jacobian(functions, layout, i, z[i], time, p, which, jac, equations)
     value = functions[1](c, z[i, 0] + time, state, p, which, grad) - target
     room.d[1, i, 0] += grad[0]
     for a in range(n):
@@ -122,6 +127,30 @@ def interior_value(functions, layout, condition, z, p, which, room):  # type: ig
             room.e[1, k] += grad[1 + a] * jac[a, 2 + n + k]
     for k in range(which.shape[0]):
         room.e[1, k] += grad[1 + n + k] - level_grad[k]
+    return value
+
+
+@helper
+def start_condition(functions, layout, i, c, target, z, p, which, room):  # type: ignore[no-untyped-def]
+    """Return an observable less a level where segment i begins, and add the gradient to the border row."""
+    equations = room.equations
+    grad, behind = equations.grad, equations.behind
+    n = z.shape[1] - 1
+    if layout.departs[i] >= RETURNS:
+        value = functions[1](c, z[i, 0], z[i, 1:], p, which, grad) - target
+        for j in range(1 + n):
+            room.d[1, i, j] += grad[j]
+    else:
+        leap(functions, layout, i, z[i], p, which, equations)
+        value = functions[1](c, z[i, 0], behind[n, :n], p, which, grad) - target
+        room.d[1, i, 0] += grad[0]
+        for a in range(n):
+            for j in range(1 + n):
+                room.d[1, i, j] += grad[1 + a] * behind[a, j]
+            for k in range(which.shape[0]):
+                room.e[1, k] += grad[1 + a] * behind[a, 1 + n + k]
+    for k in range(which.shape[0]):
+        room.e[1, k] += grad[1 + n + k]
     return value
 
 
@@ -153,9 +182,4 @@ def condition_value(functions, second, layout, condition, z, p, which, border, r
         value = functions[1](c, after[0], after[1:], p, which, grad) - target
         spread_end(grad, i, room)
         return value
-    value = functions[1](c, z[i, 0], z[i, 1:], p, which, grad) - target
-    for j in range(z.shape[1]):
-        room.d[1, i, j] += grad[j]
-    for k in range(which.shape[0]):
-        room.e[1, k] += grad[z.shape[1] + k]
-    return value
+    return start_condition(functions, layout, i, c, target, z, p, which, room)

@@ -12,12 +12,12 @@ import numpy as np
 
 from contfric.compiled import helper
 from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, EXTRA, copy_to
-from contfric.curves.bordered import DIFFERENCE
+from contfric.curves.bending import DIFFERENCE
 from contfric.curves.conditions import EXIT, JOINT, SPECTRAL, condition_value
 from contfric.curves.normal_form import cubic_coefficient
 from contfric.orbit.cyclic import finish, next_rows, start_border, take_out
 from contfric.orbit.equations import close_chain, segment_rows
-from contfric.orbit.monitor import find_turnings, watch
+from contfric.orbit.monitor import find_behind, find_turnings, watch
 from contfric.orbit.newton import (
     CHECKS,
     MULTIPLIERS,
@@ -27,6 +27,7 @@ from contfric.orbit.newton import (
     move,
 )
 from contfric.orbit.spectrum import multipliers
+from contfric.orbit.system import RETURNS
 
 #: The extra column that a curve watches where a branch watches the slope of its parameter: the
 #: coefficient of the normal form, or the rate of the load at a stop.
@@ -270,7 +271,10 @@ def other_touches(functions, layout, row, z, p, room):  # type: ignore[no-untype
     i, surface = layout.interior[row, 0], layout.interior[row, 1]
     sign, turnings, equations = float(layout.interior[row, 2]), room.turnings, room.equations
     c = layout.observables[surface]
-    found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
+    if layout.departs[i] < RETURNS:
+        found = find_behind(functions, layout, i, c, z, p, equations, turnings)
+    else:
+        found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
     target = functions[2](surface, p, equations.none, equations.empty)
     touch, least = -1, np.inf
     for k in range(found):

@@ -57,7 +57,7 @@ def _touch_time(orbit: Orbit, test: Test) -> float:
     c = [o.name for o in model.observables].index(surface.observable)
     mode = [m.name for m in model.modes].index(orbit.word[i][0])
     times, values = np.empty(256), np.empty(256)
-    start = orbit.cycle[i]
+    start = orbit.begins[i]
     found = model.flow.turning(
         mode,
         c,

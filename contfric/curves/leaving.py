@@ -137,11 +137,16 @@ def _born(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[S
 
 
 def _odd_null_vector(orbit: Orbit, problem: Problem, whole: Orbit) -> FloatArray:
-    """Return the null vector of a multiplier -1 over two turns, of size 1: (v, -K v)."""
+    """Return the null vector of a multiplier -1 over two turns, of size 1: (v, -K v).
+
+    Without excitation v ends at time 0, and -K v begins at -t of its first joint: the first turn is shifted.
+    """
     v = border_of(problem, orbit.joints, orbit.vector)[1]
     close = np.eye(v.shape[1])
     close[1:, 1:] = orbit.system.layout.closure
     phi: FloatArray = np.vstack([v, -v @ close.T])
+    if orbit.model.autonomous:
+        phi[: len(v), 0] -= v[0, 0]
     return phi / float(np.sqrt(np.sum(phi**2) / len(phi)))
 
 

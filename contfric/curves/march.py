@@ -26,6 +26,7 @@ from contfric.compiled import (
     vector,
 )
 from contfric.continuation.march import (
+    _ENDLESS,
     _GROWTH,
     _MOST_ANGLE,
     _MOST_MISS,
@@ -33,6 +34,7 @@ from contfric.continuation.march import (
     _WANTED_ANGLE,
     BROKEN,
     CLOSED,
+    ENDLESS,
     EVENT,
     FULL,
     OUTSIDE,
@@ -248,5 +250,7 @@ def march_curve(  # type: ignore[no-untyped-def]
             return CLOSED, k, following
         if largest_state(zs[k]) > _UNBOUNDED:
             return UNBOUNDED, k, following
+        if layout.turn == 0.0 and -zs[k, 0, 0] > _ENDLESS:
+            return ENDLESS, k, following
         step = following
     return FULL, k, step

@@ -11,6 +11,12 @@
   bifurcation changes between super- and subcritical, and a fold curve of the doubled orbits begins
   (Yu. A. Kuznetsov, Elements of Applied Bifurcation Theory, sections 8.2 and 9.4).
 
+Of an autonomous orbit the doubled one has its end pinned after two turns. Its null vectors, its adjoint
+ones and h are those of one turn and their images, the first turn shifted in time so that times agree
+between them. Segments and their equations do not feel a common shift, so that b is the same expression (the
+adjoint equations have no component along the shift either: ``u_i^T B_i e_t`` is the same for all i, and zero
+for the first).
+
 F_zzz v v v is the central difference of the exact second derivatives along v, with Richardson's
 extrapolation; everything is local to a segment.
 """
@@ -18,53 +24,59 @@ extrapolation; everything is local to a segment.
 from __future__ import annotations
 
 from contfric.compiled import helper
+from contfric.curves.bending import bend_flow, bend_mean_rate, bend_observable
 from contfric.curves.bordered import (
     _THIRD,
-    bend_flow,
-    bend_observable,
     chain_solve,
     end_of,
     segment_direction,
     set_border,
 )
+from contfric.orbit.equations import is_divided
 
 
 @helper
 def second_order(  # type: ignore[no-untyped-def]
-    functions, second, layout, i, start, after, p, which, sign, others, twist, room, out
+    functions, second, layout, i, start, after, p, which, sign, others, twist, divided, room, out
 ):
-    """Write F_i,zz v w (m numbers); w is ``others``, closed by ``twist``."""
+    """Write F_i,zz v w (m numbers); w is ``others``, closed by ``twist``.
+
+    ``divided`` says whether the exit row is divided by the duration: that of the orbit, beside it as well.
+    """
     bordered, equations = room.bordered, room.equations
     m = start.shape[0]
     n, close, along, other = m - 1, equations.close, bordered.along, bordered.other
     segment_direction(bordered.v, i, sign, close, along)
     segment_direction(others, i, twist, close, other)
+    lasts, bent = after[0] - start[0], bordered.bent
     bend_flow(
-        functions,
-        second,
-        layout.modes[i],
-        start,
-        after[0] - start[0],
-        p,
-        which,
-        along,
-        bordered.bent,
-        bordered,
-        equations,
+        functions, second, layout, i, start, lasts, p, which, along, bent, bordered, equations
     )
     for j in range(n):
         out[j] = 0.0
         for k in range(1 + m):
-            out[j] += bordered.bent[j, k] * other[k]
+            out[j] += bent[j, k] * other[k]
+    out[n] = 0.0
+    if divided:
+        bend_mean_rate(functions, layout, i, start, lasts, p, which, along, room)
+        for k in range(1 + m):
+            out[n] += bordered.divided[k] * other[k]
+        return
     for j in range(m):
         along[j] = end_of(bordered.v, i, sign, close, j)
     c = layout.observables[layout.exits[i]]
     bend_observable(
         functions, second, c, after, p, which, along, bordered.bent, bordered, equations
     )
-    out[n] = 0.0
     for k in range(m):
         out[n] += bordered.bent[0, k] * end_of(others, i, twist, close, k)
+
+
+@helper
+def divides_exit(layout, i, z, room):  # type: ignore[no-untyped-def]
+    """Tell whether the exit row of segment i of an orbit is divided by its duration."""
+    after = z[i + 1] if i + 1 < z.shape[0] else room.equations.last
+    return is_divided(layout, i, after[0] - z[i, 0])
 
 
 @helper
@@ -74,6 +86,7 @@ def third_order(functions, second, layout, i, z, p, which, sign, room, out):  # 
     v, u = bordered.v, bordered.u
     count, m = z.shape
     start, after = room.z_ref[i], bordered.after
+    divided = divides_exit(layout, i, z, room)
     slopes = 0.0
     for level in range(2):
         step = _THIRD if level == 0 else 0.5 * _THIRD
@@ -85,7 +98,20 @@ def third_order(functions, second, layout, i, z, p, which, sign, room, out):  # 
                 start[j] = z[i, j] + h * v[i, j]
                 after[j] = end + h * end_of(v, i, sign, close, j)
             second_order(
-                functions, second, layout, i, start, after, p, which, sign, v, sign, room, out
+                functions,
+                second,
+                layout,
+                i,
+                start,
+                after,
+                p,
+                which,
+                sign,
+                v,
+                sign,
+                divided,
+                room,
+                out,
             )
             for j in range(m):
                 slopes += weight * u[i, j] * out[j] / (2.0 * h)
@@ -102,8 +128,9 @@ def cubic_coefficient(functions, second, layout, sign, z, p, which, room):  # ty
     total = 0.0
     for i in range(count):
         after = z[i + 1] if i + 1 < count else equations.last
+        divided = divides_exit(layout, i, z, room)
         second_order(
-            functions, second, layout, i, z[i], after, p, which, sign, v, sign, room, spare
+            functions, second, layout, i, z[i], after, p, which, sign, v, sign, divided, room, spare
         )
         for j in range(m):
             even[i, j] = -spare[j]
@@ -117,8 +144,22 @@ def cubic_coefficient(functions, second, layout, sign, z, p, which, room):  # ty
             even[i, j] = bordered.work.z[i, j, 0]
     for i in range(count):
         after = z[i + 1] if i + 1 < count else equations.last
+        divided = divides_exit(layout, i, z, room)
         second_order(
-            functions, second, layout, i, z[i], after, p, which, sign, even, periodic, room, spare
+            functions,
+            second,
+            layout,
+            i,
+            z[i],
+            after,
+            p,
+            which,
+            sign,
+            even,
+            periodic,
+            divided,
+            room,
+            spare,
         )
         for j in range(m):
             total += 0.5 * u[i, j] * spare[j]

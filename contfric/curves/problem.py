@@ -10,7 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from contfric.continuation.events import TERMINAL, Bifurcation, Kind
+from contfric.continuation.events import (
+    TERMINAL,
+    Bifurcation,
+    Kind,
+    kind_of_margin,
+    resting_domain,
+)
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.linear import jacobian_blocks
@@ -216,13 +222,13 @@ def _spectral_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Probl
 
 
 def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Problem:
-    from contfric.curves.conditions import EXIT, INTERIOR, JOINT, Condition
+    from contfric.curves.conditions import EXIT, INTERIOR, JOINT, START, Condition
 
     kind, system, model = bifurcation.kind, orbit.system, orbit.model
     if not bifurcation.tests:
         raise ParameterError(f"{bifurcation!r} does not say which margin vanishes")
     surfaces = [s.name for s in model.surfaces]
-    test = bifurcation.tests[0]
+    test = _chosen(bifurcation)
     if kind is Kind.T:
         place, segment, surface = _tangency(orbit, test)
     else:
@@ -231,10 +237,19 @@ def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Proble
         margin = float(orbit.margins[system.tests.index(test)])
         if not abs(margin) < _VANISHES:
             raise ParameterError(f"{bifurcation!r} is none: its margin is {margin:.3g}, not zero")
-        places = {Margin.JOINT: JOINT, Margin.EXIT: EXIT, Margin.INTERIOR: INTERIOR}
+        places = {
+            Margin.JOINT: JOINT,
+            Margin.EXIT: EXIT,
+            Margin.INTERIOR: INTERIOR,
+            Margin.ENTRY: START,
+        }
         place, segment, surface = places[test.margin], test.segment, test.surface
+        if test not in bifurcation.tests:
+            kind = kind_of_margin(system, test, orbit)
     pinned = [] if kind is Kind.T else _vanishing(orbit)
-    rest = _rest_mode(model) if kind in (Kind.CS, Kind.SS) and place == JOINT else -1
+    rest = -1
+    if kind in (Kind.CS, Kind.SS) and place == JOINT:
+        rest = _rest_mode(system, test)
     condition = Condition(
         place,
         segment,
@@ -251,8 +266,41 @@ def _vanishing(orbit: Orbit) -> list[int]:
     return [int(k) for k in np.flatnonzero(np.abs(orbit.margins) < _VANISHES)]
 
 
-def _rest_mode(model: Model) -> int:
-    return next((i for i, mode in enumerate(model.modes) if mode.sliding), -1)
+def _chosen(bifurcation: Bifurcation) -> Test:
+    """Return the margin of an event that its curve follows: one at a joint whose exit is not tangential.
+
+    Where nothing jumps a stop without acceleration is one at which the load is on its limit, and an
+    impact without speed is one at which the speed is zero: one condition by two names. The row of the exit
+    is singular there, and only as a tangential exit does it get its rate. So a margin without one comes
+    first, and where all have one the exit itself is taken.
+    """
+    tests = bifurcation.tests
+    exits = [_tangential(test, bifurcation.orbit) for test in tests]
+    plain = next((test for test, exit_ in zip(tests, exits, strict=True) if exit_ is None), None)
+    return plain or exits[0] or tests[0]
+
+
+def _tangential(test: Test, orbit: Orbit) -> Test | None:
+    """Return the exit whose tangency is the same condition as a margin at its joint; None if none is."""
+    model, word = orbit.model, orbit.system.word
+    if test.margin is not Margin.JOINT or not (
+        model.filippov or word[test.segment][1] in model.reset_by_surface
+    ):
+        return None
+    exits = (
+        t
+        for t, value in zip(orbit.system.tests, orbit.margins, strict=True)
+        if t.margin is Margin.EXIT and t.segment == test.segment and abs(value) < _VANISHES
+    )
+    return next(exits, None)
+
+
+def _rest_mode(system: System, test: Test) -> int:
+    """Return the mode of rest whose rate at a stop tells CS from SS; -1 where there is no rest."""
+    resting = resting_domain(system, test)
+    if resting is None:
+        return -1
+    return [mode.name for mode in system.model.modes].index(resting.mode)
 
 
 def _quiet(system: System, kind: Kind, segment: int, pinned: list[Test]) -> IntArray:
@@ -272,7 +320,7 @@ def _tangency(orbit: Orbit, test: Test) -> tuple[int, int, str]:
     model, segment = orbit.model, test.segment
     named = [s for s in model.surfaces if s.observable == test.surface]
     c = [o.name for o in model.observables].index(test.surface)
-    start, end = orbit.cycle[segment], orbit.ends[segment]
+    start, end = orbit.begins[segment], orbit.ends[segment]
     times, values = np.empty(256), np.empty(256)
     mode = [m.name for m in model.modes].index(orbit.word[segment][0])
     duration = float(end[0] - start[0])

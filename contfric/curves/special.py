@@ -37,6 +37,7 @@ class CurveEndReason(str, Enum):
     LOST = "what the curve follows does not exist beyond this point"
     POINTS = "the largest number of points was reached (max_points)"
     UNBOUNDED = "the amplitude grows without bound: resonance"
+    PERIOD = "the period grows without bound: the orbit comes to an equilibrium (homoclinic), or slows down"
     BROKEN = "the orbit is not finite beyond this point"
     INTERRUPTED = "interrupted"
 

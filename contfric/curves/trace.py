@@ -123,11 +123,6 @@ def continue_bifurcation(
             "branch.bifurcations or diagram.bifurcations"
         )
     model = bifurcation.orbit.model
-    if model.resets or model.filippov or model.autonomous:
-        raise ParameterError(
-            f"model '{model.name}': curves in two parameters are offered for excited models without "
-            "impacts whose slides cannot shrink to nothing"
-        )
     box = box_of(model, parameters, ranges)
     largest = largest_step(max_step, model)
     whole_number("max_points", max_points, least=2)
@@ -271,6 +266,7 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
         codes.BROKEN: CurveEndReason.LOST,
         codes.CLOSED: CurveEndReason.CLOSED,
         codes.UNBOUNDED: CurveEndReason.UNBOUNDED,
+        codes.ENDLESS: CurveEndReason.PERIOD,
     }
     if why in ends:
         side.end = _near_limit(problem, side.tip) or CurveEnd(ends[why])

@@ -85,7 +85,6 @@ def model_of(definition: str) -> Model:
     from contfric.models.derive import model_from
 
     description = from_text(definition)
-    module_path(
-        description.motion
-    )  # written first: what has no value is reported by formula and place
+    # written first: what has no value is reported by formula and place
+    module_path(description.motion)
     return model_from(description)

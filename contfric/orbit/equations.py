@@ -257,6 +257,13 @@ def mean_rate_row(functions, layout, i, at, start, duration, p, which, room, row
 
 
 @helper
+def is_divided(layout, i, duration):  # type: ignore[no-untyped-def]
+    """Tell whether the exit row of segment i is divided by its duration."""
+    departs = layout.departs[i]
+    return abs(duration) < _SHORT and (PLAIN - departs) & 1 == 1 and departs < 0
+
+
+@helper
 def segment_rows(functions, layout, i, at, start, after, p, which, room, rows):  # type: ignore[no-untyped-def]
     """Write the rows of segment i to the last m of ``rows``; return its residual against scale.
 
@@ -304,7 +311,7 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
     for k in range(3 * m + free + 1, width):
         rows[row, k] = 0.0
     duration = after[0] - start[0]
-    if abs(duration) < _SHORT and (PLAIN - layout.departs[i]) & 1 == 1 and layout.departs[i] < 0:
+    if is_divided(layout, i, duration):
         worst += mean_rate_row(functions, layout, i, at, start, duration, p, which, room, rows)
         return worst if math.isfinite(worst) else np.inf
     for k in range(m):

@@ -1,0 +1,90 @@
+"""Sections of a plane: which are asked for, and the one-parameter diagram of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from contfric.atlas.diagram import Diagram
+from contfric.atlas.explore import explore
+from contfric.atlas.plane_state import PlaneExploration
+from contfric.atlas.seeds import Seeds
+from contfric.continuation.trace import continue_orbit
+from contfric.curves.problem import Box
+from contfric.errors import ContfricError, ParameterError
+from contfric.orbit.find import find_orbit
+from contfric.orbit.orbit import Orbit
+
+
+def sections_of(
+    orbit: Orbit, box: Box, sections: Mapping[str, Sequence[float]] | None
+) -> list[tuple[str, float]]:
+    """Return the sections as (parameter that is fixed, value)."""
+    if sections is None:
+        second = box.names[1]
+        return [(second, orbit.params[second])]
+    found = []
+    for name, values in sections.items():
+        if name not in box.names:
+            raise ParameterError(f"sections are values of {' and '.join(box.names)}, got '{name}'")
+        for value in values:
+            k = box.names.index(name)
+            if not box.low[k] <= float(value) <= box.high[k]:
+                raise ParameterError(
+                    f"the section {name} = {value:g} is outside of its range "
+                    f"({box.low[k]:g}, {box.high[k]:g})"
+                )
+            found.append((name, float(value)))
+    return found
+
+
+def section_diagram(
+    state: PlaneExploration, orbit: Orbit, fixed: str, value: float, seeds: Seeds | None
+) -> Diagram | None:
+    """Return the diagram of a section, from the first start that has one; None if none has."""
+    varies = next(n for n in state.box.names if n != fixed)
+    k = state.box.names.index(varies)
+    state.say(f"section {fixed} = {value:g}")
+    for start in _starts(state, orbit, fixed, value):
+        try:
+            return explore(
+                start,
+                varies,
+                (float(state.box.low[k]), float(state.box.high[k])),
+                bridges=False,
+                max_periods=state.max_periods,
+                seeds=seeds,
+            )
+        except ContfricError:
+            continue
+    return None
+
+
+def _starts(state: PlaneExploration, orbit: Orbit, fixed: str, value: float) -> Iterator[Orbit]:
+    """Yield orbits on a section: those that simulations settle on, then the plane's own continued to it."""
+    box = state.box
+    varies = next(n for n in box.names if n != fixed)
+    k = box.names.index(varies)
+    params = {**orbit.params, fixed: value}
+    bottom, top, _, _ = orbit.model.limits(varies, params)
+    low, high = max(box.low[k], bottom), min(box.high[k], top)
+    for share in (0.5, 0.3, 0.7, 0.1, 0.9):
+        with suppress(ContfricError):
+            there = {**params, varies: float(low + share * (high - low))}
+            yield find_orbit(orbit.model, there, longest=4000)
+    with suppress(ContfricError):
+        yield from _continued(orbit, fixed, value)
+
+
+def _continued(orbit: Orbit, fixed: str, value: float) -> Iterator[Orbit]:
+    """Yield an orbit continued to a section; nothing if its branch ends before."""
+    here = orbit.params[fixed]
+    if here == value:
+        yield orbit
+        return
+    branch = continue_orbit(orbit, fixed, (min(here, value), max(here, value)))
+    there = branch[int(np.argmin(np.abs(branch.values - value)))]
+    if there.params[fixed] == value and there.admissible:
+        yield there
