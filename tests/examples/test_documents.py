@@ -31,6 +31,16 @@ def test_code_runs(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert "SN_1a" in capsys.readouterr().out
 
 
+def test_the_model_in_the_readme_is_one(tmp_path: Path) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (found,) = [b for b in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if "modes:" in b]
+    path = tmp_path / "bilinear.yaml"
+    path.write_text(found, encoding="utf-8")
+    model = contfric.load_model(path)
+    assert [d.name for d in model.domains] == ["pressed+", "pressed-", "free+", "free-"]
+    assert model.transitions["pressed-", "contact"] == "free-"
+
+
 def test_guide_mentions_every_public_name() -> None:
     guide = (ROOT / "docs/guide.md").read_text()
     missing = [n for n in contfric.__all__ if not re.search(rf"cf\.{n}\b|`{n}`", guide)]
