@@ -128,7 +128,16 @@ MISTAKES = [
     ("name: spring", "name: spring\nintegration: {method: magic}", 2, "explicit, implicit"),
     ("name: spring", "name: spring\nstop_surface: w", 2, "no surface 'w'"),
     ("name: spring", "name: spring\nresets: {v: {w: 1}}", 2, "unknown key 'w'"),
+    ("name: spring", "name: spring\nresets: {v: {v: -v}}", 2, "motion lies on both sides of it"),
     ("name: spring", "name: spring\ndomains: {a: {mode: forward}}", 2, "it holds for: forward:u+"),
+    (
+        "name: spring",
+        "name: spring\ndomains: {a: {mode: stick}, b: {mode: stick}}",
+        2,
+        "holds for the region of domain 'a'",
+    ),
+    ("v: -u - S", "v: -2u - S", 15, "a product needs its * (in '2u')"),
+    ("v: -u - S", "v: -S u - S", 15, "a product needs its * (in 'S u')"),
 ]
 
 
