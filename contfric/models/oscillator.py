@@ -14,7 +14,6 @@ from contfric.models.entries import EntryError
 from contfric.models.files import built
 from contfric.models.grammar import TIME
 
-
 #: Likeness of two names from which one is a slip of the pen: a letter left out, added or exchanged.
 _SLIP = 0.88
 
@@ -197,7 +196,9 @@ def _check_names(kind: type[OscillatorModel]) -> None:
         for name in vars(base):
             near = get_close_matches(name, known, n=1, cutoff=_SLIP)
             if near and name not in known:
-                raise ModelError(f"{kind.__name__}: '{name}' declares nothing; did you mean '{near[0]}'?")
+                raise ModelError(
+                    f"{kind.__name__}: '{name}' declares nothing; did you mean '{near[0]}'?"
+                )
 
 
 def _traced(oscillator: OscillatorModel, method: str, *arguments: Any) -> Any:

@@ -361,9 +361,7 @@ def test_events_that_branches_share_are_listed_once() -> None:
         values = np.array([b.params[found.parameter] for b in events])
         assert np.all(np.diff(values) > 1e-7), name
     (node,) = [
-        n
-        for n in diagram("popp").nodes
-        if abs(n.bifurcation.params["omega"] - 1.66769) < 1e-5
+        n for n in diagram("popp").nodes if abs(n.bifurcation.params["omega"] - 1.66769) < 1e-5
     ]
     names = {diagram("popp").branches[i].name for i in node.branches}
     assert node.bifurcation.kind is cf.Kind.GS and names == {"0a, 4seg", "1a, 5seg", "1a, 9seg"}

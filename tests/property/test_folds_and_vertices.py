@@ -110,7 +110,9 @@ def test_no_step_leaps_over_a_vertex(step: float) -> None:
     assert end.bifurcation is not None
     assert end.bifurcation.params["Omega"] == pytest.approx(BRANCH_POINT, abs=1e-11)
     inner = slice(1, -1)
-    sides = np.sign(branch.x_max[inner] + branch.x_min[inner])  # of the other sign on the mirror branch
+    sides = np.sign(
+        branch.x_max[inner] + branch.x_min[inner]
+    )  # of the other sign on the mirror branch
     assert np.all(sides == sides[0])
 
 
@@ -162,7 +164,9 @@ def test_a_wall_takes_the_mass_off_rest_and_leaves_it_where_it_is() -> None:
     model = cf.load_model("impact-friction")
     names = [s.name for s in model.surfaces]
     kept = tables(model).kept
-    stays = {met: {n for k, n in enumerate(names) if kept[i] >> k & 1} for i, met in enumerate(names)}
+    stays = {
+        met: {n for k, n in enumerate(names) if kept[i] >> k & 1} for i, met in enumerate(names)
+    }
     assert "v" not in stays["wall"] and {"F+", "F-"} <= stays["wall"]
     assert stays["v"] == set(names)
 
