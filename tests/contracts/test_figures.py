@@ -37,6 +37,7 @@ from contfric.plot import (
     save_figure,
 )
 from contfric.plot.events import marks_of
+from contfric.plot.orbit import _columns
 from contfric.plot.pieces import level, observe, pieces_of
 from contfric.plot.runs import aligned, stability_runs
 from contfric.plot.style import (
@@ -364,6 +365,12 @@ def test_orbit_is_cut_where_it_changes_domain(orbit: Any) -> None:
         assert value == pytest.approx(level(orbit, surface), abs=1e-10)
 
 
+def test_legends_below_a_figure_fit_its_width() -> None:
+    assert _columns(["stick", "$x^+v^+$"], 9.0) == 2
+    assert _columns(["stop: reverses"] * 6, 9.0) == 6
+    assert _columns(["band:v2,w+"] * 12, 9.0) == 6
+
+
 @pytest.mark.parametrize("points", [40, 400])
 def test_impacts_are_drawn_as_jumps(points: int) -> None:
     """The wall changes the speed at one place; a sample that lies on a surface hides no crossing."""
@@ -543,7 +550,9 @@ def test_colours_tell_apart() -> None:
     assert len(set(branch_colours(names).values())) == len(names)
     assert branch_colours(names) == branch_colours([*names, "1a"])
     assert len(set(domain_colours(cf.load_model("coulomb")).values())) == 7
-    many = [f"0a, {k}seg" for k in range(2, 42, 2)]  # more than the palette has: further ones are darker
+    many = [
+        f"0a, {k}seg" for k in range(2, 42, 2)
+    ]  # more than the palette has: further ones are darker
     assert len(set(branch_colours(many).values())) == len(many)
     assert len(set(domain_colours(cf.load_model("popp")).values())) == 10
     assert isinstance(UNSTABLE, tuple)
