@@ -90,7 +90,7 @@ def model_from(description: Description) -> Model:
         flow_factory=GeneratedFlow(description.motion),
         spread=Spread(description.spread, description.text),
         references=description.references,
-        resets=tuple(_reset(description, name) for name in description.resets),
+        resets=tuple(_reset(description, name, domains) for name in description.resets),
         autonomous=not description.period,
         kinks=description.kinks,
         filippov=leaves_at_rest(sampler, description, domains),
@@ -115,8 +115,15 @@ def _mode(description: Description, name: str) -> Mode:
     return Mode(name, rank, held > 0)
 
 
-def _reset(description: Description, surface: str) -> Reset:
+def _reset(description: Description, surface: str, domains: tuple[Domain, ...]) -> Reset:
     """Return a reset; observables without the states that it maps are not changed by it."""
+    sides = {domain.signs[surface] for domain in domains}
+    if len(sides) > 1:
+        raise EntryError(
+            ("resets", surface),
+            f"'{surface}' has a reset, and motion lies on both sides of it or on it: a reset is a wall that "
+            f"motion never passes. Write the side on which it stays to the 'in' of every mode ({surface}: +)",
+        )
     texts = description.resets[surface]
     changed = {state for state, value in texts.items() if value != state}
     own = next(s.observable for s in description.surfaces if s.name == surface)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from contfric.errors import ModelError, NotationError, did_you_mean
 from contfric.models.definition import Model
 from contfric.models.describe import describe, from_text
 from contfric.models.description import Description
 from contfric.models.entries import EntryError
+
+if TYPE_CHECKING:
+    from contfric.yaml_lines import Address, LocatedYaml
 
 SUFFIXES = (".yaml", ".yml")
 
@@ -51,9 +55,17 @@ def read_model(path: Path) -> Model:
         try:
             return built(describe(located.data))
         except EntryError as error:
-            located.fail(error.address, str(error))
+            located.fail(_written_at(located, error.address), str(error))
     except NotationError as error:
         raise ModelError(str(error)) from None
+
+
+def _written_at(located: LocatedYaml, address: Address) -> Address:
+    """Return where an entry is written: the field of a mode that has none of its own is the common one."""
+    if address[:1] == ("modes",) and address[2:3] == ("field",):
+        own, common = address[:3], address[2:]
+        return common if own not in located.lines else address
+    return address
 
 
 def _file(path: Path) -> Path:

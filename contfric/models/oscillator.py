@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from difflib import get_close_matches
+from inspect import signature
 from typing import Any, ClassVar
 
 from contfric.errors import ModelError, did_you_mean
@@ -11,6 +13,9 @@ from contfric.models.describe import describe
 from contfric.models.entries import EntryError
 from contfric.models.files import built
 from contfric.models.grammar import TIME
+
+#: Likeness of two names from which one is a slip of the pen: a letter left out, added or exchanged.
+_SLIP = 0.88
 
 
 class Symbols:
@@ -138,7 +143,8 @@ def _data(oscillator: OscillatorModel) -> dict[str, Any]:
     import sympy
 
     kind, states = type(oscillator), tuple(oscillator.states)
-    if not states:
+    _check_names(kind)
+    if not states or isinstance(oscillator.states, str):
         raise ModelError(f'{kind.__name__}: \'states\' must be a list of names, such as ("x", "v")')
     t = sympy.Symbol(TIME)
     y = Symbols("state", {name: sympy.Symbol(name) for name in states})
@@ -184,6 +190,21 @@ def _data(oscillator: OscillatorModel) -> dict[str, Any]:
     return data
 
 
+def _check_names(kind: type[OscillatorModel]) -> None:
+    """Refuse an attribute that is nearly one of those that declare a model: it would do nothing.
+
+    Classes may have attributes of their own; only what looks like a slip of the pen is refused.
+    """
+    known = [name for name in vars(OscillatorModel) if not name.startswith("_")]
+    for base in kind.__mro__[: kind.__mro__.index(OscillatorModel)]:
+        for name in vars(base):
+            near = get_close_matches(name, known, n=1, cutoff=_SLIP)
+            if near and name not in known:
+                raise ModelError(
+                    f"{kind.__name__}: '{name}' declares nothing; did you mean '{near[0]}'?"
+                )
+
+
 def _traced(oscillator: OscillatorModel, method: str, *arguments: Any) -> Any:
     """Call a method with symbols; what it raises is the user's own mistake, said in one line."""
     try:
@@ -199,6 +220,9 @@ def _traced(oscillator: OscillatorModel, method: str, *arguments: Any) -> Any:
         hint = ""
         if "truth value" in str(error):
             hint = "; an 'if', min() or max() cannot look at values: use where(condition, a, b)"
+        elif "positional argument" in str(error):
+            expected = ", ".join(signature(getattr(OscillatorModel, method)).parameters)
+            hint = f"; write {method}({expected})"
         elif "float" in str(error) or "ufunc" in str(error):
             hint = "; use the functions of contfric.models.functions, not those of math or numpy"
         raise ModelError(f"{type(oscillator).__name__}.{method}: {error}{hint}") from error

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Sequence
 
 from matplotlib.axes import Axes
@@ -26,6 +28,9 @@ from contfric.plot.pieces import pieces_of, rest_bounds
 from contfric.plot.protocols import OrbitLike
 from contfric.plot.save import axes_or_new, figure_or_new
 from contfric.plot.style import BESIDE, SMALL, TEXT, parameter_label
+
+#: Room in a legend (inches, at the small size): an entry with its line, and each letter of its text.
+_ENTRY, _LETTER = 0.45, 0.06
 
 
 def plot_orbit(
@@ -129,6 +134,13 @@ def plot_orbit_in_time(orbit: OrbitLike, axes: Sequence[Axes] | None = None) -> 
     return list(axes)
 
 
+def _columns(labels: Sequence[str], width: float) -> int:
+    """Return the columns of a legend below a figure: as few rows as its width (inches) allows."""
+    letters = sum(len(re.sub(r"[$^_{}]|\\[a-z]+", "", label)) for label in labels)
+    rows = math.ceil((_ENTRY * len(labels) + _LETTER * letters) / width)
+    return math.ceil(len(labels) / rows)
+
+
 def plot_orbit_panels(orbit: OrbitLike, fig: Figure | None = None) -> list[Axes]:
     """Draw an orbit in the phase plane, beside the load plane and its observables in time.
 
@@ -170,7 +182,7 @@ def plot_orbit_panels(orbit: OrbitLike, fig: Figure | None = None) -> list[Axes]
     fig.legend(
         handles=handles,
         fontsize=SMALL,
-        ncols=len(handles),
+        ncols=_columns([str(handle.get_label()) for handle in handles], fig.get_figwidth()),
         loc="outside lower center" if fig.get_layout_engine() is not None else "lower center",
         frameon=False,
         handlelength=1.5,

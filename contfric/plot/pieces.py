@@ -95,11 +95,11 @@ def _crossings(orbit: OrbitLike, times: FloatArray, states: FloatArray) -> list[
             [observe(orbit, surface.observable, t, y) for t, y in zip(times, states, strict=True)]
         )
         gap -= limit
-        gap[np.abs(gap) < 1e-9 * (1.0 + abs(limit))] = 0.0  # a joint on the surface
-        for k in np.flatnonzero(gap[:-1] * gap[1:] < 0.0):
-            found.append(
-                (_crossing(orbit, surface.observable, limit, times[k : k + 2]), surface.name)
-            )
+        # a sample on the surface (a joint, or the middle of a motion) has no side
+        sided = np.flatnonzero(np.abs(gap) >= 1e-9 * (1.0 + abs(limit)))
+        for k in np.flatnonzero(gap[sided[:-1]] * gap[sided[1:]] < 0.0):
+            bracket = times[sided[k : k + 2]]
+            found.append((_crossing(orbit, surface.observable, limit, bracket), surface.name))
     return sorted(found)
 
 

@@ -128,6 +128,8 @@ def test_impact_oscillator_in_closed_form() -> None:
     fold = mp.findroot(lambda u: mp.diff(amplitude, u), mp.mpf("0.004"))
     assert value("impact", "SN", 0.1) == pytest.approx(float(amplitude(fold)), abs=1e-12)
     assert value("impact", "GS", 0.1) == pytest.approx(0.1, abs=1e-12)
+    assert float(amplitude(fold)) == pytest.approx(0.09997075362831327180, abs=1e-16)
+    assert float(fold) == pytest.approx(0.0041115306, abs=1e-10)
 
 
 class Belt:
@@ -151,6 +153,18 @@ def test_belt_by_another_integrator() -> None:
     assert value("belt", "SS", 0.64) == pytest.approx(ss, abs=1e-10)
     cs = brentq(lambda v: Belt.slip(v, Belt.slip(v, 1.0, -1.0), 1.0) - 1.0, 4.3, 4.5, xtol=1e-13)
     assert value("belt", "CS", 4.42) == pytest.approx(cs, abs=1e-10)
+
+
+def test_cycle_of_the_belt() -> None:
+    """Its period at 0.2 by the slip of another integrator and a stick at the belt's speed; far ahead."""
+    orbit = cf.find_orbit("belt", {"vb": 0.2})
+    (stick,) = [k for k, (mode, _) in enumerate(orbit.word) if mode == "stick"]
+    lasts = orbit.ends[stick, 0] - orbit.begins[stick, 0]
+    assert lasts == pytest.approx((1.0 - Belt.slip(0.2, 1.0, -1.0)) / 0.2, abs=1e-9)
+    assert orbit.period == pytest.approx(12.00103129483, abs=1e-10)
+    fast = cf.continue_orbit(cf.find_orbit("belt", {"vb": 10.0}), "vb", (5.0, 60.0))
+    assert [end.reason for end in fast.ends] == [cf.EndReason.RANGE] * 2
+    assert fast.name == "0a, 8seg" and bool(np.all(fast.stable))
 
 
 def _popp(omega: float, y: np.ndarray, t: float) -> list[float]:
@@ -211,6 +225,23 @@ def test_popp_grazing_of_period_one() -> None:
     assert omega == pytest.approx(0.85146070765, abs=1e-9) and orbit.periods == 1
 
 
+def test_popp_of_period_one_folds_and_becomes_a_torus() -> None:
+    """At the fold a multiplier of the orbit with a stick is 1; at the torus a pair lies on the circle."""
+    orbit = cf.find_orbit("popp", {"omega": 0.9})
+    found = cf.explore(orbit, "omega", (0.8, 1.1))
+    (fold,) = found.of_kind("SN")
+    assert fold.params["omega"] == pytest.approx(0.85421176, abs=5e-9) and fold.orbit.periods == 1
+    assert np.min(np.abs(fold.orbit.multipliers - 1.0)) < 1e-5
+    (torus,) = found.of_kind("NS")
+    omega, start = torus.params["omega"], torus.orbit.state(0.0)
+    period = 2 * pi / omega
+    end = integrated(lambda s, y: _popp(omega, y, s), [*start, 1, 0, 0, 1], (0.0, period))
+    assert end[:2] == pytest.approx(start, abs=1e-9)
+    pair = np.linalg.eigvals(end[2:].reshape(2, 2))
+    assert np.abs(pair) == pytest.approx([1.0, 1.0], abs=1e-8) and abs(pair[0].imag) > 0.1
+    assert omega == pytest.approx(1.0431131590, abs=1e-9)
+
+
 def test_popp_has_each_orbit_once() -> None:
     """Three events lead to the orbit of period 2 with a stick; twice around is no orbit of its own."""
     found = [b for b in diagram("popp").branches if b.name.startswith(("1a", "2a"))]
@@ -234,6 +265,10 @@ def test_impact_with_friction_in_closed_form() -> None:
     x = 4 * FF / (1 + E) ** 2 - B
     fold = 8 * FF**2 / (speed_squared(x, B) + 8 * FF * x)
     assert value("impact-friction", "SN", 4.95) == pytest.approx(fold, abs=1e-11)
+    assert value("impact-friction", "SS", 5.2) == pytest.approx(FF / (1.0 - B), abs=1e-9)
+    assert [ss, fold] == pytest.approx([5.5730340399782, 4.9515355556113], abs=1e-12)
+    (loose,) = diagram("impact-friction").loose_ends
+    assert loose.end.reason is cf.EndReason.SS
 
 
 def test_impact_with_friction_codimension_two_by_runs() -> None:
@@ -313,6 +348,9 @@ def test_bang_bang_is_found_from_one_start() -> None:
     assert sorted(b.system.periods for b in own) == [1, 1, 1, 1, 1, 2, 2, 4, 4, 8, 8]
     upper = next(b for b in own if 40.0 < b.values.min() < 41.0)
     assert bool(np.all(upper.stable[1:-1])) and upper.values.max() < 46.8
+    first = [b.params["A"] for b in found.of_kind("PD")][:4]
+    gaps = np.diff(first)
+    assert gaps[:-1] / gaps[1:] == pytest.approx([3.92, 4.31], abs=5e-3)
 
 
 def test_events_that_branches_share_are_listed_once() -> None:

@@ -37,6 +37,7 @@ from contfric.plot import (
     save_figure,
 )
 from contfric.plot.events import marks_of
+from contfric.plot.orbit import _columns
 from contfric.plot.pieces import level, observe, pieces_of
 from contfric.plot.runs import aligned, stability_runs
 from contfric.plot.style import (
@@ -364,6 +365,27 @@ def test_orbit_is_cut_where_it_changes_domain(orbit: Any) -> None:
         assert value == pytest.approx(level(orbit, surface), abs=1e-10)
 
 
+def test_legends_below_a_figure_fit_its_width() -> None:
+    assert _columns(["stick", "$x^+v^+$"], 9.0) == 2
+    assert _columns(["stop: reverses"] * 6, 9.0) == 6
+    assert _columns(["band:v2,w+"] * 12, 9.0) == 6
+
+
+@pytest.mark.parametrize("points", [40, 400])
+def test_impacts_are_drawn_as_jumps(points: int) -> None:
+    """The wall changes the speed at one place; a sample that lies on a surface hides no crossing."""
+    orbit = cf.find_orbit("impact-friction", {"k": 5.2}, state=[-0.08, 0.0], time=-1.5)
+    pieces = pieces_of(orbit, points)
+    walk = [name for name in orbit.signature.segments if "@" not in name]
+    names = [p.domain for p in pieces]
+    assert names in [walk[k:] + walk[:k] for k in range(len(walk))]
+    (struck,) = [p for p in pieces if p.times[0] == p.times[1]]
+    assert struck.states[0, 0] == struck.states[1, 0] and struck.states[0, 1] == 0.0
+    assert struck.states[1, 1] == pytest.approx(orbit.begins[struck.segment, 2]) and (
+        struck.states[1, 1] > 1.0
+    )
+
+
 def test_orbit_is_coloured_by_domain(orbit: Any) -> None:
     ax = plot_orbit(orbit)
     assert isinstance(ax, Axes)
@@ -528,4 +550,9 @@ def test_colours_tell_apart() -> None:
     assert len(set(branch_colours(names).values())) == len(names)
     assert branch_colours(names) == branch_colours([*names, "1a"])
     assert len(set(domain_colours(cf.load_model("coulomb")).values())) == 7
+    many = [
+        f"0a, {k}seg" for k in range(2, 42, 2)
+    ]  # more than the palette has: further ones are darker
+    assert len(set(branch_colours(many).values())) == len(many)
+    assert len(set(domain_colours(cf.load_model("popp")).values())) == 10
     assert isinstance(UNSTABLE, tuple)

@@ -72,6 +72,7 @@ MISTAKES = [
         "error",
         "motion is caught there",
     ),
+    ("in: {v: 0, F+: -, F-: +}", "in: {v: 0}", Topic.SLIDING, "warning", "'stick' is never left"),
     (
         "states: [x, v]",
         "states: [x, v]\ndefine: {g: 2*Omega}",

@@ -298,6 +298,9 @@ WRONG = [
     ({"period": lambda self, p: np.sin(p.k)}, "contfric.models.functions"),
     ({"modes": {"free": {"wal": -1}}}, "did you mean 'wall'?"),
     ({"states": ()}, "a list of names"),
+    ({"states": "xv"}, "a list of names"),
+    ({"parameter": {"k": 2.0}}, "did you mean 'parameters'?"),
+    ({"field": lambda self, mode, y, p: (y.v, 0)}, "write field(self, mode, t, y, p)"),
     ({"constraints": ("k > ",)}, "a constraint is such as"),
     ({"max_step": 0}, "as a share of the range"),
 ]
