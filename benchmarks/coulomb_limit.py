@@ -23,8 +23,6 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "coulomb-limit.md"
 #: The model stribeck with further joints inside of the hold.
 CUT = Path(__file__).with_name("stribeck-cut.yaml")
-#: What takes long is kept here, and computed anew if the folder is deleted.
-KEPT = ROOT / "build" / "coulomb_limit"
 S0 = 0.4
 #: Kinetic friction at which 1a attracts at Omega = 1/2, and ends in a bridge 0.053 wide.
 S = 0.2
@@ -36,8 +34,15 @@ BRIDGES = ((0.02, 0.44), (0.01, 0.44), (0.005, 0.446), (0.0025, 0.45))
 SEEN = 1e24
 #: Columns of the tables of bridges.
 COMPARED = "all of it | holds 0.3 to 1 | formulas | largest multiplier | growth"
-#: vS, sigma0, sigma1 / sqrt(sigma0), Omega of the start.
-BRISTLES = ((0.02, 1e5, 0.0, 0.44), (0.02, 1e5, 2.0, 0.44), (0.01, 1e6, 2.0, 0.442))
+#: vS, sigma0 = 0.2 / vS^3, sigma1 / sqrt(sigma0), Omega of a start (stable there), and the lowest Omega.
+BRISTLES = (
+    (0.04, 3125.0, 2.0, 0.44, 0.38),
+    (0.02, 25000.0, 2.0, 0.44, 0.4),
+    (0.01, 2e5, 2.0, 0.44, 0.4),
+    (0.005, 1.6e6, 2.0, 0.444, 0.4),
+)
+#: LuGre's meander is followed piece by piece, each this wide in Omega: a step may be no longer.
+PIECE = 0.002
 
 
 # One release, by integration ------------------------------------------------------------------
@@ -121,7 +126,7 @@ def stable() -> list[str]:
 
 
 #: vS and the stiffnesses of the table of LuGre's stable orbits.
-STIFF = ((0.01, (1e5, 1e6, 1e7)), (0.002, (1e6, 1e7)))
+STIFF = ((0.01, (1e4, 1e5, 1e6)), (0.005, (1e6,)))
 
 
 def lugre() -> list[str]:
@@ -134,13 +139,13 @@ def lugre() -> list[str]:
     limit = extrema(cf.find_orbit("coulomb", params))
     for vS, stiffnesses in STIFF:
         steep = extrema(cf.find_orbit("stribeck", {**params, "vS": vS}))
-        slow = amplitudes(Law(S, S0, vS), 0.5, 300)
+        slow = amplitudes(Law(S, S0, vS), 0.5, 80)
         for sigma0 in stiffnesses:
             for m in (0.0, 2.0):
                 sigma1 = m * math.sqrt(sigma0)
                 where = {**params, "vS": vS, "sigma0": sigma0, "sigma1": sigma1}
                 found = extrema(cf.find_orbit("lugre", where, longest=400))
-                derived = amplitudes(Law(S, S0, vS, sigma0, sigma1), 0.5, 300)
+                derived = amplitudes(Law(S, S0, vS, sigma0, sigma1), 0.5, 80)
                 values = (found - steep, derived - slow, found - limit, derived - limit)
                 cells = " | ".join(f"{v[1]:.2e}" for v in values)
                 lines.append(f"| {vS:g} | {sigma0:.0e} | {sigma1:g} | {cells} |")
@@ -189,43 +194,62 @@ def steep(vS: float, Omega: float) -> cf.Branch:
     return cf.continue_orbit(start, "Omega", (0.35, 0.4635), max_step=0.005)
 
 
+def measured(branch: cf.Branch) -> np.ndarray:
+    """Omega, x_max, -x_min and the largest multiplier along a branch, in the order of Omega or against it."""
+    largest = [float(np.max(np.abs(orbit.multipliers))) for orbit in branch]
+    return np.column_stack([curve(branch), largest])
+
+
 @cache
-def bristled(vS: float, sigma0: float, damping: float, Omega: float) -> cf.Branch:
-    """LuGre's branch, cut in the middle of the hold; kept in a file, as it takes minutes."""
-    kept = KEPT / f"lugre-{vS:g}-{sigma0:.0e}-{damping:g}.npz"
-    if kept.exists():
-        branch = cf.load(kept)
-        assert isinstance(branch, cf.Branch)
-        return branch
+def bristled(vS: float, sigma0: float, damping: float, Omega: float, lowest: float) -> np.ndarray:
+    """LuGre's branch from large Omega down, cut in the middle of the hold: as `measured`."""
     sigma1 = damping * math.sqrt(sigma0)
     law = {"vS": vS, "sigma0": sigma0, "sigma1": sigma1, "phi0": 6.2}
-    start = cf.find_orbit("lugre", {"Omega": Omega, "S": S, "S0": S0, **law}, longest=400)
-    branch = cf.continue_orbit(start, "Omega", (0.37, 0.4635), max_step=0.004)
-    KEPT.mkdir(parents=True, exist_ok=True)
-    cf.save(branch, kept)
-    return branch
+    orbit = cf.find_orbit("lugre", {"Omega": Omega, "S": S, "S0": S0, **law}, longest=60)
+    up = measured(cf.continue_orbit(orbit, "Omega", (Omega - 1e-6, 0.4635), max_step=0.1))
+    pieces = [up[np.argsort(-up[:, 0])]]
+    while Omega > lowest:
+        down = (Omega - PIECE, Omega + 1e-6)
+        piece = cf.continue_orbit(orbit, "Omega", down, max_step=0.5, stability=False)
+        if piece.values.min() > Omega - 0.5 * PIECE:
+            break
+        orbit = piece[int(np.argmin(piece.values))]
+        Omega = orbit.params["Omega"]
+        found = measured(piece)
+        pieces.append(found[np.argsort(-found[:, 0])])
+    return np.vstack(pieces)
 
 
-def growth(law: Law, branch: cf.Branch) -> str:
+def growth(law: Law, found: np.ndarray) -> str:
     """Largest multiplier, and its growth along the meander over that of the formula."""
     lengths = np.linspace(*INNER, 36)
-    multipliers = np.array([np.max(np.abs(orbit.multipliers)) for orbit in branch])
-    line, points = curve(branch), holds(law, lengths)
+    line, multipliers = found[:, :3], found[:, 3]
+    points = holds(law, lengths)
+    lengths, points = (
+        lengths[points[:, 0] > line[:, 0].min()],
+        points[points[:, 0] > line[:, 0].min()],
+    )
     nearest = [int(np.argmin(np.sum((line - point) ** 2, axis=1))) for point in points]
     measured = np.log(multipliers[nearest])
     derived = np.array([exponent(law, p, n) for p, n in zip(points, lengths, strict=True)])
-    clear = derived < 0.5 * math.log(SEEN)
+    clear = derived < 0.8 * math.log(SEEN)
     slope = np.polyfit(derived[clear], measured[clear], 1)[0] if clear.sum() > 4 else math.nan
     return f"{multipliers.max():.0e} | {slope:.3f}"
 
 
 def row(law: Law, line: np.ndarray) -> list[str]:
     """Distances of Coulomb's bridge, all of it and its inner part, and of that of the formulas."""
+    lowest = (
+        line[:, 0].min() + 0.5 * PIECE
+    )  # a branch that ends early is compared as far as it goes
     every, inner = np.linspace(0.0, LONGEST, 60), np.linspace(*INNER, 36)
-    whole = distances(holds(Law(S, S0, 1.0), every, delays=False), line).max()
-    part = distances(holds(Law(S, S0, 1.0), inner, delays=False), line).max()
-    derived = distances(holds(law, inner), line).max()
-    return [f"{d:.2e}" for d in (whole, part, derived)]
+    limit = Law(S, S0, 1.0)
+    compared = (
+        holds(limit, every, delays=False),
+        holds(limit, inner, delays=False),
+        holds(law, inner),
+    )
+    return [f"{distances(p[p[:, 0] > lowest], line).max():.2e}" for p in compared]
 
 
 def meander() -> list[str]:
@@ -237,7 +261,7 @@ def meander() -> list[str]:
     for vS, Omega in BRIDGES:
         branch = steep(vS, Omega)
         law = Law(S, S0, vS)
-        cells = [*row(law, curve(branch)), growth(law, branch)]
+        cells = [*row(law, curve(branch)), growth(law, measured(branch))]
         lines.append(f"| {vS:g} | {' | '.join(cells)} |")
     return lines
 
@@ -245,14 +269,14 @@ def meander() -> list[str]:
 def bristles() -> list[str]:
     """Table: LuGre's meander and the bridge."""
     lines = [
-        f"| vS | sigma0 | sigma1 | {COMPARED} |",
-        "|---|---|---|---|---|---|---|---|",
+        f"| vS | sigma0 | sigma1 | {COMPARED} | down to |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
-    for vS, sigma0, damping, Omega in BRISTLES:
-        branch = bristled(vS, sigma0, damping, Omega)
+    for vS, sigma0, damping, Omega, lowest in BRISTLES:
+        found = bristled(vS, sigma0, damping, Omega, lowest)
         law = Law(S, S0, vS, sigma0, damping * math.sqrt(sigma0))
-        cells = [*row(law, curve(branch)), growth(law, branch)]
-        lines.append(f"| {vS:g} | {sigma0:.0e} | {law.sigma1:g} | {' | '.join(cells)} |")
+        cells = [*row(law, found[:, :3]), growth(law, found), f"{found[:, 0].min():.3f}"]
+        lines.append(f"| {vS:g} | {sigma0:g} | {law.sigma1:.4g} | {' | '.join(cells)} |")
     return lines
 
 

@@ -24,11 +24,12 @@ def draw() -> None:
         1, 2, figsize=(11.0, 4.6), sharey=True, layout="constrained"
     )
     for (vS, Omega), colour in zip(limit.BRIDGES, COLOURS, strict=True):
-        _branch(left, limit.steep(vS, Omega), colour, f"$v_S$ = {vS:g}")
-    for (vS, sigma0, damping, Omega), colour in zip(limit.BRISTLES, COLOURS, strict=False):
-        how = f", $\\sigma_1 = {damping:g}\\sqrt{{\\sigma_0}}$" if damping else ""
-        name = f"$v_S$ = {vS:g}, $\\sigma_0$ = {sigma0:.0e}{how}"
-        _branch(right, limit.bristled(vS, sigma0, damping, Omega), colour, name)
+        branch = limit.steep(vS, Omega)
+        _line(left, limit.curve(branch), branch.stable, colour, f"$v_S$ = {vS:g}")
+    for case, colour in zip(limit.BRISTLES, COLOURS, strict=True):
+        found = limit.bristled(*case)
+        name = f"$v_S$ = {case[0]:g}, $\\sigma_0$ = {case[1]:g}"
+        _line(right, found[:, :3], found[:, 3] < 1.0, colour, name)
     for ax, title in ((left, "friction that falls (stribeck)"), (right, "bristles (lugre)")):
         for branch in limit.diagram().branches:
             if branch.name.startswith(("1a", "2a")):
@@ -44,11 +45,11 @@ def _smaller(branch: cf.Branch) -> np.ndarray:
     return np.minimum(branch.x_max, -branch.x_min)
 
 
-def _branch(ax: Any, branch: cf.Branch, colour: str, name: str) -> None:
+def _line(ax: Any, points: np.ndarray, stable: np.ndarray, colour: str, name: str) -> None:
     """One colour, dashed where unstable."""
-    size = _smaller(branch)
-    ax.plot(branch.values, np.where(branch.stable, size, np.nan), color=colour, lw=1.5, label=name)
-    ax.plot(branch.values, np.where(branch.stable, np.nan, size), "--", color=colour, lw=1.2)
+    size = np.minimum(points[:, 1], points[:, 2])
+    ax.plot(points[:, 0], np.where(stable, size, np.nan), color=colour, lw=1.5, label=name)
+    ax.plot(points[:, 0], np.where(stable, np.nan, size), "--", color=colour, lw=1.2)
 
 
 def _coulomb(ax: Any, branch: cf.Branch) -> None:
