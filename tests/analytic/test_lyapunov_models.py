@@ -250,13 +250,14 @@ def test_what_has_no_exponents_is_named(
 def test_a_map_of_all_kinds_of_motions_is_not_lost() -> None:
     """Escapes, rests and cycles stand beside each other, and breakdowns where a root has no value."""
     grid = {"a": [-1.0, 1.0, 2.06], "d": [0.0, 3.0]}
-    lmap = cf.lyapunov_map(jerk(), grid, state=[0.02, 0.0, 0.01], tile=2)
+    start = [0.02, 0.0, 0.01]
+    lmap = cf.lyapunov_map(jerk(), grid, state=start, tile=2, periods=3000)
     assert lmap.complete
     names = [[list(Motion)[code].name for code in row] for row in lmap.motions[..., 0]]
     assert names == [["UNBOUNDED", "UNBOUNDED"], ["UNBOUNDED", "HELD"], ["PERIODIC", "HELD"]]
     assert np.array_equal(np.isnan(lmap.values), lmap.where(Motion.UNBOUNDED))
     assert not lmap.chaotic.any()
-    limited = cf.lyapunov_map(jerk(), grid, {"s": 1e-9, "r": 5.0}, state=[0.02, 0.0, 0.01])
+    limited = cf.lyapunov_map(jerk(), grid, {"s": 1e-9, "r": 5.0}, state=start)
     assert limited.complete
     assert limited.counts()[Motion.BROKEN] > 0
     assert np.array_equal(np.isnan(limited.values), limited.absent())
