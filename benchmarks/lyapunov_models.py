@@ -1,7 +1,7 @@
 """Exponents of integrated models: cost beside the closed form, where it goes, and the first call.
 
-``python benchmarks/lyapunov_models.py`` measures and renews its section of docs/lyapunov.md; ``--short`` leaves
-the first call out (minutes of compilation) and only prints. Times are least processor times of several rounds.
+``python benchmarks/lyapunov_models.py`` measures and renews its section of docs/lyapunov.md; ``--first`` only
+prints what the first call costs (minutes of compilation). Times are least processor times of several rounds.
 """
 
 from __future__ import annotations
@@ -89,9 +89,9 @@ def costs() -> list[str]:
     for name, (which, params) in MOTIONS.items():
         model = cf.load_model(which)
         vector = model.vector(params)
-        started = cf.simulate(model, params, periods=100)
-        state = np.array(started.last[2])[None]
-        states = state if which != "coulomb-yaml" else np.array([[1.36, 0.0]])
+        states = np.array([[1.36, 0.0]])  # that of the reference
+        if not which.startswith("coulomb"):
+            states = np.array(cf.simulate(model, params, periods=100).last[2])[None]
         motion = cf.simulate(model, params, state=states[0], periods=PERIODS)
         joints, limits = len(motion), Limits(0, PERIODS, 0.0)
         plain = least(
@@ -138,12 +138,8 @@ print(first, took(lambda: model.flow.functions()))
 """
 
 
-def cold() -> list[str]:
-    """Return what the first call costs in a new cache, and what is left out of it."""
-    lines = [
-        "| first call, nothing cached | compiled and run | stationary points, which no exponent asks for |",
-        "|---|---|---|",
-    ]
+def cold() -> None:
+    """Print what the first call costs in a new cache, and what is left out of it."""
     for name in ("coulomb", "popp", "lugre"):
         with tempfile.TemporaryDirectory() as folder:
             done = subprocess.run(
@@ -154,26 +150,23 @@ def cold() -> list[str]:
                 check=True,
             )
         first, rest = (float(text) for text in done.stdout.split())
-        lines.append(f"| `{name}` | {first:.0f} s | {rest:.0f} s more |")
-        print(lines[-1], flush=True)
-    return lines
+        print(f"{name}: {first:.0f} s; stationary points, which it does not ask for: {rest:.0f} s")
 
 
 def main() -> None:
-    """Measure, print, and renew the page unless it was a short run."""
+    """Measure, print, and renew the page."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--short", action="store_true", help="no first calls; nothing is written")
+    parser.add_argument("--first", action="store_true", help="the first call alone, printed")
     options = parser.parse_args()
-    head = (
-        f"Written by `benchmarks/lyapunov_models.py`; {platform.machine()}, {os.cpu_count()} processors, Python "
-        f"{platform.python_version()}. Least processor times of several rounds, warm, on a machine with other "
-        "work to do: all are too large, their ratios less so. A tolerance of 1e-12."
-    )
-    tables_of = [costs(), maps()] + ([] if options.short else [cold()])
-    text = "\n\n".join([head, *("\n".join(part) for part in tables_of)])
-    if options.short:
-        print(text)
+    if options.first:
+        cold()
         return
+    head = (
+        f"Written by `benchmarks/lyapunov_models.py`; {platform.machine()}, {os.cpu_count()} processors, "
+        f"Python {platform.python_version()}. Least processor times of several rounds, warm, on a machine "
+        "with other work to do: all are too large, their ratios less so. A tolerance of 1e-12."
+    )
+    text = "\n\n".join([head, *("\n".join(part) for part in (costs(), maps()))])
     page = PAGE.read_text(encoding="utf-8")
     before, _, rest = page.partition(BEGIN)
     _, _, after = rest.partition(END)

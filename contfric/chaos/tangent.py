@@ -57,9 +57,10 @@ from contfric.orbit.trajectory import (
 #: A walk has come to the next joint; otherwise it ended as a simulation does (HELD, IMPOSSIBLE, INFINITE,
 #: QUIET, CHATTER), or the integration broke down.
 ARRIVED, BROKEN = 0, 10
-#: Shares of the time to a place where the integration breaks down, and the factor by which a motion that
-#: grows without bound in a finite time, as 1/(time left) or faster than its root, has grown in between.
-_EARLY, _LATE, _ESCAPES = 1.0 - 1e-3, 1.0 - 1e-6, 10.0
+#: Halvings in the search of the place where the integration breaks down. A motion that has grown there by
+#: this factor grows without bound in a finite time (as 1/(time left) it has grown by 1e12), and one that
+#: is larger than this has grown already: levels of size 1 are rounding beside it.
+_HALVINGS, _ESCAPES, _HUGE = 40, 1e6, 1e10
 
 
 class Walk(NamedTuple):
@@ -157,17 +158,24 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
 @helper
 def too_large(functions, mode, duration, p, walk, room):  # type: ignore[no-untyped-def]
     """Tell a motion that grew beyond all numbers, also in a finite time, from one that breaks off."""
-    y, start, early, late = walk.y, walk.start, 1.0, 0.0
+    y, start, size = walk.y, walk.start, 0.0
     for j in range(y.shape[0]):
         if abs(y[j]) >= TOO_LARGE:
             return INFINITE
-    functions[0](mode, start[0], start[1:], _EARLY * duration, p, room.none, walk.end, room.nothing)
-    for j in range(y.shape[0]):
-        early = max(early, abs(walk.end[j]))
-    functions[0](mode, start[0], start[1:], _LATE * duration, p, room.none, walk.end, room.nothing)
-    for j in range(y.shape[0]):
-        late = max(late, abs(walk.end[j]))
-    return INFINITE if late > _ESCAPES * early else BROKEN
+        size = max(size, abs(start[1 + j]))
+    low, high, last = 0.0, 1.0, size
+    for _ in range(_HALVINGS):
+        middle, finite, here = 0.5 * (low + high), True, 0.0
+        time = middle * duration
+        functions[0](mode, start[0], start[1:], time, p, room.none, walk.end, room.nothing)
+        for j in range(y.shape[0]):
+            finite = finite and abs(walk.end[j]) < TOO_LARGE
+            here = max(here, abs(walk.end[j]))
+        if finite:
+            low, last = middle, here
+        else:
+            high = middle
+    return INFINITE if last > min(_HUGE, _ESCAPES * (1.0 + size)) else BROKEN
 
 
 @helper
