@@ -13,6 +13,7 @@ from contfric.curves.curve import Curve, CurvePart
 from contfric.curves.points import CurvePoint
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
+from contfric.models.definition import FloatArray
 
 if TYPE_CHECKING:
     from contfric.curves.trace import CurveSide
@@ -37,9 +38,7 @@ def join_sides(behind: CurveSide | None, ahead: CurveSide, first: CurveEnd | Non
     shift = -pieces[0].points[0].arc
     special = [s for piece in pieces for s in piece.special]
     moved = tuple(replace(s, position=s.position + shift) for s in special)
-    parts = [
-        part for piece in pieces for part in _parts(piece.problem, _shifted(piece, shift), moved)
-    ]
+    parts = [part for piece in pieces for part in _parts(piece.problem, piece.points, shift, moved)]
     ends = tuple(
         end if end.special is None else replace(end, special=moved[place])
         for end, place in ((first, 0), (_pieces(ahead)[-1].end, -1))
@@ -67,22 +66,20 @@ def _reversed(piece: CurveSide) -> CurveSide:
     return turned
 
 
-def _shifted(piece: CurveSide, shift: float) -> list[CurvePoint]:
-    return [replace(p, arc=p.arc + shift) for p in piece.points]
-
-
 def _parts(
-    problem: Problem, points: list[CurvePoint], special: tuple[SpecialPoint, ...]
+    problem: Problem, points: list[CurvePoint], shift: float, special: tuple[SpecialPoint, ...]
 ) -> tuple[CurvePart, ...]:
-    """Cut the points where the kind changes."""
-    arc = np.array([p.arc for p in points])
+    """Cut the points where the kind changes; ``shift`` is added to their arclength."""
+    arc = np.array([p.arc for p in points]) + shift
     cuts = [s.position for s in special if s.kind is CodimTwo.TURNOVER]
     inner = [int(np.searchsorted(arc, cut)) for cut in cuts if arc[0] < cut < arc[-1]]
     edges = [0, *inner, len(points)]
-    return tuple(_part(problem, points[a:b]) for a, b in itertools.pairwise(edges) if b > a)
+    return tuple(
+        _part(problem, points[a:b], arc[a:b]) for a, b in itertools.pairwise(edges) if b > a
+    )
 
 
-def _part(problem: Problem, points: list[CurvePoint]) -> CurvePart:
+def _part(problem: Problem, points: list[CurvePoint], arc: FloatArray) -> CurvePart:
     kind = problem.kind
     if kind in (Kind.CS, Kind.SS) and problem.test is not None:
         middle = points[len(points) // 2]
@@ -94,7 +91,7 @@ def _part(problem: Problem, points: list[CurvePoint]) -> CurvePart:
         problem.test,
         np.array([p.w for p in points]),
         np.array([p.joints for p in points]),
-        np.array([p.arc for p in points]),
+        arc,
         np.array([p.labels for p in points], dtype=np.int64).reshape(len(points), -1),
         np.array([p.mu for p in points]),
     )

@@ -64,6 +64,10 @@ def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
     signs = signs_at(model, float(begin[0]), begin[1:].copy(), orbit.vector)
     del signs[entry]  # the joint lies on it to rounding, on the side of every domain
     own = [d for d in model.domains if d.mode == word[i][0]]
+    led = model.targets.get(
+        (ends[i - 1], entry), ()
+    )  # a surface met at the impact is on either side
+    own = [d for d in own if d.name in led] or own
     return min(own, key=lambda d: sum(d.signs[s] * sign < 0 for s, sign in signs.items())).name
 
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 from contfric.errors import NotationError, did_you_mean
 from contfric.models import Model
@@ -256,16 +257,24 @@ def entered(
 
 def _within(entries: Iterable[str], model: Model, mode: str) -> set[str]:
     """Return all domains of a mode that can be reached from the entries without leaving it."""
-    reached = set(entries)
+    reached, steps = set(entries), _steps_within(model, mode)
     waiting = list(reached)
     while waiting:
-        source = waiting.pop()
-        for (start, surface), target in model.transitions.items():
-            inside = fuses(model, mode, surface, model.domain_by_name[target].mode)
-            if start == source and inside and target not in reached:
+        for target in steps.get(waiting.pop(), ()):
+            if target not in reached:
                 reached.add(target)
                 waiting.append(target)
     return reached
+
+
+@cache
+def _steps_within(model: Model, mode: str) -> dict[str, list[str]]:
+    """Return where each domain leads to without leaving a mode."""
+    steps: dict[str, list[str]] = {}
+    for (start, surface), target in model.transitions.items():
+        if fuses(model, mode, surface, model.domain_by_name[target].mode):
+            steps.setdefault(start, []).append(target)
+    return steps
 
 
 def _has_cycle(mode: str, model: Model) -> bool:

@@ -20,6 +20,7 @@ from scipy.optimize import brentq, fsolve
 import contfric as cf
 from contfric.continuation.points import Settings
 from contfric.continuation.switching import leave_branch_point
+from contfric.curves.points import CurveRows, first_curve_point, march_rows
 from contfric.curves.trace import continue_bifurcation
 from tests.curve_check import miss
 
@@ -118,6 +119,15 @@ def test_fold_meets_switching() -> None:
     assert on_switching.params["b"] == pytest.approx(b, abs=1e-12)
     assert on_fold.params["k"] == pytest.approx(k, abs=1e-8)
     assert on_fold.params["b"] == pytest.approx(b, abs=1e-9)
+
+
+def test_curve_of_the_other_event_starts_at_the_point() -> None:
+    """Its first orbit stops on the surface to rounding, and has a name all the same."""
+    found = point_of(curve("impact-friction", "SS", "1a, 5seg, 1imp", 5.57), "SS-SN")
+    event, plane = found.bifurcation(), PLANES["impact-friction"]
+    assert event is not None and event.kind is cf.Kind.SN
+    fold = continue_bifurcation(event, tuple(plane), plane)
+    assert fold.label == "SN_1a, 5seg, 1imp" and len({orbit.name for orbit in fold}) <= 2
 
 
 def test_switching_ends_where_the_wall_grazes_the_flight() -> None:
@@ -408,8 +418,51 @@ def test_autonomous_cusp_turns_both_parameters() -> None:
     k = int(np.searchsorted(found.arc, point.position))
     before, after = found.values[k - 1] - found.values[k - 4], found.values[k + 3] - found.values[k]
     assert np.all(before * after < 0.0)
-    nearest = np.min(np.linalg.norm(found.values - [point.params["A"], point.params["C"]], axis=1))
-    assert nearest < 1e-2
+    other = point_of(curve(JERK, "SN", "0a, 14seg", 0.5139), "CUSP")
+    for name in ("A", "C"):  # the curve through the fold on the other side of the branch
+        assert other.params[name] == pytest.approx(point.params[name], abs=1e-9)
+
+
+# ------------------------------------------------------------------ gradients of the condition
+
+
+def tangent_miss(found: cf.Curve, index: int) -> float:
+    """Return how far the tangent of a curve, which its gradient gives, is from the chord around it."""
+    problem = found.parts[0].problem
+    assert problem is not None
+    first = first_curve_point(problem, found[index])
+    assert first is not None
+    start, border = first
+    sides = []
+    for point in (start, start.reversed()):  # a step of the same length to each side
+        rows = CurveRows.room_for(problem, 2)
+        rows.put(0, point)
+        _, last, _ = march_rows(problem, rows, 0, point, 0, border.copy(), 1e-4, 1e-4, 3e-13)
+        assert last == 1
+        sides.append(np.concatenate([rows.joints[1].ravel(), rows.values[1]]))
+    chord = sides[0] - sides[1]
+    tangent = np.concatenate([start.tangent.ravel(), start.slope])
+    return float(np.max(np.abs(chord / np.linalg.norm(chord) - tangent / np.linalg.norm(tangent))))
+
+
+def test_gradient_behind_resets_and_without_excitation() -> None:
+    for found in (
+        curve("impact-friction", "SN", "1a, 5seg, 1imp"),
+        curve("impact", "SN", "0a, 2seg, 1imp"),
+        curve("dead-band", "SN", "0s, 12seg"),
+        curve(JERK, "PD", "0a, 4seg", 0.7277),
+    ):
+        assert tangent_miss(found, len(found) // 2) < 1e-6, found
+
+
+def test_gradient_of_a_divided_exit_row() -> None:
+    """Towards its end the doubling's orbit has a short piece that begins and ends on x = 0."""
+    found = curve(JERK, "PD", "0a, 8seg", 0.6542)
+    lasts = [float(np.min(orbit.ends[:, 0] - orbit.cycle[:, 0])) for orbit in found]
+    short = [k for k, d in enumerate(lasts) if 0.02 < d < 0.09]
+    assert short
+    for k in short[:3]:
+        assert tangent_miss(found, k) < 1e-6, lasts[k]
 
 
 # --------------------------------------------------------------------------------- refusals
