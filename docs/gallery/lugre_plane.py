@@ -170,10 +170,14 @@ def attractors_at(omega: float, s: float) -> list[str]:
     return sorted(found)
 
 
-def region_table() -> list[str]:
+def region_table(folder: Path) -> list[str]:
     """Return what simulations settle on at places of the plane."""
-    rows = ["| Omega | S | simulations settle on |", "|---|---|---|"]
-    return [*rows, *(f"| {o:g} | {s:g} | {'; '.join(attractors_at(o, s))} |" for o, s in PLACES)]
+    file = folder / "regions.md"
+    if not file.is_file():
+        rows = [f"| {o:g} | {s:g} | {'; '.join(attractors_at(o, s))} |" for o, s in PLACES]
+        file.write_text("\n".join(rows), encoding="utf-8")
+    head = ["| Omega | S | simulations settle on |", "|---|---|---|"]
+    return [*head, *file.read_text(encoding="utf-8").splitlines()]
 
 
 def draw(curves: list[cf.Curve]) -> None:
@@ -205,7 +209,7 @@ def main(folder: Path) -> None:
     page = with_table(page, "curves", curve_table(curves))
     page = with_table(page, "special", special_table(curves))
     page = with_table(page, "refused", [f"* {line}" for line in refused] or ["None."])
-    page = with_table(page, "regions", region_table())
+    page = with_table(page, "regions", region_table(folder))
     PAGE.write_text(page, encoding="utf-8")
     draw(curves)
 
