@@ -30,9 +30,12 @@ SECTIONS = {
 #: Largest step of curves as a share of the ranges, and most points of each side.
 STEP, POINTS = 0.004, 150
 #: An event lies on a curve that crosses its section this near to it, with joints this near to its own.
-SAME_PLACE, SAME_ORBIT = 5e-4, 3e-2
+SAME_PLACE, SAME_ORBIT = 1e-5, 3e-2
 #: Kinds in the order in which their curves are followed.
-KINDS = (cf.Kind.BP, cf.Kind.SN, cf.Kind.PD)
+KINDS = (cf.Kind.BP, cf.Kind.SN)
+#: Symmetric orbits between these are left out (five loops of Fig. 18 that are like the first one), and all
+#: folds of asymmetric orbits but that at which the main branch turns: a curve takes 10 to 100 s.
+LOOPS, MAIN_FOLD = (0.41, 0.46), 0.55
 #: Places that are simulated, random starts of each, and periods that a motion may take to settle.
 PLACES = (
     (0.56, 0.38),
@@ -73,7 +76,7 @@ def events(diagrams: dict[str, cf.Diagram]) -> list[cf.Bifurcation]:
         for branch in diagram.branches
         if not branch.mirrored
         for b in branch.bifurcations
-        if b.kind in KINDS and (b.kind is not cf.Kind.BP or branch.symmetric)
+        if b.kind in KINDS and is_wanted(b, branch.symmetric)
     ]
     return sorted(
         found,
@@ -83,6 +86,16 @@ def events(diagrams: dict[str, cf.Diagram]) -> list[cf.Bifurcation]:
             -b.params["Omega"],
             b.params["S"],
         ),
+    )
+
+
+def is_wanted(event: cf.Bifurcation, symmetric: bool) -> bool:
+    """Tell whether the curve of an event is drawn."""
+    omega = event.params["Omega"]
+    return (
+        not LOOPS[0] < omega < LOOPS[1]
+        if symmetric
+        else omega > MAIN_FOLD and event.kind is cf.Kind.SN
     )
 
 
