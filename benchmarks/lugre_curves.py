@@ -73,14 +73,14 @@ def difference(curve: cf.Curve, k: int, bounds: dict[str, tuple[float, float]]) 
     return float("nan")
 
 
-def main(folder: Path) -> None:
-    """Print a row for each curve."""
+def main(folder: Path, pattern: str) -> None:
+    """Print a row for each curve whose file matches a pattern."""
     sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "gallery"))
     from lugre_plane import RANGES
 
     print("| curve | orbits | points | compared | largest difference |\n|---|---|---|---|---|")
     worst = 0.0
-    for file in sorted(folder.glob("curve-*.npz")):
+    for file in sorted(folder.glob(pattern)):
         curve = cf.load(file)
         places = np.unique(np.linspace(1, len(curve) - 2, COUNT + 2).astype(int)[1:-1])
         off = np.array([difference(curve, int(k), RANGES) for k in places])
@@ -97,4 +97,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), sys.argv[2] if len(sys.argv) > 2 else "curve-*.npz")

@@ -75,12 +75,12 @@ def smooth_events(
                 # a pole is no event: multipliers are infinite where an exit becomes tangential
                 half = orbit.system.half or column == CHI_ONE
                 kind = Kind.NS if column == CHI_PAIR else Kind.BP if half else Kind.PD
-                found.append(_not_located(orbit, kind, before, beyond, settings))
+                found.append(_leapt(orbit, kind, before, after, beyond, settings))
             continue
         if column in (CHI_ONE, CHI_MINUS) and _leaps(
             before, after, point.tests[base + column], a, b
         ):
-            found.append(_leapt(orbit, before, beyond, settings))
+            found.append(_leapt(orbit, Kind.BP, before, after, beyond, settings))
             continue
         if column == FOLD:
             folded = True
@@ -181,11 +181,14 @@ def _leaps(before: Point, after: Point, value: float, a: float, b: float) -> boo
 
 
 def _leapt(
-    orbit: Orbit, before: Point, beyond: Point, settings: Settings
+    orbit: Orbit, kind: Kind, before: Point, after: Point, beyond: Point, settings: Settings
 ) -> tuple[Bifurcation, Point]:
-    """Return what stands for a step that leaps: nothing is located, and the step is to be taken back."""
-    bifurcation, point = _not_located(orbit, Kind.BP, before, beyond, settings)
-    return bifurcation, replace(point, lost=True)
+    """Return what stands for a step between whose ends no branch is found: it is to be taken back.
+
+    A step as short as can be is not: then the event is reported as not located.
+    """
+    bifurcation, point = _not_located(orbit, kind, before, beyond, settings)
+    return bifurcation, replace(point, lost=after.arc - before.arc > _SHORTEST_LEAP)
 
 
 def _is_pole(value: float, a: float, b: float) -> bool:

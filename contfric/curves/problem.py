@@ -100,7 +100,7 @@ class Problem:
 
     @cached_property
     def limits(self) -> FloatArray:
-        """The model's constraints in the plane: rows (a, b, c) with ``a p + b q + c >= 0``."""
+        """The model's constraints that bound the plane: rows (a, b, c) with ``a p + b q + c >= 0``."""
         params = self.model.mapping(self.vector)
         one, other = self.box.names
         rows = [
@@ -110,6 +110,7 @@ class Problem:
                 constraint.value({**params, one: 0.0, other: 0.0}),
             ]
             for constraint in self.model.constraints
+            if one in constraint.coefficients or other in constraint.coefficients
         ]
         return np.array(rows, dtype=np.float64).reshape(len(rows), 3)
 

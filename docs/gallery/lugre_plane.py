@@ -28,11 +28,14 @@ SECTIONS = {
     "fig18": ("Omega", (0.4, 0.58), {"Omega": 0.57, "S": 0.32, "S0": S0}),
 }
 #: Largest step of curves as a share of the ranges, and most points of each side.
-STEP, POINTS = 0.004, 600
+STEP, POINTS = 0.004, 150
 #: An event lies on a curve that crosses its section this near to it, with joints this near to its own.
-SAME_PLACE, SAME_ORBIT = 5e-4, 3e-2
+SAME_PLACE, SAME_ORBIT = 1e-5, 3e-2
 #: Kinds in the order in which their curves are followed.
-KINDS = (cf.Kind.BP, cf.Kind.SN, cf.Kind.PD)
+KINDS = (cf.Kind.BP, cf.Kind.SN)
+#: Symmetric orbits between these are left out (five loops of Fig. 18 that are like the first one), and all
+#: folds of asymmetric orbits but that at which the main branch turns: a curve takes 10 to 100 s.
+LOOPS, MAIN_FOLD = (0.41, 0.46), 0.55
 #: Places that are simulated, random starts of each, and periods that a motion may take to settle.
 PLACES = (
     (0.56, 0.38),
@@ -45,7 +48,12 @@ PLACES = (
 )
 STARTS, LONGEST = 6, 600
 #: Digits of the tables.
-DIGITS = 9
+DIGITS = 7
+#: A curve that ends this near to an edge of the plane ends there.
+EDGE = 1e-9
+#: Third derivatives are differences over 2e-3: where an orbit comes nearer to a touch, a coefficient made of
+#: them says nothing.
+TOUCH = 2e-3
 
 
 def sections(folder: Path) -> dict[str, cf.Diagram]:
@@ -68,7 +76,7 @@ def events(diagrams: dict[str, cf.Diagram]) -> list[cf.Bifurcation]:
         for branch in diagram.branches
         if not branch.mirrored
         for b in branch.bifurcations
-        if b.kind in KINDS and (b.kind is not cf.Kind.BP or branch.symmetric)
+        if b.kind in KINDS and is_wanted(b, branch.symmetric)
     ]
     return sorted(
         found,
@@ -78,6 +86,16 @@ def events(diagrams: dict[str, cf.Diagram]) -> list[cf.Bifurcation]:
             -b.params["Omega"],
             b.params["S"],
         ),
+    )
+
+
+def is_wanted(event: cf.Bifurcation, symmetric: bool) -> bool:
+    """Tell whether the curve of an event is drawn."""
+    omega = event.params["Omega"]
+    return (
+        not LOOPS[0] < omega < LOOPS[1]
+        if symmetric
+        else omega > MAIN_FOLD and event.kind is cf.Kind.SN
     )
 
 
@@ -125,32 +143,53 @@ def curves_of(found: list[cf.Bifurcation], folder: Path) -> tuple[list[cf.Curve]
     return curves, refused
 
 
+def ends_of(curve: cf.Curve) -> str:
+    """Return how a curve ends: at an edge of the plane, at a named point, or where it gets no farther."""
+    low, high = (np.array([RANGES[name][k] for name in NAMES]) for k in range(2))
+    found = []
+    for k, end in zip((0, -1), curve.ends, strict=True):
+        point = curve.values[k]
+        edge = np.min(np.abs(np.concatenate([point - low, point - high]))) < EDGE
+        found.append("edge" if edge else end.special.name if end.special is not None else "stops")
+    return ", ".join(found)
+
+
 def curve_table(curves: list[cf.Curve]) -> list[str]:
-    """Return the curves as a table: kind, orbits, ends, extrema of S."""
+    """Return the curves as a table: kind, orbits, both ends, range of S."""
     rows = ["| curve | orbits | from | to | S from, to | ends |", "|---|---|---|---|---|---|"]
     for curve in curves:
         values = curve.values
-        ends = ", ".join(
-            e.special.name if e.special is not None else e.reason.name for e in curve.ends
-        )
         first, last = (f"({values[k, 0]:.6f}, {values[k, 1]:.6f})" for k in (0, -1))
         low, high = values[:, 1].min(), values[:, 1].max()
         kind = "symmetric" if curve.symmetric else "asymmetric"
         rows.append(
-            f"| {curve.kind.value} | {kind} | {first} | {last} | {low:.6f}, {high:.6f} | {ends} |"
+            f"| {curve.kind.value} | {kind} | {first} | {last} | {low:.6f}, {high:.6f} | {ends_of(curve)} |"
         )
     return rows
 
 
+def least_speed(orbit: cf.Orbit) -> float:
+    """Return the least abs(v) at which v is stationary: how near the orbit comes to touching v = 0."""
+    whole = orbit.as_whole()
+    c = [o.name for o in whole.model.observables].index("v")
+    times, values = np.empty(512), np.empty(512)
+    start = whole.joints[0]
+    found = whole.model.flow.turning(
+        0, c, start[0], start[1:].copy(), whole.period, whole.vector, times, values
+    )
+    return float(np.min(np.abs(values[:found])))
+
+
 def special_table(curves: list[cf.Curve]) -> list[str]:
-    """Return the points of codimension two as a table."""
-    rows = ["| point | on | Omega | S |", "|---|---|---|---|"]
+    """Return the points of codimension two that are no artefact of a touch as a table."""
+    rows = ["| point | on | Omega | S | least speed |", "|---|---|---|---|---|"]
     for curve in curves:
         for point in curve.special:
-            if point.located and not point.name.endswith("-T"):
+            speed = least_speed(point.orbit)
+            if speed > TOUCH and not point.name.endswith("-T"):
                 kind = f"{curve.kind.value}, {'symmetric' if curve.symmetric else 'asymmetric'}"
                 at = (f"{point.params[name]:.{DIGITS}f}" for name in NAMES)
-                rows.append(f"| {point.name} | {kind} | {' | '.join(at)} |")
+                rows.append(f"| {point.name} | {kind} | {' | '.join(at)} | {speed:.1e} |")
     return rows
 
 
@@ -170,10 +209,14 @@ def attractors_at(omega: float, s: float) -> list[str]:
     return sorted(found)
 
 
-def region_table() -> list[str]:
+def region_table(folder: Path) -> list[str]:
     """Return what simulations settle on at places of the plane."""
-    rows = ["| Omega | S | simulations settle on |", "|---|---|---|"]
-    return [*rows, *(f"| {o:g} | {s:g} | {'; '.join(attractors_at(o, s))} |" for o, s in PLACES)]
+    file = folder / "regions.md"
+    if not file.is_file():
+        rows = [f"| {o:g} | {s:g} | {'; '.join(attractors_at(o, s))} |" for o, s in PLACES]
+        file.write_text("\n".join(rows), encoding="utf-8")
+    head = ["| Omega | S | simulations settle on |", "|---|---|---|"]
+    return [*head, *file.read_text(encoding="utf-8").splitlines()]
 
 
 def draw(curves: list[cf.Curve]) -> None:
@@ -205,7 +248,7 @@ def main(folder: Path) -> None:
     page = with_table(page, "curves", curve_table(curves))
     page = with_table(page, "special", special_table(curves))
     page = with_table(page, "refused", [f"* {line}" for line in refused] or ["None."])
-    page = with_table(page, "regions", region_table())
+    page = with_table(page, "regions", region_table(folder))
     PAGE.write_text(page, encoding="utf-8")
     draw(curves)
 

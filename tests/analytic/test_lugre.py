@@ -172,6 +172,15 @@ def test_the_models_own_step_finds_the_folds(model, symmetric):
     assert found[cf.Kind.BP] == pytest.approx([BREAKING], abs=1e-12)
 
 
+def test_a_step_that_leaps_over_folds_is_taken_back(orbit):
+    """Two sheets are 8e-5 apart where steps are 2e-2: between the ends of a leap no branch is found."""
+    branch = cf.continue_orbit(orbit, "S", (0.36, 0.385), max_step=0.01)
+    folds = [b.params["S"] for b in branch.bifurcations if b.kind is cf.Kind.SN]
+    assert sorted(folds) == pytest.approx(FOLDS, abs=1e-11)
+    assert len(branch.bifurcations) == 3
+    assert all(b.located for b in branch.bifurcations)
+
+
 def at(orbit, **changed):
     vector = orbit.model.vector({**orbit.params, **changed})
     return polish(replace(orbit, vector=vector), damped=False)
