@@ -418,7 +418,7 @@ def test_autonomous_cusp_turns_both_parameters() -> None:
     k = int(np.searchsorted(found.arc, point.position))
     before, after = found.values[k - 1] - found.values[k - 4], found.values[k + 3] - found.values[k]
     assert np.all(before * after < 0.0)
-    other = point_of(curve(JERK, "SN", "0a, 14seg", 0.5139), "CUSP")
+    other = point_of(curve(SWITCHED, "SN", "0a, 14seg", 0.5139), "CUSP")
     for name in ("A", "C"):  # the curve through the fold on the other side of the branch
         assert other.params[name] == pytest.approx(point.params[name], abs=1e-9)
 
@@ -450,14 +450,14 @@ def test_gradient_behind_resets_and_without_excitation() -> None:
         curve("impact-friction", "SN", "1a, 5seg, 1imp"),
         curve("impact", "SN", "0a, 2seg, 1imp"),
         curve("dead-band", "SN", "0s, 12seg"),
-        curve(JERK, "PD", "0a, 4seg", 0.7277),
+        curve(SWITCHED, "PD", "0a, 4seg", 0.7277),
     ):
         assert tangent_miss(found, len(found) // 2) < 1e-6, found
 
 
 def test_gradient_of_a_divided_exit_row() -> None:
     """Towards its end the doubling's orbit has a short piece that begins and ends on x = 0."""
-    found = curve(JERK, "PD", "0a, 8seg", 0.6542)
+    found = curve(SWITCHED, "PD", "0a, 8seg", 0.6542)
     lasts = [float(np.min(orbit.ends[:, 0] - orbit.cycle[:, 0])) for orbit in found]
     short = [k for k, d in enumerate(lasts) if 0.02 < d < 0.09]
     assert short
