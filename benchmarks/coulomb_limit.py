@@ -38,8 +38,9 @@ COMPARED = "all of it | holds 0.3 to 1 | formulas | largest multiplier | growth"
 BRISTLES = (
     (0.04, 3125.0, 2.0, 0.44, 0.38),
     (0.02, 25000.0, 2.0, 0.44, 0.4),
-    (0.01, 2e5, 2.0, 0.44, 0.4),
-    (0.005, 1.6e6, 2.0, 0.444, 0.4),
+    (0.01, 2e5, 2.0, 0.44, 0.409),
+    (0.005, 1.6e6, 2.0, 0.444, 0.424),
+    (0.01, 2e5, 0.0, 0.44, 0.421),
 )
 #: LuGre's meander is followed piece by piece, each this wide in Omega: a step may be no longer.
 PIECE = 0.002

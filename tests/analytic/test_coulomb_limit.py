@@ -111,3 +111,16 @@ def bridge_lengths(bridge: cf.Branch) -> np.ndarray:
         (hold,) = orbit.system.holds
         found.append(bridge[k].ends[hold.segment, 0] - bridge[k].cycle[hold.segment, 0])
     return np.array(found)
+
+
+def test_page_shows_what_is_computed() -> None:
+    docs = Path(__file__).parents[2] / "docs"
+    page = (docs / "coulomb-limit.md").read_text()
+    law = Law(0.2, 0.4, 0.01)
+    row = f"| 0.01 | inf | inf | {released(law, RATE):.5f} | {law.release(RATE):.5f} |"
+    assert row in page
+    for name in ("release", "stable", "lugre", "meander", "bristles"):
+        table = page.split(f"<!-- limit: {name} -->\n")[1].split("<!-- end -->")[0]
+        assert len(table.splitlines()) > 4, name
+    assert "images/coulomb_limit.png" in page
+    assert (docs / "images" / "coulomb_limit.png").exists()
