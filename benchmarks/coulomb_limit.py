@@ -38,8 +38,9 @@ COMPARED = "all of it | holds 0.3 to 1 | formulas | largest multiplier | growth"
 BRISTLES = (
     (0.04, 3125.0, 2.0, 0.44, 0.38),
     (0.02, 25000.0, 2.0, 0.44, 0.4),
-    (0.01, 2e5, 2.0, 0.44, 0.4),
-    (0.005, 1.6e6, 2.0, 0.444, 0.4),
+    (0.01, 2e5, 2.0, 0.44, 0.409),
+    (0.005, 1.6e6, 2.0, 0.444, 0.424),
+    (0.01, 2e5, 0.0, 0.44, 0.421),
 )
 #: LuGre's meander is followed piece by piece, each this wide in Omega: a step may be no longer.
 PIECE = 0.002
@@ -126,7 +127,7 @@ def stable() -> list[str]:
 
 
 #: vS and the stiffnesses of the table of LuGre's stable orbits.
-STIFF = ((0.01, (1e4, 1e5, 1e6)), (0.005, (1e6,)))
+STIFF = ((0.01, (1e4, 1e5, 4e5)), (0.005, (4e5,)))
 
 
 def lugre() -> list[str]:
@@ -144,7 +145,7 @@ def lugre() -> list[str]:
             for m in (0.0, 2.0):
                 sigma1 = m * math.sqrt(sigma0)
                 where = {**params, "vS": vS, "sigma0": sigma0, "sigma1": sigma1}
-                found = extrema(cf.find_orbit("lugre", where, longest=400))
+                found = extrema(cf.find_orbit("lugre", where, longest=60))
                 derived = amplitudes(Law(S, S0, vS, sigma0, sigma1), 0.5, 80)
                 values = (found - steep, derived - slow, found - limit, derived - limit)
                 cells = " | ".join(f"{v[1]:.2e}" for v in values)

@@ -9,13 +9,13 @@ import matplotlib as mpl
 import numpy as np
 
 import contfric as cf
-from contfric.plot.style import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILLION
+from contfric.plot.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 PATH = limit.ROOT / "docs" / "images" / "coulomb_limit.png"
-COLOURS = (ORANGE, GREEN, SKY, BLUE)
+COLOURS = (ORANGE, GREEN, SKY, BLUE, PURPLE)
 
 
 def draw() -> None:
@@ -23,12 +23,13 @@ def draw() -> None:
     figure, (left, right) = plt.subplots(
         1, 2, figsize=(11.0, 4.6), sharey=True, layout="constrained"
     )
-    for (vS, Omega), colour in zip(limit.BRIDGES, COLOURS, strict=True):
+    for (vS, Omega), colour in zip(limit.BRIDGES, COLOURS, strict=False):
         branch = limit.steep(vS, Omega)
         _line(left, limit.curve(branch), branch.stable, colour, f"$v_S$ = {vS:g}")
     for case, colour in zip(limit.BRISTLES, COLOURS, strict=True):
         found = limit.bristled(*case)
-        name = f"$v_S$ = {case[0]:g}, $\\sigma_0$ = {case[1]:g}"
+        undamped = "" if case[2] else r", $\sigma_1 = 0$"
+        name = f"$v_S$ = {case[0]:g}, $\\sigma_0$ = {case[1]:g}{undamped}"
         _line(right, found[:, :3], found[:, 3] < 1.0, colour, name)
     for ax, title in ((left, "friction that falls (stribeck)"), (right, "bristles (lugre)")):
         for branch in limit.diagram().branches:

@@ -48,7 +48,7 @@ class Law:
 
     def release(self, rate: float) -> float:
         """Delay of a release: (tau - nu) (log(D^2 / (a vS)) - log A(kappa)) + nu."""
-        early = 0.0 if math.isinf(self.sigma0) else math.log(amplification(self.kappa(rate)))
+        early = 0.0 if math.isinf(self.sigma0) else interpolated(self.kappa(rate))
         logarithm = math.log(self.drop**2 / (rate * self.vS)) - early
         return (self.tau - self.nu) * logarithm + self.nu
 
@@ -111,6 +111,17 @@ def amplification(kappa: float) -> float:
     )
     s, W = float(run.t[-1]), float(run.y[0, -1])
     return (W + s + 1.0) * math.exp(-s)
+
+
+def interpolated(kappa: float) -> float:
+    """Log A from the four values next to kappa that are tenths of a decade apart: good to 1e-5."""
+    place = 10.0 * math.log10(kappa)
+    nodes = [math.floor(place) + k for k in (-1, 0, 1, 2)]
+    total = 0.0
+    for node in nodes:
+        weight = math.prod((place - other) / (node - other) for other in nodes if other != node)
+        total += weight * math.log(amplification(10.0 ** (node / 10.0)))
+    return total
 
 
 @dataclass(frozen=True)
