@@ -70,7 +70,7 @@ def test_study_of_a_map_of_an_integrated_model(tmp_path: Path) -> None:
     study = read_study("popp-chaos")
     task = study.content.lyapunov
     assert task is not None
-    sides = {name: (low, high, 2) for name, (low, high, _) in task.grid.items()}
+    sides = {name: [low, high, 2] for name, (low, high, _) in task.grid.items()}
     content = study.content.model_copy(update={"lyapunov": task.model_copy(update={"grid": sides})})
     result = cf.run_study(dataclasses.replace(study, content=content), tmp_path / "out")
     assert result.lyapunov is not None and result.lyapunov.complete
