@@ -11,6 +11,7 @@ import re
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -180,7 +181,7 @@ def least_speed(orbit: cf.Orbit) -> float:
     return float(np.min(np.abs(values[:found])))
 
 
-def shown_points(curves: list[cf.Curve]) -> list[cf.SpecialPoint]:
+def shown_points(curves: list[cf.Curve]) -> list[Any]:
     """Return the points of codimension two that are no artefact of a touch."""
     points = [point for curve in curves for point in curve.special]
     return [p for p in points if not p.name.endswith("-T") and least_speed(p.orbit) > TOUCH]
