@@ -11,6 +11,7 @@ import re
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -180,16 +181,21 @@ def least_speed(orbit: cf.Orbit) -> float:
     return float(np.min(np.abs(values[:found])))
 
 
+def shown_points(curves: list[cf.Curve]) -> list[Any]:
+    """Return the points of codimension two that are no artefact of a touch."""
+    points = [point for curve in curves for point in curve.special]
+    return [p for p in points if not p.name.endswith("-T") and least_speed(p.orbit) > TOUCH]
+
+
 def special_table(curves: list[cf.Curve]) -> list[str]:
-    """Return the points of codimension two that are no artefact of a touch as a table."""
+    """Return the same as a table."""
     rows = ["| point | on | Omega | S | least speed |", "|---|---|---|---|---|"]
     for curve in curves:
-        for point in curve.special:
+        for point in shown_points([curve]):
+            kind = f"{curve.kind.value}, {'symmetric' if curve.symmetric else 'asymmetric'}"
+            at = (f"{point.params[name]:.{DIGITS}f}" for name in NAMES)
             speed = least_speed(point.orbit)
-            if speed > TOUCH and not point.name.endswith("-T"):
-                kind = f"{curve.kind.value}, {'symmetric' if curve.symmetric else 'asymmetric'}"
-                at = (f"{point.params[name]:.{DIGITS}f}" for name in NAMES)
-                rows.append(f"| {point.name} | {kind} | {' | '.join(at)} | {speed:.1e} |")
+            rows.append(f"| {point.name} | {kind} | {' | '.join(at)} | {speed:.1e} |")
     return rows
 
 
@@ -223,7 +229,13 @@ def draw(curves: list[cf.Curve]) -> None:
     """Write the figure."""
     from contfric.plot.plane import plot_curves
 
-    axes = plot_curves(curves)
+    axes = plot_curves(curves, special=False)
+    for point in shown_points(curves):
+        at = [point.params[name] for name in NAMES]
+        axes.plot(
+            *at, "o", markersize=4.5, markerfacecolor="white", markeredgecolor="black", zorder=5
+        )
+        axes.annotate(point.name, at, xytext=(8, -12), textcoords="offset points", fontsize=8)
     axes.set_xlim(*RANGES["Omega"])
     axes.set_ylim(*RANGES["S"])
     for name, (parameter, _, params) in SECTIONS.items():

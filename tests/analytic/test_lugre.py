@@ -276,10 +276,9 @@ def printed(page, low, high, orbits):
     [
         ("fig17", {"Omega": 0.5, "S": 0.352}, "S", (0.35, 0.377), "0a"),
         ("fig18", {"S": 0.32, "Omega": 0.4033}, "Omega", (0.403, 0.406), "0s"),
-        ("fig18", {"S": 0.32, "Omega": 0.4808}, "Omega", (0.4805, 0.4818), "0s"),
         ("fig18", {"S": 0.32, "Omega": 0.541}, "Omega", (0.54, 0.556), "0a"),
     ],
-    ids=["meander", "loop", "folds", "main"],
+    ids=["meander", "loop", "main"],
 )
 def test_tables_of_the_gallery_are_computed_anew(model, page, params, parameter, bounds, orbits):
     """A short run with the model's own step finds what is printed there, and nothing else."""

@@ -95,8 +95,8 @@ def test_a_model_declares_its_largest_step(tmp_path: Path) -> None:
     assert cf.load_model("lugre").max_step == 0.001
 
     def points(model: cf.Model, **step: float) -> int:
-        orbit = cf.find_orbit(model, {"Omega": 0.5})
-        return len(cf.continue_orbit(orbit, "Omega", (0.45, 0.55), **step))
+        orbit = cf.find_orbit(model, {"Omega": 0.72})
+        return len(cf.continue_orbit(orbit, "Omega", (0.68, 0.78), **step))
 
     assert points(careful) == points(plain, max_step=0.002) > 3 * points(plain)
     assert points(careful, max_step=0.01) == points(plain)
