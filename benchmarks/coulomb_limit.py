@@ -40,7 +40,6 @@ BRISTLES = (
     (0.02, 25000.0, 2.0, 0.44, 0.4),
     (0.01, 2e5, 2.0, 0.44, 0.409),
     (0.005, 1.6e6, 2.0, 0.444, 0.424),
-    (0.01, 2e5, 0.0, 0.44, 0.421),
 )
 #: LuGre's meander is followed piece by piece, each this wide in Omega: a step may be no longer.
 PIECE = 0.002
@@ -250,7 +249,8 @@ def row(law: Law, line: np.ndarray) -> list[str]:
         holds(limit, inner, delays=False),
         holds(law, inner),
     )
-    return [f"{distances(p[p[:, 0] > lowest], line).max():.2e}" for p in compared]
+    reached = [p[p[:, 0] > lowest] for p in compared]
+    return [f"{distances(p, line).max():.2e}" if len(p) else "-" for p in reached]
 
 
 def meander() -> list[str]:
