@@ -230,10 +230,12 @@ def growth(law: Law, found: np.ndarray) -> str:
         points[points[:, 0] > line[:, 0].min()],
     )
     nearest = [int(np.argmin(np.sum((line - point) ** 2, axis=1))) for point in points]
-    measured = np.log(multipliers[nearest])
+    grown = np.log(multipliers[nearest])
     derived = np.array([exponent(law, p, n) for p, n in zip(points, lengths, strict=True)])
     clear = derived < 0.8 * math.log(SEEN)
-    slope = np.polyfit(derived[clear], measured[clear], 1)[0] if clear.sum() > 4 else math.nan
+    if clear.sum() < 5:
+        return f"{multipliers.max():.0e} | -"
+    slope = np.polyfit(derived[clear], grown[clear], 1)[0]
     return f"{multipliers.max():.0e} | {slope:.3f}"
 
 
