@@ -40,7 +40,6 @@ BRISTLES = (
     (0.02, 25000.0, 2.0, 0.44, 0.4),
     (0.01, 2e5, 2.0, 0.44, 0.409),
     (0.005, 1.6e6, 2.0, 0.444, 0.424),
-    (0.01, 2e5, 0.0, 0.44, 0.421),
 )
 #: LuGre's meander is followed piece by piece, each this wide in Omega: a step may be no longer.
 PIECE = 0.002
@@ -231,10 +230,12 @@ def growth(law: Law, found: np.ndarray) -> str:
         points[points[:, 0] > line[:, 0].min()],
     )
     nearest = [int(np.argmin(np.sum((line - point) ** 2, axis=1))) for point in points]
-    measured = np.log(multipliers[nearest])
+    grown = np.log(multipliers[nearest])
     derived = np.array([exponent(law, p, n) for p, n in zip(points, lengths, strict=True)])
     clear = derived < 0.8 * math.log(SEEN)
-    slope = np.polyfit(derived[clear], measured[clear], 1)[0] if clear.sum() > 4 else math.nan
+    if clear.sum() < 5:
+        return f"{multipliers.max():.0e} | -"
+    slope = np.polyfit(derived[clear], grown[clear], 1)[0]
     return f"{multipliers.max():.0e} | {slope:.3f}"
 
 
@@ -250,7 +251,8 @@ def row(law: Law, line: np.ndarray) -> list[str]:
         holds(limit, inner, delays=False),
         holds(law, inner),
     )
-    return [f"{distances(p[p[:, 0] > lowest], line).max():.2e}" for p in compared]
+    reached = [p[p[:, 0] > lowest] for p in compared]
+    return [f"{distances(p, line).max():.2e}" if len(p) else "-" for p in reached]
 
 
 def meander() -> list[str]:

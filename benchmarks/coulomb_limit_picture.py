@@ -26,7 +26,7 @@ def draw() -> None:
     for (vS, Omega), colour in zip(limit.BRIDGES, COLOURS, strict=False):
         branch = limit.steep(vS, Omega)
         _line(left, limit.curve(branch), branch.stable, colour, f"$v_S$ = {vS:g}")
-    for case, colour in zip(limit.BRISTLES, COLOURS, strict=True):
+    for case, colour in zip(limit.BRISTLES, COLOURS, strict=False):
         found = limit.bristled(*case)
         undamped = "" if case[2] else r", $\sigma_1 = 0$"
         name = f"$v_S$ = {case[0]:g}, $\\sigma_0$ = {case[1]:g}{undamped}"
