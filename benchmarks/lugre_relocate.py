@@ -29,8 +29,8 @@ TOLERANCES = (1e-11, 1e-12, 1e-13)
 CUTS = ((0.7, 0.001), (1.9, 0.0007))
 #: Points of the diagram between the start of a short branch and its event.
 BEHIND = 3
-#: Points of each side of a short branch: the first steps are short.
-POINTS = 14
+#: Points of each side of a short branch (the first steps are short), and of a second attempt.
+POINTS = (14, 60)
 #: An event that was asked for lies within this of where it is known (fold and doubling may be 4e-7 apart).
 NEAR = 1e-6
 
@@ -87,11 +87,14 @@ def located(place: Place, model: cf.Model, phase: float, step: float, diagram: c
     start = moved_cut(place.start, model, phase)
     if not start.converged:
         return float("nan")
-    branch = cf.continue_orbit(start, name, diagram.range, max_step=step, max_points=POINTS)
     known = place.event.params[name]
-    found = [b.params[name] for b in branch.bifurcations if b.kind is place.event.kind]
-    nearest = min(found, key=lambda value: abs(value - known), default=float("nan"))
-    return nearest if abs(nearest - known) < NEAR else float("nan")
+    for points in POINTS:
+        branch = cf.continue_orbit(start, name, diagram.range, max_step=step, max_points=points)
+        found = [b.params[name] for b in branch.bifurcations if b.kind is place.event.kind]
+        nearest = min(found, key=lambda value: abs(value - known), default=float("nan"))
+        if abs(nearest - known) < NEAR:
+            return nearest
+    return float("nan")
 
 
 def touch(orbit: cf.Orbit) -> float:
