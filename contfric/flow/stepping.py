@@ -28,9 +28,10 @@ from contfric.flow.variations import slope
 #: patiently that is borne, steps since the method changed.
 NEXT, BEFORE, FALLS, KIND, TRIED, FRESH, REMEMBERED, LIMITED, PATIENCE, SINCE = range(10)
 
-#: Most steps tried in one segment. A segment takes 1 to 1e4 of them; one that takes more is stiffer than
-#: its method can bear or ends in a singularity, and the caller is told.
-MOST_STEPS = 1_000_000
+#: Most steps tried in one segment. A segment takes 1 to 1e4 of them; one that takes many more is stiffer than
+#: its method can bear or ends in a singularity, and the caller is told. Trial motions of Newton's method
+#: may be such ones: it gives them up after seconds.
+MOST_STEPS = 200_000
 #: Share of the optimal step that is taken, and the limits of its change (Hairer's values).
 SAFETY, SHRINK, GROW = 0.9, 1.0 / 3.0, 6.0
 #: Share of the integral part in the control (Hairer's value for smooth changes of the step).
