@@ -187,7 +187,8 @@ def locate(  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    ends : (parameter, slope, parameter, slope, arclength between) of the first and the second point
+    ends : (parameter, slope, parameter, slope, arclength between) of the first and the second point, and
+        whether the fields have kinks
     values : the watched value at both
     za, zb, ta, tb : joints and tangents of both, shape (N, m)
 
@@ -203,7 +204,7 @@ def locate(  # type: ignore[no-untyped-def]
     which = np.empty(1, dtype=np.int64)
     which[0] = active
     count, m = za.shape
-    wa, sa, wb, sb, length = ends
+    wa, sa, wb, sb, length, kinked = ends
     room = step_room(count, m, p.shape[0])
     z, t = np.empty((count, m)), np.empty((count, m))
     best_z, best_t = np.empty((count, m)), np.empty((count, m))
@@ -227,9 +228,11 @@ def locate(  # type: ignore[no-untyped-def]
     # margins and distances are positive before the event, the others have the sign that they have
     two_sided = kind == BY_PARAMETER or (kind == BY_TEST and index >= margins)
     noise = 0.1 * _NOISE if two_sided else _NOISE  # slopes and products of multipliers have less
-    # slopes and multipliers are those of the last Jacobian: it must be that of the orbit, not one from which
-    # Newton's method is known to end there
-    accuracy = ALONG if kind == BY_TEST and index >= margins else AT_EVENT
+    accuracy = AT_EVENT
+    if kinked > 0.0 and kind == BY_TEST and index >= margins:
+        # slopes and multipliers are those of the last Jacobian. Beside a touch of a kink it changes with the
+        # root of a distance: it must be that of the orbit, not one from which Newton is known to end there
+        accuracy = ALONG
     sign = -1.0 if two_sided and f_low < 0.0 else 1.0
     f_low, f_high = limited(sign * f_low), limited(sign * f_high)
     low, high, x = 0.0, 1.0, 0.5

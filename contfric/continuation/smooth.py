@@ -31,11 +31,6 @@ _MARGINAL = 1e-5
 _NEAR_ONE = 0.1
 #: What it may change by over a step, relative to the range, where it is constant: the root of rounding.
 _CONSTANT = 1e-7
-#: What is left of a product of 1 - mu or 1 + mu where its sign changes, against its values at the ends of the
-#: step: far above what a bracket as narrow as rounding leaves of a continuous one.
-_JUMP = 1e-3
-#: Products above this belong to a pole: multipliers are infinite where an exit becomes tangential.
-_POLE = 1e3
 #: A step shorter than this (arclength) is not taken back: there is nothing to be found in between.
 _SHORTEST_LEAP = 1e-7
 #: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
@@ -76,11 +71,6 @@ def smooth_events(
                 half = orbit.system.half or column == CHI_ONE
                 kind = Kind.NS if column == CHI_PAIR else Kind.BP if half else Kind.PD
                 found.append(_leapt(orbit, kind, before, after, beyond, settings))
-            continue
-        if column in (CHI_ONE, CHI_MINUS) and _leaps(
-            before, after, point.tests[base + column], a, b
-        ):
-            found.append(_leapt(orbit, Kind.BP, before, after, beyond, settings))
             continue
         if column == FOLD:
             folded = True
@@ -167,17 +157,6 @@ def _not_located(
     here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     bifurcation = bifurcation_at(kind, here, before, beyond, before, settings)
     return replace(bifurcation, located=False), before
-
-
-def _leaps(before: Point, after: Point, value: float, a: float, b: float) -> bool:
-    """Tell whether multipliers pass +-1 over a step by a jump, not through it.
-
-    Along a branch they are continuous, but where they are infinite: the step has gone over to another sheet,
-    behind folds in between.
-    """
-    largest = max(abs(a), abs(b))
-    jumps = largest < _POLE and abs(value) > _JUMP * largest
-    return jumps and after.arc - before.arc > _SHORTEST_LEAP
 
 
 def _leapt(

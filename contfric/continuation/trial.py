@@ -29,7 +29,8 @@ def locate_change(
     tests, labels, mu = before.tests.copy(), before.labels.copy(), before.mu.copy()
     slope = np.empty(1)
     length = after.arc - before.arc
-    ends = np.array([before.value, before.slope, after.value, after.slope, length])
+    kinked = float(bool(orbit.model.kinks))
+    ends = np.array([before.value, before.slope, after.value, after.slope, length, kinked])
     if kind == BY_TEST:
         values = np.array([before.tests[index], after.tests[index]])
     else:
