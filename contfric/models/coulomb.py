@@ -106,6 +106,7 @@ coulomb = Model(
         surfaces={"F+": "F-", "F-": "F+", "v": "v"},
     ),
     stop_surface="v",
+    rounding=1e-15,  # of its closed form: a few units in the last place
     flow_factory=_flow,
     spread=_spread,
     references=(

@@ -93,6 +93,9 @@ class Model:
     max_step : float or None
         Largest step of a continuation, as a share of the range, where the user gives none; None for that
         of the engine. For a model whose branches fold in less.
+    rounding : float
+        Relative rounding of its motion, the floor of what Newton's method can reach: that of integrated
+        flows with large accelerations by default; a closed form has less.
     definition : str
         Text from which the model can be built anywhere (:mod:`contfric.models.description`); empty if
         it is known by its name only.
@@ -118,6 +121,7 @@ class Model:
     kinks: tuple[str, ...] = ()
     filippov: bool = False
     max_step: float | None = None
+    rounding: float = 1e-13
     definition: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:

@@ -80,6 +80,7 @@ LayoutType = types.NamedTuple(
         matrix,
         f8,
         i8,
+        f8,
     ],
     Layout,
 )

@@ -44,9 +44,8 @@ FLOOR = 5e-14
 #: Relative residual that is rounding: where the system is ill-conditioned (beside a fold) corrections
 #: stop falling earlier, and no iterate can be better.
 _ROUNDING = 1e-14
-#: Relative residual below which one that no longer falls is the rounding of the flow: ten times what
-#: integrated flows of the bundled models show (1e-13).
-_NOISE = 1e-12
+#: A residual that no longer falls is rounding below this many times that of the flow.
+_NOISE = 10.0
 #: A residual of rounding varies by more than this from step to step; one on its way down falls faster.
 _STILL_FALLS = 0.5
 #: Error that the last correction may leave: below one unit in the last place.
@@ -135,16 +134,16 @@ def has_settled(size, before, worst, floor):  # type: ignore[no-untyped-def]
 
 
 @helper
-def is_noise(size, worst):  # type: ignore[no-untyped-def]
+def is_noise(size, worst, rounding):  # type: ignore[no-untyped-def]
     """Tell whether a residual may be rounding, and the correction what it asks for."""
-    return worst < _NOISE and size < 1e-6
+    return worst < _NOISE * rounding and size < 1e-6
 
 
 @helper
-def at_floor(size, before, worst, worst_before):  # type: ignore[no-untyped-def]
+def at_floor(size, before, worst, worst_before, rounding):  # type: ignore[no-untyped-def]
     """Tell whether neither corrections nor residual fall any more: what is left is rounding."""
     stands = size >= 0.5 * before and worst >= _STILL_FALLS * worst_before
-    return stands and is_noise(size, worst)
+    return stands and is_noise(size, worst, rounding)
 
 
 @helper
@@ -185,11 +184,16 @@ def correct(  # type: ignore[no-untyped-def]
         if step == 0:
             first = size
         if has_settled(size, before, worst, floor) or at_floor(
-            size, before, worst, residual_before
+            size, before, worst, residual_before, layout.rounding
         ):
             return CONVERGED, step + 1, first, worst
         residual_before = worst
-        if not damped and step > 1 and size > 2.0 * before and not is_noise(size, worst):
+        if (
+            not damped
+            and step > 1
+            and size > 2.0 * before
+            and not is_noise(size, worst, layout.rounding)
+        ):
             return NOT_CONVERGED, step + 1, first, worst
         before = (
             size if share == 1.0 else np.inf

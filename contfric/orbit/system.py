@@ -81,6 +81,7 @@ class Layout(NamedTuple):
     closure : state matrix of the closure, shape (n, n)
     turn : duration of one turn in periods of the excitation; 0 of an autonomous model
     rank : number of independent directions that survive one turn
+    rounding : relative rounding of the flow
     """
 
     modes: IntArray
@@ -97,6 +98,7 @@ class Layout(NamedTuple):
     closure: FloatArray
     turn: float
     rank: int
+    rounding: float
 
 
 class Margin(str, Enum):
@@ -200,6 +202,7 @@ def build_system(
         turn=_turn(model, periods, half),
         # a shift in time is no disturbance of an autonomous orbit
         rank=min(model.mode_by_name[mode].rank for mode, _ in word) - int(model.autonomous),
+        rounding=model.rounding,
     )
     return System(model, word, periods, half, layout, tests, domains, holds)
 
