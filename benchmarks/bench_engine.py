@@ -55,7 +55,7 @@ def test_branch(benchmark, name: str) -> None:
 
 
 def test_diagram(benchmark) -> None:
-    assert len(benchmark(diagram_of_fig05()).branches) == 6
+    assert len(benchmark(diagram_of_fig05()).branches) == 8
 
 
 def test_simulation(benchmark) -> None:
