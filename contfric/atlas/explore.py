@@ -16,6 +16,7 @@ from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import continue_orbit
 from contfric.errors import ConvergenceError, whole_number
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.repetition import shortest
 
 
 def explore(
@@ -26,7 +27,7 @@ def explore(
     max_step: float | None = None,
     stability: bool = True,
     bridges: bool = True,
-    max_periods: int = 4,
+    max_periods: int = 1,
     max_branches: int = 200,
     max_points: int = MOST_POINTS,
     seeds: Seeds | None = None,
@@ -42,7 +43,9 @@ def explore(
         Whether the jumps of the flow (SS, AS, GS) are bridged by orbits with holds; without them
         branches end there.
     max_periods : int
-        Longest orbit, in periods of the excitation, that a period doubling is followed to.
+        Longest orbits, in periods of the excitation: the diagram is the connected component, through
+        events, of all orbits whose shortest period is at most this. A start of longer period raises
+        it, and ``diagram.notes`` says so.
     max_branches : int
         Most branches to compute; reached, it is said in the diagram's notes.
 
@@ -73,7 +76,10 @@ def explore(
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
     whole_number("max_periods", max_periods, least=1)
     whole_number("max_branches", max_branches, least=1)
-    state = Exploration(settings, max_periods, max_branches, bridges, progress)
+    orbit = shortest(orbit)
+    state = Exploration(settings, max(max_periods, orbit.periods), max_branches, bridges, progress)
+    if orbit.periods > max_periods:
+        state.notes.append(f"max_periods raised to {orbit.periods}: the start has that many periods")
     try:
         state.add(
             continue_orbit(

@@ -19,7 +19,7 @@ from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.matching import SAME_MOTION, part_distance
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
-from contfric.continuation.candidates import Candidate, candidates, directions, wider_candidates
+from contfric.continuation.candidates import Candidate, candidates, directions
 from contfric.continuation.events import (
     ACCURACY,
     TERMINAL,
@@ -70,10 +70,13 @@ def follow(state: Exploration, event: Event) -> None:
 
 def _follow_sliding(state: Exploration, event: Event) -> None:
     accepted = jumps = False
-    model = event.bifurcation.orbit.model
-    edits = bool(model.resets) or any(mode.sliding for mode in model.modes)  # else nothing rests
-    for proposed in (candidates, wider_candidates) if edits else ():
-        for candidate in proposed(event.bifurcation):
+    orbit = event.bifurcation.orbit
+    active = orbit.model.index_of(state.settings.parameter)
+    edits = bool(orbit.model.resets) or any(mode.sliding for mode in orbit.model.modes)  # else nothing rests
+    for wide in (False, True) if edits else ():
+        for candidate in candidates(
+            event.bifurcation, active, most_periods=state.max_periods, held=state.bridges, wide=wide
+        ):
             jumps = jumps or candidate.has_hold
             accepted = _judge(state, event, candidate) or accepted
         if accepted:
@@ -126,13 +129,11 @@ def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:
         state.judge(event, candidate.reason, Verdict.REFUSED, why=candidate.refusal)
         event.rests = event.rests or candidate.rest
         return candidate.rest
-    if candidate.has_hold and not state.bridges:
-        state.judge(event, candidate.reason, Verdict.REFUSED, why="bridges are switched off")
-        return False
     known = state.ends_here(candidate.orbit, event)
     if known is not None:
+        arrived = event.branches[:1] == [known]
         state.judge(event, candidate.reason, Verdict.KNOWN, known)
-        return True
+        return not arrived
     return _try(state, event, candidate)
 
 

@@ -95,7 +95,7 @@ class Outcome:
 def places_of(bifurcation: Bifurcation) -> list[Test]:
     """Return the places of the whole orbit at which a sliding event happens."""
     orbit = bifurcation.orbit
-    places = [_normal(test, orbit) for test in bifurcation.tests]
+    places = [normal_place(test, orbit) for test in bifurcation.tests]
     places = list(dict.fromkeys(places))
     if orbit.system.half and orbit.model.symmetry is not None:
         n, image = len(orbit.system.word), orbit.model.symmetry.surfaces
@@ -120,7 +120,7 @@ def end_message(bifurcation: Bifurcation) -> str:
     return ""
 
 
-def _normal(test: Test, orbit: Orbit) -> Test:
+def normal_place(test: Test, orbit: Orbit) -> Test:
     """Return a test of what belongs to a hold as one of the hold itself."""
     hold = hold_of_test(test, orbit)
     if hold is None or hold.segment == test.segment:

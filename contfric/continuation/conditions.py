@@ -1,0 +1,342 @@
+"""Local conditions: which sequences of forms can exist beside an event, to first order.
+
+A form (:mod:`contfric.continuation.incident`) relates the joint u that a unit begins with to the joint u'
+that it ends with, and to the distance lambda in the parameter:
+
+    P u + Q u' + c lambda + sum_j d_j q_j = 0,        q_j >= 0,
+    G u + H u' + g lambda + E q >= 0.
+
+The rows are those of the boundary-value problem with the inner joints taken out: the left null vectors of the
+columns of the inner joints. A null direction v of these columns is a freedom that moves nothing to first
+order: the length of a hold at a touch of rest, the end of a slide that stops tangentially, a slide of no
+length. What it does is of order p: ``F(z + eps v) = eps^p d``, and ``q = eps^p`` is its unknown. The
+inequalities are the margins that vanish at the event.
+
+For a sequence of n units these are n (m + k) + n units' joints and one lambda: a ray on each side. A sequence
+exists on a side if its ray obeys all inequalities. For places with two outcomes each this is the linear
+complementarity problem of docs/bridges.md, written so that an outcome of any kind fits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contfric.continuation.incident import Form, Unit, vanishing
+from contfric.continuation.standstill import touch_of
+from contfric.errors import NotationError
+from contfric.models.definition import FloatArray
+from contfric.orbit.linear import jacobian_blocks
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Margin, Test
+
+#: Singular values below this, relative to the largest, belong to null directions: events are located to
+#: 1e-13, and directions at a tangency to the root of that.
+_NULL = 1e-6
+#: Length of the finite step along a null direction, and what its order is told from: the next order is this
+#: much smaller, rounding is 1e-16 over its cube.
+_STEP = 1e-3
+#: Orders that occur: a hold at a touch of rest (2), a slide of no length (3).
+_ORDERS = (2, 3)
+#: How far the logarithm of the ratio may be from an order.
+_CLEAR = 0.2
+#: Inequalities violated by less than this share of the largest number in them are undecided: the
+#: sequence is tried.
+_UNDECIDED = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Relation:
+    """The linear relation of one form.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (m + k, 2 m + 1 + k)
+        On (u, u', lambda, q).
+    margins : ndarray, shape (g, 2 m + 1 + k)
+        What must not be negative, on the same.
+    signed : ndarray, shape (k,)
+        Whether each q has a sign.
+    """
+
+    rows: FloatArray
+    margins: FloatArray
+    signed: FloatArray
+
+
+def relation_of(unit: Unit, form: Form, active: int, least: float) -> Relation | None:
+    """Return the relation of a form; None where its orders are not clear.
+
+    Parameters
+    ----------
+    active : index of the parameter that varies
+    least : margins below it vanish
+    """
+    orbit = unit.orbit((form,))[0]
+    system, m = orbit.system, orbit.joints.shape[1]
+    a, b, c, close = jacobian_blocks(system, orbit.joints, orbit.vector)
+    inner, outer = _columns(a, b, c[:, :, active], close)
+    left, size, right = np.linalg.svd(inner)
+    rank = int(np.sum(size > _NULL * (size[0] if size.size else 1.0)))
+    free = right[rank:]
+    rest = left[:, rank:].T
+    moves = -(right[:rank].T / size[:rank]) @ left[:, :rank].T @ outer  # inner joints by (u, u', lambda)
+    margins, signed = [], np.zeros(len(free))
+    for gradient, slope in _gradients(orbit, active, least):
+        on_inner = gradient[1:-1].ravel()
+        along = free @ on_inner
+        bent = np.flatnonzero(np.abs(along) > _NULL * (1.0 + np.max(np.abs(on_inner), initial=0.0)))
+        if bent.size:  # it is of the order of a freedom, which it gives its sign
+            for k in bent:
+                free[k] *= np.copysign(1.0, along[k]) if not signed[k] else 1.0
+                signed[k] = 1.0
+            continue
+        row = on_inner @ moves
+        row[:m] += gradient[0]
+        row[m : 2 * m] += gradient[-1] @ close
+        row[2 * m] += slope + gradient[-1] @ _closing(orbit, active)
+        margins.append(np.concatenate([row, np.zeros(len(free))]))
+    effects = []
+    for k, direction in enumerate(free):
+        effect = _effect(orbit, direction.reshape(-1, m), rest)
+        if effect is None:
+            return None
+        effects.append(effect[0])
+        signed[k] = max(signed[k], float(effect[1] % 2 == 0))
+    rows = np.hstack([rest @ outer, *(effect[:, None] for effect in effects)])
+    found = np.array(margins).reshape(len(margins), 2 * m + 1 + len(free))
+    return Relation(rows, found, signed)
+
+
+def _columns(
+    a: FloatArray, b: FloatArray, c: FloatArray, close: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the columns on the inner joints, and those on (u, u', lambda)."""
+    count, m = len(a), a.shape[1]
+    inner, outer = np.zeros((count * m, (count - 1) * m)), np.zeros((count * m, 2 * m + 1))
+    for i in range(count):
+        rows = slice(i * m, (i + 1) * m)
+        if i > 0:
+            inner[rows, (i - 1) * m : i * m] = a[i]
+        if i + 1 < count:
+            inner[rows, i * m : (i + 1) * m] = b[i]
+        outer[rows, 2 * m] = c[i]
+    outer[:m, :m] = a[0]
+    outer[-m:, m : 2 * m] = b[-1] @ close
+    return inner, outer
+
+
+def _closing(orbit: Orbit, active: int) -> FloatArray:
+    """Return how the end of a turn moves with the parameter, shape (m,): the period does."""
+    model, out = orbit.model, np.zeros(orbit.joints.shape[1])
+    if not model.autonomous:
+        grad = np.empty(1)
+        model.flow.period(orbit.vector, np.array([active], dtype=np.int64), grad)
+        out[0] = orbit.system.layout.turn * grad[0]
+    return out
+
+
+def _effect(orbit: Orbit, direction: FloatArray, rest: FloatArray) -> tuple[FloatArray, int] | None:
+    """Return what a null direction does to the remaining equations, and its order; None if that is not clear.
+
+    Times move by the step; a direction is scaled so that its largest component is 1.
+    """
+    direction = direction / np.max(np.abs(direction))
+    sizes = []
+    found = []
+    for step in (_STEP, 0.5 * _STEP):
+        moved = orbit.joints.copy()
+        moved[1:] += step * direction
+        found.append(rest @ (_residual(orbit, moved) - _residual(orbit, orbit.joints)))
+        sizes.append(float(np.linalg.norm(found[-1])))
+    if min(sizes) <= 0.0:
+        return None
+    order = np.log2(sizes[0] / sizes[1])
+    nearest = min(_ORDERS, key=lambda k: abs(k - order))
+    if abs(nearest - order) > _CLEAR:
+        return None
+    return found[0] / sizes[0], nearest
+
+
+def _residual(orbit: Orbit, joints: FloatArray) -> FloatArray:
+    """Return the residuals of all equations, shape (N m,)."""
+    from contfric.orbit.newton import linearise
+
+    count, m = joints.shape
+    a, b, c = np.empty((count, m, m)), np.empty((count, m, m)), np.empty((count, m, len(orbit.vector)))
+    r, close = np.empty((count, m, 1)), np.empty((m, m))
+    system = orbit.system
+    linearise(system.functions(), system.layout, joints, orbit.vector, a, b, c, r, close)
+    return -r.ravel()
+
+
+# ---------------------------------------------------------------------- the margins that vanish
+
+
+def _gradients(orbit: Orbit, active: int, least: float) -> list[tuple[FloatArray, float]]:
+    """Return the gradients of the vanishing margins on the joints, shape (N + 1, m), and on the parameter."""
+    whole = orbit.as_whole()
+    found = []
+    for place, _ in vanishing(whole, least):
+        if place.segment < orbit.system.segments:
+            gradient = _gradient(whole, place, orbit.system.segments, active)
+            if gradient is not None:
+                found.append(gradient)
+    return found
+
+
+def _gradient(
+    orbit: Orbit, place: Test, count: int, active: int
+) -> tuple[FloatArray, float] | None:
+    """Return the gradient of one margin, or of what vanishes with it; None if there is none to first order."""
+    i, m = place.segment, orbit.joints.shape[1]
+    gradient, slope = np.zeros((count + 1, m)), 0.0
+    held = next((hold for hold in orbit.system.holds if hold.segment == i), None)
+    short = held is not None and orbit.ends[i, 0] - orbit.cycle[i, 0] < _STEP
+    if place.margin is Margin.LASTING or short:
+        gradient[i + 1, 0], gradient[i, 0] = 1.0, -1.0
+        return gradient, slope
+    sign = _sign(orbit, place)
+    if place.margin is Margin.JOINT:
+        gradient[i + 1], slope = _surface_gradient(orbit, place.surface, orbit.ends[i], active)
+    elif place.margin is Margin.EXIT:
+        mode = held.departs if held is not None else orbit.word[i][0]
+        gradient[i + 1], slope = _rate_gradient(orbit, mode, place.surface, orbit.ends[i], active)
+    elif place.margin is Margin.INTERIOR:
+        try:
+            touch = touch_of(orbit, i, place.surface)
+        except NotationError:
+            return None
+        there, slope = _surface_gradient(orbit, place.surface, touch, active)
+        gradient[i], moves = _carried(orbit, i, touch, there, active)
+        slope += moves
+    else:
+        return None
+    return sign * gradient, sign * slope
+
+
+def _sign(orbit: Orbit, place: Test) -> float:
+    """Return the sign with which a margin counts what it watches."""
+    layout, i = orbit.system.layout, place.segment
+    if place.margin is Margin.EXIT:
+        return float(layout.exit_signs[i])
+    k = [s.name for s in orbit.model.surfaces].index(place.surface)
+    rows = layout.joint if place.margin is Margin.JOINT else layout.interior
+    return float(next((row[2] for row in rows if row[0] == i and row[1] == k), 0.0))
+
+
+def _which(active: int) -> np.ndarray:
+    return np.array([active], dtype=np.int64)
+
+
+def _surface_gradient(
+    orbit: Orbit, surface: str, joint: FloatArray, active: int
+) -> tuple[FloatArray, float]:
+    """Return the gradient of an observable less the level of a surface on (t, y), and on the parameter."""
+    model, m = orbit.model, len(joint)
+    k = [s.name for s in model.surfaces].index(surface)
+    c = [o.name for o in model.observables].index(model.surfaces[k].observable)
+    grad, level = np.empty(m + 1), np.empty(1)
+    time, y = float(joint[0]), np.ascontiguousarray(joint[1:])
+    model.flow.observe(c, time, y, orbit.vector, _which(active), grad)
+    model.flow.level(k, orbit.vector, _which(active), level)
+    return grad[:m], float(grad[m] - level[0])
+
+
+def _rate_gradient(
+    orbit: Orbit, mode: str, surface: str, joint: FloatArray, active: int
+) -> tuple[FloatArray, float]:
+    """Return the gradient of the rate of a surface's observable along a mode."""
+    model, m = orbit.model, len(joint)
+    number = [mo.name for mo in model.modes].index(mode)
+    observable = model.surface_by_name[surface].observable
+    c = [o.name for o in model.observables].index(observable)
+    grad = np.empty(m + 1)
+    time, y = float(joint[0]), np.ascontiguousarray(joint[1:])
+    model.flow.rate(number, c, time, y, orbit.vector, _which(active), grad)
+    return grad[:m], float(grad[m])
+
+
+def _carried(
+    orbit: Orbit, i: int, touch: FloatArray, there: FloatArray, active: int
+) -> tuple[FloatArray, float]:
+    """Return a gradient at a touch inside of a segment as one on the start of the segment.
+
+    The time of the touch is stationary: it does not move the value.
+    """
+    model, m = orbit.model, len(touch)
+    start, n = orbit.begins[i], len(touch) - 1
+    jac, out = np.empty((n, 3 + n)), np.empty(n)
+    number = [mo.name for mo in model.modes].index(orbit.word[i][0])
+    time, y = float(start[0]), np.ascontiguousarray(start[1:])
+    model.flow.flow(number, time, y, float(touch[0]) - time, orbit.vector, _which(active), out, jac)
+    gradient = np.empty(m)
+    gradient[0] = there[1:] @ (jac[:, 0] - jac[:, 1 + n])
+    gradient[1:] = there[1:] @ jac[:, 1 : 1 + n]
+    return gradient, float(there[1:] @ jac[:, 2 + n])
+
+
+# --------------------------------------------------------------------------------- sequences
+
+
+def possible(relations: list[Relation], sequences: list[tuple[int, ...]]) -> list[tuple[bool, bool]]:
+    """Return, for each sequence of one length, whether it can exist below and above the event.
+
+    Parameters
+    ----------
+    relations : of the forms
+    sequences : tuples of indices of forms, all of one length
+    """
+    if not sequences:
+        return []
+    most = max(len(r.signed) for r in relations)
+    rows, margins, signed = (np.array(part) for part in zip(*(_padded(r, most) for r in relations), strict=True))
+    chosen = np.array(sequences)
+    count, length = chosen.shape
+    m = (rows.shape[2] - 1 - most) // 2
+    width = m + most
+    full = np.zeros((count, length * width, length * width))
+    right = np.zeros((count, length * width))
+    for j in range(length):
+        block = rows[chosen[:, j]]
+        at = slice(j * width, (j + 1) * width)
+        ahead = ((j + 1) % length) * width
+        full[:, at, j * width : j * width + m] += block[:, :, :m]
+        full[:, at, ahead : ahead + m] += block[:, :, m : 2 * m]
+        full[:, at, j * width + m : (j + 1) * width] += block[:, :, 2 * m + 1 :]
+        right[:, at] = -block[:, :, 2 * m]
+    try:
+        solved = np.linalg.solve(full, right[:, :, None])[:, :, 0].reshape(count, length, width)
+    except np.linalg.LinAlgError:
+        return [(True, True)] * count
+    joints = solved[:, :, :m]
+    ahead_joints = np.roll(joints, -1, axis=1)
+    lam = np.ones((count, length, 1))
+    local = np.concatenate([joints, ahead_joints, lam, solved[:, :, m:]], axis=2)
+    picked = margins[chosen]
+    values = np.einsum("sjgk,sjk->sjg", picked, local)
+    scale = np.einsum("sjgk,sjk->sjg", np.abs(picked), np.abs(local)) * _UNDECIDED
+    q = solved[:, :, m:] * signed[chosen]
+    slack = _UNDECIDED * np.max(np.abs(solved), axis=(1, 2))[:, None, None]
+    fine = np.all(np.isfinite(solved), axis=(1, 2))
+    above = np.all(values >= -scale, axis=(1, 2)) & np.all(q >= -slack, axis=(1, 2))
+    below = np.all(values <= scale, axis=(1, 2)) & np.all(q <= slack, axis=(1, 2))
+    return [(bool(b or not f), bool(a or not f)) for a, b, f in zip(above, below, fine, strict=True)]
+
+
+def _padded(relation: Relation, most: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return a relation with as many freedoms as others have; those that come in are zero."""
+    m2 = relation.rows.shape[1] - len(relation.signed)
+    more = most - len(relation.signed)
+    rows = np.zeros((relation.rows.shape[0] + more, m2 + most))
+    rows[: len(relation.rows), : relation.rows.shape[1]] = relation.rows
+    for k in range(more):
+        rows[len(relation.rows) + k, relation.rows.shape[1] + k] = 1.0
+    margins = np.zeros((_MOST_MARGINS, m2 + most))
+    margins[: len(relation.margins), : relation.rows.shape[1]] = relation.margins
+    return rows, margins, np.concatenate([relation.signed, np.zeros(more)])
+
+
+#: Margins of a unit that vanish at once; others are not looked at here.
+_MOST_MARGINS = 12

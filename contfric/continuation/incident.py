@@ -1,0 +1,367 @@
+"""All words that the motion at an event solves: its regular outcomes, and those that are held.
+
+At an event one motion solves the equations of several words. The words differ at **places** of the motion
+only: a stop on the limit, a touch inside of a stick, a stop without acceleration, a touch of rest inside of
+a slide. At each place there are few local outcomes (:mod:`contfric.continuation.outcomes`). Which words
+there are is a property of the motion, not of the branch that came to it. So they are collected as a closure:
+
+1. The motion is cut down to its shortest period, and to half of it if it is its own symmetry image. That is
+   its **unit**. It is cut at the start of a slide of some length, which every word has.
+2. The word of the branch that arrives, cut into units, gives the first **forms** of the unit.
+3. Every margin that vanishes on an orbit of one form gives an outcome; the form with that outcome is a form,
+   too. This is repeated until nothing new appears.
+
+An orbit at the event is a cyclic sequence of forms (:mod:`contfric.continuation.sequences`).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind, kind_of_margin
+from contfric.continuation.outcomes import Outcome, RestsForEver, normal_place, outcome_at, places_of
+from contfric.errors import NotationError
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.clock import clocked
+from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.system import Test, Word, build_system, mirror_mode
+from contfric.orbit.words import mirror_pairs
+from contfric.signature.edits import apply_edit, edited_pieces
+
+#: Parts of a cycle that agree to this (nondimensional) are the same motion: the root of rounding.
+SAME_MOTION = 1e-5
+#: Margins below this vanish at an event: it is located to about 1e-13.
+_VANISHES = 1e-9
+#: The same at an event that is located to half of the digits only.
+_NEARLY = 1e-6
+#: Most forms of a unit: six places with two outcomes each.
+_MOST_FORMS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """One word of the unit of a motion.
+
+    Attributes
+    ----------
+    word : mode and exit of each segment
+    joints : start joints (t, y) of the segments, shape (k, 1 + n)
+    away : how fast the start joints move in time where the new orbit is singular at the event, shape (k,)
+    reason : what happens at its places, in words
+    """
+
+    word: Word
+    joints: FloatArray
+    away: FloatArray
+    reason: str = ""
+
+    @property
+    def has_hold(self) -> bool:
+        """Whether something is held."""
+        return any(exit_.startswith("hold@") for _, exit_ in self.word)
+
+
+@dataclass(frozen=True, eq=False)
+class Unit:
+    """The shortest part of a motion that it consists of.
+
+    Attributes
+    ----------
+    model : the model that moves
+    vector : parameters
+    periods : shortest period of the motion, in periods of the excitation
+    half : whether the unit is half of it, the other half being its symmetry image
+    duration : of the unit
+    mode : mode of the slide that it begins with
+    cut : joint (t, y) at which it begins, shape (1 + n,)
+    """
+
+    model: Model
+    vector: FloatArray
+    periods: int
+    half: bool
+    duration: float
+    mode: str
+    cut: FloatArray
+
+    def image(self, joints: FloatArray, times: int) -> FloatArray:
+        """Return joints of the unit as those of the unit that is some number of times later."""
+        moved = joints.copy()
+        moved[:, 0] += times * self.duration
+        if self.half and times % 2:
+            assert self.model.symmetry is not None
+            moved[:, 1:] = moved[:, 1:] @ self.model.symmetry.array().T
+        return moved
+
+    def image_word(self, word: Word, times: int) -> Word:
+        """Return a word of the unit as one of the unit that is some number of times later."""
+        return mirror_pairs(self.model, word) if self.half and times % 2 else word
+
+    def orbit(self, forms: tuple[Form, ...]) -> tuple[Orbit, FloatArray]:
+        """Return the motion as an orbit of forms one after the other, and how its joints move away.
+
+        An odd number of half units is the half of a symmetric orbit.
+
+        Raises
+        ------
+        NotationError
+            If there is no such word.
+        """
+        count = len(forms)
+        word = tuple(pair for j, f in enumerate(forms) for pair in self.image_word(f.word, j))
+        joints = np.concatenate([self.image(f.joints, j) for j, f in enumerate(forms)])
+        away = np.concatenate([f.away for f in forms])
+        half = self.half and count % 2 == 1
+        periods = self.periods * count // (2 if self.half and not half else 1)
+        joints = clocked(self.model, joints, float(joints[0, 0]) + count * self.duration)
+        try:
+            system = build_system(self.model, word, periods, half)
+        except ValueError as error:
+            raise NotationError(str(error)) from None
+        return Orbit(system, joints, self.vector.copy(), 0.0, Status.CONVERGED), away
+
+    def whole(self, form: Form) -> Orbit:
+        """Return the motion as an orbit of one form alone, on its whole cycle."""
+        return self.orbit((form,))[0].as_whole()
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """An outcome that is none, and why; whether because nothing moves any more."""
+
+    reason: str
+    why: str
+    rest: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Incident:
+    """The unit of the motion at an event, its forms, and the outcomes that are none; margins below
+    ``least`` count as zero.
+    """
+
+    unit: Unit
+    forms: tuple[Form, ...]
+    refusals: tuple[Refusal, ...]
+    least: float
+    wide: bool = False
+
+
+def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
+    """Return all forms of the motion at a sliding event.
+
+    Parameters
+    ----------
+    wide : bool
+        Whether margins that nearly vanish count: where the place is known to half of the digits.
+    """
+    orbit = bifurcation.orbit.as_whole()
+    unit = unit_of(orbit)
+    least = _NEARLY if wide or bifurcation.accuracy > ACCURACY else _VANISHES
+    collection = _Collection(unit, least)
+    collection.take(orbit, np.zeros(len(orbit.word)), "")
+    places = [(place, bifurcation.kind) for place in places_of(bifurcation)]
+    collection.edit(orbit, np.zeros(len(orbit.word)), "", places)
+    collection.close()
+    return Incident(unit, tuple(collection.forms), tuple(collection.refusals), least, wide)
+
+
+class _Collection:
+    """Forms while they are collected."""
+
+    def __init__(self, unit: Unit, least: float) -> None:
+        self.unit = unit
+        self.least = least
+        self.forms: list[Form] = []
+        self.refusals: list[Refusal] = []
+        self._waiting: deque[Form] = deque()
+        self._words: set[Word] = set()
+
+    def take(self, orbit: Orbit, away: FloatArray, reason: str) -> None:
+        """Take the units of an orbit as forms."""
+        for form in pieces(orbit, away, self.unit, reason):
+            if form.word in self._words:
+                continue
+            if len(self.forms) >= _MOST_FORMS:
+                text = f"more than {_MOST_FORMS} words at once: the others are not tried"
+                self.refusals.append(Refusal("other outcomes", text))
+                return
+            self._words.add(form.word)
+            self.forms.append(form)
+            self._waiting.append(form)
+
+    def close(self) -> None:
+        """Add what the outcomes at the places of every form make of it."""
+        while self._waiting:
+            form = self._waiting.popleft()
+            try:
+                orbit = self.unit.whole(form)
+            except NotationError as error:
+                self.refusals.append(Refusal(form.reason, str(error)))
+                self.forms = [other for other in self.forms if other is not form]
+                continue
+            count = len(form.word)
+            places = [p for p in vanishing(orbit, self.least) if p[0].segment < count]
+            away = np.concatenate([form.away, form.away]) if self.unit.half else form.away
+            self.edit(orbit, away, form.reason, places)
+
+    def edit(
+        self, orbit: Orbit, away: FloatArray, reason: str, places: list[tuple[Test, Kind]]
+    ) -> None:
+        """Add the forms that follow from the outcomes at places of an orbit."""
+        for place, kind in places:
+            try:
+                outcome = outcome_at(orbit, place, kind)
+                edited, moves = edited_whole(orbit, [outcome], away)
+                text = "; ".join(filter(None, (reason, outcome.reason)))
+                self.take(edited, moves, text)
+            except NotationError as error:
+                rest = isinstance(error, RestsForEver)
+                text = f"change at segment {place.segment + 1}"
+                refusal = Refusal(text, str(error), rest)
+                if refusal not in self.refusals:
+                    self.refusals.append(refusal)
+
+
+def vanishing(orbit: Orbit, least: float) -> list[tuple[Test, Kind]]:
+    """Return the places of a whole orbit whose margins vanish, with the kind of each; no tangencies."""
+    found: dict[Test, Kind] = {}
+    for test, value in zip(orbit.system.tests, orbit.margins, strict=True):
+        if not abs(value) < least:
+            continue
+        kind = kind_of_margin(orbit.system, test, orbit)
+        if kind is not Kind.T:
+            found.setdefault(normal_place(test, orbit), kind)
+    return list(found.items())
+
+
+def edited_whole(
+    orbit: Orbit, outcomes: list[Outcome], away: FloatArray | None = None
+) -> tuple[Orbit, FloatArray]:
+    """Return the same motion as a whole orbit of the edited word, and how its joints move away, shape (N,).
+
+    Parameters
+    ----------
+    away : how the joints of the orbit itself move
+
+    Raises
+    ------
+    NotationError
+        If the transition graph has no such walk.
+    """
+    edit, joints, speeds = outcomes[0].edit, dict(outcomes[0].joints), dict(outcomes[0].away)
+    for outcome in outcomes[1:]:
+        edit |= outcome.edit
+        joints |= outcome.joints
+        speeds |= outcome.away
+    word = apply_edit(orbit.word, edit, orbit.model)
+    origins = [origin for origin, _ in edited_pieces(orbit.word, edit)]
+    starts = np.array([joints[o] if o in joints else orbit.cycle[o[0]] for o in origins])
+    kept = np.zeros(len(orbit.word)) if away is None else away
+    moves = np.array([speeds.get(o, kept[o[0]] if o[1] < 0 else 0.0) for o in origins])
+    first = next(k for k, (_, exit_) in enumerate(word) if not exit_.startswith("hold@"))
+    word, moves = word[first:] + word[:first], np.roll(moves, -first)
+    starts = np.roll(starts, -first, axis=0)
+    if first:
+        starts[-first:, 0] += orbit.period
+    starts = clocked(orbit.model, starts, float(starts[0, 0]) + orbit.period)
+    try:
+        system = build_system(orbit.model, word, orbit.periods)
+    except ValueError as error:
+        raise NotationError(str(error)) from None
+    return replace(orbit, system=system, joints=starts, status=Status.CONVERGED), moves
+
+
+# ------------------------------------------------------------------------ the unit of a motion
+
+
+def unit_of(orbit: Orbit) -> Unit:
+    """Return the unit of the motion of a whole orbit."""
+    slides = slides_of(orbit)
+    turns = next(
+        k for k in range(orbit.periods, 0, -1) if orbit.periods % k == 0 and _repeats(orbit, slides, k)
+    )
+    periods = orbit.periods // turns
+    half = periods % 2 == 1 and _repeats(orbit, slides, 2 * turns, mirrored=True)
+    longest = max(slides, key=lambda i: orbit.ends[i, 0] - orbit.cycle[i, 0])
+    duration = orbit.period / (turns * (2 if half else 1))
+    mode = orbit.word[longest][0]
+    cut = np.array(orbit.cycle[longest])
+    return Unit(orbit.model, orbit.vector, periods, half, duration, mode, cut)
+
+
+def slides_of(orbit: Orbit) -> list[int]:
+    """Return the segments with which slides of some length begin, joined over a touch of rest.
+
+    Segments of rest are left out, and those of no length; a segment that goes on in the mode and from
+    the state in which the one before it ended is a part of that.
+    """
+    sliding = {mode.name for mode in orbit.model.modes if mode.sliding}
+    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    some = [i for i in range(len(orbit.word)) if lasts[i] > SAME_MOTION]
+    found = []
+    for k, i in enumerate(some):
+        before, mode = some[k - 1], orbit.word[i][0]
+        gap = np.abs(orbit.begins[i, 1:] - orbit.ends[before, 1:])
+        goes_on = orbit.word[before][0] == mode and np.max(gap) < SAME_MOTION and len(some) > 1
+        if mode not in sliding and not goes_on:
+            found.append(i)
+    return found or [i for i in some if orbit.word[i][0] not in sliding] or [0]
+
+
+def _repeats(orbit: Orbit, slides: list[int], turns: int, mirrored: bool = False) -> bool:
+    """Tell whether the slides repeat themselves (or as symmetry images) after a part of the period."""
+    if turns == 1:
+        return True
+    count, rest = divmod(len(slides), turns)
+    symmetry = orbit.model.symmetry
+    if rest or (mirrored and symmetry is None):
+        return False
+    starts = orbit.cycle[slides]
+    ahead = np.roll(starts, -count, axis=0)
+    ahead[len(starts) - count :, 0] += orbit.period
+    ahead[:, 0] -= orbit.period / turns
+    if mirrored:
+        assert symmetry is not None
+        ahead[:, 1:] = ahead[:, 1:] @ symmetry.array().T
+    return bool(np.max(np.abs(ahead - starts)) < SAME_MOTION)
+
+
+def pieces(orbit: Orbit, away: FloatArray, unit: Unit, reason: str = "") -> Iterator[Form]:
+    """Yield the units of a whole orbit as forms, each as the first unit of the motion."""
+    cuts = _cuts(orbit, unit)
+    if cuts is None:
+        raise NotationError("the edited word does not begin with a slide where the motion does")
+    count = len(orbit.word)
+    for j, (start, stop) in enumerate(zip(cuts, [*cuts[1:], cuts[0]], strict=True)):
+        places = range(start, stop if stop > start else stop + count)
+        word = tuple(orbit.word[i % count] for i in places)
+        joints = np.array([orbit.cycle[i % count] for i in places])
+        joints[:, 0] += np.array([orbit.period * (i // count) for i in places])
+        joints[:, 0] += unit.cut[0] + j * unit.duration - joints[0, 0]
+        back = unit.image(joints, -j)
+        yield Form(unit.image_word(word, j), back, away[[i % count for i in places]], reason)
+
+
+def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
+    """Return the segments with which the units of a whole orbit begin; None if one is not there."""
+    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    cuts = []
+    for j in range(round(orbit.period / unit.duration)):
+        mode = mirror_mode(unit.model)[unit.mode] if unit.half and j % 2 else unit.mode
+        joint = unit.image(unit.cut[None, :], j)[0]
+        gap = np.abs(orbit.cycle - joint)
+        gap[:, 0] = np.abs((gap[:, 0] + 0.5 * orbit.period) % orbit.period - 0.5 * orbit.period)
+        if orbit.model.autonomous:
+            gap[:, 0] = 0.0
+        fits = (np.max(gap, axis=1) < SAME_MOTION) & (lasts > SAME_MOTION)
+        found = [i for i in np.flatnonzero(fits) if orbit.word[i][0] == mode]
+        if not found:
+            return None
+        cuts.append(int(found[0]))
+    return cuts
+
