@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from contfric.atlas.diagram import Diagram, LooseEnd, Node
+from contfric.atlas.diagram import Asked, Diagram, LooseEnd, Node
 from contfric.atlas.matching import same_event, telling_kind
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation, End, EndReason, Proposal, Verdict
+from contfric.continuation.events import Bifurcation, End, EndReason, Kind, Proposal, Verdict
 from contfric.continuation.points import Settings
 from contfric.models.definition import Model
 
@@ -33,6 +33,7 @@ class Event:
     members : the same event as located on the other branches
     proposals : what was proposed to follow it
     rests : whether the mass stays at rest for ever behind it
+    kinds : what the words of its motion call it
     """
 
     bifurcation: Bifurcation
@@ -40,6 +41,7 @@ class Event:
     members: list[Bifurcation] = field(default_factory=list)
     proposals: list[Proposal] = field(default_factory=list)
     rests: bool = False
+    kinds: set[Kind] = field(default_factory=set)
 
 
 def collect(
@@ -50,6 +52,7 @@ def collect(
     events: list[Event],
     notes: tuple[str, ...],
     complete: bool,
+    asked: Asked,
 ) -> Diagram:
     """Return the diagram, with the mirror image of every asymmetric branch."""
     computed = _with_proposals(model, computed, events)
@@ -78,6 +81,7 @@ def collect(
         tuple(loose),
         complete,
         notes,
+        asked,
     )
 
 
@@ -93,7 +97,7 @@ def _with_proposals(model: Model, computed: list[Branch], events: list[Event]) -
         proposals = tuple(
             p if p.branch is None else replace(p, branch=place[p.branch]) for p in event.proposals
         )
-        kind = telling_kind(member.kind for member in event.members)
+        kind = telling_kind([*event.kinds, *(member.kind for member in event.members)])
         for member in event.members:
             changed[id(member)] = replace(member, kind=kind, proposals=proposals)
         event.bifurcation = changed[id(event.bifurcation)]

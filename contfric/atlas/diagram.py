@@ -8,13 +8,15 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation, End, Kind
+from contfric.continuation.events import Bifurcation, End, Kind, Proposal
 from contfric.models.definition import Model
 
 if TYPE_CHECKING:
     import networkx as nx
     import pandas as pd
     from matplotlib.axes import Axes
+
+    from contfric.atlas.verification import Verification
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +37,14 @@ class Node:
     branches: tuple[int, ...]
     mirrored: bool = False
 
+    @property
+    def proposals(self) -> tuple[Proposal, ...]:
+        """What was proposed to follow it, and what became of each."""
+        return self.bifurcation.proposals
+
+    def __str__(self) -> str:
+        return f"{self.bifurcation!r}: {len(self.branches)} branches"
+
 
 @dataclass(frozen=True)
 class LooseEnd:
@@ -48,6 +58,27 @@ class LooseEnd:
         return (
             f"branch {self.branch + 1}, {'first' if self.side == 0 else 'last'} point: {self.end}"
         )
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What an exploration was asked for; a restart asks for the same.
+
+    Attributes
+    ----------
+    max_step : largest step, as a share of the range; None for that of the model
+    stability : whether multipliers were evaluated
+    bridges : whether jumps were bridged
+    max_periods : longest orbits, in periods; raised to that of a longer start
+    max_branches, max_points : most branches, and most points of each half-branch
+    """
+
+    max_step: float | None = None
+    stability: bool = True
+    bridges: bool = True
+    max_periods: int = 1
+    max_branches: int = 200
+    max_points: int = 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +100,10 @@ class Diagram:
         Ends that nothing follows, each with its reason.
     complete : bool
         False if the exploration was stopped before it was done.
+    notes : tuple of str
+        What the user should know of the run.
+    settings : Asked
+        What was asked for.
     """
 
     model: Model
@@ -79,6 +114,47 @@ class Diagram:
     loose_ends: tuple[LooseEnd, ...]
     complete: bool = True
     notes: tuple[str, ...] = field(default=())
+    settings: Asked = field(default=Asked())
+    verification: Verification | None = field(default=None, repr=False)
+
+    @property
+    def events(self) -> tuple[Node, ...]:
+        """Every event once (symmetry images are not listed), in the order of the parameter."""
+        found = [node for node in self.nodes if not node.mirrored]
+        return tuple(sorted(found, key=lambda node: node.bifurcation.params[self.parameter]))
+
+    def verify(self, restarts: int = 6, step: float | None = None) -> Verification:
+        """Explore again from the diagram's own branches, and check the sums of indices.
+
+        Parameters
+        ----------
+        restarts : int
+            Most branches that it is explored again from.
+        step : float, optional
+            Largest step of the restarts, in largest steps of the diagram; 0.31 by default.
+
+        Returns
+        -------
+        Verification
+            ``passed``, and ``faults`` that name what differs; kept in ``diagram.verification``.
+
+        Examples
+        --------
+        >>> import contfric as cf
+        >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+        >>> cf.explore(orbit, "Omega", (0.48, 0.55)).verify(restarts=2).passed
+        True
+        """
+        from contfric.atlas.verification import STEP, verify
+
+        found = verify(self, restarts, STEP if step is None else step)
+        object.__setattr__(self, "verification", found)
+        return found
+
+    @property
+    def verified(self) -> bool | None:
+        """Whether :meth:`verify` found nothing that differs; None before it was asked."""
+        return None if self.verification is None else self.verification.passed
 
     @property
     def bifurcations(self) -> tuple[Bifurcation, ...]:

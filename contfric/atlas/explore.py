@@ -6,8 +6,10 @@ those already known, and a new one puts what leaves it into the queue (:mod:`con
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from contfric.atlas.collect import collect
-from contfric.atlas.diagram import Diagram
+from contfric.atlas.diagram import Asked, Diagram
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.follow import follow
 from contfric.atlas.seeds import Seeds, attractors
@@ -72,6 +74,7 @@ def explore(
     ['0s', '1a', '1a, 7seg, 1hold', '2a', '2s']
     """
     settings = settings_of(orbit, parameter, range, max_step, stability, max_points)
+    settings = replace(settings, stability=stability)  # also where the start itself is on a bridge
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
     whole_number("max_periods", max_periods, least=1)
@@ -79,7 +82,9 @@ def explore(
     orbit = shortest(orbit)
     state = Exploration(settings, max(max_periods, orbit.periods), max_branches, bridges, progress)
     if orbit.periods > max_periods:
-        state.notes.append(f"max_periods raised to {orbit.periods}: the start has that many periods")
+        state.notes.append(
+            f"max_periods raised to {orbit.periods}: the start has that many periods"
+        )
     try:
         state.add(
             continue_orbit(
@@ -106,6 +111,7 @@ def explore(
         state.events,
         tuple(state.notes),
         state.complete,
+        Asked(max_step, stability, bridges, state.max_periods, max_branches, max_points),
     )
 
 

@@ -16,10 +16,10 @@ import numpy as np
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration, Progress
-from contfric.atlas.matching import SAME_MOTION, part_distance
+from contfric.atlas.matching import SAME_MOTION, part_distance, same_place
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
-from contfric.continuation.candidates import Candidate, candidates, directions
+from contfric.continuation.candidates import Candidate, directions, sequences_of
 from contfric.continuation.events import (
     ACCURACY,
     TERMINAL,
@@ -29,12 +29,14 @@ from contfric.continuation.events import (
     Kind,
     Verdict,
 )
+from contfric.continuation.incident import incident_forms
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import NEARER, leaps, leave_branch_point, settings_value
 from contfric.continuation.trace import continue_orbit, trace_side
 from contfric.continuation.walked import walked
 from contfric.models.definition import FloatArray
+from contfric.orbit.linear import null_space
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish
@@ -44,11 +46,16 @@ from contfric.signature.edits import show
 _NEAR_EVENT = 0.01
 #: Where an orbit beside an event is looked for, relative to the range.
 _SHARES = (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6)
+#: Null vectors where two curves may cross, and the directions between them that are tried: the corrector
+#: reaches a curve from 30 degrees beside it.
+_PLANE, _ANGLES = 2, 12
 #: A branch that gets no farther than this (arclength) from the event it starts at has left it in the
 #: direction in which it is not admissible.
 _NOWHERE = 1e-7
 #: The same for an event that is located to the root of rounding only.
 _NOWHERE_ROUGHLY = 1e-3
+#: A branch shorter than this (arclength) that comes back to its event has been nowhere.
+_NO_WIDTH = 1e-3
 #: One that gets this far has left it in the right one. A shorter one may have gone back the way that the
 #: start was beside the event: a touch at the very end of a segment is located to the root of rounding.
 _SURELY_AWAY = 1e-4
@@ -72,11 +79,13 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
     accepted = jumps = False
     orbit = event.bifurcation.orbit
     active = orbit.model.index_of(state.settings.parameter)
-    edits = bool(orbit.model.resets) or any(mode.sliding for mode in orbit.model.modes)  # else nothing rests
+    edits = bool(orbit.model.resets) or any(
+        mode.sliding for mode in orbit.model.modes
+    )  # else nothing rests
     for wide in (False, True) if edits else ():
-        for candidate in candidates(
-            event.bifurcation, active, most_periods=state.max_periods, held=state.bridges, wide=wide
-        ):
+        incident = incident_forms(event.bifurcation, wide)
+        event.kinds |= incident.kinds
+        for candidate in sequences_of(incident, active, state.max_periods, state.bridges):
             jumps = jumps or candidate.has_hold
             accepted = _judge(state, event, candidate) or accepted
         if accepted:
@@ -148,6 +157,10 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         if known is not None:
             state.judge(event, candidate.reason, Verdict.KNOWN, known)
             return True
+    if branch is not None and _has_no_width(branch, event, state.settings):
+        why = "it begins and ends at the event, without any width"
+        state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
+        return False
     if branch is None:
         why = "no admissible orbit beyond the event"
         state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
@@ -155,6 +168,14 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
     state.judge(event, candidate.reason, Verdict.ACCEPTED, len(state.branches))
     state.add_from(branch, event)
     return True
+
+
+def _has_no_width(branch: Branch, event: Event, settings: Settings) -> bool:
+    """Tell whether a branch begins and ends at one event and is nowhere else: admissible to rounding only."""
+    b, last = event.bifurcation, branch.ends[1].bifurcation
+    if last is None or branch.arc[-1] > _NO_WIDTH:
+        return False
+    return same_place(last, b, settings.parameter, settings.width)
 
 
 def _leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branch | None:
@@ -171,7 +192,7 @@ def _leave_event(state: Exploration, candidate: Candidate, event: Event) -> Bran
         if longest is not None and side.length > _SURELY_AWAY:
             break
     if longest is None:
-        return None
+        return _leave_singular(state, orbit, event, settings)
     there, side = longest
     first = _first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
     return assemble(there, settings, side, first)
@@ -215,6 +236,25 @@ def _leave_beside(
     return None
 
 
+def _leave_singular(
+    state: Exploration, orbit: Orbit, event: Event, settings: Settings
+) -> Branch | None:
+    """Trace away from an event at which the curve has no unique direction.
+
+    Its directions lie in the plane of two null vectors; those at regular angles are tried.
+    """
+    active = orbit.model.index_of(settings.parameter)
+    vectors, _ = null_space(orbit.system, orbit.joints, orbit.vector, active)
+    if len(vectors) != _PLANE:
+        return None
+    for angle in np.arange(_ANGLES) * (2.0 * np.pi / _ANGLES):
+        away = np.cos(angle) * vectors[0] + np.sin(angle) * vectors[1]
+        branch = _leave_beside(state, orbit, away / np.max(np.abs(away)), event, settings)
+        if branch is not None and branch.arc[-1] > _SURELY_AWAY:
+            return branch
+    return None
+
+
 def _trace(orbit: Orbit, point: Point, settings: Settings, progress: Progress | None) -> Side:
     return trace_side(
         orbit, point, settings, first_step=_NEAR_EVENT, at_event=True, progress=progress
@@ -235,7 +275,7 @@ def _first_end(reason: EndReason, event: Event, side: Side, settings: Settings) 
     """Return the end of a branch at the event that it starts from."""
     b = event.bifurcation
     stable: bool | None = False if side_is_bridge(side) else None
-    if settings.stability:
+    if settings.stability and not side_is_bridge(side):
         stable = bool(np.all(np.abs(side.second_multipliers) < 1.0))
     here = replace(b, position=0.0, stable_before=None, stable_after=stable)
     return End(reason, f"{EndReason.START.value}: {where(b, settings.parameter)}", here)
@@ -281,7 +321,7 @@ def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
 
 def _follow_departure(state: Exploration, orbit: Orbit, event: Event, reason: EndReason) -> None:
     """Trace the branch that leaves a branch point or a period doubling."""
-    settings = state.settings
+    settings = settings_for(orbit, state.settings)
     text = "the branch that leaves along the null vector"
     active = orbit.model.index_of(settings.parameter)
     for distance in NEARER:

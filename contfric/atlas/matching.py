@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -61,28 +60,23 @@ def stops_distance(a: FloatArray, b: FloatArray, mirror: bool) -> float:
 
 def same_event(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> bool:
     """Tell whether two branches have met the same event (or its mirror image)."""
-    if not same_kind(a, b):
-        return False
+    return same_kind(a, b) and same_place(a, b, parameter, width)
+
+
+def same_place(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> bool:
+    """Tell whether two events have the same parameters and the same motion (or its mirror image)."""
     if abs(a.params[parameter] - b.params[parameter]) > max(a.accuracy, b.accuracy) * width:
         return False
-    mirror = a.orbit.model.symmetry is not None
-    if stops_distance(a.orbit.stops, b.orbit.stops, mirror) >= SAME_MOTION:
-        return False
-    if a.orbit.model.autonomous:  # no time is common to both
-        return True
-    images = (b.orbit, b.orbit.mirror()) if mirror else (b.orbit,)
-    return any(motions_distance(a.orbit, image) < SAME_MOTION for image in images)
+    return a.outline.apart(b.outline) < SAME_MOTION
 
 
 def same_kind(a: Bifurcation, b: Bifurcation) -> bool:
     """Tell whether two events may be one by what branches call them.
 
-    Where nothing jumps, what is a grazing for one word may be a stop at the boundary of rest for another:
-    the sliding events are compared by their motions alone.
+    What is a grazing for one word may be a stop at the boundary of rest for another: the sliding events are
+    compared by their motions alone.
     """
-    if a.kind is b.kind:
-        return True
-    return a.orbit.model.filippov and a.kind in TERMINAL and b.kind in TERMINAL
+    return a.kind is b.kind or (a.kind in TERMINAL and b.kind in TERMINAL)
 
 
 def telling_kind(kinds: Iterable[Kind]) -> Kind:
@@ -94,24 +88,6 @@ def telling_kind(kinds: Iterable[Kind]) -> Kind:
     'GS'
     """
     return min(kinds, key=lambda kind: _TELLING.get(kind, len(_TELLING)))
-
-
-def motions_distance(a: Orbit, b: Orbit) -> float:
-    """Return how far two motions are apart, once a period of the excitation, best whole shift.
-
-    Orbits that run through the same stops a different number of times are told apart by it.
-    """
-    common = math.lcm(a.periods, b.periods)
-    one = np.tile(strobe(a), (common // a.periods, 1))
-    other = np.tile(strobe(b), (common // b.periods, 1))
-    shifted = (np.roll(other, shift, axis=0) for shift in range(b.periods))
-    return float(min(np.max(np.abs(one - moved)) for moved in shifted))
-
-
-def strobe(orbit: Orbit) -> FloatArray:
-    """Return the state once a period of the excitation, shape (periods, n)."""
-    period = orbit.period / orbit.periods
-    return np.array([orbit.state(k * period) for k in range(orbit.periods)])
 
 
 def on_branch(orbit: Orbit, branch: Branch) -> bool:

@@ -60,13 +60,13 @@ class Candidate:
         return self.orbit is not None and bool(self.orbit.system.holds)
 
 
-def candidates(
-    bifurcation: Bifurcation,
-    active: int | None = None,
-    *,
-    most_periods: int = 1,
-    held: bool = True,
-    wide: bool = False,
+def candidates(bifurcation: Bifurcation) -> Iterator[Candidate]:
+    """Yield what can follow a sliding event over the shortest period of its motion."""
+    return sequences_of(incident_forms(bifurcation))
+
+
+def sequences_of(
+    incident: Incident, active: int | None = None, most_periods: int = 1, held: bool = True
 ) -> Iterator[Candidate]:
     """Yield what can follow a sliding event, short orbits first.
 
@@ -78,17 +78,16 @@ def candidates(
     active : index of the parameter that varies; without it local conditions are not asked
     most_periods : longest orbit; the shortest period of the motion at least
     held : whether orbits with holds are candidates; those that are not are said to be refused
-    wide : whether margins that nearly vanish count
     """
-    incident = incident_forms(bifurcation, wide)
     for refusal in incident.refusals:
         yield Candidate(refusal.reason, None, refusal.why, rest=refusal.rest)
     unit, forms = incident.unit, incident.forms
     if not held and any(form.has_hold for form in forms):
         yield Candidate("orbits with holds", None, "bridges are switched off")
         forms = tuple(form for form in forms if not form.has_hold)
-    relations = _relations(incident, forms, active)
-    for length in lengths(unit.periods, unit.half, most_periods):
+    longest = lengths(unit.periods, unit.half, most_periods)
+    relations = _relations(incident, forms, active) if longest[-1] > 1 else None
+    for length in longest:
         if count(len(forms), length) > MOST_SEQUENCES:
             why = f"{count(len(forms), length)} sequences: more than {MOST_SEQUENCES} are not tried"
             yield Candidate(f"orbits of {length} units", None, why)

@@ -41,6 +41,9 @@ _STEP = 1e-3
 _ORDERS = (2, 3)
 #: How far the logarithm of the ratio may be from an order.
 _CLEAR = 0.2
+#: Condition number from which a sequence's own equations are singular at the event: undecided, too. (Without
+#: damping a slide may last a whole natural period, and its start then moves its end to second order only.)
+_SINGULAR = 1e9
 #: Inequalities violated by less than this share of the largest number in them are undecided: the
 #: sequence is tried.
 _UNDECIDED = 1e-4
@@ -81,7 +84,9 @@ def relation_of(unit: Unit, form: Form, active: int, least: float) -> Relation |
     rank = int(np.sum(size > _NULL * (size[0] if size.size else 1.0)))
     free = right[rank:]
     rest = left[:, rank:].T
-    moves = -(right[:rank].T / size[:rank]) @ left[:, :rank].T @ outer  # inner joints by (u, u', lambda)
+    moves = (
+        -(right[:rank].T / size[:rank]) @ left[:, :rank].T @ outer
+    )  # inner joints by (u, u', lambda)
     margins, signed = [], np.zeros(len(free))
     for gradient, slope in _gradients(orbit, active, least):
         on_inner = gradient[1:-1].ravel()
@@ -164,7 +169,11 @@ def _residual(orbit: Orbit, joints: FloatArray) -> FloatArray:
     from contfric.orbit.newton import linearise
 
     count, m = joints.shape
-    a, b, c = np.empty((count, m, m)), np.empty((count, m, m)), np.empty((count, m, len(orbit.vector)))
+    a, b, c = (
+        np.empty((count, m, m)),
+        np.empty((count, m, m)),
+        np.empty((count, m, len(orbit.vector))),
+    )
     r, close = np.empty((count, m, 1)), np.empty((m, m))
     system = orbit.system
     linearise(system.functions(), system.layout, joints, orbit.vector, a, b, c, r, close)
@@ -280,7 +289,9 @@ def _carried(
 # --------------------------------------------------------------------------------- sequences
 
 
-def possible(relations: list[Relation], sequences: list[tuple[int, ...]]) -> list[tuple[bool, bool]]:
+def possible(
+    relations: list[Relation], sequences: list[tuple[int, ...]]
+) -> list[tuple[bool, bool]]:
     """Return, for each sequence of one length, whether it can exist below and above the event.
 
     Parameters
@@ -291,7 +302,9 @@ def possible(relations: list[Relation], sequences: list[tuple[int, ...]]) -> lis
     if not sequences:
         return []
     most = max(len(r.signed) for r in relations)
-    rows, margins, signed = (np.array(part) for part in zip(*(_padded(r, most) for r in relations), strict=True))
+    rows, margins, signed = (
+        np.array(part) for part in zip(*(_padded(r, most) for r in relations), strict=True)
+    )
     chosen = np.array(sequences)
     count, length = chosen.shape
     m = (rows.shape[2] - 1 - most) // 2
@@ -306,10 +319,9 @@ def possible(relations: list[Relation], sequences: list[tuple[int, ...]]) -> lis
         full[:, at, ahead : ahead + m] += block[:, :, m : 2 * m]
         full[:, at, j * width + m : (j + 1) * width] += block[:, :, 2 * m + 1 :]
         right[:, at] = -block[:, :, 2 * m]
-    try:
-        solved = np.linalg.solve(full, right[:, :, None])[:, :, 0].reshape(count, length, width)
-    except np.linalg.LinAlgError:
-        return [(True, True)] * count
+    singular = np.linalg.cond(full) > _SINGULAR
+    full[singular] = np.eye(length * width)
+    solved = np.linalg.solve(full, right[:, :, None])[:, :, 0].reshape(count, length, width)
     joints = solved[:, :, :m]
     ahead_joints = np.roll(joints, -1, axis=1)
     lam = np.ones((count, length, 1))
@@ -319,10 +331,12 @@ def possible(relations: list[Relation], sequences: list[tuple[int, ...]]) -> lis
     scale = np.einsum("sjgk,sjk->sjg", np.abs(picked), np.abs(local)) * _UNDECIDED
     q = solved[:, :, m:] * signed[chosen]
     slack = _UNDECIDED * np.max(np.abs(solved), axis=(1, 2))[:, None, None]
-    fine = np.all(np.isfinite(solved), axis=(1, 2))
+    fine = ~singular
     above = np.all(values >= -scale, axis=(1, 2)) & np.all(q >= -slack, axis=(1, 2))
     below = np.all(values <= scale, axis=(1, 2)) & np.all(q <= slack, axis=(1, 2))
-    return [(bool(b or not f), bool(a or not f)) for a, b, f in zip(above, below, fine, strict=True)]
+    return [
+        (bool(b or not f), bool(a or not f)) for a, b, f in zip(above, below, fine, strict=True)
+    ]
 
 
 def _padded(relation: Relation, most: int) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -32,6 +32,7 @@ import numpy as np
 from contfric.models.definition import Domain
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.slides import Outline, outline_of
 from contfric.orbit.system import Margin, System, Test, inside_sign
 
 
@@ -188,6 +189,11 @@ class Bifurcation:
             return False
         gap = np.max(np.abs(np.sort(stops) + np.sort(stops)[::-1]))
         return bool(gap < max(_SYMMETRIC_STOPS, self.accuracy))
+
+    @cached_property
+    def outline(self) -> Outline:
+        """The slides of the motion at the event, whatever word it was reached with."""
+        return outline_of(self.orbit)
 
     @property
     def label(self) -> str:

@@ -23,17 +23,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind, kind_of_margin
-from contfric.continuation.outcomes import Outcome, RestsForEver, normal_place, outcome_at, places_of
+from contfric.continuation.outcomes import (
+    Outcome,
+    RestsForEver,
+    normal_place,
+    outcome_at,
+    places_of,
+)
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.slides import SAME_MOTION, repeats, repetitions, slides_of
 from contfric.orbit.system import Test, Word, build_system, mirror_mode
 from contfric.orbit.words import mirror_pairs
 from contfric.signature.edits import apply_edit, edited_pieces
 
-#: Parts of a cycle that agree to this (nondimensional) are the same motion: the root of rounding.
-SAME_MOTION = 1e-5
 #: Margins below this vanish at an event: it is located to about 1e-13.
 _VANISHES = 1e-9
 #: The same at an event that is located to half of the digits only.
@@ -140,13 +145,15 @@ class Refusal:
 
 @dataclass(frozen=True, eq=False)
 class Incident:
-    """The unit of the motion at an event, its forms, and the outcomes that are none; margins below
-    ``least`` count as zero.
+    """The unit of the motion at an event, its forms, and the outcomes that are none.
+
+    ``kinds`` are the names that the forms have for it; margins below ``least`` count as zero.
     """
 
     unit: Unit
     forms: tuple[Form, ...]
     refusals: tuple[Refusal, ...]
+    kinds: frozenset[Kind]
     least: float
     wide: bool = False
 
@@ -160,14 +167,36 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
         Whether margins that nearly vanish count: where the place is known to half of the digits.
     """
     orbit = bifurcation.orbit.as_whole()
-    unit = unit_of(orbit)
     least = _NEARLY if wide or bifurcation.accuracy > ACCURACY else _VANISHES
-    collection = _Collection(unit, least)
-    collection.take(orbit, np.zeros(len(orbit.word)), "")
+    collection = _started(orbit, unit_of(orbit), least)
+    unit = collection.unit
     places = [(place, bifurcation.kind) for place in places_of(bifurcation)]
     collection.edit(orbit, np.zeros(len(orbit.word)), "", places)
     collection.close()
-    return Incident(unit, tuple(collection.forms), tuple(collection.refusals), least, wide)
+    return Incident(
+        unit,
+        tuple(collection.forms),
+        tuple(collection.refusals),
+        frozenset(collection.kinds),
+        least,
+        wide,
+    )
+
+
+def _started(orbit: Orbit, unit: Unit, least: float) -> _Collection:
+    """Return a collection with the forms of the branch that arrives.
+
+    Where its motion repeats itself to rounding only, the whole orbit is the unit.
+    """
+    collection = _Collection(unit, least)
+    try:
+        collection.take(orbit, np.zeros(len(orbit.word)), "")
+    except NotationError:
+        collection = _Collection(
+            replace(unit, periods=orbit.periods, half=False, duration=orbit.period), least
+        )
+        collection.take(orbit, np.zeros(len(orbit.word)), "")
+    return collection
 
 
 class _Collection:
@@ -178,6 +207,7 @@ class _Collection:
         self.least = least
         self.forms: list[Form] = []
         self.refusals: list[Refusal] = []
+        self.kinds: set[Kind] = set()
         self._waiting: deque[Form] = deque()
         self._words: set[Word] = set()
 
@@ -219,6 +249,7 @@ class _Collection:
                 edited, moves = edited_whole(orbit, [outcome], away)
                 text = "; ".join(filter(None, (reason, outcome.reason)))
                 self.take(edited, moves, text)
+                self.kinds.add(kind)
             except NotationError as error:
                 rest = isinstance(error, RestsForEver)
                 text = f"change at segment {place.segment + 1}"
@@ -282,53 +313,14 @@ def edited_whole(
 def unit_of(orbit: Orbit) -> Unit:
     """Return the unit of the motion of a whole orbit."""
     slides = slides_of(orbit)
-    turns = next(
-        k for k in range(orbit.periods, 0, -1) if orbit.periods % k == 0 and _repeats(orbit, slides, k)
-    )
+    turns = repetitions(orbit, slides)
     periods = orbit.periods // turns
-    half = periods % 2 == 1 and _repeats(orbit, slides, 2 * turns, mirrored=True)
+    half = periods % 2 == 1 and repeats(orbit, slides, 2 * turns, mirrored=True)
     longest = max(slides, key=lambda i: orbit.ends[i, 0] - orbit.cycle[i, 0])
     duration = orbit.period / (turns * (2 if half else 1))
     mode = orbit.word[longest][0]
     cut = np.array(orbit.cycle[longest])
     return Unit(orbit.model, orbit.vector, periods, half, duration, mode, cut)
-
-
-def slides_of(orbit: Orbit) -> list[int]:
-    """Return the segments with which slides of some length begin, joined over a touch of rest.
-
-    Segments of rest are left out, and those of no length; a segment that goes on in the mode and from
-    the state in which the one before it ended is a part of that.
-    """
-    sliding = {mode.name for mode in orbit.model.modes if mode.sliding}
-    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
-    some = [i for i in range(len(orbit.word)) if lasts[i] > SAME_MOTION]
-    found = []
-    for k, i in enumerate(some):
-        before, mode = some[k - 1], orbit.word[i][0]
-        gap = np.abs(orbit.begins[i, 1:] - orbit.ends[before, 1:])
-        goes_on = orbit.word[before][0] == mode and np.max(gap) < SAME_MOTION and len(some) > 1
-        if mode not in sliding and not goes_on:
-            found.append(i)
-    return found or [i for i in some if orbit.word[i][0] not in sliding] or [0]
-
-
-def _repeats(orbit: Orbit, slides: list[int], turns: int, mirrored: bool = False) -> bool:
-    """Tell whether the slides repeat themselves (or as symmetry images) after a part of the period."""
-    if turns == 1:
-        return True
-    count, rest = divmod(len(slides), turns)
-    symmetry = orbit.model.symmetry
-    if rest or (mirrored and symmetry is None):
-        return False
-    starts = orbit.cycle[slides]
-    ahead = np.roll(starts, -count, axis=0)
-    ahead[len(starts) - count :, 0] += orbit.period
-    ahead[:, 0] -= orbit.period / turns
-    if mirrored:
-        assert symmetry is not None
-        ahead[:, 1:] = ahead[:, 1:] @ symmetry.array().T
-    return bool(np.max(np.abs(ahead - starts)) < SAME_MOTION)
 
 
 def pieces(orbit: Orbit, away: FloatArray, unit: Unit, reason: str = "") -> Iterator[Form]:
@@ -364,4 +356,3 @@ def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
             return None
         cuts.append(int(found[0]))
     return cuts
-

@@ -10,6 +10,10 @@ import numpy as np
 from contfric.models.definition import FloatArray
 from contfric.orbit.system import System
 
+#: Singular values below this share of the largest are zero: at an event they are good to the root of rounding
+#: at worst.
+_NULL = 1e-7
+
 
 def jacobian_blocks(
     system: System, joints: FloatArray, vector: FloatArray
@@ -69,6 +73,22 @@ def tangent_of(
         full[size] = null / np.linalg.norm(null)
         null = np.asarray(np.linalg.solve(full, wanted), dtype=np.float64)
     return null[:size].reshape(joints.shape), float(null[size])
+
+
+def null_space(
+    system: System, joints: FloatArray, vector: FloatArray, active: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return the directions in which curves of orbits may pass through one, and their shares of the parameter.
+
+    The null vectors of the Jacobian with the parameter's column, shapes (k, N, m) and (k,): one where the curve
+    has a unique direction.
+    """
+    _, _, c, _ = jacobian_blocks(system, joints, vector)
+    full = np.hstack([assembled(system, joints, vector), c[:, :, active].reshape(-1, 1)])
+    _, size, right = np.linalg.svd(full)
+    rank = int(np.sum(size > _NULL * size[0]))
+    found = right[rank:]
+    return found[:, :-1].reshape(len(found), *joints.shape), found[:, -1]
 
 
 def pencil_of_turn(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:

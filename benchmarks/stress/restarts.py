@@ -1,0 +1,153 @@
+"""Random diagrams in all five parameters, explored again from up to six of their branches.
+
+``python benchmarks/stress/restarts.py --count 3000 --seed 1 --out restarts.json``
+
+Each restart has 0.31 times the step. What differs is counted by class. The classes that are excused are fixed here, each by a test on
+the events of the diagram; everything else is a fault. Points are asked for admissibility, and sums of indices are tested.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from report import Report, Tally, command_line
+from scenes import time_limit
+
+import contfric as cf
+from contfric.atlas.verification import Verification
+
+WHAT = "Diagrams of random scenes in all five parameters, explored again from up to six of their branches."
+#: Longest that one scene may take with its restarts (s); longer ones are counted as cut.
+LIMIT = 60.0
+#: Most branches of a diagram; those with more are counted as cut.
+MOST_BRANCHES = 60
+#: Restarts a scene.
+RESTARTS = 6
+#: S0 and S this near (relative) are equal: conditions degenerate together.
+EQUAL = 1e-6
+#: Omega this near to 1/(2 n) with this little damping: slides that last whole natural periods, continua.
+RESONANT, UNDAMPED = 1e-6, 1e-6
+
+Progress = Callable[[str], None] | None
+VARIED = ("Omega", "S", "S0", "h", "zeta")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Parameters, what varies, and its range."""
+
+    params: dict[str, float]
+    vary: str
+    range: tuple[float, float]
+
+
+def scene(seed: int, index: int) -> Scene:
+    """Return a random scene; special values (S = S0, Omega = 1/2 or 1/3, no damping) are drawn on purpose."""
+    rng = np.random.default_rng([seed, index])
+    omega = float(np.exp(rng.uniform(np.log(0.07), np.log(1.5))))
+    if rng.random() < 0.05:
+        omega = float(rng.choice([0.5, 1.0 / 3.0, 0.25]))
+    top = float(np.exp(rng.uniform(np.log(0.02), np.log(1.1))))
+    share = 1.0 if rng.random() < 0.03 else rng.uniform(0.1, 1.0)
+    h = 0.0 if rng.random() < 0.4 else float(rng.uniform(-0.5, 0.5))
+    zeta = float(rng.choice([0.0, 1e-9, 10.0 ** rng.uniform(-8, -1), rng.uniform(0.0, 0.1)]))
+    params = {"Omega": omega, "S": share * top, "S0": top, "h": h, "zeta": zeta}
+    vary = str(rng.choice(VARIED))
+    size = {"Omega": omega, "S": params["S"], "S0": top, "h": 1.0, "zeta": 0.5}[vary]
+    low, high = (float(rng.uniform(0.03, 0.15)) * size for _ in range(2))
+    return Scene(params, vary, (params[vary] - low, params[vary] + high))
+
+
+def excuse(found: Scene, diagram: cf.Diagram) -> str:
+    """Return the degenerate class of a diagram; nothing if it has none. Fixed before any scene is run."""
+    low, high = found.range
+    p = found.params
+    if found.vary in ("S", "S0"):
+        other = p["S0"] if found.vary == "S" else p["S"]
+        if low - EQUAL <= other <= high + EQUAL and abs(p["S"] - p["S0"]) < EQUAL:
+            return "S = S0"
+    elif abs(p["S"] - p["S0"]) < EQUAL * p["S0"]:
+        return "S = S0"
+    inverse = 1.0 / (2.0 * p["Omega"])
+    nearest = round(inverse)
+    resonant = nearest > 0 and abs(inverse - nearest) < RESONANT * nearest
+    if resonant and found.vary != "Omega" and (abs(p["zeta"]) < UNDAMPED or found.vary == "zeta"):
+        return "Omega = 1/(2 n) without damping: a continuum"
+    width, values = high - low, [b for b in diagram.bifurcations if b.kind.value != "T"]
+    for a, b in pairwise(values):
+        gap = abs(a.params[found.vary] - b.params[found.vary])
+        if gap <= (a.accuracy + b.accuracy) * width:
+            return "two events nearer than their accuracies"
+    return ""
+
+
+def run(count: int, seed: int, *, first: int = 0, progress: Progress = None) -> Report:
+    """Explore random scenes and restart them."""
+    began, tally = time.perf_counter(), Tally()
+    for index in range(first, first + count):
+        tally.index = index
+        start = time.perf_counter()
+        try:
+            with time_limit(LIMIT):
+                one_scene(tally, scene(seed, index))
+        except TimeoutError:
+            tally.met("cut: longer than the limit of a scene")
+        except (
+            Exception
+        ) as error:  # whatever it is, it is a failure of this scene and not of the run
+            tally.check("no exception", False, f"{scene(seed, index)}: {error!r}")
+        tally.largest("seconds of one scene", time.perf_counter() - start)
+        if progress is not None and index % 10 == 9:
+            progress(f"restarts: {index + 1 - first} of {count}, {len(tally.failed)} failures")
+    return tally.report("restarts", WHAT, count, seed, time.perf_counter() - began)
+
+
+def one_scene(tally: Tally, found: Scene) -> None:
+    """Explore one scene, ask its points, and verify it."""
+    try:
+        orbit = cf.find_orbit("coulomb", found.params, longest=1000)
+        diagram = cf.explore(orbit, found.vary, found.range, max_branches=MOST_BRANCHES)
+    except cf.ContfricError as error:
+        tally.met(f"no start: {type(error).__name__}")
+        return
+    if not diagram.complete:
+        tally.met("cut: more branches than asked for")
+        return
+    tally.met("scenes")
+    tally.met("branches", len(diagram.branches))
+    tally.met("events", len(diagram.events))
+    tally.met("loose ends", len(diagram.loose_ends))
+    name = excuse(found, diagram)
+    report(tally, found, diagram.verify(RESTARTS), name)
+    points = [orbit for branch in diagram.branches if not branch.mirrored for orbit in branch]
+    wrong = [orbit for orbit in points if not orbit.admissible]
+    tally.met("points asked for admissibility", len(points))
+    tally.check("all points admissible", not wrong, f"{found}: {len(wrong)} of {len(points)}")
+
+
+def report(tally: Tally, found: Scene, held: Verification, name: str) -> None:
+    """Count what a verification has found."""
+    for restart in held.restarts:
+        if not restart.complete:
+            tally.met("cut: a restart with more branches than asked for")
+            return
+    tally.met("restarts", len(held.restarts))
+    different = [str(r) for r in held.restarts if not r.same]
+    unbalanced = [str(b) for b in held.balances if not b.holds]
+    if name and (different or unbalanced):
+        tally.met(f"excused: {name}")
+        return
+    tally.check("the same from every branch", not different, f"{found}: {different}")
+    tally.met("balances", len(held.balances))
+    tally.check("indices balance at every event", not unbalanced, f"{found}: {unbalanced}")
+    missing = [s for s in held.sums if not s.holds]
+    tally.met("sums of indices", len(held.sums))
+    tally.met("sums that tell of another component", len(missing))
+
+
+if __name__ == "__main__":
+    command_line(run, count=60)

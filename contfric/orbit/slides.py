@@ -1,0 +1,116 @@
+"""The slides of a motion: what it is, whatever word it is solved with.
+
+A motion at an event solves several words. They differ by segments of no length, and by touches of rest inside of
+a slide. The slides of some length, joined over such touches, are the same for all of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
+
+#: Parts of a cycle that agree to this (nondimensional) are the same motion: the root of rounding.
+SAME_MOTION = 1e-5
+
+
+def slides_of(orbit: Orbit) -> list[int]:
+    """Return the segments with which slides of some length begin, joined over a touch of rest.
+
+    Segments of rest are left out, and those of no length; a segment that goes on in the mode and from
+    the state in which the one before it ended is a part of that.
+    """
+    sliding = {mode.name for mode in orbit.model.modes if mode.sliding}
+    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    some = [i for i in range(len(orbit.word)) if lasts[i] > SAME_MOTION]
+    found = []
+    for k, i in enumerate(some):
+        before, mode = some[k - 1], orbit.word[i][0]
+        gap = np.abs(orbit.begins[i, 1:] - orbit.ends[before, 1:])
+        goes_on = orbit.word[before][0] == mode and np.max(gap) < SAME_MOTION and len(some) > 1
+        if mode not in sliding and not goes_on:
+            found.append(i)
+    return found or [i for i in some if orbit.word[i][0] not in sliding] or [0]
+
+
+def repeats(orbit: Orbit, slides: list[int], turns: int, mirrored: bool = False) -> bool:
+    """Tell whether the slides repeat themselves (or as symmetry images) after a part of the period."""
+    if turns == 1:
+        return True
+    count, rest = divmod(len(slides), turns)
+    symmetry = orbit.model.symmetry
+    if rest or (mirrored and symmetry is None):
+        return False
+    starts = orbit.cycle[slides]
+    ahead = np.roll(starts, -count, axis=0)
+    ahead[len(starts) - count :, 0] += orbit.period
+    ahead[:, 0] -= orbit.period / turns
+    if mirrored:
+        assert symmetry is not None
+        ahead[:, 1:] = ahead[:, 1:] @ symmetry.array().T
+    return bool(np.max(np.abs(ahead - starts)) < SAME_MOTION)
+
+
+def repetitions(orbit: Orbit, slides: list[int]) -> int:
+    """Return how often the motion of a whole orbit repeats itself in its period."""
+    found = (
+        k
+        for k in range(orbit.periods, 0, -1)
+        if orbit.periods % k == 0 and repeats(orbit, slides, k)
+    )
+    return next(found)
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """The starts of the slides of a motion, over its shortest period.
+
+    Attributes
+    ----------
+    periods : shortest period, in periods of the excitation
+    cycle : period of the excitation; infinite without one
+    starts : ndarray, shape (k, 1 + n)
+        Time and state at the start of each slide; times are those of the excitation, zero without one.
+    images : ndarray, shape (k, 1 + n)
+        The same for the symmetry image; ``starts`` if the model has no symmetry.
+    """
+
+    periods: int
+    cycle: float
+    starts: FloatArray
+    images: FloatArray
+
+    def apart(self, other: Outline) -> float:
+        """Return how far two motions are apart, up to symmetry; infinite if they are of another kind."""
+        if self.periods != other.periods or len(self.starts) != len(other.starts):
+            return np.inf
+        return min(_apart(self.starts, there, self.cycle) for there in (other.starts, other.images))
+
+
+def outline_of(orbit: Orbit) -> Outline:
+    """Return the outline of an orbit."""
+    whole, model = orbit.as_whole(), orbit.model
+    slides = slides_of(whole)
+    turns = repetitions(whole, slides)
+    starts = np.array(whole.cycle[slides[: len(slides) // turns]])
+    cycle = np.inf if model.autonomous else whole.period / whole.periods
+    starts[:, 0] = 0.0 if model.autonomous else starts[:, 0] % cycle
+    images = starts
+    if model.symmetry is not None:
+        images = starts.copy()
+        images[:, 1:] = starts[:, 1:] @ model.symmetry.array().T
+        if not model.autonomous:
+            images[:, 0] += model.symmetry.fraction * cycle
+    return Outline(whole.periods // turns, cycle, starts, images)
+
+
+def _apart(one: FloatArray, other: FloatArray, cycle: float) -> float:
+    """Return the Hausdorff distance of two sets of joints, times modulo a cycle."""
+    gaps = np.abs(one[:, None, :] - other[None, :, :])
+    if np.isfinite(cycle):
+        gaps[:, :, 0] = np.abs((gaps[:, :, 0] + 0.5 * cycle) % cycle - 0.5 * cycle)
+    distance = np.max(gaps, axis=2)
+    return float(max(distance.min(axis=0).max(), distance.min(axis=1).max()))
