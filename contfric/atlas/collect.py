@@ -5,9 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from contfric.atlas.diagram import Asked, Diagram, LooseEnd, Node
-from contfric.atlas.matching import same_event, telling_kind
+from contfric.atlas.matching import same_event, same_place, telling_kind
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation, End, EndReason, Kind, Proposal, Verdict
+from contfric.continuation.events import (
+    TERMINAL,
+    Bifurcation,
+    End,
+    EndReason,
+    Kind,
+    Proposal,
+    Verdict,
+)
 from contfric.continuation.points import Settings
 from contfric.models.definition import Model
 
@@ -65,6 +73,7 @@ def collect(
         if not branch.symmetric and model.symmetry is not None:
             image[i] = len(branches)
             branches.append(branch.mirror())
+    events = [event for event in events if not _is_relabelling_at_end(event, events, settings)]
     nodes = [node for event in events for node in _nodes(event, place, image)]
     loose = [
         LooseEnd(place[i], side, _not_followed(end) if end.reason in _FOLLOWED else end)
@@ -82,6 +91,19 @@ def collect(
         complete,
         notes,
         asked,
+    )
+
+
+def _is_relabelling_at_end(event: Event, events: list[Event], settings: Settings) -> bool:
+    """Tell whether an event is a tangency that happens at a sliding event: a part of that.
+
+    Which branch has it before its end is rounding: the labels of the ends of a segment of no length are arbitrary.
+    """
+    b = event.bifurcation
+    return b.kind is Kind.T and any(
+        other.bifurcation.kind in TERMINAL
+        and same_place(other.bifurcation, b, settings.parameter, settings.width)
+        for other in events
     )
 
 

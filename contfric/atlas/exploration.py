@@ -22,6 +22,11 @@ _PASSED = frozenset({Kind.SN, Kind.T, Kind.NS})
 _SAME_PLACE, _SAME_STOPS = 1e-8, 1e-6
 
 
+def _may_cross(bifurcation: Bifurcation) -> bool:
+    """Tell whether other families may pass a fold: those of several holds."""
+    return bifurcation.kind is Kind.SN and len(bifurcation.orbit.as_whole().system.holds) > 1
+
+
 @dataclass(eq=False)
 class Exploration:
     """State of one exploration."""
@@ -85,7 +90,7 @@ class Exploration:
         if not bifurcation.located:
             why = "not located: Newton fails behind this point"
             self.judge(event, "go on behind the event", Verdict.REFUSED, why=why)
-        elif bifurcation.kind not in _PASSED:
+        elif bifurcation.kind not in _PASSED or _may_cross(bifurcation):
             self.waiting.append(event)
 
     def merge(self, event: Event, end: End) -> None:

@@ -34,6 +34,7 @@ from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import NEARER, leaps, leave_branch_point, settings_value
 from contfric.continuation.trace import continue_orbit, trace_side
+from contfric.continuation.vertices import symmetrised
 from contfric.continuation.walked import walked
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import null_space
@@ -49,6 +50,8 @@ _SHARES = (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6)
 #: Null vectors where two curves may cross, and the directions between them that are tried: the corrector
 #: reaches a curve from 30 degrees beside it.
 _PLANE, _ANGLES = 2, 12
+#: An orbit this much (of its distance from a symmetric one) off its own symmetry image is asymmetric.
+_ODD = 0.1
 #: A branch that gets no farther than this (arclength) from the event it starts at has left it in the
 #: direction in which it is not admissible.
 _NOWHERE = 1e-7
@@ -70,6 +73,64 @@ def follow(state: Exploration, event: Event) -> None:
         _follow_branch_point(state, event)
     elif kind is Kind.PD:
         _follow_doubling(state, event)
+    elif kind is Kind.SN:
+        _follow_fold(state, event)
+
+
+def _follow_fold(state: Exploration, event: Event) -> None:
+    """Try the families that cross a symmetric bridge where it turns.
+
+    A hold has an effect that is stationary in its length: there each of two symmetric holds may be shorter
+    or longer, so that the bridge with one of either passes the same motion, and turns there as well.
+    """
+    orbit = event.bifurcation.orbit
+    half = orbit if orbit.system.half else symmetrised(orbit)
+    if half is None:
+        return
+    _try_crossing(
+        state, event, half.as_whole(), "the asymmetric branch with one hold of either length"
+    )
+    if not any(state.branches[i].system.half for i in event.branches):
+        _try_crossing(state, event, half, "the symmetric branch through the fold")
+
+
+def _try_crossing(state: Exploration, event: Event, orbit: Orbit, reason: str) -> None:
+    settings = settings_for(orbit, state.settings)
+    active = orbit.model.index_of(settings.parameter)
+    for distance in NEARER:
+        for direction in _plane_of(orbit, active):
+            moved = replace(orbit, joints=orbit.joints + distance * direction)
+            point = first_point(moved, settings, direction, 0.0)
+            if point is None:
+                continue
+            there = point.orbit(orbit.system, orbit.vector, active)
+            off = there.mirror_distance > _ODD * distance
+            if not there.admissible or off is orbit.system.half:
+                continue
+            if (known := state.known(there)) is not None:
+                state.judge(event, reason, Verdict.KNOWN, known)
+                return
+            branch = continue_orbit(
+                there,
+                settings.parameter,
+                (settings.low, settings.high),
+                max_step=settings.largest,
+                stability=False,
+                max_points=settings.most_points,
+            )
+            state.judge(event, reason, Verdict.ACCEPTED, len(state.branches))
+            state.add_from(branch, event)
+            return
+
+
+def _plane_of(orbit: Orbit, active: int) -> Iterator[FloatArray]:
+    """Yield directions in the plane of two null vectors; none where the curve has a unique direction."""
+    vectors, _ = null_space(orbit.system, orbit.joints, orbit.vector, active)
+    if len(vectors) != _PLANE:
+        return
+    for angle in np.arange(_ANGLES) * (2.0 * np.pi / _ANGLES):
+        away = np.cos(angle) * vectors[0] + np.sin(angle) * vectors[1]
+        yield away / np.max(np.abs(away))
 
 
 # -------------------------------------------------------------------------- sliding events
@@ -243,13 +304,8 @@ def _leave_singular(
 
     Its directions lie in the plane of two null vectors; those at regular angles are tried.
     """
-    active = orbit.model.index_of(settings.parameter)
-    vectors, _ = null_space(orbit.system, orbit.joints, orbit.vector, active)
-    if len(vectors) != _PLANE:
-        return None
-    for angle in np.arange(_ANGLES) * (2.0 * np.pi / _ANGLES):
-        away = np.cos(angle) * vectors[0] + np.sin(angle) * vectors[1]
-        branch = _leave_beside(state, orbit, away / np.max(np.abs(away)), event, settings)
+    for away in _plane_of(orbit, orbit.model.index_of(settings.parameter)):
+        branch = _leave_beside(state, orbit, away, event, settings)
         if branch is not None and branch.arc[-1] > _SURELY_AWAY:
             return branch
     return None

@@ -2,7 +2,7 @@
 
 * **Restart.** Explored again from any of its branches, with another step, a diagram has the same events and branches.
 * **Balance.** At every event, for every number of periods, the indices of the families below and above it have the same sum
-  (:mod:`contfric.atlas.index`).
+  (:mod:`contfric.orbit.index`).
 * **Sum.** At every parameter value the indices of all orbits of one period have the sum that the motion at large amplitudes
   gives. Where they have not, something is not in the diagram: another component, which seeds or a census find.
 """
@@ -11,16 +11,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.atlas.index import index_at_infinity, index_of
 from contfric.atlas.matching import on_branch, same_event, same_place
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.incident import unit_of
 from contfric.continuation.points import LARGEST_STEP
+from contfric.orbit.index import index_at_infinity, index_of
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
 
@@ -341,7 +342,7 @@ def index_sums(diagram: Diagram) -> Iterator[IndexSum]:
     low, high = _covered(diagram)
     places = sorted({low, high, *(b.params[diagram.parameter] for b in diagram.bifurcations)})
     width = diagram.range[1] - diagram.range[0]
-    for a, b in zip(places[:-1], places[1:], strict=True):
+    for a, b in pairwise(places):
         if b - a < _APART * width:
             continue
         for share in _SHARES:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation, End
+from contfric.continuation.openings import with_openings
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
 from contfric.orbit.orbit import Orbit
@@ -70,7 +71,7 @@ def _branch(
         *([events[1]] if events[1] is not None else []),
     )
     columns = _joined(behind, ahead, origin)
-    return Branch(
+    branch = Branch(
         orbit.system,
         settings.parameter,
         orbit.vector,
@@ -82,6 +83,7 @@ def _branch(
         listed,
         ends,
     )
+    return with_openings(branch, settings.width)
 
 
 def _joined(behind: Side | None, ahead: Side, origin: Point | None) -> dict[str, NDArray[Any]]:

@@ -17,7 +17,6 @@ import numpy as np
 from contfric.continuation.conditions import Relation, possible, relation_of
 from contfric.continuation.events import Bifurcation
 from contfric.continuation.incident import (
-    SAME_MOTION,
     Form,
     Incident,
     Unit,
@@ -31,6 +30,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.linear import tangent_of
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.slides import SAME_MOTION
 from contfric.orbit.system import build_system
 from contfric.orbit.words import half_of
 

@@ -93,7 +93,7 @@ def relation_of(unit: Unit, form: Form, active: int, least: float) -> Relation |
         along = free @ on_inner
         bent = np.flatnonzero(np.abs(along) > _NULL * (1.0 + np.max(np.abs(on_inner), initial=0.0)))
         if bent.size:  # it is of the order of a freedom, which it gives its sign
-            for k in bent:
+            for k in map(int, bent):
                 free[k] *= np.copysign(1.0, along[k]) if not signed[k] else 1.0
                 signed[k] = 1.0
             continue

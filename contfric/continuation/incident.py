@@ -24,6 +24,7 @@ import numpy as np
 
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind, kind_of_margin
 from contfric.continuation.outcomes import (
+    NO_LENGTH_AT_TOUCH,
     Outcome,
     RestsForEver,
     normal_place,
@@ -35,7 +36,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.slides import SAME_MOTION, repeats, repetitions, slides_of
-from contfric.orbit.system import Test, Word, build_system, mirror_mode
+from contfric.orbit.system import Margin, Test, Word, build_system, mirror_mode
 from contfric.orbit.words import mirror_pairs
 from contfric.signature.edits import apply_edit, edited_pieces
 
@@ -244,12 +245,12 @@ class _Collection:
     ) -> None:
         """Add the forms that follow from the outcomes at places of an orbit."""
         for place, kind in places:
+            self.kinds.add(kind)
             try:
                 outcome = outcome_at(orbit, place, kind)
                 edited, moves = edited_whole(orbit, [outcome], away)
                 text = "; ".join(filter(None, (reason, outcome.reason)))
                 self.take(edited, moves, text)
-                self.kinds.add(kind)
             except NotationError as error:
                 rest = isinstance(error, RestsForEver)
                 text = f"change at segment {place.segment + 1}"
@@ -267,7 +268,21 @@ def vanishing(orbit: Orbit, least: float) -> list[tuple[Test, Kind]]:
         kind = kind_of_margin(orbit.system, test, orbit)
         if kind is not Kind.T:
             found.setdefault(normal_place(test, orbit), kind)
+    for place in _vanished(orbit):
+        found.setdefault(place, Kind.GS)
     return list(found.items())
+
+
+def _vanished(orbit: Orbit) -> Iterator[Test]:
+    """Yield the holds at a touch of rest that are too short to be told from none.
+
+    Their margins do not show it: they are of the order of the length, and its square is what is located.
+    """
+    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    for hold in orbit.system.holds:
+        touches = hold.pin is None and not hold.after_rest
+        if touches and lasts[hold.segment] < NO_LENGTH_AT_TOUCH:
+            yield Test(Margin.EXIT, hold.segment, hold.leaves)
 
 
 def edited_whole(

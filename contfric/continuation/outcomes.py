@@ -48,6 +48,9 @@ from contfric.signature.holds import TOUCH, hold_at, is_hold, release_mode
 
 #: A hold this short has no length: an event is located to about 1e-12, at a tangency to its root.
 NO_LENGTH = 1e-6
+#: The same for a hold at a touch of rest, which is left with an acceleration that grows from zero: what it does
+#: to the orbit is the square of its length, so that it is located to the root.
+NO_LENGTH_AT_TOUCH = 1e-4
 #: Rest that is left with less than this acceleration, or lies nearer than this to the boundary of its
 #: region (nondimensional), has no jump: far above rounding, far below any difference of two limits.
 NO_JUMP = 1e-9
@@ -261,7 +264,8 @@ def _hold_ends(orbit: Orbit, place: Test) -> Outcome:
     before, behind = h - 1, (h + 1) % len(word)
     after_rest = orbit.model.mode_by_name[word[before][0]].sliding
     at_touch = word[h][1] == TOUCH
-    if orbit.ends[h, 0] - orbit.cycle[h, 0] < NO_LENGTH:
+    no_length = NO_LENGTH_AT_TOUCH if at_touch and not after_rest else NO_LENGTH
+    if orbit.ends[h, 0] - orbit.cycle[h, 0] < no_length:
         reason = f"hold {h + 1} vanishes"
         if at_touch and not after_rest:  # the slide goes on
             fused = Edit(frozenset({h, behind}), {before % len(word): word[behind][1]})

@@ -67,7 +67,7 @@ def count(letters: int, length: int) -> int:
     >>> [count(2, n) for n in range(1, 9)]
     [2, 1, 2, 3, 6, 9, 18, 30]
     """
-    total = letters**length
+    total = int(letters**length)
     for part in range(1, length):
         if length % part == 0:
             total -= part * count(letters, part)

@@ -25,6 +25,8 @@ SAME_PLACE = 1e-7
 #: A parameter that changes this slowly along a branch, in units of arclength, is constant: the orbits are
 #: a continuum at one value, and the sign of the slope is rounding.
 _VERTICAL = 1e-3
+#: A parameter is solved for to this (relative to 1).
+_ROUNDING = 1e-13
 #: A multiplier of a continuum is 1 to the root of rounding and a little.
 _MARGINAL = 1e-5
 #: A fold has a multiplier 1, located to far better than this.
@@ -75,7 +77,7 @@ def smooth_events(
         if column == FOLD:
             folded = True
             vertex = _fold(orbit, before, beyond, point, settings)
-            vertical = _is_vertical(before, after, settings) or _is_idle(
+            vertical = _is_vertical(before, after, settings, point) or _is_idle(
                 orbit, before, point, after, settings
             )
             if vertex[0].kind is not Kind.SN or not vertical:
@@ -117,16 +119,23 @@ def vertex_at(orbit: Orbit, point: Point, settings: Settings) -> Bifurcation | N
     return None if found.kind is Kind.SN else found
 
 
-def _is_vertical(before: Point, after: Point, settings: Settings) -> bool:
+def _is_vertical(
+    before: Point, after: Point, settings: Settings, between: Point | None = None
+) -> bool:
     """Tell whether the parameter is constant over a step: the sign of its slope is rounding.
 
-    At a fold the multiplier passes 1 as fast as the parameter turns; on a continuum it is 1.
+    At a fold the multiplier passes 1 as fast as the parameter turns; on a continuum it is 1. Without multipliers
+    (on a bridge) a parameter that is beyond that of the fold on neither side, by more than rounding, turns.
     """
     slopes = max(abs(before.slope), abs(after.slope))
     if slopes > _VERTICAL or abs(after.value - before.value) > _CONSTANT * settings.width:
         return False
     if not settings.stability:
-        return True
+        if between is None:
+            return True
+        gaps = [side.value - between.value for side in (before, after)]
+        least = _ROUNDING * (1.0 + abs(between.value))
+        return not (gaps[0] * gaps[1] > 0.0 and min(map(abs, gaps)) > least)
     return all(float(np.min(np.abs(point.mu - 1.0))) < _MARGINAL for point in (before, after))
 
 

@@ -40,11 +40,11 @@ _HALVINGS = 40
 
 def symmetric_part(orbit: Orbit, active: int) -> Orbit | None:
     """Return the symmetric orbit that an orbit has come to, solved on its half; None if far."""
-    part = _symmetrised(orbit)
+    part = symmetrised(orbit)
     return None if part is None else _vertex(part, active)
 
 
-def _symmetrised(orbit: Orbit) -> Orbit | None:
+def symmetrised(orbit: Orbit) -> Orbit | None:
     """Return the symmetric part of an orbit, not solved; None if it is far from its mirror image."""
     system = orbit.system
     half = None if system.half else half_of(orbit.model, system.word, system.periods)
@@ -69,7 +69,7 @@ def left_at(before: Point, after: Orbit, active: int) -> Point | None:
     passes -1. For vertices with a sharp tip, where orbits become symmetric too fast to be met by shorter
     steps: beside a touch of a kink multipliers change with the root of the parameter.
     """
-    part = _symmetrised(after)
+    part = symmetrised(after)
     if part is None:
         return None
     low, high = (_moved(part, active, w) for w in (before.value, float(after.vector[active])))
@@ -198,6 +198,12 @@ def opens_through(orbit: Orbit, active: int) -> bool:
     offset = _BESIDE * (1.0 + abs(value))
     sides = [_opening(_moved(orbit, active, value + s * offset)) for s in (-1.0, 1.0)]
     return sides[0] * sides[1] < 0.0
+
+
+def refined_opening(orbit: Orbit, active: int) -> Orbit | None:
+    """Return the orbit next to one at which a disturbance opens that changes sign after a turn; None if far."""
+    found = _refined(orbit, active)
+    return found if found.converged and abs(_opening(found)) < _EVEN else None
 
 
 def _refined(orbit: Orbit, active: int) -> Orbit:

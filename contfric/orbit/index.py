@@ -1,23 +1,28 @@
 """The fixed-point index of orbits, regular and held: what must balance at every event, and in the whole.
 
-The return map of an oscillator with S0 > S jumps. Its image at a jump is filled with the arc of all outcomes, from "leaves at
-once" to "held until the regular release". The filled map is upper semicontinuous with acyclic values, so the fixed-point index
-is defined for it, is additive, and does not change with the parameter while no fixed point passes the boundary (L. Gorniewicz,
-Topological Fixed Point Theory of Multivalued Mappings, Springer 2006, chapters 8 and 9).
+The return map of an oscillator with S0 > S jumps. Its image at a jump is filled with the arc of all
+outcomes, from "leaves at once" to "held until the regular release". The filled map is upper semicontinuous
+with acyclic values, so the fixed-point index is defined for it, is additive, and does not change with the
+parameter while no fixed point passes the boundary (L. Gorniewicz, Topological Fixed Point Theory of
+Multivalued Mappings, Springer 2006, chapters 8 and 9).
 
 * A regular orbit has the index ``sign det(I - M)``, M the derivative of its return map.
-* An orbit with k holds: let the hold times be steep functions ``tau_i = kappa g_i`` of the pins, g_i increasing from "leaves"
-  to "held". That map is continuous, and its index for kappa to infinity is
+* An orbit with k holds: let the hold times be steep functions ``tau_i = kappa g_i`` of the pins, g_i
+  increasing from "leaves" to "held". That map is continuous, and its index for kappa to infinity is
 
       sign det [[I - R_z, R_tau], [g_z, -g_tau]],
 
-  R(z, tau) the return with hold times tau, g(z, tau) the pins (g_tau is strictly lower triangular: a pin depends on earlier
-  holds only). It follows from ``det [[I - R_z, -R_tau], [-kappa g_z, I - kappa g_tau]]``, whose leading power of kappa it is.
-  There is no further sign for k > 1.
+  R(z, tau) the return with hold times tau, g(z, tau) the pins (g_tau is strictly lower triangular: a pin
+  depends on earlier holds only). It follows from ``det [[I - R_z, -R_tau], [-kappa g_z, I - kappa g_tau]]``,
+  whose leading power of kappa it is. There is no further sign for k > 1.
 
-So at an event, for every number of periods, the sum over the families that live below it equals the sum over those above it;
-and where the motion at large amplitudes is linear, ``y' = A y + bounded``, the sum over all orbits of one period is
-``sign det(I - exp(A T))``, as I - P is I - exp(A T) up to something bounded.
+So at an event, for every number of periods, the sum over the families below it equals the sum over those
+above it; and where the motion at large amplitudes is linear, ``y' = A y + bounded``, the sum over all orbits
+of one period is ``sign det(I - exp(A T))``, as I - P is I - exp(A T) up to something bounded.
+
+With ``I + M`` in the place of ``I - M`` the determinant changes sign where a disturbance that changes sign
+after a turn solves the equations: the branch point of a symmetric orbit solved on its half, a period doubling
+of others (:func:`opening_sign`). Other than a multiplier it is defined with holds, too.
 """
 
 from __future__ import annotations
@@ -48,29 +53,40 @@ def index_of(orbit: Orbit, times: int = 1) -> int | None:
     Examples
     --------
     >>> import contfric as cf
-    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
-    >>> index_of(orbit), index_of(cf.solve_orbit("coulomb", "2s", {"Omega": 0.5, "S": 0.32, "S0": 0.4}))
+    >>> params = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
+    >>> index_of(cf.find_orbit("coulomb", params)), index_of(cf.solve_orbit("coulomb", "2s", params))
     (1, -1)
     """
-    whole = orbit.as_whole()
-    system, m = whole.system, whole.joints.shape[1]
-    if whole.model.autonomous:
-        return None
-    a, b, _, _ = jacobian_blocks(system, whole.joints, whole.vector)
+    return None if orbit.model.autonomous else _turn_sign(orbit.as_whole(), times, 1.0)
+
+
+def opening_sign(orbit: Orbit) -> int | None:
+    """Return what changes sign where a disturbance that changes sign after one turn solves the equations."""
+    return None if orbit.model.autonomous else _turn_sign(orbit, 1, -1.0)
+
+
+def _turn_sign(orbit: Orbit, times: int, sign: float) -> int | None:
+    system, m = orbit.system, orbit.joints.shape[1]
+    a, b, _, close = jacobian_blocks(system, orbit.joints, orbit.vector)
     pins = _pins(system, a, b)
     holds = len(pins)
-    moved, rows = np.eye(m, m + holds * times), np.zeros((holds * times, m + holds * times))
+    moved: FloatArray = np.eye(m, m + holds * times)
+    rows = np.zeros((holds * times, m + holds * times))
     for turn in range(times):
         for i in range(system.segments):
             before, right = moved, -a[i] @ moved
             if i in pins:
                 right[-1, m + turn * holds + pins[i].number] += 1.0
-            moved = np.linalg.solve(b[i], right)
+            try:
+                moved = np.linalg.solve(b[i], right)
+            except np.linalg.LinAlgError:  # an exit is tangential
+                return None
             for pin in pins.values():
                 if pin.segment == i:
                     rows[turn * holds + pin.number] = pin.on_start @ before + pin.on_end @ moved
-    full = np.block([[np.eye(m) - moved[:, :m], moved[:, m:]], [rows[:, :m], -rows[:, m:]]])
-    return _sign(full)
+        moved = np.linalg.solve(close, moved)
+    left = np.eye(m) - sign * moved[:, :m]
+    return _sign(np.block([[left, sign * moved[:, m:]], [rows[:, :m], -rows[:, m:]]]))
 
 
 @dataclass(frozen=True, eq=False)
