@@ -41,6 +41,7 @@ from contfric.orbit.linear import null_space
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish
+from contfric.orbit.system import Word
 from contfric.signature.edits import show
 
 #: First step away from an event, in largest steps: the new word is proved close to it.
@@ -110,17 +111,33 @@ def _try_crossing(state: Exploration, event: Event, orbit: Orbit, reason: str) -
             if (known := state.known(there)) is not None:
                 state.judge(event, reason, Verdict.KNOWN, known)
                 return
-            branch = continue_orbit(
-                there,
-                settings.parameter,
-                (settings.low, settings.high),
-                max_step=settings.largest,
-                stability=False,
-                max_points=settings.most_points,
-            )
-            state.judge(event, reason, Verdict.ACCEPTED, len(state.branches))
-            state.add_from(branch, event)
+            _add_crossing(state, event, orbit, point, reason)
             return
+
+
+def _add_crossing(
+    state: Exploration, event: Event, orbit: Orbit, point: Point, reason: str
+) -> None:
+    """Trace a family that crosses a fold: both ways, or to one side of it where the other is its image."""
+    settings = settings_for(orbit, state.settings)
+    active = orbit.model.index_of(settings.parameter)
+    if orbit.system.half:
+        there = point.orbit(orbit.system, orbit.vector, active)
+        bounds = settings.low, settings.high
+        most, largest = settings.most_points, settings.largest
+        branch = continue_orbit(
+            there, settings.parameter, bounds, max_step=largest, stability=False, max_points=most
+        )
+    else:
+        if float(np.sum((point.joints - orbit.joints) * point.tangent)) < 0.0:
+            point = point.reversed()
+        origin = replace(point, joints=orbit.joints, value=settings_value(orbit, settings), arc=0.0)
+        point.arc = float(np.linalg.norm(point.joints - orbit.joints)) / len(orbit.joints) ** 0.5
+        side = trace_side(orbit, point, settings, progress=state.progress)
+        first = _first_end(EndReason.BP, event, side, settings)
+        branch = assemble(orbit, settings, side, first, origin)
+    state.judge(event, reason, Verdict.ACCEPTED, len(state.branches))
+    state.add_from(branch, event)
 
 
 def _plane_of(orbit: Orbit, active: int) -> Iterator[FloatArray]:
@@ -145,10 +162,13 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
     )  # else nothing rests
     for wide in (False, True) if edits else ():
         incident = incident_forms(event.bifurcation, wide)
-        event.kinds |= incident.kinds
+        words: set[Word] = set()
         for candidate in sequences_of(incident, active, state.max_periods, state.bridges):
             jumps = jumps or candidate.has_hold
             accepted = _judge(state, event, candidate) or accepted
+            if event.proposals and event.proposals[-1].verdict is not Verdict.REFUSED:
+                words |= candidate.words
+        event.kinds |= {n.kind for n in incident.names if n.before & words and n.after & words}
         if accepted:
             return
     if not jumps:  # else motions beside the event are not near what follows it

@@ -19,7 +19,7 @@ SAME_MOTION = 1e-4
 #: Orbits solved at the same parameter are one if their stops agree to this.
 _SAME_ORBIT = 1e-8
 #: Names of one and the same sliding event, those that say more first.
-_TELLING = {kind: rank for rank, kind in enumerate((Kind.GS, Kind.AS, Kind.SS, Kind.CS))}
+_TELLING = {kind: rank for rank, kind in enumerate((Kind.GS, Kind.AS, Kind.SS, Kind.CS, Kind.BP))}
 
 
 def identity(orbit: Orbit) -> frozenset[ReducedWord]:
@@ -74,9 +74,12 @@ def same_kind(a: Bifurcation, b: Bifurcation) -> bool:
     """Tell whether two events may be one by what branches call them.
 
     What is a grazing for one word may be a stop at the boundary of rest for another: the sliding events are
-    compared by their motions alone.
+    compared by their motions alone. A symmetric bridge may turn where an asymmetric one leaves it.
     """
-    return a.kind is b.kind or (a.kind in TERMINAL and b.kind in TERMINAL)
+    if a.kind is b.kind or (a.kind in TERMINAL and b.kind in TERMINAL):
+        return True
+    held = bool(a.orbit.system.holds) and bool(b.orbit.system.holds)
+    return held and {a.kind, b.kind} == {Kind.SN, Kind.BP}
 
 
 def telling_kind(kinds: Iterable[Kind]) -> Kind:

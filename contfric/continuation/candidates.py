@@ -31,7 +31,7 @@ from contfric.orbit.clock import clocked
 from contfric.orbit.linear import tangent_of
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import SAME_MOTION
-from contfric.orbit.system import build_system
+from contfric.orbit.system import Word, build_system
 from contfric.orbit.words import half_of
 
 
@@ -46,6 +46,7 @@ class Candidate:
     refusal : why there is none
     away : how its joints move where it is singular at the event and has to start beside it; else None
     rest : whether there is none because nothing moves any more
+    words : of the units that it consists of
     """
 
     reason: str
@@ -53,6 +54,7 @@ class Candidate:
     refusal: str = ""
     away: FloatArray | None = None
     rest: bool = False
+    words: frozenset[Word] = frozenset()
 
     @property
     def has_hold(self) -> bool:
@@ -85,6 +87,8 @@ def sequences_of(
     if not held and any(form.has_hold for form in forms):
         yield Candidate("orbits with holds", None, "bridges are switched off")
         forms = tuple(form for form in forms if not form.has_hold)
+    if not forms:
+        return
     longest = lengths(unit.periods, unit.half, most_periods)
     relations = _relations(incident, forms, active) if longest[-1] > 1 else None
     for length in longest:
@@ -128,11 +132,12 @@ def _candidate(unit: Unit, forms: tuple[Form, ...], reason: str) -> Candidate:
         orbit, away = unit.orbit(forms)
     except NotationError as error:
         return Candidate(reason, None, str(error))
+    words = frozenset(form.word for form in forms)
     if not np.any(away):
-        return Candidate(reason, orbit)
+        return Candidate(reason, orbit, words=words)
     moves = np.zeros(orbit.joints.shape)
     moves[:, 0] = away
-    return Candidate(reason, orbit, away=moves)
+    return Candidate(reason, orbit, away=moves, words=words)
 
 
 def _reason(unit: Unit, forms: tuple[Form, ...], sequence: tuple[int, ...]) -> str:

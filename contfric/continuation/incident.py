@@ -144,17 +144,26 @@ class Refusal:
     rest: bool = False
 
 
+@dataclass(frozen=True)
+class Name:
+    """The kind of event that a step from some words of the unit to others is."""
+
+    kind: Kind
+    before: frozenset[Word]
+    after: frozenset[Word]
+
+
 @dataclass(frozen=True, eq=False)
 class Incident:
     """The unit of the motion at an event, its forms, and the outcomes that are none.
 
-    ``kinds`` are the names that the forms have for it; margins below ``least`` count as zero.
+    ``names`` say what the step from one form to another is called; margins below ``least`` count as zero.
     """
 
     unit: Unit
     forms: tuple[Form, ...]
     refusals: tuple[Refusal, ...]
-    kinds: frozenset[Kind]
+    names: tuple[Name, ...]
     least: float
     wide: bool = False
 
@@ -169,7 +178,12 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
     """
     orbit = bifurcation.orbit.as_whole()
     least = _NEARLY if wide or bifurcation.accuracy > ACCURACY else _VANISHES
-    collection = _started(orbit, unit_of(orbit), least)
+    unit = unit_of(orbit)
+    if not _moves(orbit):
+        return Incident(
+            unit, (), (Refusal("what moves", "nothing moves any more", True),), (), least
+        )
+    collection = _started(orbit, unit, least)
     unit = collection.unit
     places = [(place, bifurcation.kind) for place in places_of(bifurcation)]
     collection.edit(orbit, np.zeros(len(orbit.word)), "", places)
@@ -178,9 +192,19 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
         unit,
         tuple(collection.forms),
         tuple(collection.refusals),
-        frozenset(collection.kinds),
+        tuple(collection.names),
         least,
         wide,
+    )
+
+
+def _moves(orbit: Orbit) -> bool:
+    """Tell whether a motion has a slide of some length."""
+    sliding = {mode.name for mode in orbit.model.modes if mode.sliding}
+    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    return any(
+        mode not in sliding and last > SAME_MOTION
+        for (mode, _), last in zip(orbit.word, lasts, strict=True)
     )
 
 
@@ -208,22 +232,24 @@ class _Collection:
         self.least = least
         self.forms: list[Form] = []
         self.refusals: list[Refusal] = []
-        self.kinds: set[Kind] = set()
+        self.names: list[Name] = []
         self._waiting: deque[Form] = deque()
         self._words: set[Word] = set()
 
-    def take(self, orbit: Orbit, away: FloatArray, reason: str) -> None:
-        """Take the units of an orbit as forms."""
-        for form in pieces(orbit, away, self.unit, reason):
+    def take(self, orbit: Orbit, away: FloatArray, reason: str) -> frozenset[Word]:
+        """Take the units of an orbit as forms; return their words."""
+        taken = list(pieces(orbit, away, self.unit, reason))
+        for form in taken:
             if form.word in self._words:
                 continue
             if len(self.forms) >= _MOST_FORMS:
                 text = f"more than {_MOST_FORMS} words at once: the others are not tried"
                 self.refusals.append(Refusal("other outcomes", text))
-                return
+                break
             self._words.add(form.word)
             self.forms.append(form)
             self._waiting.append(form)
+        return frozenset(form.word for form in taken)
 
     def close(self) -> None:
         """Add what the outcomes at the places of every form make of it."""
@@ -244,13 +270,14 @@ class _Collection:
         self, orbit: Orbit, away: FloatArray, reason: str, places: list[tuple[Test, Kind]]
     ) -> None:
         """Add the forms that follow from the outcomes at places of an orbit."""
+        before = frozenset(form.word for form in pieces(orbit, away, self.unit))
         for place, kind in places:
-            self.kinds.add(kind)
             try:
                 outcome = outcome_at(orbit, place, kind)
                 edited, moves = edited_whole(orbit, [outcome], away)
                 text = "; ".join(filter(None, (reason, outcome.reason)))
-                self.take(edited, moves, text)
+                after = self.take(edited, moves, text)
+                self.names.append(Name(kind, before, after - before))
             except NotationError as error:
                 rest = isinstance(error, RestsForEver)
                 text = f"change at segment {place.segment + 1}"

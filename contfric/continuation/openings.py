@@ -36,7 +36,7 @@ def with_openings(branch: Branch, width: float) -> Branch:
     for k, (a, b) in enumerate(zip(signs[:-1], signs[1:], strict=True)):
         if a is not None and b is not None and a * b < 0:
             event = _located(branch, k, width)
-            if event is not None:
+            if event is not None and not _is_at_fold(branch, event, width):
                 found.append(event)
     if not found:
         return branch
@@ -58,6 +58,15 @@ def _located(branch: Branch, k: int, width: float) -> Bifurcation | None:
             position = float(branch.arc[k] + share * (branch.arc[k + 1] - branch.arc[k]))
             return Bifurcation(kind, there.params, there, (), position, False, False)
     return None
+
+
+def _is_at_fold(branch: Branch, event: Bifurcation, width: float) -> bool:
+    """Tell whether the branch turns there: what opens at a fold belongs to it."""
+    return any(
+        b.kind is Kind.SN
+        and abs(b.params[branch.parameter] - event.params[branch.parameter]) < b.accuracy * width
+        for b in branch.bifurcations
+    )
 
 
 def _share(branch: Branch, k: int, orbit: Orbit) -> float:

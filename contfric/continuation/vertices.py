@@ -15,7 +15,7 @@ from contfric.continuation.points import Point
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.linear import pencil_of_turn
-from contfric.orbit.orbit import Orbit
+from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import polish
 from contfric.orbit.system import System, build_system
 from contfric.orbit.words import half_of
@@ -164,6 +164,9 @@ def at_vertex(point: Point, simple: Orbit, active: int) -> Point:
 def _vertex(orbit: Orbit, active: int) -> Orbit | None:
     """Return the orbit solved if its turn has a multiplier -1, else None."""
     solved = polish(orbit, damped=False)
+    if not solved.converged and orbit.system.holds:  # the symmetric bridge turns there, too
+        solved = replace(orbit, status=Status.CONVERGED)
+        return solved if abs(_opening(solved)) < _OPENS else None
     if not solved.converged or not abs(_opening(solved)) < _OPENS:
         return None
     return _refined(solved, active)

@@ -78,13 +78,13 @@ def _turn_sign(orbit: Orbit, times: int, sign: float) -> int | None:
             if i in pins:
                 right[-1, m + turn * holds + pins[i].number] += 1.0
             try:
-                moved = np.linalg.solve(b[i], right)
+                moved = np.asarray(np.linalg.solve(b[i], right), dtype=np.float64)
             except np.linalg.LinAlgError:  # an exit is tangential
                 return None
             for pin in pins.values():
                 if pin.segment == i:
                     rows[turn * holds + pin.number] = pin.on_start @ before + pin.on_end @ moved
-        moved = np.linalg.solve(close, moved)
+        moved = np.asarray(np.linalg.solve(close, moved), dtype=np.float64)
     left = np.eye(m) - sign * moved[:, :m]
     return _sign(np.block([[left, sign * moved[:, m:]], [rows[:, :m], -rows[:, m:]]]))
 

@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import contfric as cf
-from contfric.continuation.candidates import shorter_orbits
+from contfric.continuation.incident import pieces, unit_of
 from contfric.continuation.vertices import passed_vertex
 from contfric.errors import NotationError
 from contfric.models import load_model
@@ -304,16 +304,18 @@ def test_tangent_of_is_the_direction_of_the_branch(index: int) -> None:
 
 
 @pytest.mark.parametrize("index", range(2))
-def test_shorter_orbits_of_a_doubled_one(index: int) -> None:
+def test_the_unit_of_a_doubled_orbit_is_that_of_the_orbit(index: int) -> None:
     branch = bridges()[index]
     orbit = branch[len(branch) // 2]
-    assert shorter_orbits(orbit.as_whole()) == []
-    copies = shorter_orbits(orbit.doubled())
-    assert len(copies) == 2
+    unit, doubled = unit_of(orbit.as_whole()), unit_of(orbit.doubled())
+    assert unit.periods == doubled.periods == orbit.periods
+    assert unit.half == doubled.half == orbit.symmetric
+    copies = list(pieces(orbit.doubled(), np.zeros(len(orbit.word) * 2), doubled))
+    assert len(copies) == (4 if orbit.symmetric else 2)
     for copy in copies:
-        assert copy.periods == orbit.periods
-        assert same(copy.word, orbit.word)
-        assert np.allclose(np.sort(copy.stops), np.sort(orbit.stops), rtol=0, atol=1e-12)
+        again = doubled.whole(copy)
+        assert same(again.word, orbit.word)
+        assert np.allclose(np.sort(again.stops), np.sort(orbit.stops), rtol=0, atol=1e-12)
 
 
 def test_passed_vertex_finds_the_step() -> None:

@@ -1,0 +1,167 @@
+"""A diagram does not depend on where it was started, and its indices balance.
+
+Random scenes in all five parameters (``benchmarks/stress/restarts.py`` draws them, and says which classes are degenerate),
+and the scenes whose diagrams once differed.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.continuation.conditions import possible, relation_of
+from contfric.continuation.incident import incident_forms
+from contfric.continuation.sequences import count, lengths, necklaces
+from contfric.orbit.index import index_at_infinity, index_of, opening_sign
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "stress"))
+import restarts
+from report import Tally
+
+#: Scenes of the share that runs here: few enough for a minute.
+SHARE = range(60)
+#: Scenes that gave different diagrams from different starts: S, S0, Omega, zeta, h; what varies, its range.
+CAUGHT = {
+    "a one-hold bridge met a symmetric pair": (
+        {"Omega": 0.31, "S": 0.06, "S0": 0.18, "h": 0.0, "zeta": 0.06},
+        "h",
+        (-0.15026364205774628, 0.11978325412211589),
+    ),
+    "a restart from a bridge lost PD": (
+        {
+            "Omega": 0.28518652907865744,
+            "S": 0.016843376032476123,
+            "S0": 0.0854840441104789,
+            "h": 0.0,
+            "zeta": 0.010074902253449593,
+        },
+        "S0",
+        (0.05235108330322144, 0.10748913795236487),
+    ),
+    "the stop of a hold depends on its length twice": (
+        {"Omega": 0.43, "S": 0.17605, "S0": 0.219291},
+        "Omega",
+        (0.42, 0.44),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CAUGHT)
+def test_the_same_from_every_branch(name: str) -> None:
+    params, vary, bounds = CAUGHT[name]
+    diagram = cf.explore(cf.find_orbit("coulomb", params), vary, bounds)
+    assert diagram.verified is None
+    found = diagram.verify(restarts=3)
+    assert found.passed, str(found)
+    assert diagram.verified
+    assert len(found.restarts) == 3
+    assert sum(b.below is not None for b in found.balances) >= 2
+
+
+def test_random_scenes() -> None:
+    """No difference outside of the degenerate classes; most scenes have something to restart."""
+    tally = Tally()
+    for index in SHARE:
+        tally.index = index
+        restarts.one_scene(tally, restarts.scene(7, index), most=2)
+    faults = [f for f in tally.failed if f.kind != "all points admissible"]
+    assert not faults, faults
+    assert tally.counts["restarts"] > len(SHARE)
+    assert tally.counts["balances"] > len(SHARE) // 2
+
+
+def test_a_sum_tells_of_another_component() -> None:
+    """Between the ends of the window of a fold that no event joins: the sum is not that of the whole."""
+    params = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
+    diagram = cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.4, 0.6))
+    whole = diagram.verify(restarts=0)
+    assert whole.sums
+    assert not whole.missing
+    part = cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.4, 0.6), bridges=False)
+    assert not part.verify(restarts=0).sums  # without bridges nothing adds up, and nothing is asked
+
+
+# ------------------------------------------------------------------------------------ sequences
+
+
+@pytest.mark.parametrize("letters", [1, 2, 3, 4])
+@pytest.mark.parametrize("length", range(1, 7))
+def test_necklaces(letters: int, length: int) -> None:
+    """As many as Moebius counts; aperiodic, each in its least rotation, no two the same up to rotation."""
+    found = list(necklaces(letters, length))
+    assert len(found) == count(letters, length)
+    rotations = [{w[k:] + w[:k] for k in range(length)} for w in found]
+    assert all(
+        len(turned) == length and min(turned) == w
+        for turned, w in zip(rotations, found, strict=True)
+    )
+    assert len(set().union(*rotations)) == length * len(found) if found else True
+
+
+def test_lengths_of_a_symmetric_motion() -> None:
+    assert lengths(1, True, 4) == [1, 2, 3, 4, 6, 8]
+    assert lengths(3, True, 2) == [1, 2]
+
+
+# ------------------------------------------------------------------------- indices and conditions
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_index_of_a_regular_orbit_is_that_of_its_multipliers(seed: int) -> None:
+    """``sign det(I - M)`` from the pencil's multipliers, and the product over several turns."""
+    rng = np.random.default_rng(seed)
+    params = {"Omega": rng.uniform(0.3, 0.8), "S": 0.2, "S0": rng.uniform(0.21, 0.4)}
+    orbit = cf.find_orbit("coulomb", params, longest=1000)
+    for times in (1, 2, 3):
+        wanted = np.sign(np.real(np.prod(1.0 - orbit.multipliers**times)))
+        assert index_of(orbit, times) == wanted
+    wanted = np.sign(np.real(np.prod(1.0 + orbit.turn_multipliers)))
+    assert opening_sign(orbit) == wanted
+
+
+def test_index_at_infinity() -> None:
+    """With the closed form of the linear oscillator: det(I - exp(A T)) = 1 - 2 e^-a cos b + e^-2a."""
+    model = cf.load_model("coulomb")
+    for zeta, omega in ((0.0, 0.4), (0.1, 0.7), (-0.05, 0.3)):
+        vector = model.vector({"Omega": omega, "S": 0.1, "S0": 0.2, "zeta": zeta})
+        period = 2.0 * np.pi / omega
+        a, b = zeta * period, np.sqrt(1.0 - zeta**2) * period
+        wanted = np.sign(1.0 - 2.0 * np.exp(-a) * np.cos(b) + np.exp(-2.0 * a))
+        assert index_at_infinity(model, vector) == wanted
+    assert index_at_infinity(cf.load_model("belt"), cf.load_model("belt").vector({})) is None
+
+
+def test_local_conditions_agree_with_what_is_solved() -> None:
+    """Where the conditions say that a form exists on a side, its branch leaves to that side."""
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    diagram = cf.explore(orbit, "Omega", (0.4, 0.6))
+    active, checked = orbit.model.index_of("Omega"), 0
+    for event in diagram.events:
+        b = event.bifurcation
+        if b.kind.value not in ("SS", "CS", "AS", "GS"):
+            continue
+        incident = incident_forms(b)
+        relations = [relation_of(incident.unit, f, active, incident.least) for f in incident.forms]
+        assert all(r is not None for r in relations)
+        sides = possible(
+            [r for r in relations if r is not None], [(k,) for k in range(len(relations))]
+        )
+        leaving = set()
+        for i in event.branches:
+            branch = diagram.branches[i]
+            at = (
+                0
+                if branch.ends[0].bifurcation is b
+                or abs(branch.values[0] - b.params["Omega"]) < 1e-9
+                else -1
+            )
+            beside = branch.values[1 if at == 0 else -2]
+            leaving.add(bool(beside > b.params["Omega"]))
+        told = {above for below, above in sides if below != above}
+        assert told <= leaving
+        checked += len(told)
+    assert checked >= 4
