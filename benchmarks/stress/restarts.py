@@ -2,8 +2,9 @@
 
 ``python benchmarks/stress/restarts.py --count 3000 --seed 1 --out restarts.json``
 
-Each restart has 0.31 times the step. What differs is counted by class. The classes that are excused are fixed here, each by a test on
-the events of the diagram; everything else is a fault. Points are asked for admissibility, and sums of indices are tested.
+Each restart has 0.31 times the step. What differs is counted by class. The classes that are excused are
+fixed here, each by a test on the events of the diagram; everything else is a fault. Points are asked for
+admissibility, and sums of indices are tested.
 """
 
 from __future__ import annotations

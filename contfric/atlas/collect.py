@@ -97,7 +97,8 @@ def collect(
 def _is_relabelling_at_end(event: Event, events: list[Event], settings: Settings) -> bool:
     """Tell whether an event is a tangency that happens at a sliding event: a part of that.
 
-    Which branch has it before its end is rounding: the labels of the ends of a segment of no length are arbitrary.
+    Which branch has it before its end is rounding: the labels of the ends of a segment of no length are
+    arbitrary.
     """
     b = event.bifurcation
     return b.kind is Kind.T and any(

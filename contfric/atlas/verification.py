@@ -1,10 +1,14 @@
 """What a diagram is held against: restarts from its own branches, and sums of indices.
 
-* **Restart.** Explored again from any of its branches, with another step, a diagram has the same events and branches.
-* **Balance.** At every event, for every number of periods, the indices of the families below and above it have the same sum
+* **Restart.** Explored again from any of its branches, with another step, a diagram has the same events and
+branches.
+* **Balance.** At every event, for every number of periods, the indices of the families below and above it
+have the same sum
   (:mod:`contfric.orbit.index`).
-* **Sum.** At every parameter value the indices of all orbits of one period have the sum that the motion at large amplitudes
-  gives. Where they have not, something is not in the diagram: another component, which seeds or a census find.
+* **Sum.** At every parameter value the indices of all orbits of one period have the sum that the motion at
+large amplitudes
+  gives. Where they have not, something is not in the diagram: another component, which seeds or a census
+  find.
 """
 
 from __future__ import annotations
@@ -117,7 +121,10 @@ class IndexSum:
         return self.found is None or self.found == self.wanted
 
     def __str__(self) -> str:
-        return f"at {self.value:.10g} the indices of all orbits of one period add up to {self.found}, not {self.wanted}"
+        return (
+            f"at {self.value:.10g} the indices of all orbits of one period add up to "
+            f"{self.found}, not {self.wanted}"
+        )
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
 """Candidates for what follows a sliding event: orbits of other words, at the event itself.
 
-The motion at the event solves the equations of several words (:mod:`contfric.continuation.incident`), over one
-period or several (:mod:`contfric.continuation.sequences`). Each is a candidate, unless the local conditions
-exclude it (:mod:`contfric.continuation.conditions`). The segments that come in have length zero, and those
-that are held have their pins.
+The motion at the event solves the equations of several words (:mod:`contfric.continuation.incident`), over
+one period or several (:mod:`contfric.continuation.sequences`). Each is a candidate, unless the local
+conditions exclude it (:mod:`contfric.continuation.conditions`). The segments that come in have length zero,
+and those that are held have their pins.
 """
 
 from __future__ import annotations

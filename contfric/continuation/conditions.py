@@ -198,7 +198,7 @@ def _gradients(orbit: Orbit, active: int, least: float) -> list[tuple[FloatArray
 def _gradient(
     orbit: Orbit, place: Test, count: int, active: int
 ) -> tuple[FloatArray, float] | None:
-    """Return the gradient of one margin, or of what vanishes with it; None if there is none to first order."""
+    """Return the gradient of one margin; None if it has none to first order."""
     i, m = place.segment, orbit.joints.shape[1]
     gradient, slope = np.zeros((count + 1, m)), 0.0
     held = next((hold for hold in orbit.system.holds if hold.segment == i), None)

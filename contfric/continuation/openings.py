@@ -1,14 +1,15 @@
 """Branch points and period doublings of bridges.
 
-An orbit with holds has no multipliers. But its equations can be singular for a disturbance that changes sign after
-a turn as those of any orbit, and a branch leaves there: of a symmetric orbit the asymmetric ones, of others those of
-twice the period. The sign of the determinant tells (:mod:`contfric.orbit.index`), and the place is located as at the
-vertex of a pitchfork.
+An orbit with holds has no multipliers. But its equations can be singular for a disturbance that changes
+sign after a turn as those of any orbit, and a branch leaves there: of a symmetric orbit the asymmetric
+ones, of others those of twice the period. The sign of the determinant tells (:mod:`contfric.orbit.index`),
+and the place is located as at the vertex of a pitchfork.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -33,7 +34,7 @@ def with_openings(branch: Branch, width: float) -> Branch:
         return branch
     signs = [opening_sign(orbit) for orbit in branch]
     found = []
-    for k, (a, b) in enumerate(zip(signs[:-1], signs[1:], strict=True)):
+    for k, (a, b) in enumerate(pairwise(signs)):
         if a is not None and b is not None and a * b < 0:
             event = _located(branch, k, width)
             if event is not None and not _is_at_fold(branch, event, width):

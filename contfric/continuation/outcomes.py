@@ -48,8 +48,8 @@ from contfric.signature.holds import TOUCH, hold_at, is_hold, release_mode
 
 #: A hold this short has no length: an event is located to about 1e-12, at a tangency to its root.
 NO_LENGTH = 1e-6
-#: The same for a hold at a touch of rest, which is left with an acceleration that grows from zero: what it does
-#: to the orbit is the square of its length, so that it is located to the root.
+#: The same for a hold at a touch of rest, which is left with an acceleration that grows from zero: what it
+#: does to the orbit is the square of its length, so that it is located to the root.
 NO_LENGTH_AT_TOUCH = 1e-4
 #: Rest that is left with less than this acceleration, or lies nearer than this to the boundary of its
 #: region (nondimensional), has no jump: far above rounding, far below any difference of two limits.

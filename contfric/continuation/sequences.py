@@ -1,9 +1,9 @@
 """Cyclic sequences of the forms of a unit: the orbits of one or several periods that an event can have.
 
-A motion whose unit has k forms is an orbit of every cyclic sequence of them, each unit with its own form. Two
-sequences are one orbit if one is a rotation of the other. Where the unit is half of a symmetric motion, a
-rotation by one unit is the symmetry image; so rotations are orbits up to symmetry there, and a sequence of odd
-length is the half of a symmetric orbit. A sequence that repeats itself is an orbit of fewer periods.
+A motion whose unit has k forms is an orbit of every cyclic sequence of them, each unit with its own form.
+Two sequences are one orbit if one is a rotation of the other. Where the unit is half of a symmetric motion,
+a rotation by one unit is the symmetry image; so rotations are orbits up to symmetry there, and a sequence
+of odd length is the half of a symmetric orbit. A sequence that repeats itself is an orbit of fewer periods.
 
 They are the aperiodic necklaces over k letters; their number is ``sum_{d | n} mu(d) k^(n / d) / n``
 (P. A. MacMahon, 1892).

@@ -124,8 +124,9 @@ def _is_vertical(
 ) -> bool:
     """Tell whether the parameter is constant over a step: the sign of its slope is rounding.
 
-    At a fold the multiplier passes 1 as fast as the parameter turns; on a continuum it is 1. Without multipliers
-    (on a bridge) a parameter that is beyond that of the fold on neither side, by more than rounding, turns.
+    At a fold the multiplier passes 1 as fast as the parameter turns; on a continuum it is 1. Without
+    multipliers (on a bridge) a parameter that is beyond that of the fold on neither side, by more than
+    rounding, turns.
     """
     slopes = max(abs(before.slope), abs(after.slope))
     if slopes > _VERTICAL or abs(after.value - before.value) > _CONSTANT * settings.width:

@@ -204,7 +204,7 @@ def opens_through(orbit: Orbit, active: int) -> bool:
 
 
 def refined_opening(orbit: Orbit, active: int) -> Orbit | None:
-    """Return the orbit next to one at which a disturbance opens that changes sign after a turn; None if far."""
+    """Return the orbit nearby at which a disturbance opens that changes sign after a turn; or None."""
     found = _refined(orbit, active)
     return found if found.converged and abs(_opening(found)) < _EVEN else None
 

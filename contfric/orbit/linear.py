@@ -78,10 +78,10 @@ def tangent_of(
 def null_space(
     system: System, joints: FloatArray, vector: FloatArray, active: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the directions in which curves of orbits may pass through one, and their shares of the parameter.
+    """Return the directions in which curves of orbits may pass through one, and the parameter's shares.
 
-    The null vectors of the Jacobian with the parameter's column, shapes (k, N, m) and (k,): one where the curve
-    has a unique direction.
+    The null vectors of the Jacobian with the parameter's column, shapes (k, N, m) and (k,): one where the
+    curve has a unique direction.
     """
     _, _, c, _ = jacobian_blocks(system, joints, vector)
     full = np.hstack([assembled(system, joints, vector), c[:, :, active].reshape(-1, 1)])

@@ -1,7 +1,7 @@
 """The slides of a motion: what it is, whatever word it is solved with.
 
-A motion at an event solves several words. They differ by segments of no length, and by touches of rest inside of
-a slide. The slides of some length, joined over such touches, are the same for all of them.
+A motion at an event solves several words. They differ by segments of no length, and by touches of rest
+inside of a slide. The slides of some length, joined over such touches, are the same for all of them.
 """
 
 from __future__ import annotations

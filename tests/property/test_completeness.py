@@ -1,7 +1,7 @@
 """A diagram does not depend on where it was started, and its indices balance.
 
-Random scenes in all five parameters (``benchmarks/stress/restarts.py`` draws them, and says which classes are degenerate),
-and the scenes whose diagrams once differed.
+Random scenes in all five parameters (``benchmarks/stress/restarts.py`` draws them, and says which classes
+are degenerate), and the scenes whose diagrams once differed.
 """
 
 from __future__ import annotations
