@@ -29,10 +29,10 @@ from contfric.continuation.events import (
     Kind,
     Verdict,
 )
-from contfric.continuation.points import Point, Settings
+from contfric.continuation.points import Point, Settings, settings_of
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import NEARER, leaps, leave_branch_point, settings_value
-from contfric.continuation.trace import continue_orbit, trace_side
+from contfric.continuation.trace import follow_orbit, trace_side
 from contfric.continuation.walked import walked
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
@@ -318,14 +318,16 @@ def _through(state: Exploration, orbit: Orbit) -> Branch | None:
         vector[active] = beside
         solved = polish(Orbit(orbit.system, orbit.joints, vector, np.inf))
         if solved.converged and solved.admissible:
-            return continue_orbit(
-                shortest(solved),
+            found = shortest(solved)
+            own = settings_of(
+                found,
                 settings.parameter,
                 (settings.low, settings.high),
-                max_step=settings.largest,
-                stability=settings.stability and not orbit.system.holds,
-                max_points=settings.most_points,
+                settings.largest,
+                settings.stability and not orbit.system.holds,
+                settings.most_points,
             )
+            return follow_orbit(found, own)
     return None
 
 

@@ -71,6 +71,11 @@ class CurveSide:
         """The last point."""
         return self.points[-1]
 
+    @property
+    def last(self) -> CurveSide:
+        """What it goes on as at its very end."""
+        return self if self.following is None else self.following.last
+
 
 def continue_bifurcation(
     bifurcation: Bifurcation,
@@ -128,10 +133,14 @@ def continue_bifurcation(
     whole_number("max_points", max_points, least=2)
     problem = problem_of(bifurcation, box)
     problem, start, border = start_of_curve(problem, bifurcation, largest)
-    ahead = trace_curve_side(problem, start, border, largest, max_points, progress)
+    ahead = trace_curve_side(problem, start, border, largest, max_points, progress, keep=True)
     if ahead.end.reason is CurveEndReason.CLOSED:
         return join_sides(None, ahead)
-    behind = trace_curve_side(problem, start.reversed(), border, largest, max_points, progress)
+    if ahead.last.end.reason is CurveEndReason.INTERRUPTED:
+        return join_sides(None, ahead, CurveEnd(CurveEndReason.INTERRUPTED))
+    behind = trace_curve_side(
+        problem, start.reversed(), border, largest, max_points, progress, keep=True
+    )
     return join_sides(behind, ahead)
 
 
@@ -197,14 +206,20 @@ def trace_curve_side(
     max_points: int,
     progress: Progress | None = None,
     changes: int = _MOST_CHANGES,
+    keep: bool = False,
 ) -> CurveSide:
-    """Follow a curve from a point along its tangent until it ends, through changes of its signature."""
+    """Follow a curve from a point along its tangent until it ends, through changes of its signature.
+
+    ``keep`` is that of :func:`contfric.continuation.trace.trace_side`.
+    """
     side = CurveSide(problem, [start], border.copy())
     step = FIRST_STEP * largest
     while True:
         try:
             finished, step = _advance(side, step, largest, max_points)
-        except KeyboardInterrupt:  # keep what was found
+        except KeyboardInterrupt:
+            if not keep:
+                raise
             side.end = CurveEnd(CurveEndReason.INTERRUPTED)
             return side
         if progress is not None:
@@ -216,12 +231,18 @@ def trace_curve_side(
             break
     special = side.end.special
     if side.end.reason is CurveEndReason.MEETS and special is not None and changes > 0:
-        on = goes_on(problem, side.tip, special, largest)
+        try:
+            on = goes_on(problem, side.tip, special, largest)
+        except KeyboardInterrupt:
+            if not keep:
+                raise
+            side.end = CurveEnd(CurveEndReason.INTERRUPTED, special=special)
+            return side
         if on is not None:
             other, point, border = on
             point.arc = side.tip.arc
             side.following = trace_curve_side(
-                other, point, border, largest, max_points, progress, changes - 1
+                other, point, border, largest, max_points, progress, changes - 1, keep
             )
     return side
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
+from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from contfric.errors import ParameterError, did_you_mean
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.orbit.counts import TALLY
+from contfric.orbit.pace import Pace
 from contfric.orbit.system import IntArray, mode_bounds
 
 
@@ -296,17 +298,15 @@ def run(
     events: int,
 ) -> Trajectory:
     """Run the compiled simulation; the state is copied. Rows are grown as they are needed."""
-    from contfric.orbit.trajectory import ALL_EVENTS
+    from contfric.orbit.trajectory import ALL_EVENTS, CARRIED
     from contfric.orbit.trajectory import simulate as kernel
 
     model_tables = tables(model)
     y = y.copy()
-    period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0))) or 1.0
     pieces: list[EventRows] = []
-    done, base, left = 0, 0, float(periods)
-    room = int(min(events, max(64.0, 8.0 * periods)))
-    while True:
-        rows = min(room, events - done)
+    done, carry, pace = 0, np.zeros(CARRIED), Pace(_FIRST_EVENTS)
+    while True:  # between the calls Ctrl-C is heard
+        rows, began = min(pace.budget, events - done), perf_counter()
         written = EventRows(
             np.empty((rows, 2), dtype=np.int64),
             np.empty(rows, dtype=np.int64),
@@ -314,18 +314,25 @@ def run(
             np.empty((rows, y.shape[0])),
         )
         end, count, mode, cycle, phase = kernel(
-            model.flow.following(), model_tables, mode, on, time, y, vector, left, written
+            model.flow.following(),
+            model_tables,
+            mode,
+            on,
+            time,
+            y,
+            vector,
+            float(periods),
+            written,
+            carry,
+            pace.budget,
         )
         TALLY[3] += count
-        written.cycles[:count] += base
         pieces.append(written.first(count))
         done += count
         if end != ALL_EVENTS or done >= events:
             break
-        left -= cycle + (phase - time) / period
-        base, time = base + cycle, phase
-        last, surface = written.joints[-1]
-        on = (1 << int(surface)) | int(model_tables.lies_on[last] & model_tables.kept[surface])
+        time = phase
+        pace.took(pace.budget, perf_counter() - began)
     found = joined(pieces)
     last_mode = model.modes[mode].name if mode >= 0 else ""
     return Trajectory(
@@ -337,10 +344,12 @@ def run(
         found.times,
         found.states,
         list(SimulationEnd)[end],
-        (base + cycle, float(phase), y, last_mode),
+        (cycle, float(phase), y, last_mode),
     )
 
 
+#: Events that the first call of the simulation may follow: a few milliseconds, or half a second of a stiff model.
+_FIRST_EVENTS = 256
 #: Displacements that a start is looked for at where the region is one-sided, in half-widths of the model.
 _PLACES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
 
