@@ -136,6 +136,7 @@ def follow(
     if stop is not None:
         follow_cells(*arguments)
         return rows
+    assert follow_cells.dispatcher is not None  # compiled here, not where nobody could interrupt it
     with ThreadPoolExecutor(1) as pool:  # a kernel hears no Ctrl-C, but who waits for it does
         try:
             pool.submit(follow_cells, *arguments).result()

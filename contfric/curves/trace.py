@@ -26,7 +26,7 @@ from contfric.curves.points import (
 )
 from contfric.curves.problem import Problem, box_of, problem_of
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
-from contfric.errors import ConvergenceError, ParameterError, whole_number
+from contfric.errors import ConvergenceError, ParameterError, finite_number, whole_number
 from contfric.models.definition import FloatArray, Model
 
 #: A first point farther than this from the bifurcation (in widths of the ranges) is another one.
@@ -154,11 +154,10 @@ def largest_step(max_step: Any, model: Model) -> float:
     """
     if max_step is None:
         return model.max_step or LARGEST_STEP
-    if isinstance(max_step, bool) or not isinstance(max_step, (int, float)):
-        raise ParameterError(f"max_step is a share of the ranges, in (0, 1], got {max_step!r}")
+    max_step = finite_number("max_step", max_step)
     if not 1e-8 <= max_step <= 1.0:
         raise ParameterError(f"max_step is a share of the ranges, from 1e-8 to 1, got {max_step!r}")
-    return float(max_step)
+    return max_step
 
 
 def start_of_curve(problem: Problem, bifurcation: Bifurcation, largest: float) -> Start:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contfric.errors import ParameterError, did_you_mean
+from contfric.errors import ParameterError, did_you_mean, finite_number, shown, whole_number
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.orbit.counts import TALLY
@@ -281,8 +281,10 @@ def simulate(
     model = load_model(model)
     vector = model.vector(params or {})
     y = _checked_state(model, vector, state)
-    if not (np.isfinite(time) and np.isfinite(periods) and periods >= 0):
-        raise ParameterError(f"time and periods must be finite, got {time!r} and {periods!r}")
+    time, periods = finite_number("time", time), finite_number("periods", periods)
+    events = whole_number("events", events, least=0)
+    if periods < 0.0:
+        raise ParameterError(f"periods must not be negative, got {periods!r}")
     mode, on = start_of(model, time, y, vector, domain)
     return run(model, vector, mode, on, time, y, periods, events)
 
@@ -348,7 +350,7 @@ def run(
     )
 
 
-#: Events that the first call of the simulation may follow: a few milliseconds, or half a second of a stiff model.
+#: Events that the first call of the simulation may follow: milliseconds, or half a second of a stiff one.
 _FIRST_EVENTS = 256
 #: Displacements that a start is looked for at where the region is one-sided, in half-widths of the model.
 _PLACES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
@@ -370,10 +372,13 @@ def _checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) ->
     if state is None:
         # away from rest, so that symmetric and asymmetric attractors can both be reached
         return displaced(model, vector)
-    y = np.array(state, dtype=np.float64)
+    try:
+        y = np.array(state, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        y = np.empty(0)
     if y.shape != (len(model.states),) or not np.all(np.isfinite(y)):
         raise ParameterError(
             f"a state of '{model.name}' is {len(model.states)} finite numbers "
-            f"({', '.join(model.states)}), got {state!r}"
+            f"({', '.join(model.states)}), got {shown(state)}"
         )
     return y
