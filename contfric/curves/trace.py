@@ -154,10 +154,10 @@ def largest_step(max_step: Any, model: Model) -> float:
     """
     if max_step is None:
         return model.max_step or LARGEST_STEP
-    max_step = finite_number("max_step", max_step)
-    if not 1e-8 <= max_step <= 1.0:
+    given = finite_number("max_step", max_step)
+    if not 1e-8 <= given <= 1.0:
         raise ParameterError(f"max_step is a share of the ranges, from 1e-8 to 1, got {max_step!r}")
-    return max_step
+    return given
 
 
 def start_of_curve(problem: Problem, bifurcation: Bifurcation, largest: float) -> Start:
