@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 #: Where an entry is: keys and list indices from the top.
 Address: TypeAlias = tuple[str | int, ...]
 #: Largest file, and most entries in it: a model or a study has a few hundred. (Reading takes a second then.)
-_MOST_BYTES, _MOST_ENTRIES = 250_000, 20_000
+_MOST_BYTES, _MOST_ENTRIES = 100_000, 20_000
 #: Levels of nesting whose lines are kept.
 _DEEPEST = 4
 

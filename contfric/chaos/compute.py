@@ -147,9 +147,11 @@ def lyapunov_map(
             "client: client.get_executor())"
         )
     grid = _checked_axes(model, axes)
+    shape = tuple(len(values) for values in grid.values())
+    check_size(shape, whole_number("starts", starts, least=1), len(model.states))
     vector, example = _checked_params(model, grid, params or {})
     count = number_of_starts(model, state, starts, example)
-    check_size(tuple(len(values) for values in grid.values()), count, len(model.states))
+    check_size(shape, count, len(model.states))
     states = None if state is None else _all_states(model, grid, vector, state, count)
     job = _Job(model, grid, vector, count, states, checked_time(time), limits, tile)
     kept = None if folder is None else open_tiles(Path(folder), job.record())
@@ -244,7 +246,7 @@ def _checked_params(
     named = {**model.defaults, **params, first: rows[:, None], second: columns[None, :]}
     try:
         defined = np.argwhere(inside(model, named, (len(rows), len(columns))))
-    except TypeError:  # a value that is no number: what follows says so
+    except (TypeError, OverflowError):  # a value that is no number: what follows says so
         defined = np.empty((0, 2), dtype=np.int64)
     i, j = defined[0] if len(defined) else (0, 0)
     example = model.check_params({**params, first: rows[i], second: columns[j]})
