@@ -145,13 +145,7 @@ def continue_bifurcation(
 
 
 def largest_step(max_step: Any, model: Model) -> float:
-    """Return the largest step as a share of the ranges: what is asked for, or the model's.
-
-    Raises
-    ------
-    ParameterError
-        If it is no number in (0, 1].
-    """
+    """Return the largest step as a share of the ranges: what is asked for, or the model's."""
     if max_step is None:
         return model.max_step or LARGEST_STEP
     given = finite_number("max_step", max_step)
@@ -393,7 +387,6 @@ def _range_crossed(side: CurveSide, after: CurvePoint) -> CurvePoint | None:
     box, before = side.problem.box, side.tip
     if np.all(after.w >= box.low) and np.all(after.w <= box.high):
         return None
-
     inside = before.w @ box.edges[:, :2].T + box.edges[:, 2]
     if np.min(inside) <= 0.0:
         return before
