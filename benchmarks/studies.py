@@ -25,8 +25,8 @@ PAGE = """# The bundled studies
 
 Written by `make studies` (`benchmarks/studies.py`, which took {took}); {machine}, {processors} processors,
 Python {python}. Each study is run from the shell (`contfric run NAME`), with a limit of {limit:.0f} s; one
-that does not end by itself, or ends with an error, fails the command. The time is that of a whole process with
-its kernels compiled, figures and tables written. {once}
+that does not end by itself, or ends with an error, fails the command. The time is that of a whole process
+with its kernels compiled, figures and tables written. {once}
 
 | study | what it computes | found | s |
 |---|---|---|---|

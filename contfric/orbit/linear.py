@@ -16,8 +16,8 @@ def jacobian_blocks(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the blocks on z_i, z_{i+1} and the parameters, and the closure.
 
-    Shapes (N, m, m), (N, m, m), (N, m, parameters) and (m, m). Without ``parameters`` the third has none: where
-    motion is integrated most of the time goes to them.
+    Shapes (N, m, m), (N, m, m), (N, m, parameters) and (m, m). Without ``parameters`` the third has none:
+    where motion is integrated most of the time goes to them.
     """
     from contfric.orbit.newton import linearise
 
