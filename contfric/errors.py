@@ -90,8 +90,10 @@ def whole_number(name: str, value: object, least: int, most: int | None = None) 
     return number
 
 
-def finite_number(name: str, value: object) -> float:
+def finite_number(name: str, value: object, what: str = "must be a finite number") -> float:
     """Return a finite number that a user gave: a float, a whole number that fits, or one of numpy's.
+
+    ``what`` says in the message what it has to be.
 
     Raises
     ------
@@ -104,13 +106,13 @@ def finite_number(name: str, value: object) -> float:
     3.0
     """
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise ParameterError(f"{name} must be a finite number, got {shown(value)}")
+        raise ParameterError(f"{name} {what}, got {shown(value)}")
     try:
         number = float(value)
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
-        raise ParameterError(f"{name} must be a finite number, got {shown(value)}")
+        raise ParameterError(f"{name} {what}, got {shown(value)}")
     return number
 
 

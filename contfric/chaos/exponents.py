@@ -129,9 +129,10 @@ def limits_of(transient: int, periods: int, tolerance: float, confirm: int) -> L
     transient = whole_number("transient", transient, least=0)
     periods = whole_number("periods", periods, least=1)
     confirm = whole_number("confirm", confirm, least=0)
-    tolerance = finite_number("tolerance", tolerance)
+    wanted = "is a number >= 0"
+    tolerance = finite_number("tolerance", tolerance, wanted)
     if tolerance < 0.0:
-        raise ParameterError(f"tolerance is a number >= 0, got {tolerance!r}")
+        raise ParameterError(f"tolerance {wanted}, got {tolerance!r}")
     return Limits(transient, periods, tolerance, confirm)
 
 

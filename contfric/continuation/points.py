@@ -124,7 +124,7 @@ def settings_of(
     low, high = checked_range(parameter, bounds)
     max_points = whole_number("max_points", max_points, least=2)
     if max_step is not None:
-        max_step = finite_number("max_step", max_step)
+        max_step = finite_number("max_step", max_step, "is a share of the range, in (0, 1]")
         if not _LEAST_STEP <= max_step <= 1.0:
             raise ParameterError(
                 f"max_step is a share of the range, from {_LEAST_STEP:g} to 1, got {max_step!r}"
