@@ -144,7 +144,7 @@ def checked_time(time: float) -> float:
     ParameterError
         If it is not finite.
     """
-    return finite_number("time", time)
+    return finite_number("time", time, "must be finite")
 
 
 def lyapunov_exponent(

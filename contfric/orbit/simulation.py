@@ -281,7 +281,8 @@ def simulate(
     model = load_model(model)
     vector = model.vector(params or {})
     y = _checked_state(model, vector, state)
-    time, periods = finite_number("time", time), finite_number("periods", periods)
+    time = finite_number("time", time, "must be finite")
+    periods = finite_number("periods", periods, "must be finite")
     events = whole_number("events", events, least=0)
     if periods < 0.0:
         raise ParameterError(f"periods must not be negative, got {periods!r}")

@@ -46,14 +46,14 @@ def test_curves(diagram: cf.Diagram) -> None:
         problem = problem_of(event, box)
         orbit = event.orbit if event.orbit.system is problem.system else event.orbit.as_half()
         border = border_of(problem, orbit.joints, orbit.vector)
-        for _ in range(STARTS // 10):
+        for _ in range(STARTS // 4):
             share = 10.0 ** draw.uniform(-6.0, 0.0)
             joints = orbit.joints + share * wild(draw, orbit.joints.shape)
             w = orbit.vector[problem.which] + share * wild(draw, (2,))
             tangent, slope = wild(draw, joints.shape), wild(draw, (2,))
             solve_point(problem, joints, w, tangent, slope, border.copy())
             tried += 1
-    assert tried > 20
+    assert tried >= STARTS // 4
     assert time.monotonic() - began < MOST
 
 
@@ -62,7 +62,7 @@ def test_branches_and_orbits(diagram: cf.Diagram) -> None:
     for branch in diagram.branches[:4]:
         orbit = branch[len(branch) // 2]
         settings = settings_of(orbit, "Omega", (0.1, 0.9), None, True, 100)
-        for _ in range(STARTS // 4):
+        for _ in range(STARTS // 10):
             share = 10.0 ** draw.uniform(-6.0, 0.0)
             vector = orbit.vector + share * wild(draw, orbit.vector.shape)
             joints = orbit.joints + share * wild(draw, orbit.joints.shape)
