@@ -163,7 +163,7 @@ BOMBS = {
     "merges": "a0: &a0 {x: 1}\n"
     + "".join(f"a{k}: &a{k} {{<<: [*a{k - 1}, *a{k - 1}]}}\n" for k in range(1, 40)),
     "itself": "a: &a {b: *a}",
-    "deep": "a: " + "[" * 20_000,
+    "deep": "a: " + "[" * 5_000,
     "digits": "params: {Omega: 1" + "0" * 5_000 + "}",
     "hexadecimal": "model: coulomb\nparams: {Omega: 0x1" + "0" * 5_000 + "}",
 }
