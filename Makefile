@@ -1,4 +1,4 @@
-# make setup | demo | test | bench | stress | gallery | clean
+# make setup | demo | test | bench | stress | studies | gallery | clean
 PYTHON ?= python3
 WORKERS ?= 2
 
@@ -10,7 +10,7 @@ DEMO := demo
 STRESS := .stress
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint types contracts unit bench stress gallery clean
+.PHONY: help setup demo test lint types contracts unit bench stress studies gallery clean
 MAKEFLAGS += --no-print-directory
 
 help:
@@ -18,6 +18,7 @@ help:
 	@echo "make test     lint, types, import contracts, tests"
 	@echo "make bench    run times, cost at scale and of scenes, run time against error beside others"
 	@echo "make stress   random cases against 50 digits, to docs/stress.md (an hour or more)"
+	@echo "make studies  every bundled study from the shell, each with a time limit, to docs/studies.md"
 	@echo "make gallery  the figures of docs/gallery"
 	@echo "make setup    a virtual environment in $(VENV)/ (the others do this by themselves)"
 	@echo "make clean    removes what make and the tests wrote, and keeps $(VENV)/"
@@ -87,6 +88,11 @@ stress: $(STAMP)
 	@$(BIN)/python benchmarks/stress/events.py --count 400 --seed 2 --out $(STRESS)/events.json
 	@$(BIN)/python benchmarks/stress/continuation.py --count 300 --seed 2 --out $(STRESS)/continuation.json
 	@$(BIN)/python benchmarks/stress/write_page.py $(STRESS)/*.json --out docs/stress.md
+
+# A study that does not end within the limit, or ends with an error, fails this.
+studies: $(STAMP)
+	@echo "== studies"
+	@$(BIN)/python benchmarks/studies.py
 
 gallery: $(STAMP)
 	@echo "== gallery"

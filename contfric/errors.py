@@ -3,7 +3,17 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable
+from numbers import Integral, Real
+
+#: Largest whole number that counts something: beyond it a float no longer counts in ones.
+_MOST = 2**53
+#: Widest range: steps are 1e-10 of it at the least, and squares of it are taken. The narrowest is as small,
+#: and a share of its ends, as their rounding must be below its largest steps.
+_WIDE, _NARROW = 1e100, 1e-10
+#: Most characters of a value in a message.
+_SHOWN = 80
 
 
 class ContfricError(Exception):
@@ -72,8 +82,87 @@ def whole_number(name: str, value: object, least: int, most: int | None = None) 
     100
     """
     limits = f">= {least}" if most is None else f"from {least} to {most}"
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise ParameterError(f"{name} is a whole number {limits}, got {value!r}")
-    if value < least or (most is not None and value > most):
-        raise ParameterError(f"{name} is a whole number {limits}, got {value!r}")
-    return value
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise ParameterError(f"{name} is a whole number {limits}, got {shown(value)}")
+    number = int(value)
+    if not least <= number <= (_MOST if most is None else most):
+        raise ParameterError(f"{name} is a whole number {limits}, got {shown(value)}")
+    return number
+
+
+def finite_number(name: str, value: object, what: str = "must be a finite number") -> float:
+    """Return a finite number that a user gave: a float, a whole number that fits, or one of numpy's.
+
+    ``what`` says in the message what it has to be.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+
+    Examples
+    --------
+    >>> finite_number("time", 3)
+    3.0
+    """
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise ParameterError(f"{name} {what}, got {shown(value)}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ParameterError(f"{name} {what}, got {shown(value)}")
+    return number
+
+
+def checked_range(name: str, bounds: object) -> tuple[float, float]:
+    """Return the range of a parameter: two finite numbers, lower first, that a float can tell apart.
+
+    Raises
+    ------
+    ParameterError
+        If it is none, or so wide or narrow that steps along it cannot be resolved.
+
+    Examples
+    --------
+    >>> checked_range("Omega", (0.3, 1))
+    (0.3, 1.0)
+    """
+    ends = tuple(bounds) if isinstance(bounds, Iterable) else ()
+    if len(ends) != 2 or not all(isinstance(e, Real) and not isinstance(e, bool) for e in ends):
+        raise ParameterError(
+            f"the range of '{name}' is a pair of numbers (lower, upper), got {shown(bounds)}"
+        )
+    try:
+        low, high = (float(end) for end in ends)
+    except OverflowError:  # a whole number of 400 digits
+        low = high = math.inf
+    if not (math.isfinite(low) and math.isfinite(high)) or not low < high:
+        raise ParameterError(
+            f"the range of '{name}' must be two finite numbers, lower first, got {shown(bounds)}"
+        )
+    width, size = high - low, max(abs(low), abs(high))
+    if not _NARROW * size <= width or not 1.0 / _WIDE <= width <= _WIDE:
+        raise ParameterError(
+            f"the range of '{name}', ({low:g}, {high:g}), is {'wider' if width > 1.0 else 'narrower'} than "
+            "steps along it can be resolved: give the part of it that is of interest"
+        )
+    return low, high
+
+
+def shown(value: object) -> str:
+    """Return a value for a message: in one line that is not too long.
+
+    Examples
+    --------
+    >>> shown(10**400)
+    'a whole number of 401 digits'
+    """
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 10**_SHOWN:
+        return f"a whole number of {int(value.bit_length() * math.log10(2)) + 1} digits"
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # it holds such a number
+        text = f"a {type(value).__name__} of numbers that are too large"
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."

@@ -35,6 +35,8 @@ def replacing(path: Path) -> Iterator[Path]:
     >>> path.read_text()
     'whole'
     """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise ResultFileError(f"{path} is no ordinary file, and is not replaced: give another name")
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
         yield temporary

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 #: Where an entry is: keys and list indices from the top.
 Address: TypeAlias = tuple[str | int, ...]
+#: Largest file, and most entries in it: a model or a study has a few hundred. (Reading takes a second then.)
+_MOST_BYTES, _MOST_ENTRIES = 100_000, 20_000
 #: Levels of nesting whose lines are kept.
 _DEEPEST = 4
 
@@ -55,6 +57,10 @@ def read_yaml(path: Path) -> LocatedYaml:
     text = _text(path)
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
+        if node is not None and _entries(node, {}) > _MOST_ENTRIES:
+            raise NotationError(
+                f"{path}:1: has more than {_MOST_ENTRIES} entries, those that its aliases repeat among them"
+            )
         data = yaml.safe_load(text)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
@@ -69,8 +75,30 @@ def read_yaml(path: Path) -> LocatedYaml:
     return located
 
 
+def _entries(node: yaml.Node, known: dict[int, int]) -> int:
+    """Return the number of entries of a node, each as often as aliases repeat it."""
+    import yaml
+
+    if isinstance(node, yaml.ScalarNode):
+        return 1
+    if id(node) not in known:
+        known[id(node)] = _MOST_ENTRIES + 1  # within itself a node has no end
+        if isinstance(node, yaml.MappingNode):
+            below = [part for pair in node.value for part in pair]
+        else:
+            below = list(node.value)
+        known[id(node)] = 1 + sum(_entries(part, known) for part in below)
+    return known[id(node)]
+
+
 def _text(path: Path) -> str:
     try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise NotationError(f"cannot read {path}: it is no ordinary file")
+        if path.stat().st_size > _MOST_BYTES:
+            raise NotationError(
+                f"{path}:1: is larger than {_MOST_BYTES // 1000} kB, and files of this kind are pages of text"
+            )
         return path.read_text(encoding="utf-8")
     except OSError as error:
         raise NotationError(f"cannot read {path}: {error.strerror or error}") from None

@@ -23,7 +23,8 @@ import numpy as np
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import candidates
 from contfric.continuation.events import Bifurcation
-from contfric.continuation.trace import continue_orbit
+from contfric.continuation.points import MOST_POINTS, settings_of
+from contfric.continuation.trace import follow_orbit
 from contfric.errors import ConvergenceError, ParameterError, whole_number
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit, Status
@@ -181,12 +182,9 @@ def _window(turns: str, letters: dict[str, Orbit], bridge: Branch) -> Window | N
         return None
     width = bridge.values.max() - bridge.values.min()
     try:
-        branch = continue_orbit(
-            middle,
-            bridge.parameter,
-            (low - width, high + width),
-            max_step=min(1.0, (high - low) / width),
-        )
+        bounds, step = (low - width, high + width), min(1.0, (high - low) / width)
+        settings = settings_of(middle, bridge.parameter, bounds, step, True, MOST_POINTS)
+        branch = follow_orbit(middle, settings)
     except ConvergenceError:
         return None
     name = "-".join(letters[letter].name for letter in turns)

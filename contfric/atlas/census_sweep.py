@@ -34,8 +34,18 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.equations import FunctionsType
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
-from contfric.orbit.trajectory import StateRoom, TablesType, copy_state, follow, sign_code
+from contfric.orbit.trajectory import (
+    CARRIED,
+    STARTED,
+    StateRoom,
+    TablesType,
+    copy_state,
+    follow,
+    sign_code,
+)
 
+#: Most surfaces that a trajectory meets for each of its events: one that is only touched is no event.
+_MOST_MET = 64
 #: Newton steps onto a section: one where it is flat, a few where it is curved.
 _MOST_STEPS = 12
 #: Distance from the section (relative to 1 + the level) that is rounding.
@@ -200,7 +210,8 @@ def sweep(  # type: ignore[no-untyped-def]
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
     state_room = StateRoom(none, empty, nothing, np.empty(n), np.empty(n))
     room = section_room(tables.lies_on[mode], exit_, surfaces, n)
-    y = np.empty(n)
+    y, carry = np.empty(n), np.zeros(CARRIED)
+    budget = _MOST_MET * (1 + joints.shape[1])
     total = 0
     for i in range(count):
         outcome[i, 0], outcome[i, 1], outcome[i, 2] = -1, -1, -1
@@ -216,7 +227,21 @@ def sweep(  # type: ignore[no-untyped-def]
             continue
         rows = EventRows(joints[i], cycles[i], clocks[i], states[i])
         on = (1 << exit_) | tables.lies_on[mode]
-        found = follow(functions, tables, after, on, times[i], y, p, periods, rows, state_room)
+        carry[STARTED] = 0.0
+        found = follow(
+            functions,
+            tables,
+            after,
+            on,
+            times[i],
+            y,
+            p,
+            periods,
+            rows,
+            carry,
+            budget,
+            state_room,
+        )
         outcome[i, 0], outcome[i, 1], outcome[i, 2] = found[1], found[2], found[0]
         total += found[1]
     return total

@@ -30,10 +30,10 @@ from contfric.continuation.events import (
     Verdict,
 )
 from contfric.continuation.incident import incident_forms
-from contfric.continuation.points import Point, Settings
+from contfric.continuation.points import Point, Settings, settings_of
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import NEARER, leaps, leave_branch_point, settings_value
-from contfric.continuation.trace import continue_orbit, trace_side
+from contfric.continuation.trace import follow_orbit, trace_side
 from contfric.continuation.vertices import symmetrised
 from contfric.continuation.walked import walked
 from contfric.models.definition import FloatArray
@@ -123,11 +123,7 @@ def _add_crossing(
     active = orbit.model.index_of(settings.parameter)
     if orbit.system.half:
         there = point.orbit(orbit.system, orbit.vector, active)
-        bounds = settings.low, settings.high
-        most, largest = settings.most_points, settings.largest
-        branch = continue_orbit(
-            there, settings.parameter, bounds, max_step=largest, stability=False, max_points=most
-        )
+        branch = follow_orbit(there, settings)
     else:
         if float(np.sum((point.joints - orbit.joints) * point.tangent)) < 0.0:
             point = point.reversed()
@@ -435,14 +431,16 @@ def _through(state: Exploration, orbit: Orbit) -> Branch | None:
         vector[active] = beside
         solved = polish(Orbit(orbit.system, orbit.joints, vector, np.inf))
         if solved.converged and solved.admissible:
-            return continue_orbit(
-                shortest(solved),
+            found = shortest(solved)
+            own = settings_of(
+                found,
                 settings.parameter,
                 (settings.low, settings.high),
-                max_step=settings.largest,
-                stability=settings.stability and not orbit.system.holds,
-                max_points=settings.most_points,
+                settings.largest,
+                settings.stability and not orbit.system.holds,
+                settings.most_points,
             )
+            return follow_orbit(found, own)
     return None
 
 

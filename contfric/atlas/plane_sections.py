@@ -11,7 +11,9 @@ from contfric.atlas.diagram import Diagram
 from contfric.atlas.explore import explore
 from contfric.atlas.plane_state import PlaneExploration
 from contfric.atlas.seeds import Seeds
-from contfric.continuation.trace import continue_orbit
+from contfric.continuation.events import EndReason
+from contfric.continuation.points import MOST_POINTS, settings_of
+from contfric.continuation.trace import follow_orbit
 from contfric.curves.problem import Box
 from contfric.errors import ContfricError, ParameterError
 from contfric.orbit.find import find_orbit
@@ -49,7 +51,7 @@ def section_diagram(
     state.say(f"section {fixed} = {value:g}")
     for start in _starts(state, orbit, fixed, value):
         try:
-            return explore(
+            diagram = explore(
                 start,
                 varies,
                 (float(state.box.low[k]), float(state.box.high[k])),
@@ -59,6 +61,9 @@ def section_diagram(
             )
         except ContfricError:
             continue
+        if EndReason.INTERRUPTED.value in diagram.notes:
+            raise KeyboardInterrupt
+        return diagram
     return None
 
 
@@ -84,7 +89,8 @@ def _continued(orbit: Orbit, fixed: str, value: float) -> Iterator[Orbit]:
     if here == value:
         yield orbit
         return
-    branch = continue_orbit(orbit, fixed, (min(here, value), max(here, value)))
+    bounds = min(here, value), max(here, value)
+    branch = follow_orbit(orbit, settings_of(orbit, fixed, bounds, None, True, MOST_POINTS))
     there = branch[int(np.argmin(np.abs(branch.values - value)))]
     if there.params[fixed] == value and there.admissible:
         yield there

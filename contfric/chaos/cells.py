@@ -220,7 +220,9 @@ def carry_behind(functions, tables, ranks, mode, on, t, p, period, live, rooms):
 
 
 @helper
-def follow_cell(functions, tables, ranks, mode, on, t, p, period, limits, rooms, rows, cell):  # type: ignore[no-untyped-def]
+def follow_cell(  # type: ignore[no-untyped-def]
+    functions, tables, ranks, mode, on, t, p, period, limits, stop, rooms, rows, cell
+):
     """Follow one motion from ``rooms.walk.y`` and write what it is and its exponents."""
     walk, growth, averages = rooms.walk, rooms.growth, rooms.averages
     surfaces, n = tables.observables.shape[0], growth.shape[0]
@@ -231,6 +233,8 @@ def follow_cell(functions, tables, ranks, mode, on, t, p, period, limits, rooms,
     forget(rooms.memory)
     clear(averages)
     while not (done and cycle >= end):
+        if stop[0] != 0:
+            break
         if walk.at_once[1] == 0:
             outcome, surface, following, duration, turns, t, live = carry_on(
                 functions, tables, ranks, mode, on, t, p, period, live, rooms
@@ -288,15 +292,24 @@ def follow_cell(functions, tables, ranks, mode, on, t, p, period, limits, rooms,
 
 @kernel(
     types.void(
-        FunctionsType, TablesType, StartingType, f8, matrix, matrix, LimitsType, CellRowsType
+        FunctionsType,
+        TablesType,
+        StartingType,
+        f8,
+        matrix,
+        matrix,
+        LimitsType,
+        indices,
+        CellRowsType,
     )
 )
-def follow_cells(functions, tables, starting, time, vectors, states, limits, rows):  # type: ignore[no-untyped-def]
+def follow_cells(functions, tables, starting, time, vectors, states, limits, stop, rows):  # type: ignore[no-untyped-def]
     """Follow motions from ``states`` at ``time``, and fill the rows.
 
     Parameters
     ----------
     vectors, states : parameters and initial states, shapes (cells, parameters) and (cells, n)
+    stop : another thread writes a 1 to it when nobody waits for the rows any more
     """
     n = states.shape[1]
     rooms = new_rooms(n)
@@ -304,6 +317,8 @@ def follow_cells(functions, tables, starting, time, vectors, states, limits, row
     for k in range(tables.observables.shape[0]):
         walls = 1 if tables.bounds[0, k] == 2 else walls
     for cell in range(states.shape[0]):
+        if stop[0] != 0:
+            break
         p = vectors[cell]
         for j in range(n):
             rooms.walk.y[j] = states[cell, j]
@@ -333,6 +348,7 @@ def follow_cells(functions, tables, starting, time, vectors, states, limits, row
             p,
             period,
             limits,
+            stop,
             rooms,
             rows,
             cell,

@@ -18,9 +18,13 @@ from contfric.chaos.running import Progress, Timer, compute_all
 from contfric.chaos.starts import StateLike, given_states, number_of_starts
 from contfric.chaos.store import TileFolder, digest, open_tiles
 from contfric.chaos.tiles import Place, Tile, TileRows, empty_tile, inside, places
-from contfric.errors import ParameterError, whole_number
+from contfric.errors import ParameterError, shown, whole_number
+from contfric.memory import must_fit
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
+
+#: Bytes of a motion in a map beyond its exponents and its initial state.
+_BYTES = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,19 +140,38 @@ def lyapunov_map(
     """
     model = load_model(model)
     limits = limits_of(transient, periods, tolerance, confirm)
-    whole_number("tile", tile, least=1)
+    tile = whole_number("tile", tile, least=1)
     if executor is not None and not isinstance(executor, Executor):
         raise ParameterError(
             f"executor is a concurrent.futures.Executor, got {type(executor).__name__} (of a dask "
             "client: client.get_executor())"
         )
     grid = _checked_axes(model, axes)
+    shape = tuple(len(values) for values in grid.values())
+    check_size(shape, whole_number("starts", starts, least=1), len(model.states))
     vector, example = _checked_params(model, grid, params or {})
     count = number_of_starts(model, state, starts, example)
+    check_size(shape, count, len(model.states))
     states = None if state is None else _all_states(model, grid, vector, state, count)
     job = _Job(model, grid, vector, count, states, checked_time(time), limits, tile)
     kept = None if folder is None else open_tiles(Path(folder), job.record())
     return LyapunovMap(model, grid, vector, _computed(job, executor, kept, progress))
+
+
+def check_size(shape: tuple[int, ...], starts: int, n: int) -> None:
+    """Refuse a map that does not fit into the memory: its results, and its initial states.
+
+    Raises
+    ------
+    ParameterError
+        If it does not.
+    """
+    each = _BYTES + 16 * n
+    points = " x ".join(str(length) for length in shape)
+    must_fit(
+        f"a map of {points} points with {starts} starts",
+        int(np.prod(shape, dtype=object)) * starts * each,
+    )
 
 
 def _computed(
@@ -204,12 +227,12 @@ def _checked_axes(model: Model, axes: object) -> dict[str, FloatArray]:
         model.index_of(name)
         try:
             values = np.array(given, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             values = np.empty(0)
         fine = values.ndim == 1 and len(values) > 0 and bool(np.isfinite(values).all())
         if not fine or np.any(np.diff(values) <= 0.0):
             raise ParameterError(
-                f"the values of '{name}' are a list of finite numbers in ascending order, got {given!r}"
+                f"the values of '{name}' are a list of finite numbers in ascending order, got {shown(given)}"
             )
         grid[name] = values
     return grid
@@ -223,7 +246,7 @@ def _checked_params(
     named = {**model.defaults, **params, first: rows[:, None], second: columns[None, :]}
     try:
         defined = np.argwhere(inside(model, named, (len(rows), len(columns))))
-    except TypeError:  # a value that is no number: what follows says so
+    except (TypeError, OverflowError):  # a value that is no number: what follows says so
         defined = np.empty((0, 2), dtype=np.int64)
     i, j = defined[0] if len(defined) else (0, 0)
     example = model.check_params({**params, first: rows[i], second: columns[j]})

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from contfric.chaos.rows import Limits, follow
 from contfric.chaos.starts import StateLike, default_states, given_states
 from contfric.chaos.status import Motion
-from contfric.errors import ParameterError, whole_number
+from contfric.errors import ParameterError, finite_number, whole_number
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
 
@@ -126,14 +126,14 @@ def limits_of(transient: int, periods: int, tolerance: float, confirm: int) -> L
     ParameterError
         If a number is out of its range.
     """
-    whole_number("transient", transient, least=0)
-    whole_number("periods", periods, least=1)
-    whole_number("confirm", confirm, least=0)
-    if isinstance(tolerance, bool) or not isinstance(tolerance, (int, float)):
-        raise ParameterError(f"tolerance is a number >= 0, got {tolerance!r}")
-    if not (np.isfinite(tolerance) and tolerance >= 0.0):
-        raise ParameterError(f"tolerance is a number >= 0, got {tolerance!r}")
-    return Limits(transient, periods, float(tolerance), confirm)
+    transient = whole_number("transient", transient, least=0)
+    periods = whole_number("periods", periods, least=1)
+    confirm = whole_number("confirm", confirm, least=0)
+    wanted = "is a number >= 0"
+    tolerance = finite_number("tolerance", tolerance, wanted)
+    if tolerance < 0.0:
+        raise ParameterError(f"tolerance {wanted}, got {tolerance!r}")
+    return Limits(transient, periods, tolerance, confirm)
 
 
 def checked_time(time: float) -> float:
@@ -144,9 +144,7 @@ def checked_time(time: float) -> float:
     ParameterError
         If it is not finite.
     """
-    if not np.isfinite(time):
-        raise ParameterError(f"time must be finite, got {time!r}")
-    return float(time)
+    return finite_number("time", time, "must be finite")
 
 
 def lyapunov_exponent(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import product
 from typing import NamedTuple
@@ -92,7 +93,12 @@ def starting(model: Model) -> Starting:
 
 
 def follow(
-    model: Model, vectors: FloatArray, states: FloatArray, time: float, limits: Limits
+    model: Model,
+    vectors: FloatArray,
+    states: FloatArray,
+    time: float,
+    limits: Limits,
+    stop: IntArray | None = None,
 ) -> CellRows:
     """Follow motions, compiled and without Python's lock, and return their rows.
 
@@ -100,6 +106,8 @@ def follow(
     ----------
     vectors, states : parameters and initial states, shapes (cells, parameters) and (cells, n)
     time : initial time
+    stop : shape (1,); another thread writes a 1 to it to end the computation, whose rows are then of no
+        use. Without it the motions are followed in a thread, and Ctrl-C ends them.
 
     Examples
     --------
@@ -113,7 +121,8 @@ def follow(
     from contfric.chaos.cells import follow_cells
 
     rows = empty_rows(len(vectors), len(model.states))
-    follow_cells(
+    flag = new_stop() if stop is None else stop
+    arguments = (
         model.flow.following(),
         tables(model),
         starting(model),
@@ -121,9 +130,24 @@ def follow(
         np.ascontiguousarray(vectors),
         np.ascontiguousarray(states),
         limits,
+        flag,
         rows,
     )
+    if stop is not None:
+        follow_cells(*arguments)
+        return rows
+    assert follow_cells.dispatcher is not None  # compiled here, not where nobody could interrupt it
+    with ThreadPoolExecutor(1) as pool:  # a kernel hears no Ctrl-C, but who waits for it does
+        try:
+            pool.submit(follow_cells, *arguments).result()
+        finally:
+            flag[0] = 1
     return rows
+
+
+def new_stop() -> IntArray:
+    """Return what :func:`follow` is told to end by."""
+    return np.zeros(1, dtype=np.int64)
 
 
 def check_excited(model: Model, vector: FloatArray) -> None:

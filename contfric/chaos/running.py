@@ -14,6 +14,7 @@ from concurrent.futures import (
 from time import monotonic
 from typing import TypeAlias
 
+from contfric.chaos.rows import new_stop
 from contfric.chaos.tiles import Tile, TileRows, compute_tile
 
 Progress: TypeAlias = Callable[[str], None]
@@ -84,10 +85,11 @@ def _on_threads(tiles: Mapping[int, Tile]) -> Iterator[tuple[int, TileRows]]:
     pool = ThreadPoolExecutor(count, thread_name_prefix="contfric-tile")
     waiting = iter(tiles.items())
     running: dict[Future[TileRows], int] = {}
+    stop = new_stop()
 
     def start(most: int) -> None:
         while len(running) < most and (following := next(waiting, None)) is not None:
-            running[pool.submit(compute_tile, following[1])] = following[0]
+            running[pool.submit(compute_tile, following[1], stop)] = following[0]
 
     try:
         start(count * _AHEAD)
@@ -97,6 +99,7 @@ def _on_threads(tiles: Mapping[int, Tile]) -> Iterator[tuple[int, TileRows]]:
             start(count * _AHEAD)
             yield number, done.result()
     finally:
+        stop[0] = 1  # after Ctrl-C nobody waits for what is under way
         pool.shutdown(cancel_futures=True)
 
 

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contfric.errors import ParameterError, whole_number
+from contfric.errors import ParameterError, shown, whole_number
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.simulation import displaced
 
@@ -76,12 +76,12 @@ def given_states(model: Model, state: StateLike, params: Mapping[str, float]) ->
     given = state(params) if callable(state) else state
     try:
         states = np.array(given, dtype=np.float64, ndmin=2)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         states = np.empty((0, 0))
     n = len(model.states)
     if states.ndim != 2 or states.shape[1] != n or not len(states) or not np.isfinite(states).all():
         raise ParameterError(
             f"a state of '{model.name}' is {n} finite numbers ({', '.join(model.states)}), several "
-            f"states are rows of them; got {given!r}"
+            f"states are rows of them; got {shown(given)}"
         )
     return states

@@ -30,7 +30,7 @@ class TileFolder:
     def read(self, number: int, tile: Tile) -> TileRows | None:
         """Return a finished tile, or None if it has not been finished."""
         path = self._file(number)
-        if not path.exists():
+        if not path.is_file():
             return None
         like = empty_tile(tile.shape, len(tile.model.states))
         try:
@@ -72,7 +72,7 @@ def open_tiles(path: Path, record: dict[str, Any]) -> TileFolder:
     except OSError as error:
         raise ResultFileError(unwritable(path, error)) from error
     file = path / _RECORD
-    if file.exists():
+    if file.is_file():
         _check_same(file, record)
     elif any(path.glob("tile-*.npz")):
         raise ResultFileError(f"{path} holds tiles without their {_RECORD}: use another folder")

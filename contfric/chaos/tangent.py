@@ -52,6 +52,7 @@ from contfric.orbit.trajectory import (
     copy_state,
     first_hit,
     sign_code,
+    whole_turns,
 )
 
 #: A walk has come to the next joint; otherwise it ended as a simulation does (HELD, IMPOSSIBLE, INFINITE,
@@ -128,9 +129,8 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
             return HELD if held else QUIET, surface, mode, duration, turns, t
         copy_state(room.after, y)
         t, duration = t + tau, duration + tau
-        while t >= period:
-            t -= period
-            turns += 1
+        more, t = whole_turns(t, period)
+        turns += more
         for j in range(y.shape[0]):
             if not abs(y[j]) < TOO_LARGE:
                 why = CHATTER  # flights too short to be resolved

@@ -22,6 +22,7 @@ from contfric.chaos.status import Motion
 from contfric.errors import ParameterError
 from contfric.models import load_model
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.system import IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +133,11 @@ def inside(model: Model, named: Mapping[str, Any], shape: tuple[int, ...]) -> ND
     return holds
 
 
-def compute_tile(tile: Tile) -> TileRows:
-    """Compute the cells of a tile; what it returns depends on nothing but the tile."""
+def compute_tile(tile: Tile, stop: IntArray | None = None) -> TileRows:
+    """Compute the cells of a tile; what it returns depends on nothing but the tile.
+
+    ``stop`` is that of :func:`contfric.chaos.rows.follow`.
+    """
     rows, columns, starts = tile.shape
     n = len(tile.model.states)
     vectors = tile.vectors()
@@ -153,6 +157,7 @@ def compute_tile(tile: Tile) -> TileRows:
         states.reshape(-1, n),
         tile.time,
         tile.limits,
+        stop,
     )
     shape = (len(vectors), starts, 1)
     found.exponents[defined] = cells.exponents.reshape(*shape, n)

@@ -94,6 +94,9 @@ class EndReason(str, Enum):
     CLOSED = "the branch is a closed curve"
     START = "the branch starts here"
     POINTS = "the largest number of points was reached (max_points)"
+    WORK = (
+        "most steps are refused: the work for max_points points is done, and more would get nowhere"
+    )
     STEP = "the step became too small: Newton does not converge"
     SINGULAR = "several conditions fail at once: the equations are singular beyond this point"
     UNBOUNDED = "the amplitude grows without bound: resonance"

@@ -37,7 +37,7 @@ from contfric.continuation.steps import (
 from contfric.orbit.equations import FunctionsType, LayoutType
 
 #: Why a march stopped.
-FULL, EVENT, OUTSIDE, STEP, CLOSED, BROKEN, UNBOUNDED, ENDLESS = range(8)
+FULL, EVENT, OUTSIDE, STEP, CLOSED, BROKEN, UNBOUNDED, ENDLESS, MORE = range(9)
 
 #: Angle between consecutive tangents (rad): wanted, and the most that is accepted. At the wanted
 #: angle a branch is smooth to the eye; beyond the other one, the step may change branches.
@@ -159,11 +159,14 @@ def march(  # type: ignore[no-untyped-def]
 ):
     """Continue from the point in row k (with its tangent and watched values) until something happens.
 
-    With k = -1, row 0 alone is solved, normal to the tangent given there.
+    With k = -1, row 0 alone is solved, normal to the tangent given there. A call that has used up its budget
+    ends with MORE: called again with the last row, the next step and the same options, it goes on as if
+    nothing had been.
 
     Parameters
     ----------
-    options : (first step, largest step, smallest step, lower limit, upper limit, 1/width^2)
+    options : (first step, largest step, smallest step, lower limit, upper limit, 1/width^2, budget: most
+        points that are solved for, whether the last trial was not finite)
     k : last row that is given; an earlier one serves the prediction
     start, taken : where the branch began, and points since then
     zs, ws, tzs, tws, arc, tests, labels, mu : points of the branch, one a row; filled from row k + 1
@@ -173,16 +176,20 @@ def march(  # type: ignore[no-untyped-def]
     tuple
         (why it stopped, index of the last row written, next step).
     """
-    step, largest, smallest, low, high, scale = options
+    step, largest, smallest, low, high, scale, budget, lost = options
     which, trial = np.empty(1, dtype=np.int64), np.empty(p.shape[0])
     which[0] = active
     for j in range(p.shape[0]):
         trial[j] = p[j]
     guess, angle = np.empty((zs.shape[1], zs.shape[2])), 0.0
     room = step_room(zs.shape[1], zs.shape[2], p.shape[0])
-    solving_first, finite = k < 0, True
+    solving_first, finite, solved = k < 0, lost == 0.0, 0.0
     while k + 1 < ws.shape[0]:
         row = k + 1
+        if solved >= budget:
+            options[7] = 0.0 if finite else 1.0
+            return MORE, k, step
+        solved += 1.0
         if solving_first:
             trial[active], slope = ws[0], tws[0]
         elif step < smallest:

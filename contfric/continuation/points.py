@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.errors import ParameterError, whole_number
+from contfric.errors import ParameterError, checked_range, finite_number, whole_number
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System
@@ -22,6 +21,8 @@ FIRST_STEP = 0.1
 SMALLEST_STEP = 1e-10
 #: Smallest largest step: below it a branch is millions of points long.
 _LEAST_STEP = 1e-8
+#: Widest range for a parameter of this size (1 at least): the smallest step is a tenth of it.
+_RESOLVED = 1e9
 #: Most points of one side of a branch by default.
 MOST_POINTS = 20_000
 #: Extra columns of the tests behind the margins and the distances of the labels; the first is the slope
@@ -120,23 +121,14 @@ def settings_of(
         raise ParameterError(f"continuation starts from an Orbit, got {type(orbit).__name__}")
     model = orbit.model
     model.index_of(parameter)
-    try:
-        low, high = (float(value) for value in bounds)
-    except (TypeError, ValueError):
-        raise ParameterError(
-            f"the range of '{parameter}' is a pair of numbers (lower, upper), got {bounds!r}"
-        ) from None
-    whole_number("max_points", max_points, least=2)
-    if max_step is not None and not isinstance(max_step, (int, float)):
-        raise ParameterError(f"max_step is a share of the range, in (0, 1], got {max_step!r}")
-    if not (math.isfinite(low) and math.isfinite(high)) or not low < high:
-        raise ParameterError(
-            f"the range of '{parameter}' must be two finite numbers, lower first, got ({low}, {high})"
-        )
-    if max_step is not None and not _LEAST_STEP <= max_step <= 1.0:
-        raise ParameterError(
-            f"max_step is a share of the range, from {_LEAST_STEP:g} to 1, got {max_step!r}"
-        )
+    low, high = checked_range(parameter, bounds)
+    max_points = whole_number("max_points", max_points, least=2)
+    if max_step is not None:
+        max_step = finite_number("max_step", max_step, "is a share of the range, in (0, 1]")
+        if not _LEAST_STEP <= max_step <= 1.0:
+            raise ParameterError(
+                f"max_step is a share of the range, from {_LEAST_STEP:g} to 1, got {max_step!r}"
+            )
     width = high - low
     bottom, top, why_bottom, why_top = model.limits(parameter, orbit.params)
     clipped_low, clipped_high = max(low, bottom), min(high, top)
@@ -151,6 +143,11 @@ def settings_of(
         raise ParameterError(
             f"the orbit is at {parameter} = {value:g}, outside of the range ({low:g}, {high:g}): "
             "start from an orbit inside"
+        )
+    if width > _RESOLVED * max(1.0, abs(value)):
+        raise ParameterError(
+            f"the orbit is at {parameter} = {value:g}, and the range ({low:g}, {high:g}) is so wide that no "
+            "step along it would be short there: give the part of it that is of interest"
         )
     return Settings(
         parameter,

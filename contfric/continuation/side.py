@@ -7,6 +7,7 @@ parameter, arclength, labels, multipliers) is copied out of the rows when they a
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,17 @@ from contfric.continuation.points import EXTRA, SMALLEST_STEP, Point, Settings
 from contfric.models.definition import FloatArray
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.pace import Pace
 from contfric.orbit.system import IntArray, System
 
-#: Points that one call of the compiled march may write: long enough to cost nothing, short enough
-#: for Ctrl-C to be answered at once.
+#: Points that the rows hold at a time: enough to cost nothing.
 CHUNK = 512
+#: Most points that are solved for along one side, for each that it may have: one in two is refused at worst,
+#: a few tens where a side comes to an end. Beyond that it gets nowhere.
+_MOST_SOLVES = 50
 
+#: Place of the budget in the options of the march.
+_BUDGET = 6
 #: A column that is full grows by one part in this many; the last rest is given back.
 _GROWTH = 8
 #: Rows that are moved at once: few enough to need no memory to speak of.
@@ -144,6 +150,7 @@ class Side:
     at_event : whether the first point is at a sliding event
     autonomous : whether the duration of a turn is one of the unknowns
     largest : longest step, where the settings' would leap over what is near
+    solves : points solved for by the march, those among them that it refused
     """
 
     first: Point
@@ -158,6 +165,8 @@ class Side:
     _kept: Columns = field(default_factory=lambda: Columns({}))
     _fresh: int = 0
     autonomous: bool = False
+    solves: int = 0
+    _pace: Pace = field(default_factory=Pace)
 
     @classmethod
     def starting(cls, point: Point, system: System, end: End, stability: bool) -> Side:
@@ -213,27 +222,34 @@ class Side:
 
     def march(self, orbit: Orbit, settings: Settings, step: float) -> tuple[int, float]:
         """March on; return (why it stopped, next step)."""
-        from contfric.continuation.march import march
+        from contfric.continuation.march import MORE, march
 
         if self.last + 1 >= CHUNK:
             self._keep_full_rows()
         stop = min(CHUNK, self.last + 1 + settings.most_points - self.count)
-        why, last, step = march(
-            orbit.system.functions(),
-            orbit.system.layout,
-            orbit.vector,
-            orbit.model.index_of(settings.parameter),
-            march_options(settings, step, self.largest),
-            self.last,
-            settings.stability,
-            self.first.as_start(),
-            self.count - 1,
-            *self.rows.arrays(stop),
-            TALLY,
-        )
-        self.count += last - self.last
-        self.last = last
-        return why, step
+        options = march_options(settings, step, self.largest)
+        why, most = MORE, _MOST_SOLVES * settings.most_points
+        while why == MORE and self.solves < most:  # between the calls Ctrl-C is heard
+            options[_BUDGET], before, began = self._pace.budget, int(TALLY[0]), perf_counter()
+            why, last, options[0] = march(
+                orbit.system.functions(),
+                orbit.system.layout,
+                orbit.vector,
+                orbit.model.index_of(settings.parameter),
+                options,
+                self.last,
+                settings.stability,
+                self.first.as_start(),
+                self.count - 1,
+                *self.rows.arrays(stop),
+                TALLY,
+            )
+            self.count += last - self.last
+            self.last = last
+            done = int(TALLY[0]) - before
+            self.solves += done
+            self._pace.took(done, perf_counter() - began)
+        return why, float(options[0])
 
     def _keep_full_rows(self) -> None:
         """Keep all rows but the last, and go on with the last two as the first."""
@@ -254,11 +270,10 @@ class Side:
 
 
 def march_options(settings: Settings, step: float, largest: float = np.inf) -> FloatArray:
-    """Return the numbers that steer the march."""
+    """Return the numbers that steer the march, with room for a single point in its budget."""
     largest = min(largest, settings.largest)
-    return np.array(
-        [min(step, largest), largest, SMALLEST_STEP, settings.low, settings.high, settings.scale]
-    )
+    steps = [min(step, largest), largest, SMALLEST_STEP]
+    return np.array([*steps, settings.low, settings.high, settings.scale, 1.0, 0.0])
 
 
 def first_point(

@@ -104,6 +104,13 @@ def continue_orbit(
     ['SS', 'CS']
     """
     settings = settings_of(orbit, parameter, range, max_step, stability, max_points)
+    return follow_orbit(orbit, settings, progress, keep=True)
+
+
+def follow_orbit(
+    orbit: Orbit, settings: Settings, progress: Progress | None = None, *, keep: bool = False
+) -> Branch:
+    """Continue an orbit both ways, as :func:`continue_orbit` does; ``keep`` is that of :func:`trace_side`."""
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
     orbit = orbit.as_half()
@@ -114,10 +121,10 @@ def continue_orbit(
             "an orbit of a continuum). Move the parameter a little and solve again",
             orbit,
         )
-    ahead = trace_side(orbit, start, settings, progress=progress)
+    ahead = trace_side(orbit, start, settings, progress=progress, keep=keep)
     if ahead.end.reason in (EndReason.CLOSED, EndReason.INTERRUPTED):
         return assemble(orbit, settings, ahead, End(ahead.end.reason))
-    behind = trace_side(orbit, start.reversed(), settings, progress=progress)
+    behind = trace_side(orbit, start.reversed(), settings, progress=progress, keep=keep)
     return join(orbit, settings, behind, ahead)
 
 
@@ -129,10 +136,13 @@ def trace_side(
     first_step: float = FIRST_STEP,
     at_event: bool = False,
     progress: Progress | None = None,
+    keep: bool = False,
 ) -> Side:
     """Follow a branch from a point along its tangent until it ends.
 
     ``at_event`` says that the point is at a sliding event, to which smooth events in the same place belong.
+    With ``keep`` Ctrl-C ends the side where it is, with the reason INTERRUPTED. Without it is passed on: who
+    traces sides one after the other must not take the end of one for an answer.
     """
     side = Side.starting(start, orbit.system, End(EndReason.START), settings.stability)
     side.at_event = at_event
@@ -140,7 +150,9 @@ def trace_side(
     while True:
         try:
             finished, step = _advance(orbit, side, settings, step)
-        except KeyboardInterrupt:  # keep what was found
+        except KeyboardInterrupt:
+            if not keep:
+                raise
             side.end = End(EndReason.INTERRUPTED)
             return side
         if progress is not None:
@@ -166,6 +178,7 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         kernels.CLOSED: EndReason.CLOSED,
         kernels.UNBOUNDED: EndReason.UNBOUNDED,
         kernels.ENDLESS: EndReason.PERIOD,
+        kernels.MORE: EndReason.WORK,
     }
     if why in reasons:
         side.end = End(reasons[why])

@@ -37,6 +37,7 @@ from contfric.continuation.march import (
     ENDLESS,
     EVENT,
     FULL,
+    MORE,
     OUTSIDE,
     STEP,
     UNBOUNDED,
@@ -145,9 +146,11 @@ def march_curve(  # type: ignore[no-untyped-def]
 ):
     """Continue from the point in row k until something happens; with k = -1 solve row 0 alone.
 
+    Ends with MORE when its budget is used up, as the march of a branch does.
+
     Parameters
     ----------
-    options : (step, largest step, smallest step, accuracy)
+    options : (step, largest step, smallest step, accuracy, budget, whether the last trial was not finite)
     box : lower corner, upper corner, widths; shape (3, 2)
     start_z, start_w : first point of the curve and its tangent, shapes (2, N, m) and (2, 2)
     taken : points since then
@@ -160,14 +163,18 @@ def march_curve(  # type: ignore[no-untyped-def]
         (why it stopped, index of the last row written, next step).
     """
     zs, ws, tzs, tws, arc, tests, labels, mu = points
-    step, largest, smallest, accuracy = options
+    step, largest, smallest, accuracy, budget, lost = options
     trial, scale, w = p.copy(), 1.0 / box[2] ** 2, np.empty(2)
     tw = np.empty(2)
     guess, angle = np.empty((zs.shape[1], zs.shape[2])), 0.0
     room = curve_room(zs.shape[1], zs.shape[2], p.shape[0])
-    solving_first, finite = k < 0, True
+    solving_first, finite, solved = k < 0, lost == 0.0, 0.0
     while k + 1 < ws.shape[0]:
         row = k + 1
+        if solved >= budget:
+            options[5] = 0.0 if finite else 1.0
+            return MORE, k, step
+        solved += 1.0
         if solving_first:
             for j in range(2):
                 w[j], tw[j] = ws[0, j], tws[0, j]

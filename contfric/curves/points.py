@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,15 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import assembled
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.pace import Pace
 from contfric.orbit.system import IntArray
 
-#: Points that one call of the march may write: limits of the parameters are looked at after each.
+#: Points that are marched at a time: limits of the parameters are looked at after each.
 CHUNK = 128
+#: Place of the budget in the options of the march.
+_BUDGET = 4
+#: How much one call of the march may do; all curves of a process share what was learned.
+_PACE = Pace()
 #: The first point is the orbit of the bifurcation to this: located events are good to about 1e-6 at worst.
 _SAME_ORBIT = 1e-3
 
@@ -116,27 +122,35 @@ def march_rows(
     accuracy: float,
 ) -> tuple[int, int, float]:
     """March on from row k; return (why it stopped, last row, next step)."""
+    from contfric.continuation.march import MORE
     from contfric.curves.march import march_curve
 
-    box = problem.box
-    why, last, step = march_curve(
-        problem.system.functions(),
-        problem.model.flow.second_derivatives,
-        problem.system.layout,
-        problem.condition,
-        problem.vector,
-        problem.which,
-        np.array([min(step, largest), largest, SMALLEST_STEP, accuracy]),
-        np.array([box.low, box.high, box.widths]),
-        k,
-        np.array([start.joints, start.tangent]),
-        np.array([start.w, start.slope]),
-        taken,
-        border,
-        rows.arrays(),
-        TALLY,
-    )
-    return int(why), int(last), float(step)
+    box, why, last = problem.box, MORE, k
+    options = np.array([min(step, largest), largest, SMALLEST_STEP, accuracy, 1.0, 0.0])
+    while (
+        why == MORE
+    ):  # between the calls Ctrl-C is heard; a step that is refused is halved, down to the least
+        options[_BUDGET], before, began = _PACE.budget, int(TALLY[0]), perf_counter()
+        taken, k = taken + last - k, last
+        why, last, options[0] = march_curve(
+            problem.system.functions(),
+            problem.model.flow.second_derivatives,
+            problem.system.layout,
+            problem.condition,
+            problem.vector,
+            problem.which,
+            options,
+            np.array([box.low, box.high, box.widths]),
+            k,
+            np.array([start.joints, start.tangent]),
+            np.array([start.w, start.slope]),
+            taken,
+            border,
+            rows.arrays(),
+            TALLY,
+        )
+        _PACE.took(int(TALLY[0]) - before, perf_counter() - began)
+    return int(why), int(last), float(options[0])
 
 
 def solve_point(

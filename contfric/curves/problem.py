@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,7 +16,7 @@ from contfric.continuation.events import (
     kind_of_margin,
     resting_domain,
 )
-from contfric.errors import ParameterError, did_you_mean
+from contfric.errors import ParameterError, checked_range, did_you_mean
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.linear import jacobian_blocks
 from contfric.orbit.orbit import Orbit
@@ -158,17 +157,7 @@ def box_of(
 def _range_of(name: str, ranges: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
     if name not in ranges:
         raise ParameterError(f"the range of '{name}' is missing: {{'{name}': (lower, upper), ..}}")
-    try:
-        low, high = (float(value) for value in ranges[name])
-    except (TypeError, ValueError):
-        raise ParameterError(
-            f"the range of '{name}' is a pair of numbers (lower, upper), got {ranges[name]!r}"
-        ) from None
-    if not (math.isfinite(low) and math.isfinite(high)) or not low < high:
-        raise ParameterError(
-            f"the range of '{name}' must be two finite numbers, lower first, got ({low}, {high})"
-        )
-    return low, high
+    return checked_range(name, ranges[name])
 
 
 def problem_of(bifurcation: Bifurcation, box: Box) -> Problem:
@@ -353,7 +342,7 @@ def border_of(problem: Problem, joints: FloatArray, vector: FloatArray) -> Float
     border = np.zeros((2, *joints.shape))
     if problem.test is not None:
         return border
-    a, b, _, close = jacobian_blocks(problem.system, joints, vector)
+    a, b, _, close = jacobian_blocks(problem.system, joints, vector, parameters=False)
     count, m = joints.shape
     full = np.zeros((count * m, count * m))
     for i in range(count):

@@ -26,7 +26,7 @@ from contfric.curves.points import (
 )
 from contfric.curves.problem import Problem, box_of, problem_of
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
-from contfric.errors import ConvergenceError, ParameterError, whole_number
+from contfric.errors import ConvergenceError, ParameterError, finite_number, whole_number
 from contfric.models.definition import FloatArray, Model
 
 #: A first point farther than this from the bifurcation (in widths of the ranges) is another one.
@@ -70,6 +70,11 @@ class CurveSide:
     def tip(self) -> CurvePoint:
         """The last point."""
         return self.points[-1]
+
+    @property
+    def last(self) -> CurveSide:
+        """What it goes on as at its very end."""
+        return self if self.following is None else self.following.last
 
 
 def continue_bifurcation(
@@ -128,28 +133,25 @@ def continue_bifurcation(
     whole_number("max_points", max_points, least=2)
     problem = problem_of(bifurcation, box)
     problem, start, border = start_of_curve(problem, bifurcation, largest)
-    ahead = trace_curve_side(problem, start, border, largest, max_points, progress)
+    ahead = trace_curve_side(problem, start, border, largest, max_points, progress, keep=True)
     if ahead.end.reason is CurveEndReason.CLOSED:
         return join_sides(None, ahead)
-    behind = trace_curve_side(problem, start.reversed(), border, largest, max_points, progress)
+    if ahead.last.end.reason is CurveEndReason.INTERRUPTED:
+        return join_sides(None, ahead, CurveEnd(CurveEndReason.INTERRUPTED))
+    behind = trace_curve_side(
+        problem, start.reversed(), border, largest, max_points, progress, keep=True
+    )
     return join_sides(behind, ahead)
 
 
 def largest_step(max_step: Any, model: Model) -> float:
-    """Return the largest step as a share of the ranges: what is asked for, or the model's.
-
-    Raises
-    ------
-    ParameterError
-        If it is no number in (0, 1].
-    """
+    """Return the largest step as a share of the ranges: what is asked for, or the model's."""
     if max_step is None:
         return model.max_step or LARGEST_STEP
-    if isinstance(max_step, bool) or not isinstance(max_step, (int, float)):
-        raise ParameterError(f"max_step is a share of the ranges, in (0, 1], got {max_step!r}")
-    if not 1e-8 <= max_step <= 1.0:
+    given = finite_number("max_step", max_step, "is a share of the ranges, in (0, 1]")
+    if not 1e-8 <= given <= 1.0:
         raise ParameterError(f"max_step is a share of the ranges, from 1e-8 to 1, got {max_step!r}")
-    return float(max_step)
+    return given
 
 
 def start_of_curve(problem: Problem, bifurcation: Bifurcation, largest: float) -> Start:
@@ -197,14 +199,20 @@ def trace_curve_side(
     max_points: int,
     progress: Progress | None = None,
     changes: int = _MOST_CHANGES,
+    keep: bool = False,
 ) -> CurveSide:
-    """Follow a curve from a point along its tangent until it ends, through changes of its signature."""
+    """Follow a curve from a point along its tangent until it ends, through changes of its signature.
+
+    ``keep`` is that of :func:`contfric.continuation.trace.trace_side`.
+    """
     side = CurveSide(problem, [start], border.copy())
     step = FIRST_STEP * largest
     while True:
         try:
             finished, step = _advance(side, step, largest, max_points)
-        except KeyboardInterrupt:  # keep what was found
+        except KeyboardInterrupt:
+            if not keep:
+                raise
             side.end = CurveEnd(CurveEndReason.INTERRUPTED)
             return side
         if progress is not None:
@@ -216,12 +224,18 @@ def trace_curve_side(
             break
     special = side.end.special
     if side.end.reason is CurveEndReason.MEETS and special is not None and changes > 0:
-        on = goes_on(problem, side.tip, special, largest)
+        try:
+            on = goes_on(problem, side.tip, special, largest)
+        except KeyboardInterrupt:
+            if not keep:
+                raise
+            side.end = CurveEnd(CurveEndReason.INTERRUPTED, special=special)
+            return side
         if on is not None:
             other, point, border = on
             point.arc = side.tip.arc
             side.following = trace_curve_side(
-                other, point, border, largest, max_points, progress, changes - 1
+                other, point, border, largest, max_points, progress, changes - 1, keep
             )
     return side
 
@@ -373,7 +387,6 @@ def _range_crossed(side: CurveSide, after: CurvePoint) -> CurvePoint | None:
     box, before = side.problem.box, side.tip
     if np.all(after.w >= box.low) and np.all(after.w <= box.high):
         return None
-
     inside = before.w @ box.edges[:, :2].T + box.edges[:, 2]
     if np.min(inside) <= 0.0:
         return before

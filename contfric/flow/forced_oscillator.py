@@ -20,6 +20,7 @@ import math
 from contfric.compiled import (
     allocating_helper,
     flow_signature,
+    helper,
     hit_signature,
     kernel,
     level_signature,
@@ -203,11 +204,23 @@ def rate(mode, c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
     return slides * (f - friction * p[S] - 2.0 * p[ZETA] * y[1] - y[0])
 
 
+@helper
+def is_motion(t0, y0, dt, p):  # type: ignore[no-untyped-def]
+    """Tell whether there is a motion to search: iterates of Newton's method may be anything."""
+    return p[OMEGA] > 0.0 and math.isfinite(t0 + dt + y0[0] + y0[1] + p[S] + p[H] + p[ZETA])
+
+
 @kernel(hit_signature)
 def hit(mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-untyped-def]
-    """Return the first time at which observable c takes a value, with the state there, or -1."""
+    """Return the first time at which observable c takes a value, with the state there, or -1.
+
+    No numbers as the state where nothing can be found: what is given is no motion, or the search too long.
+    """
     if mode == STICK and c == SPEED:
         return -1.0
+    if not is_motion(t0, y0, dt_max, p):
+        y1[0], y1[1] = math.nan, math.nan
+        return 0.0
     sign = direction(mode) if on and c == SPEED else 0.0  # a slide leaves v = 0 to its own side
     phase = phases(p, t0)
     if mode == STICK and p[H] == 0.0 and abs(y0[0] - phase[1] - target) > AWAY:
@@ -218,6 +231,9 @@ def hit(mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-untyped-
     _, tau, x = roots_along(mode, c, order, target, on, sign, phase, t0, y0, dt_max, p, y0, y0)
     if tau < 0.0 or tau > dt_max:
         return -1.0
+    if math.isnan(tau):
+        y1[0], y1[1] = tau, tau
+        return 0.0
     if c == SPEED and not math.isnan(x):
         y1[0], y1[1] = x, target
     else:
@@ -231,6 +247,8 @@ def turning(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-d
     """Write the interior stationary points of observable c and return their number."""
     if dt <= 0.0 or (mode == STICK and c == SPEED):
         return 0
+    if not is_motion(t0, y0, dt, p):
+        return -1
     phase = phases(p, t0)
     if mode == STICK and p[H] == 0.0:
         first, last = interior_of(dt)

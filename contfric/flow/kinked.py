@@ -32,7 +32,15 @@ from contfric.flow.dense import is_flat, node, probed, write
 from contfric.flow.dop853 import STAGES
 from contfric.flow.hits import _FLAT, first_hit, first_in_step, leaving
 from contfric.flow.integrated import folded, hand_back
-from contfric.flow.stepping import FRESH, REMEMBERED, first_step, next_step, settle
+from contfric.flow.stepping import (
+    FRESH,
+    MOST_STEPS,
+    REMEMBERED,
+    TRIED,
+    first_step,
+    next_step,
+    settle,
+)
 from contfric.flow.turnings import all_turnings
 from contfric.flow.variations import begin, make_room, slope
 
@@ -180,6 +188,11 @@ def kinked_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ign
     piece = piece_at(motion, mode, phase, here, kink, p, room)
     done = 0.0
     while done < dt_max:
+        room.control[TRIED] += 1.0  # kinks that are met at once take no step
+        if room.control[TRIED] > MOST_STEPS:
+            for i in range(n):
+                y1[i] = math.nan
+            return done
         t, left = phase + done, dt_max - done
         until, k = next_kink(motion, piece, t, here, kink, left, p, room, behind)
         span = left if k < 0 else until
@@ -211,6 +224,9 @@ def kinked_turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: igno
     piece = piece_at(motion, mode, phase, here, -1, p, room)
     done, kink, count = 0.0, -1, 0
     while done < dt:
+        room.control[TRIED] += 1.0  # kinks that are met at once take no step
+        if room.control[TRIED] > MOST_STEPS:
+            return -1
         t, left = phase + done, dt - done
         until, k = next_kink(motion, piece, t, here, kink, left, p, room, behind)
         span = left if k < 0 else until

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from contfric.compiled import helper
+from contfric.flow.overdamped import STRONG, damped_bound, damped_rates, is_gone
 from contfric.flow.response import forced, free
 
 OMEGA, S, S0, H, ZETA = range(5)
@@ -126,33 +127,40 @@ def point(mode, p, phase, t0, x0, v0, d):  # type: ignore[no-untyped-def]
 
 @helper
 def quantity(mode, c, order, p, phase, t0, x0, v0, d):  # type: ignore[no-untyped-def]
-    """Return q with three derivatives, E and a value; q is observable c or (order 1) its rate.
+    """Return q with three derivatives, E, a value and G; q is observable c or (order 1) its rate.
 
-    E bounds hypot(v, v'). Of an observable the value is x; of a rate it is the observable, and the
-    third derivative is left out (0).
+    E and G are what the bounds below start from: E is hypot(v, v') and G is 0; of a strongly damped slide
+    they are |w_s| and the fast exponential of :mod:`contfric.flow.overdamped`. Of an observable the value
+    is x; of a rate it is the observable, and the third derivative is left out (0).
     """
     x, v, f, f1, f2, f3 = point(mode, p, phase, t0, x0, v0, d)
     u = x - f
     if mode == STICK:
         if order == 0:
-            return u, -f1, -f2, -f3, 0.0, x
-        return -f1, -f2, -f3, 0.0, 0.0, u
-    z = 2.0 * p[ZETA]
-    a = f - z * v - x - direction(mode) * p[S]
-    a1 = f1 - z * a - v
-    a2 = f2 - z * a1 - a
-    size = math.sqrt(v * v + a * a)
+            return u, -f1, -f2, -f3, 0.0, x, 0.0
+        return -f1, -f2, -f3, 0.0, 0.0, u, 0.0
+    zeta, friction, fast = p[ZETA], direction(mode) * p[S], 0.0
+    if zeta > STRONG:
+        a, a1, a2, size, fast = damped_rates(
+            zeta, friction, p[OMEGA], p[H], phase, x0, v0, x, v, f, f1, f2, f3, d
+        )
+    else:
+        z = 2.0 * zeta
+        a = f - z * v - x - friction
+        a1 = f1 - z * a - v
+        a2 = f2 - z * a1 - a
+        size = math.sqrt(v * v + a * a)
     if c == SPEED:
         if order == 0:
-            return v, a, a1, a2, size, x
-        return a, a1, a2, 0.0, size, v
+            return v, a, a1, a2, size, x, fast
+        return a, a1, a2, 0.0, size, v, fast
     if order == 0:
-        return u, v - f1, a - f2, a1 - f3, size, x
-    return v - f1, a - f2, a1 - f3, 0.0, size, u
+        return u, v - f1, a - f2, a1 - f3, size, x, fast
+    return v - f1, a - f2, a1 - f3, 0.0, size, u, fast
 
 
 @helper
-def third_bound(mode, c, order, p, size, window):  # type: ignore[no-untyped-def]
+def third_bound(mode, c, order, p, size, fast, window):  # type: ignore[no-untyped-def]
     """Return a bound of |q'''| over a window that starts where hypot(v, v') = size.
 
     From ``v'' + 2 zeta v' + v = f'`` follows ``d/dt hypot(v, v') <= |f'| + 2 max(0, -zeta) hypot``.
@@ -161,6 +169,11 @@ def third_bound(mode, c, order, p, size, window):  # type: ignore[no-untyped-def
     w3 = w * w * w
     if mode == STICK:
         return w3 * (1 + 27 * h) if order == 0 else w3 * w * (1 + 81 * h)
+    if zeta > STRONG:
+        if c == SPEED:
+            return damped_bound(3 + order, zeta, w, h, size, fast, window)
+        force = w3 * (1 + 27 * h) if order == 0 else w3 * w * (1 + 81 * h)
+        return damped_bound(2 + order, zeta, w, h, size, fast, window) + force
     z = 2.0 * abs(zeta)
     f1 = w * (1 + 3 * h)
     e = size + f1 * window
@@ -175,15 +188,28 @@ def third_bound(mode, c, order, p, size, window):  # type: ignore[no-untyped-def
 
 @helper
 def natural_scale(mode, p):  # type: ignore[no-untyped-def]
-    """Return the longest window worth a bound: one radian of the fastest motion."""
+    """Return the longest window worth a bound: one radian of the fastest motion.
+
+    Of a strongly damped slide: of the motion that is left when the fast exponential has gone.
+    """
     fastest = p[OMEGA] if p[H] == 0.0 else 3.0 * p[OMEGA]
     if mode == STICK:
         return 1.0 / fastest
+    if p[ZETA] > STRONG:
+        return 1.0 / max(1.0, fastest)
     return 1.0 / max(1.0 + 2.0 * abs(p[ZETA]), fastest)
 
 
 @helper
-def sixth_bound(mode, c, order, p, size, window):  # type: ignore[no-untyped-def]
+def scale_there(mode, p, natural, fast):  # type: ignore[no-untyped-def]
+    """Return the window worth a bound at a place: shorter while the fast exponential lasts."""
+    if mode == STICK or not p[ZETA] > STRONG or is_gone(p[ZETA], fast):
+        return natural
+    return min(natural, 0.5 / p[ZETA])
+
+
+@helper
+def sixth_bound(mode, c, order, p, size, fast, window):  # type: ignore[no-untyped-def]
     """Return a bound of |q^(6)| over a window that starts where hypot(v, v') = size.
 
     By ``v^(k) = f^(k-1) - 2 zeta v^(k-1) - v^(k-2)``, from the bound of hypot(v, v') as above.
@@ -193,6 +219,11 @@ def sixth_bound(mode, c, order, p, size, window):  # type: ignore[no-untyped-def
     w6 = w2 * w2 * w2
     if mode == STICK:
         return w6 * (1 + 729 * h) if order == 0 else w6 * w * (1 + 2187 * h)
+    if zeta > STRONG:
+        if c == SPEED:
+            return damped_bound(6 + order, zeta, w, h, size, fast, window)
+        force = w6 * (1 + 729 * h) if order == 0 else w6 * w * (1 + 2187 * h)
+        return damped_bound(5 + order, zeta, w, h, size, fast, window) + force
     z = 2.0 * abs(zeta)
     f1 = w * (1 + 3 * h)
     e = size + f1 * window

@@ -34,11 +34,18 @@ def rest_hit(x, target, w, phase):  # type: ignore[no-untyped-def]
 
 @helper
 def rest_turnings(x, w, phase, first, last, times, values):  # type: ignore[no-untyped-def]
-    """Write the stationary points of the load between two times; return their number, -1 if too many."""
+    """Write the stationary points of the load between two times; return their number.
+
+    It is -1 if they are too many, or what is given is no motion at rest under an excitation.
+    """
     start = math.atan2(phase[0], phase[1])
+    if not (w > 0.0 and math.isfinite(start + last)):
+        return -1
     count = 0
-    turn = math.ceil(start / math.pi)
-    while True:
+    turn = (
+        math.ceil((start + w * max(first, 0.0)) / math.pi) - 1
+    )  # one earlier: the quotient is rounded
+    for _ in range(times.shape[0] + 3):
         time = (turn * math.pi - start) / w
         if time >= last:
             return count
@@ -49,3 +56,4 @@ def rest_turnings(x, w, phase, first, last, times, values):  # type: ignore[no-u
             values[count] = x - 1.0 if turn % 2 == 0 else x + 1.0
             count += 1
         turn += 1
+    return -1

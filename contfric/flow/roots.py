@@ -10,7 +10,7 @@ import math
 
 from contfric.compiled import helper
 from contfric.flow.march import leaving_step, reached, safe_step, window_of
-from contfric.flow.motion import natural_scale, quantity, sixth_bound, third_bound
+from contfric.flow.motion import natural_scale, quantity, scale_there, sixth_bound, third_bound
 from contfric.flow.pieces import ISOLATED, UNSURE, coefficients, root_of, scan
 
 #: Below this fraction of the natural scale a stationary value at the start counts as being there.
@@ -26,6 +26,9 @@ PAST = 1e-8
 #: Length of a piece in natural scales: the interpolation error is about 1e-3 of the size there.
 PIECE = 2.2
 EPS = 2.220446049250313e-16
+#: Most pieces of a search, a tenth of a second: a segment of an orbit has a few, a thousand at the slowest
+#: excitations. Iterates of Newton's method on their way to nowhere ask for any number.
+MOST_PIECES = 1_000_000
 
 
 @helper
@@ -57,8 +60,8 @@ def roots_along(mode, c, order, target, on, sign, phase, t0, y0, end, p, times, 
     Returns
     -------
     tuple
-        (number of roots, -1 if they do not fit; the last one found, -1 if none; x there where c is
-        the speed and it is known, else nan).
+        (number of roots, -1 if they do not fit or the search is too long; the last one found, -1 if none,
+        no number if the search is too long; x there where c is the speed and it is known, else nan).
     """
     single = order == 0
     natural = natural_scale(mode, p)
@@ -67,13 +70,18 @@ def roots_along(mode, c, order, target, on, sign, phase, t0, y0, end, p, times, 
         longest = end / math.ceil(end / longest)
     first, last = interior_of(end)
     x0, v0 = y0[0], y0[1]
-    tau, leaving, length, count = 0.0, on, longest, 0
-    q, q1, q2, _, size, value = quantity(mode, c, order, p, phase, t0, x0, v0, 0.0)
+    tau, leaving, count, pieces = 0.0, on, 0, 0
+    q, q1, q2, _, size, value, fast = quantity(mode, c, order, p, phase, t0, x0, v0, 0.0)
     q -= target
+    scale = scale_there(mode, p, natural, fast)
+    length = min(longest, PIECE * scale)
     if not single:
         leaving = abs(q) <= AT_START * (1.0 + size)
     stop = end if single else last  # what lies behind the last place is at the joint
     while tau < stop:
+        pieces += 1
+        if pieces > MOST_PIECES:
+            return -1, math.nan, math.nan
         if leaving and abs(q1) <= AT_START * (1.0 + size):
             q1 = 0.0  # the rate vanishes at the start (a release with S0 = S): rounding is no sign
         if sign == 0.0:
@@ -82,10 +90,12 @@ def roots_along(mode, c, order, target, on, sign, phase, t0, y0, end, p, times, 
         if not found:
             after = min(end, tau + length)
             step = after - tau
-            r, r1, r2, _, size_r, value_r = quantity(mode, c, order, p, phase, t0, x0, v0, after)
+            r, r1, r2, _, size_r, value_r, fast_r = quantity(
+                mode, c, order, p, phase, t0, x0, v0, after
+            )
             r -= target
             s2 = step * step
-            error = sixth_bound(mode, c, order, p, size, step) * s2 * s2 * s2
+            error = sixth_bound(mode, c, order, p, size, fast, step) * s2 * s2 * s2
             before = 0.0 if leaving else sign * q
             ends = coefficients(before, sign * q1, sign * q2, sign * r, sign * r1, sign * r2, step)
             outcome, low, high, here = scan(ends, error, leaving)
@@ -115,30 +125,33 @@ def roots_along(mode, c, order, target, on, sign, phase, t0, y0, end, p, times, 
                 sign = -sign  # and behind the root, up to the end of the part, it falls further
                 if high < 1.0:
                     after = tau + high * step
-                    r, r1, r2, _, size_r, value_r = quantity(
+                    r, r1, r2, _, size_r, value_r, fast_r = quantity(
                         mode, c, order, p, phase, t0, x0, v0, after
                     )
                     r -= target
             if outcome != UNSURE:
                 tau, leaving, length = after, False, min(longest, 2.0 * length)
-                q, q1, q2, size, value = r, r1, r2, size_r, value_r
+                q, q1, q2, size, value, fast = r, r1, r2, size_r, value_r, fast_r
                 continue
-            length = max(0.5 * step, SHORTEST * natural)
+            scale = scale_there(mode, p, natural, fast)
+            length = max(0.5 * step, SHORTEST * scale)
             if low > 0.0:
                 step = low * step
             elif leaving and q1 == 0.0 and abs(q2) <= FLAT * (1.0 + size):
                 # a third-order start, such as a release at the largest force: what the first two rates
                 # leave is rounding, and the third decides on which side of the root the function is
-                step = SHORTEST * natural
+                step = SHORTEST * scale
                 beyond = quantity(mode, c, order, p, phase, t0, x0, v0, tau + step)[0] - target
                 found = sign * beyond <= 0.0
                 step = 0.0 if found else step
             elif leaving:
-                bound = third_bound(mode, c, order, p, size, natural)
-                step = min(leaving_step(sign * q1, sign * q2, bound), natural)
+                bound = third_bound(mode, c, order, p, size, fast, scale)
+                step = min(leaving_step(sign * q1, sign * q2, bound), scale)
                 found = step <= 0.0
             else:
-                step, found = taylor_step(mode, c, order, sign, p, q, q1, q2, size, natural, tau)
+                step, found = taylor_step(
+                    mode, c, order, sign, p, q, q1, q2, size, fast, scale, tau
+                )
                 root = tau + step
                 value += step * (q + step * (0.5 * q1 + step * q2 / 6.0))
             moved = tau + step
@@ -156,20 +169,20 @@ def roots_along(mode, c, order, target, on, sign, phase, t0, y0, end, p, times, 
             leaving = sign * slope < 0.0
             sign = -sign if leaving else 0.0
             if not leaving:  # a double root: the rate touches zero; go past its resolution
-                tau += PAST * natural
+                tau += PAST * scale_there(mode, p, natural, fast)
         else:
             leaving = False
-        q, q1, q2, _, size, value = quantity(mode, c, order, p, phase, t0, x0, v0, tau)
+        q, q1, q2, _, size, value, fast = quantity(mode, c, order, p, phase, t0, x0, v0, tau)
         q -= target
     return count, -1.0, math.nan
 
 
 @helper
-def taylor_step(mode, c, order, sign, p, q, q1, q2, size, natural, tau):  # type: ignore[no-untyped-def]
+def taylor_step(mode, c, order, sign, p, q, q1, q2, size, fast, natural, tau):  # type: ignore[no-untyped-def]
     """Return a step that passes no root, and whether it has come to one."""
     w = sign * q
     window = window_of(w, sign * q1, natural)
-    bound = third_bound(mode, c, order, p, size, window)
+    bound = third_bound(mode, c, order, p, size, fast, window)
     step = safe_step(w, sign * q1, sign * q2, bound, window)
     if step >= window:
         return step, False
@@ -194,7 +207,7 @@ def refined(mode, c, order, target, sign, phase, t0, x0, v0, p, start, width, sh
     tau = start + share * width
     q1, value = 0.0, 0.0
     for _ in range(100):  # bisection alone needs 60
-        q, q1, q2, q3, size, value = quantity(mode, c, order, p, phase, t0, x0, v0, tau)
+        q, q1, q2, q3, size, value, fast = quantity(mode, c, order, p, phase, t0, x0, v0, tau)
         q -= target
         if sign * q > 0.0:
             low = tau
@@ -211,7 +224,7 @@ def refined(mode, c, order, target, sign, phase, t0, x0, v0, p, start, width, sh
             tau = 0.5 * (low + high)
             continue
         # a rate's third derivative is the fourth one of its observable
-        next_bound = third_bound(mode, c, 1, p, size, abs(shift))
+        next_bound = third_bound(mode, c, 1, p, size, fast, abs(shift))
         cube = abs(ratio) ** 3
         if order == 0:
             value += shift * (

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contfric.errors import ParameterError, did_you_mean
+from contfric.errors import ParameterError, did_you_mean, shown
 from contfric.models.parts import (
     Constraint,
     Departure,
@@ -300,17 +300,21 @@ class Model:
             self.index_of(name)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
                 raise ParameterError(
-                    f"parameter '{name}' must be a number, got {value!r} ({type(value).__name__})"
+                    f"parameter '{name}' must be a number, got {shown(value)} ({type(value).__name__})"
                 )
-            if not math.isfinite(value):
-                raise ParameterError(f"parameter '{name}' must be finite, got {value!r}")
-            values[name] = float(value)
+            try:
+                number = float(value)
+            except (OverflowError, TypeError):  # a whole number of 400 digits; a complex one
+                number = math.inf
+            if not math.isfinite(number):
+                raise ParameterError(f"parameter '{name}' must be finite, got {shown(value)}")
+            values[name] = number
         for constraint in self.constraints:
             left = constraint.value(values)
             if left < 0 or (constraint.strict and left == 0):
-                shown = ", ".join(f"{n} = {values[n]!r}" for n in constraint.coefficients)
+                given = ", ".join(f"{n} = {values[n]!r}" for n in constraint.coefficients)
                 raise ParameterError(
-                    f"model '{self.name}' needs {constraint.text}, got {shown}. "
+                    f"model '{self.name}' needs {constraint.text}, got {given}. "
                     + (constraint.meaning or "Choose a value that obeys it.")
                 )
         return values

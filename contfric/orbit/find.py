@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from contfric.errors import AperiodicError, ConvergenceError, whole_number
 from contfric.models import ModelSource, load_model
+from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
@@ -25,6 +26,9 @@ _MOST_EVENTS = 2048
 _NEAR = 1e-2
 #: A return nearer than this is periodic to the resolution of a simulation.
 _EXACT = 1e-9
+#: A motion whose returns shrink by less than this from one to the next takes hundreds of periods more. Its
+#: series, and the place of its end, are those of the orbit to this share: it is still some way off.
+_SLOW, _SERIES = 0.9, 0.2
 #: A motion that returns this near and still does not settle creeps along a continuum of orbits.
 _CREEPING = 1e-5
 #: Periods to follow before the first look, and how much longer before each next one.
@@ -150,11 +154,12 @@ def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:
     """Return the orbit that the end of a trajectory has settled on, if it has.
 
     A return that is not yet exact may belong to an orbit that repels, beside an attractor of longer
-    period; longer simulation tells. Only at the final look are multipliers asked instead.
+    period; longer simulation tells. Only at the final look are multipliers asked instead, and where the
+    motion creeps towards the orbit as slowly as they say.
     """
     for lag, turns, mismatch in recurrences(trajectory):
         if mismatch > _EXACT and not final:
-            return None
+            return _crept_to(trajectory, lag, turns)
         orbit = _orbit_of_lag(trajectory, lag, turns)
         if orbit is None:
             continue
@@ -165,6 +170,38 @@ def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:
             # the simulation repeats itself but the system is singular: one orbit of a continuum
             return Orbit(orbit.system, orbit.joints, orbit.vector, mismatch, Status.CONVERGED)
     return None
+
+
+def _crept_to(trajectory: Trajectory, lag: int, turns: int) -> Orbit | None:
+    """Return the orbit that a motion approaches by a geometric series of small steps; None if it does not.
+
+    Under strong damping a displacement decays within ``2 zeta``, thousands of periods. Three returns give the
+    ratio of the series and with it the place of its end: an orbit that Newton's method finds there, and
+    that attracts, is what the motion comes to.
+    """
+    if len(trajectory) < 2 * lag + 1:
+        return None
+    a, b, c = (trajectory.states[-1 - k * lag] for k in (2, 1, 0))
+    before, step = b - a, c - b
+    ratio = float(before @ step) / float(before @ before) if np.any(before) else 0.0
+    if not _SLOW < ratio < 1.0 or not np.linalg.norm(
+        step - ratio * before
+    ) < _SERIES * np.linalg.norm(step):
+        return None
+    orbit = _orbit_of_lag(trajectory, lag, turns)
+    solved = None if orbit is None else settle(shortest(settle(orbit)))
+    if solved is None or not (solved.converged and solved.admissible and _attracts(solved)):
+        return None
+    left = ratio / (1.0 - ratio) * step
+    ends = np.concatenate([solved.ends[:, 1:], *_images(solved)])
+    missed = np.min(np.linalg.norm(ends - (c + left), axis=1))
+    return solved if missed < _SERIES * np.linalg.norm(left) else None
+
+
+def _images(orbit: Orbit) -> list[FloatArray]:
+    """Return the joints of the second half of an orbit that is solved on its half."""
+    symmetry = orbit.model.symmetry
+    return [] if symmetry is None else [orbit.ends[:, 1:] @ symmetry.array().T]
 
 
 def _attracts(orbit: Orbit) -> bool:

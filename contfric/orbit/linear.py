@@ -16,17 +16,18 @@ _NULL = 1e-7
 
 
 def jacobian_blocks(
-    system: System, joints: FloatArray, vector: FloatArray
+    system: System, joints: FloatArray, vector: FloatArray, parameters: bool = True
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the blocks on z_i, z_{i+1} and the parameters, and the closure.
 
-    Shapes (N, m, m), (N, m, m), (N, m, parameters) and (m, m).
+    Shapes (N, m, m), (N, m, m), (N, m, parameters) and (m, m). Without ``parameters`` the third has none:
+    where motion is integrated most of the time goes to them.
     """
     from contfric.orbit.newton import linearise
 
     count, m = joints.shape
     a, b = np.empty((count, m, m)), np.empty((count, m, m))
-    c, r = np.empty((count, m, len(vector))), np.empty((count, m, 1))
+    c, r = np.empty((count, m, len(vector) if parameters else 0)), np.empty((count, m, 1))
     close = np.empty((m, m))
     linearise(system.functions(), system.layout, joints, vector, a, b, c, r, close)
     return a, b, c, close
@@ -34,7 +35,7 @@ def jacobian_blocks(
 
 def assembled(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:
     """Return the Jacobian with respect to all joints, shape (N m, N m)."""
-    a, b, _, close = jacobian_blocks(system, joints, vector)
+    a, b, _, close = jacobian_blocks(system, joints, vector, parameters=False)
     count, m = joints.shape
     full = np.zeros((count * m, count * m))
     for i in range(count):
@@ -97,7 +98,7 @@ def pencil_of_turn(system: System, joints: FloatArray, vector: FloatArray) -> Fl
     Each inner joint is taken out by an orthogonal transformation of the two blocks that it stands
     in: the last m rows of the transposed Q of their QR factorisation annihilate it.
     """
-    a, b, _, _ = jacobian_blocks(system, joints, vector)
+    a, b, _, _ = jacobian_blocks(system, joints, vector, parameters=False)
     m = joints.shape[1]
     p, q = a[0], b[0]
     for i in range(1, len(a)):

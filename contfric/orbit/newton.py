@@ -219,9 +219,12 @@ def solve(functions, layout, z, p, trust, pencil, counts):  # type: ignore[no-un
     types.boolean(FunctionsType, LayoutType, matrix, vector, blocks, blocks, blocks, blocks, matrix)
 )
 def linearise(functions, layout, z, p, a, b, c, r, close):  # type: ignore[no-untyped-def]
-    """Fill the blocks of the full Jacobian (all parameters) for use outside of the engine."""
+    """Fill the blocks of the full Jacobian for use outside of the engine.
+
+    The first parameters are differentiated by, as many as ``c`` has columns: none or all.
+    """
     count, m = z.shape
-    free = p.shape[0]
+    free = c.shape[2]
     which = np.empty(free, dtype=np.int64)
     for k in range(free):
         which[k] = k

@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
+from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contfric.errors import ParameterError, did_you_mean
+from contfric.errors import ParameterError, did_you_mean, finite_number, shown, whole_number
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.orbit.counts import TALLY
+from contfric.orbit.pace import Pace
 from contfric.orbit.system import IntArray, mode_bounds
 
 
@@ -279,8 +281,11 @@ def simulate(
     model = load_model(model)
     vector = model.vector(params or {})
     y = _checked_state(model, vector, state)
-    if not (np.isfinite(time) and np.isfinite(periods) and periods >= 0):
-        raise ParameterError(f"time and periods must be finite, got {time!r} and {periods!r}")
+    time = finite_number("time", time, "must be finite")
+    periods = finite_number("periods", periods, "must be finite")
+    events = whole_number("events", events, least=0)
+    if periods < 0.0:
+        raise ParameterError(f"periods must not be negative, got {periods!r}")
     mode, on = start_of(model, time, y, vector, domain)
     return run(model, vector, mode, on, time, y, periods, events)
 
@@ -296,17 +301,15 @@ def run(
     events: int,
 ) -> Trajectory:
     """Run the compiled simulation; the state is copied. Rows are grown as they are needed."""
-    from contfric.orbit.trajectory import ALL_EVENTS
+    from contfric.orbit.trajectory import ALL_EVENTS, CARRIED
     from contfric.orbit.trajectory import simulate as kernel
 
     model_tables = tables(model)
     y = y.copy()
-    period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0))) or 1.0
     pieces: list[EventRows] = []
-    done, base, left = 0, 0, float(periods)
-    room = int(min(events, max(64.0, 8.0 * periods)))
-    while True:
-        rows = min(room, events - done)
+    done, carry, pace = 0, np.zeros(CARRIED), Pace(_FIRST_EVENTS)
+    while True:  # between the calls Ctrl-C is heard
+        rows, began = min(pace.budget, events - done), perf_counter()
         written = EventRows(
             np.empty((rows, 2), dtype=np.int64),
             np.empty(rows, dtype=np.int64),
@@ -314,18 +317,25 @@ def run(
             np.empty((rows, y.shape[0])),
         )
         end, count, mode, cycle, phase = kernel(
-            model.flow.following(), model_tables, mode, on, time, y, vector, left, written
+            model.flow.following(),
+            model_tables,
+            mode,
+            on,
+            time,
+            y,
+            vector,
+            float(periods),
+            written,
+            carry,
+            pace.budget,
         )
         TALLY[3] += count
-        written.cycles[:count] += base
         pieces.append(written.first(count))
         done += count
         if end != ALL_EVENTS or done >= events:
             break
-        left -= cycle + (phase - time) / period
-        base, time = base + cycle, phase
-        last, surface = written.joints[-1]
-        on = (1 << int(surface)) | int(model_tables.lies_on[last] & model_tables.kept[surface])
+        time = phase
+        pace.took(pace.budget, perf_counter() - began)
     found = joined(pieces)
     last_mode = model.modes[mode].name if mode >= 0 else ""
     return Trajectory(
@@ -337,10 +347,12 @@ def run(
         found.times,
         found.states,
         list(SimulationEnd)[end],
-        (base + cycle, float(phase), y, last_mode),
+        (cycle, float(phase), y, last_mode),
     )
 
 
+#: Events that the first call of the simulation may follow: milliseconds, or half a second of a stiff one.
+_FIRST_EVENTS = 256
 #: Displacements that a start is looked for at where the region is one-sided, in half-widths of the model.
 _PLACES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
 
@@ -361,10 +373,13 @@ def _checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) ->
     if state is None:
         # away from rest, so that symmetric and asymmetric attractors can both be reached
         return displaced(model, vector)
-    y = np.array(state, dtype=np.float64)
+    try:
+        y = np.array(state, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        y = np.empty(0)
     if y.shape != (len(model.states),) or not np.all(np.isfinite(y)):
         raise ParameterError(
             f"a state of '{model.name}' is {len(model.states)} finite numbers "
-            f"({', '.join(model.states)}), got {state!r}"
+            f"({', '.join(model.states)}), got {shown(state)}"
         )
     return y

@@ -49,6 +49,11 @@ NO_TIME, MOST_AT_ONCE = 1e-12, 16
 #: The same where impacts chatter: a mass that bounces to less than rounding of its displacement (1e-16)
 #: is in flight for the root of that, and never for less.
 NO_FLIGHT = 1e-7
+#: Numbers that a simulation hands over to the call that goes on with it: whether there are any, the period
+#: and phase it began in, the period it is in, events at once, whether one was an impact, surfaces it is on.
+CARRIED = 7
+STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON = range(CARRIED)
+
 #: A state this large grows for ever (negative damping, or resonance without any): its square is still
 #: far from overflow, and its events are still exact.
 TOO_LARGE = 1e100
@@ -116,22 +121,41 @@ def never_left(tables, mode):  # type: ignore[no-untyped-def]
 
 
 @helper
-def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: ignore[no-untyped-def]
+def whole_turns(t, period):  # type: ignore[no-untyped-def]
+    """Return the number of periods that a time has completed, and the phase."""
+    if not (period > 0.0 and t >= period):
+        return 0, t
+    t -= period
+    if t < period:
+        return 1, t
+    turns = math.floor(t / period)
+    return 1 + int(turns), max(0.0, t - turns * period)
+
+
+@helper
+def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, room):  # type: ignore[no-untyped-def]
     """Follow a trajectory; see :func:`simulate`."""
     observables, following = tables.observables, tables.following
     joints, none, empty, after = rows.joints, room.none, room.empty, room.after
     period = functions[5](p, none, empty)
     unit = period if period > 0.0 else 1.0
-    cycle = 0
-    if period > 0.0:
-        cycle = int(math.floor(t / period))
-        t -= cycle * period
-    first_cycle, first_time = cycle, t
-    event, at_once, struck, at_most = 0, 0, False, NO_TIME
+    cycle, event, at_most = 0, 0, NO_TIME
+    if carry[STARTED] == 0.0:
+        if period > 0.0:
+            cycle = int(math.floor(t / period))
+            t -= cycle * period
+        carry[STARTED], carry[FIRST_CYCLE], carry[FIRST_TIME] = 1.0, float(cycle), t
+        carry[AT_ONCE] = carry[STRUCK] = 0.0
+    else:
+        cycle, on = int(carry[CYCLE]), int(carry[ON])
+    first_cycle, first_time = int(carry[FIRST_CYCLE]), carry[FIRST_TIME]
+    at_once, struck = int(carry[AT_ONCE]), carry[STRUCK] != 0.0
     for k in range(observables.shape[0]):
         if tables.bounds[mode, k] == 2:  # a wall bounds every mode
             at_most = NO_FLIGHT
-    while event < joints.shape[0]:
+    for _ in range(budget):
+        if event == joints.shape[0]:
+            break
         left = (periods - (cycle - first_cycle)) * unit - (t - first_time)
         if period <= 0.0:
             left = periods - (t - first_time)
@@ -146,15 +170,13 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
             copy_state(after, y)
             t += left
             if period > 0.0:
-                turns = int(math.floor(t / period))
+                turns, t = whole_turns(t, period)
                 cycle += turns
-                t -= turns * period
             return ALL_TIME, event, mode, cycle, t
         copy_state(after, y)
         t += tau
-        while period > 0.0 and t >= period:
-            t -= period
-            cycle += 1
+        turns, t = whole_turns(t, period)
+        cycle += turns
         for j in range(y.shape[0]):
             if not abs(y[j]) < TOO_LARGE:  # or flights too short to be resolved
                 return (CHATTER if struck else INFINITE), event, mode, cycle, t
@@ -184,19 +206,23 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, room):  # type: 
         on |= tables.lies_on[mode] & tables.kept[surface]
         mode = target
         event += 1
-    return ALL_EVENTS, joints.shape[0], mode, cycle, t
+    carry[CYCLE], carry[AT_ONCE], carry[ON] = float(cycle), float(at_once), float(on)
+    carry[STRUCK] = 1.0 if struck else 0.0
+    return ALL_EVENTS, event, mode, cycle, t
 
 
 @kernel(
     types.Tuple((i8, i8, i8, i8, f8))(
-        FunctionsType, TablesType, i8, i8, f8, vector, vector, f8, RowsType
+        FunctionsType, TablesType, i8, i8, f8, vector, vector, f8, RowsType, vector, i8
     )
 )
-def simulate(functions, tables, mode, on, t, y, p, periods, rows):  # type: ignore[no-untyped-def]
-    """Follow a trajectory from ``(t, y)`` in a mode until all rows are full or time is over.
+def simulate(functions, tables, mode, on, t, y, p, periods, rows, carry, budget):  # type: ignore[no-untyped-def]
+    """Follow a trajectory from ``(t, y)`` in a mode until all rows or the budget are full, or time is over.
 
     Parameters
     ----------
+    carry : zeros at first; a further call goes on exactly where this one ended
+    budget : most surfaces to be met
     on : surfaces that the start lies on and leaves, as bits
     periods : time allowed, in periods of the excitation (in units of time if it has none)
 
@@ -210,4 +236,4 @@ def simulate(functions, tables, mode, on, t, y, p, periods, rows):  # type: igno
     count = y.shape[0]
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
     room = StateRoom(none, empty, nothing, np.empty(count), np.empty(count))
-    return follow(functions, tables, mode, on, t, y, p, periods, rows, room)
+    return follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, room)

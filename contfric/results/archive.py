@@ -154,6 +154,8 @@ def _restored(content: Header, pool: Unpacker) -> Saveable:
 
 
 def _read(path: Path) -> Arrays:
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise ResultFileError(f"cannot read {path}: it is no ordinary file")
     try:
         # an npz is a zip; anything else np.load would try to read in other ways
         with path.open("rb") as file:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NoReturn
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from contfric.errors import did_you_mean
+from contfric.errors import did_you_mean, shown
 from contfric.study.schema import (
     ContinueTask,
     ExploreTask,
@@ -80,7 +80,10 @@ def _message(entry: ErrorDetails, address: Address) -> str:
 
 def _shown(value: object) -> str:
     """Return a value and, where YAML may surprise, why it is what it is."""
-    text = f"{reprlib.repr(value)} ({type(value).__name__})"
+    try:
+        text = f"{reprlib.repr(value)} ({type(value).__name__})"
+    except ValueError:  # a number of more digits than Python writes
+        return shown(value)
     if isinstance(value, str):
         try:
             float(value)

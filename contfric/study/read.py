@@ -267,6 +267,13 @@ def _check_grid(located: LocatedYaml, content: StudyFile, model: Model) -> None:
                 f"{name} is [low, high, number of values], with low < high and a whole number of at "
                 f"least 2, got {values}",
             )
+    from contfric.chaos.compute import check_size
+
+    shape = tuple(int(values[2]) for values in task.grid.values())
+    try:
+        check_size(shape, task.starts or 1, len(model.states))
+    except ParameterError as error:
+        located.fail(("lyapunov", "grid"), str(error))
 
 
 def _check_plane(located: LocatedYaml, content: StudyFile, model: Model) -> None:

@@ -1,0 +1,122 @@
+"""Ctrl-C acts at once, wherever it comes: a process is interrupted at random times in every long call."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+#: Time after the signal within which a call has returned (s); on an idle machine it is a tenth of that.
+AT_ONCE = 3.0
+
+SCRIPT = """
+import sys
+import numpy as np
+import contfric as cf
+from contfric.atlas.census_sweep import sweep
+from contfric.chaos.cells import follow_cells
+from contfric.continuation.bracket import locate
+from contfric.continuation.march import march
+from contfric.curves.bracket import locate_on_curve
+from contfric.curves.march import march_curve
+from contfric.orbit.trajectory import simulate
+
+for kernel in (sweep, follow_cells, locate, march, locate_on_curve, march_curve, simulate):
+    kernel.dispatcher  # compiled before anything is interrupted
+model, start, parameter, bounds, other, span = {
+    "coulomb": ("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, "Omega", (0.3, 0.7), "S", (0.2, 0.4)),
+    "popp": ("popp", {"omega": 1.72}, "omega", (1.6, 1.9), "F", (0.06, 0.15)),
+}[sys.argv[1]]
+orbit = cf.find_orbit(model, start)
+narrow = cf.explore(orbit, parameter, (0.48, 0.55) if model == "coulomb" else (1.7, 1.75), max_periods=2)
+box = {parameter: bounds, other: span}
+event = next(b for b in narrow.bifurcations if b.kind.value in ("SN", "BP", "PD", "CS", "GS"))
+bridge = next((b for b in narrow.branches if b.bridge), None)
+grid = {parameter: np.linspace(*bounds, 60), other: np.linspace(*span, 60)}
+
+def cut(*ends):
+    return any(end.reason.name == "INTERRUPTED" for end in ends)
+
+# each call, and whether its result says that it was interrupted; None: it raises KeyboardInterrupt
+calls = {
+    "find_orbit": (lambda: cf.find_orbit(model, start, longest=10**6), None),
+    "simulate": (lambda: cf.simulate(model, start, periods=1e7), None),
+    "continue_orbit": (
+        lambda: cf.continue_orbit(orbit, parameter, bounds, max_step=1e-6), lambda b: cut(*b.ends)
+    ),
+    "explore": (lambda: cf.explore(orbit, parameter, bounds, max_periods=8), lambda d: not d.complete),
+    "continue_bifurcation": (
+        lambda: cf.continue_bifurcation(event, (parameter, other), box, max_step=1e-5), lambda c: cut(*c.ends)
+    ),
+    "explore_plane": (
+        lambda: cf.explore_plane(orbit, (parameter, other), box, max_sections=2), lambda p: not p.complete
+    ),
+    "census": (lambda: cf.census(model, start), lambda c: c.interrupted),
+    "lyapunov_map": (
+        lambda: cf.lyapunov_map(model, grid, start, periods=10000), lambda m: not m.complete
+    ),
+    "lyapunov_exponent": (
+        lambda: cf.lyapunov_exponent(model, start, periods=10**7, tolerance=0.0, confirm=10**7), None
+    ),
+    "period_adding": (lambda: cf.period_adding(bridge, longest=8) if bridge else None, None),
+}
+for name in sys.argv[2:]:
+    call, was_cut = calls[name]
+    print("go", name, flush=True)
+    try:
+        while True:
+            found = call()
+            if was_cut is not None and was_cut(found):
+                break
+        print("kept", name, flush=True)
+    except KeyboardInterrupt:
+        print("raised", name, flush=True)
+"""
+KEPT = (
+    "continue_orbit",
+    "explore",
+    "continue_bifurcation",
+    "explore_plane",
+    "census",
+    "lyapunov_map",
+)
+RAISED = ("find_orbit", "simulate", "lyapunov_exponent", "period_adding")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as a terminal sends them")
+@pytest.mark.parametrize("model", ["coulomb", "popp"])
+def test_ctrl_c_acts_at_once(model: str) -> None:
+    draw = random.Random(f"{model} {os.environ.get('CONTFRIC_SIGINT_SEED', '')}")
+    # a census is offered for the first model only, and there are no bridges in the second
+    missing = () if model == "coulomb" else ("census", "period_adding")
+    calls = [name for name in (*KEPT, *RAISED) if name not in missing]
+    # its own group: a signal for the tests is none for it
+    process = subprocess.Popen(
+        [sys.executable, "-c", SCRIPT, model, *calls],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    assert process.stdout is not None
+    try:
+        for name in calls:
+            assert process.stdout.readline().split() == ["go", name], process.communicate()[1]
+            time.sleep(draw.uniform(0.05, 0.6))
+            began = time.monotonic()
+            process.send_signal(signal.SIGINT)
+            how = process.stdout.readline().split()
+            took = time.monotonic() - began
+            # between two calls there is nothing to keep
+            assert how in (["kept", name], ["raised", name]), process.communicate()[1]
+            assert took < AT_ONCE, (name, took)
+            if os.environ.get("CONTFRIC_SIGINT_SEED"):
+                print(model, *how, f"{took:.2f} s")
+    finally:
+        process.kill()
+        process.communicate()

@@ -1,0 +1,73 @@
+"""Kernels return in bounded work, whatever Newton's method makes of a start: iterates may be anything.
+
+Where several conditions vanish together the system is singular, and a correction may leave a frequency that
+is negative, a segment of a million periods, or states beyond all bounds. What is computed there is of no use;
+but it must end.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.continuation.points import settings_of
+from contfric.continuation.side import first_point
+from contfric.curves.points import solve_point
+from contfric.curves.problem import border_of, box_of, problem_of
+from contfric.orbit.solve import polish
+
+#: Starts, and time that they may take together (s): each is a few thousand evaluations at worst.
+STARTS, MOST = 60, 20.0
+
+
+@pytest.fixture(scope="module", params=[0.0, 0.3])
+def diagram(request: pytest.FixtureRequest) -> cf.Diagram:
+    """Return a small diagram, with one harmonic (sticks in closed form) and with two."""
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4, "h": request.param})
+    return cf.explore(orbit, "Omega", (0.48, 0.55), max_periods=1)
+
+
+def wild(draw: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
+    """Return numbers of any sign and size, some of them none."""
+    values = draw.standard_normal(shape) * 10.0 ** draw.uniform(-4.0, 9.0, shape)
+    return np.where(draw.uniform(size=shape) < 0.02, np.nan, values)
+
+
+def test_curves(diagram: cf.Diagram) -> None:
+    draw, began, tried = np.random.default_rng(5), time.monotonic(), 0
+    box = box_of(diagram.model, ("Omega", "S"), {"Omega": (0.1, 0.7), "S": (0.0, 0.4)})
+    for event in diagram.bifurcations:
+        if not event.located or event.orbit.system.holds or event.kind.value == "NS":
+            continue
+        problem = problem_of(event, box)
+        orbit = event.orbit if event.orbit.system is problem.system else event.orbit.as_half()
+        border = border_of(problem, orbit.joints, orbit.vector)
+        for _ in range(STARTS // 4):
+            share = 10.0 ** draw.uniform(-6.0, 0.0)
+            joints = orbit.joints + share * wild(draw, orbit.joints.shape)
+            w = orbit.vector[problem.which] + share * wild(draw, (2,))
+            tangent, slope = wild(draw, joints.shape), wild(draw, (2,))
+            solve_point(problem, joints, w, tangent, slope, border.copy())
+            tried += 1
+    assert tried >= STARTS // 4
+    assert time.monotonic() - began < MOST
+
+
+def test_branches_and_orbits(diagram: cf.Diagram) -> None:
+    draw, began = np.random.default_rng(6), time.monotonic()
+    for branch in diagram.branches[:4]:
+        orbit = branch[len(branch) // 2]
+        settings = settings_of(orbit, "Omega", (0.1, 0.9), None, True, 100)
+        for _ in range(STARTS // 10):
+            share = 10.0 ** draw.uniform(-6.0, 0.0)
+            vector = orbit.vector + share * wild(draw, orbit.vector.shape)
+            joints = orbit.joints + share * wild(draw, orbit.joints.shape)
+            moved = replace(orbit, joints=joints, vector=vector)
+            first_point(moved, settings, wild(draw, joints.shape), float(wild(draw, (1,))[0]))
+            polish(moved)
+            moved.margins.sum()
+    assert time.monotonic() - began < MOST
