@@ -25,6 +25,7 @@ from contfric.continuation.smooth import SAME_PLACE, leapt_vertex, vertex_at
 from contfric.continuation.trial import locate_value
 from contfric.continuation.vertices import at_vertex, left_at, passed_vertex
 from contfric.errors import ConvergenceError
+from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
 
 #: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).
@@ -121,6 +122,11 @@ def continue_orbit(
     return join(orbit, settings, behind, ahead)
 
 
+def _went_to_its_end(side: Side) -> bool:
+    return side.end.reason is not EndReason.INTERRUPTED
+
+
+@remembered(finished=_went_to_its_end)
 def trace_side(
     orbit: Orbit,
     start: Point,
@@ -146,6 +152,7 @@ def trace_side(
         if progress is not None:
             progress(f"{side.count} points, {settings.parameter} = {side.tip.value:.6g}")
         if finished:
+            side.rows = side.rows.first(side.last + 1)
             return side
 
 

@@ -27,6 +27,7 @@ from contfric.curves.points import (
 from contfric.curves.problem import Problem, box_of, problem_of
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.errors import ConvergenceError, ParameterError, whole_number
+from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
 
 #: A first point farther than this from the bifurcation (in widths of the ranges) is another one.
@@ -199,6 +200,33 @@ def trace_curve_side(
     changes: int = _MOST_CHANGES,
 ) -> CurveSide:
     """Follow a curve from a point along its tangent until it ends, through changes of its signature."""
+    side = _trace_piece(problem, start, border, largest, max_points, progress)
+    special = side.end.special
+    if side.end.reason is CurveEndReason.MEETS and special is not None and changes > 0:
+        on = goes_on(problem, side.tip, special, largest)
+        if on is not None:
+            other, point, border = on
+            point.arc = side.tip.arc
+            side.following = trace_curve_side(
+                other, point, border, largest, max_points, progress, changes - 1
+            )
+    return side
+
+
+def _went_to_its_end(side: CurveSide) -> bool:
+    return side.end.reason is not CurveEndReason.INTERRUPTED
+
+
+@remembered(finished=_went_to_its_end)
+def _trace_piece(
+    problem: Problem,
+    start: CurvePoint,
+    border: FloatArray,
+    largest: float,
+    max_points: int,
+    progress: Progress | None,
+) -> CurveSide:
+    """Follow a curve from a point to its end, or to the next change of its signature."""
     side = CurveSide(problem, [start], border.copy())
     step = FIRST_STEP * largest
     while True:
@@ -213,17 +241,7 @@ def trace_curve_side(
             )
             progress(f"{problem.kind.value}: {len(side.points)} points, {where}")
         if finished:
-            break
-    special = side.end.special
-    if side.end.reason is CurveEndReason.MEETS and special is not None and changes > 0:
-        on = goes_on(problem, side.tip, special, largest)
-        if on is not None:
-            other, point, border = on
-            point.arc = side.tip.arc
-            side.following = trace_curve_side(
-                other, point, border, largest, max_points, progress, changes - 1
-            )
-    return side
+            return side
 
 
 def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[bool, float]:

@@ -24,8 +24,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,6 +46,7 @@ from contfric.models.parts import (
     Surface,
     Symmetry,
 )
+from contfric.stored import given
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
@@ -343,3 +347,16 @@ class Model:
             elif c < 0 and bound <= high:
                 high, why_high = bound, constraint.text
         return low, high, why_low, why_high
+
+
+def _told_apart(model: Model) -> tuple[Any, ...]:
+    """Return what tells a model from others: its definition, or its name and the file that makes its flow."""
+    code = getattr(model.flow_factory, "__code__", None)
+    source = b""
+    if code is not None and not model.definition:
+        with suppress(OSError):
+            source = Path(code.co_filename).read_bytes()
+    return model.name, model.definition, model.parameter_names, sha256(source).hexdigest()
+
+
+given(Model, _told_apart)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from contfric.errors import ConvergenceError, ParameterError
+from contfric.journal import SLOW, remembered
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
@@ -30,6 +31,7 @@ _LONGEST = 300.0
 CANDIDATES = 40
 
 
+@remembered(slow=SLOW)
 def polish(orbit: Orbit, damped: bool = True) -> Orbit:
     """Solve the boundary-value problem from an orbit's joints; the status says how it went.
 
