@@ -40,6 +40,7 @@ from numba.core.errors import NumbaExperimentalFeatureWarning
 from contfric.checked import discard, discard_damaged, list_files
 from contfric.errors import ResultFileError
 from contfric.inlined import part_options
+from contfric.resources import user_cache
 
 # First-class functions are what makes the cache possible; numba still calls them experimental.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
@@ -242,17 +243,7 @@ def _digest(folder: Path) -> str:
 
 def cache_folder(source: Path) -> Path:
     """Return the folder that the kernels of a source file are cached in."""
-    chosen = os.environ.get("CONTFRIC_CACHE_DIR") or os.environ.get("NUMBA_CACHE_DIR")
-    base = Path(chosen) if chosen else _user_cache() / "contfric"
-    return base / _digest(source.parent)
-
-
-def _user_cache() -> Path:
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", str(Path.home())))
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches"
-    return Path(os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache")))
+    return user_cache() / _digest(source.parent)
 
 
 def kernel(signature: Any) -> Callable[[Callable[..., Any]], Kernel]:

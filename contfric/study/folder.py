@@ -51,7 +51,7 @@ def open_folder(path: Path, files: Iterable[str], force: bool) -> Folder:
     files : iterable of str
         Names of the files that the run writes.
     force : bool
-        Whether results of an earlier run may be replaced.
+        Whether results of an earlier run may be replaced (a run that goes on replaces its own).
 
     Raises
     ------
