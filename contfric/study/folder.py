@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from contfric.errors import ResultFileError
-from contfric.files import unwritable
+from contfric.files import remove_leftovers, unwritable
 from contfric.study.plan import RECORD, RESULT_FILES
 
 
@@ -34,6 +34,11 @@ class Folder:
         for name in {*RESULT_FILES, *self.earlier} - kept:
             with suppress(OSError):
                 (self.path / name).unlink()
+
+    def remove_leftovers(self, names: Iterable[str]) -> None:
+        """Remove the halves of files that a killed run has left."""
+        for name in names:
+            remove_leftovers(self.path / name)
 
     def free_name(self, stem: str, suffix: str) -> Path:
         """Return a file name that is not taken yet: ``stem.npz``, ``stem-2.npz``, ..."""

@@ -139,6 +139,7 @@ class _Run:
             self.progress(text)
 
     def run(self) -> StudyResult:
+        self.folder.remove_leftovers(self.plan.files)
         if self.checkpoint.earlier:
             self.say(f"goes on: {self.checkpoint.earlier} results of the run before are kept")
         try:
