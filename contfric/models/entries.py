@@ -14,6 +14,8 @@ SIDES = {
     **{"+": 1, "-": -1, "0": 0, "above": 1, "below": -1, "on": 0},
     **{"1": 1, "-1": -1, "+1": 1},
 }
+#: Other words for true and false, which are names elsewhere.
+TRUTH = {"yes": True, "on": True, "no": False, "off": False}
 
 
 class EntryError(ModelError):
@@ -40,7 +42,7 @@ class Part:
         known = tuple(valid)
         for key in self.data:
             if key not in known:
-                hint = comma_hint(key) or did_you_mean(key, known)
+                hint = comma_hint(key, self.data[key]) or did_you_mean(key, known)
                 self.fail(key, f"unknown key '{key}'{hint}")
 
     def needs(self, key: str, wanted: str) -> Any:
@@ -88,6 +90,8 @@ class Part:
     def flag(self, key: str) -> bool | None:
         """Return an entry that is true or false, None if it is not there."""
         value = self.data.get(key)
+        if isinstance(value, str):
+            value = TRUTH.get(value.lower(), value)
         if value is not None and not isinstance(value, bool):
             self.fail(key, f"'{key}' must be true or false, got {value!r}")
         return value

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.errors import ParameterError
+from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
@@ -176,7 +178,9 @@ class Orbit:
         """Return the mirror image under the model's symmetry (an orbit of the same parameters)."""
         symmetry = self.model.symmetry
         if symmetry is None:
-            raise ValueError(f"model '{self.model.name}' has no symmetry")
+            raise ParameterError(
+                f"model '{self.model.name}' has no symmetry: an orbit has no mirror image"
+            )
         joints = self.joints.copy()
         if not self.model.autonomous:
             joints[:, 0] += symmetry.fraction * self.period / self.periods
@@ -361,6 +365,7 @@ class Orbit:
 
     def to_dataframe(self, points: int = 400) -> pd.DataFrame:
         """Return one period as a table: t, the states, the domain (needs pandas)."""
+        need_pandas()
         import pandas as pd
 
         times, states, names = self.trajectory(points)

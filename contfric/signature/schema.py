@@ -12,7 +12,7 @@ from contfric.models import Model, load_model
 from contfric.models.files import is_path, relative_model
 from contfric.signature.library import SUFFIXES, signature_path
 from contfric.signature.notation import Signature, split_segments, walk_fault
-from contfric.yaml_lines import Address, LocatedYaml, read_yaml
+from contfric.yaml_lines import Address, LocatedYaml, comma_hint, read_yaml
 
 SignatureLike: TypeAlias = str | Path | Signature
 
@@ -142,7 +142,8 @@ def _check_example(located: LocatedYaml, model: Model, example: dict[str, float]
 def _validated(located: LocatedYaml) -> SignatureFile:
     for key in located.data:
         if key not in SignatureFile.model_fields:
-            hint = did_you_mean(str(key), SignatureFile.model_fields)
+            hint = comma_hint(str(key), located.data[key])
+            hint = hint or did_you_mean(str(key), SignatureFile.model_fields)
             located.fail((str(key),), f"unknown key '{key}'{hint}")
     try:
         return SignatureFile.model_validate(located.data)

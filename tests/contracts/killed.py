@@ -2,9 +2,9 @@
 
     python killed.py FOLDER ROUNDS SEED run STUDY
 
-It is a process of its own, which compiles everything once and forks: each run is a process that can be killed,
-and begins at once. What a run that nobody disturbs writes goes to FOLDER/whole, the other one's to FOLDER/out.
-It prints, as JSON, the exit codes and how large the checkpoint was when each run began.
+It is a process of its own, which compiles everything once and forks: each run is a process that can be
+killed, and begins at once. What a run that nobody disturbs writes goes to FOLDER/whole, the other one's to
+FOLDER/out. It prints, as JSON, the exit codes and how large the checkpoint was when each run began.
 """
 
 from __future__ import annotations

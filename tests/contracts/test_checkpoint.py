@@ -8,19 +8,14 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-import contfric as cf
-from contfric import journal
-from contfric.cli import main
 from contfric.cli.exits import Exit
-from contfric.journal import Journal, keeping, remembered
-from contfric.stored import Reader, UnstorableError, Writer
-from contfric.study import checkpoint
 
 HEAD = "model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\n"
-EXPLORE = HEAD + "explore: {parameter: Omega, range: [0.4, 0.6]}\nwant: [extrema, stops, stability]\n"
+EXPLORE = (
+    HEAD + "explore: {parameter: Omega, range: [0.4, 0.6]}\nwant: [extrema, stops, stability]\n"
+)
 PLANE = (
     HEAD + "plane: {parameters: [Omega, S], range: {Omega: [0.52, 0.56], S: [0.3, 0.39]}, "
     "max_sections: 1}\n"

@@ -625,6 +625,7 @@ def test_interrupted_while_writing(tmp_path, study, monkeypatch) -> None:
     assert sorted(contents(result.out)) == [
         "bifurcations.csv",
         "branch.npz",
+        "checkpoint",
         "orbit.npz",
         "run.json",
     ]
@@ -653,6 +654,7 @@ def test_a_full_disk_loses_no_result(tmp_path, study, monkeypatch) -> None:
     assert sorted(contents(result.out)) == [
         "bifurcations.csv",
         "branch.npz",
+        "checkpoint",
         "orbit.npz",
         "run.json",
     ]
