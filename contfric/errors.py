@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+import math
+import operator
+import os
+import reprlib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
 
 
 class ContfricError(Exception):
@@ -42,7 +48,7 @@ class AperiodicError(ConvergenceError):
     """The simulation did not settle on a periodic orbit within its allowance."""
 
 
-def did_you_mean(word: str, valid: Iterable[str]) -> str:
+def did_you_mean(word: object, valid: Iterable[str]) -> str:
     """Return ``"; did you mean 'x'?"`` for the closest valid words, and the list of valid words.
 
     Examples
@@ -50,7 +56,7 @@ def did_you_mean(word: str, valid: Iterable[str]) -> str:
     >>> did_you_mean("Omga", ["Omega", "S"])
     "; did you mean 'Omega'? Valid: Omega, S"
     """
-    names = [str(name) for name in valid]
+    names, word = [str(name) for name in valid], str(word)
     likeness = {name: difflib.SequenceMatcher(None, word, name).ratio() for name in names}
     best = max(likeness.values(), default=0.0)
     close = [f"'{name}'" for name in likeness if likeness[name] == best]
@@ -72,8 +78,101 @@ def whole_number(name: str, value: object, least: int, most: int | None = None) 
     100
     """
     limits = f">= {least}" if most is None else f"from {least} to {most}"
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise ParameterError(f"{name} is a whole number {limits}, got {value!r}")
-    if value < least or (most is not None and value > most):
-        raise ParameterError(f"{name} is a whole number {limits}, got {value!r}")
+    try:
+        if isinstance(value, bool):
+            raise TypeError
+        number = operator.index(value)  # type: ignore[arg-type] # whole numbers of numpy count
+    except TypeError:
+        raise ParameterError(f"{name} is a whole number {limits}, got {shown(value)}") from None
+    if number < least or (most is not None and number > most):
+        raise ParameterError(f"{name} is a whole number {limits}, got {shown(value)}")
+    return number
+
+
+def shown(value: object) -> str:
+    """Return what a user gave as one line, shortened.
+
+    Examples
+    --------
+    >>> shown("0.5")
+    "'0.5'"
+    """
+    return " ".join(reprlib.repr(value).split())
+
+
+def real_number(name: str, value: object, least: float | None = None) -> float:
+    """Return a finite number that a user gave.
+
+    Raises
+    ------
+    ParameterError
+        If it is none, or below its limit.
+
+    Examples
+    --------
+    >>> real_number("time", 1)
+    1.0
+    """
+    wanted = "a finite number" if least is None else f"a finite number >= {least:g}"
+    try:
+        if isinstance(value, (bool, str, bytes)):
+            raise TypeError
+        number = float(value)  # type: ignore[arg-type] # numbers of numpy count
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"{name} is {wanted}, got {shown(value)}") from None
+    if not math.isfinite(number) or (least is not None and number < least):
+        raise ParameterError(f"{name} is {wanted}, got {shown(value)}")
+    return number
+
+
+def truth(name: str, value: object) -> bool:
+    """Return True or False that a user gave.
+
+    Raises
+    ------
+    ParameterError
+        If it is neither.
+    """
+    if type(value).__name__ not in ("bool", "bool_"):  # the second is numpy's
+        raise ParameterError(f"{name} is True or False, got {shown(value)}")
+    return bool(value)
+
+
+def mapping_of(name: str, value: object, example: str) -> Mapping[Any, Any]:
+    """Return a mapping that a user gave.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    if not isinstance(value, Mapping):
+        raise ParameterError(f"{name} is a mapping, such as {example}; got {shown(value)}")
     return value
+
+
+def function_of(name: str, value: object) -> None:
+    """Check a function that a user gave, or None.
+
+    Raises
+    ------
+    ParameterError
+        If it can be neither called nor left out.
+    """
+    if value is not None and not callable(value):
+        raise ParameterError(
+            f"{name} is a function of one text, such as print, or None; got {shown(value)}"
+        )
+
+
+def path_of(what: str, value: object) -> Path:
+    """Return a path that a user gave.
+
+    Raises
+    ------
+    ResultFileError
+        If it is none.
+    """
+    if not isinstance(value, (str, os.PathLike)) or not str(value).strip() or "\0" in str(value):
+        raise ResultFileError(f"{what} is a path, such as 'results.npz', got {shown(value)}")
+    return Path(value)

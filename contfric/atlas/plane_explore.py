@@ -38,6 +38,8 @@ from contfric.errors import (
     ConvergenceError,
     ParameterError,
     did_you_mean,
+    function_of,
+    shown,
     whole_number,
 )
 from contfric.journal import remembered
@@ -117,7 +119,8 @@ def explore_plane(
         ("max_sections", max_sections),
     ):
         whole_number(name, most, least=1)
-    wanted = _kinds(kinds)
+    function_of("progress", progress)
+    wanted, seeds = _kinds(kinds), Seeds.given(seeds)
     largest = largest_step(max_step, orbit.model)
     state = PlaneExploration(
         box, orbit.vector.copy(), wanted, max_periods, max_curves, largest, progress
@@ -135,6 +138,8 @@ def explore_plane(
 
 def _kinds(kinds: Sequence[str | Kind]) -> frozenset[Kind]:
     known = [kind.value for kind in Kind if kind is not Kind.NS]
+    if isinstance(kinds, str) or not isinstance(kinds, Iterable):
+        raise ParameterError(f"kinds is a list, such as ['SN', 'BP'], got {shown(kinds)}")
     names = [kind.value if isinstance(kind, Kind) else str(kind) for kind in kinds]
     for name in names:
         if name not in known:

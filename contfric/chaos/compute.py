@@ -18,7 +18,7 @@ from contfric.chaos.running import Progress, Timer, compute_all
 from contfric.chaos.starts import StateLike, given_states, number_of_starts
 from contfric.chaos.store import TileFolder, digest, open_tiles
 from contfric.chaos.tiles import Place, Tile, TileRows, empty_tile, inside, places
-from contfric.errors import ParameterError, whole_number
+from contfric.errors import ParameterError, function_of, mapping_of, whole_number
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
 
@@ -143,7 +143,9 @@ def lyapunov_map(
             "client: client.get_executor())"
         )
     grid = _checked_axes(model, axes)
-    vector, example = _checked_params(model, grid, params or {})
+    function_of("progress", progress)
+    fixed = mapping_of("params", {} if params is None else params, "{'S0': 0.4}")
+    vector, example = _checked_params(model, grid, fixed)
     count = number_of_starts(model, state, starts, example)
     states = None if state is None else _all_states(model, grid, vector, state, count)
     job = _Job(model, grid, vector, count, states, checked_time(time), limits, tile)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from contfric.chaos.rows import Limits, follow
 from contfric.chaos.starts import StateLike, default_states, given_states
 from contfric.chaos.status import Motion
-from contfric.errors import ParameterError, whole_number
+from contfric.errors import ParameterError, real_number, whole_number
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
 
@@ -144,9 +144,7 @@ def checked_time(time: float) -> float:
     ParameterError
         If it is not finite.
     """
-    if not np.isfinite(time):
-        raise ParameterError(f"time must be finite, got {time!r}")
-    return float(time)
+    return real_number("time", time)
 
 
 def lyapunov_exponent(
@@ -190,7 +188,7 @@ def lyapunov_exponent(
     """
     model = load_model(model)
     limits = limits_of(transient, periods, tolerance, confirm)
-    vector = model.vector(params or {})
+    vector = model.vector({} if params is None else params)
     named = model.mapping(vector)
     if state is None:
         states = default_states(model, named, 1)

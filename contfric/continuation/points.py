@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.errors import ParameterError, whole_number
+from contfric.errors import ParameterError, truth, whole_number
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System
@@ -126,7 +126,8 @@ def settings_of(
         raise ParameterError(
             f"the range of '{parameter}' is a pair of numbers (lower, upper), got {bounds!r}"
         ) from None
-    whole_number("max_points", max_points, least=2)
+    max_points = whole_number("max_points", max_points, least=2)
+    stability = truth("stability", stability)
     if max_step is not None and not isinstance(max_step, (int, float)):
         raise ParameterError(f"max_step is a share of the range, in (0, 1], got {max_step!r}")
     if not (math.isfinite(low) and math.isfinite(high)) or not low < high:

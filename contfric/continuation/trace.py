@@ -24,7 +24,7 @@ from contfric.continuation.sliding import ROUGHLY_REACHED, nearly_reached
 from contfric.continuation.smooth import SAME_PLACE, leapt_vertex, vertex_at
 from contfric.continuation.trial import locate_value
 from contfric.continuation.vertices import at_vertex, left_at, passed_vertex
-from contfric.errors import ConvergenceError
+from contfric.errors import ConvergenceError, function_of
 from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
 
@@ -104,6 +104,7 @@ def continue_orbit(
     >>> [end.reason.name for end in cf.continue_orbit(orbit, "Omega", (0.4, 0.6)).ends]
     ['SS', 'CS']
     """
+    function_of("progress", progress)
     settings = settings_of(orbit, parameter, range, max_step, stability, max_points)
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -17,7 +17,7 @@ from contfric.continuation.events import (
     kind_of_margin,
     resting_domain,
 )
-from contfric.errors import ParameterError, did_you_mean
+from contfric.errors import ParameterError, did_you_mean, mapping_of, shown
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.linear import jacobian_blocks
 from contfric.orbit.orbit import Orbit
@@ -138,14 +138,17 @@ def box_of(
         For anything but two different parameters of the model with a finite range each.
     """
     names: object = parameters  # whatever the user gave
-    if isinstance(names, str) or len(tuple(parameters)) != 2:
-        raise ParameterError(f"a curve needs a pair of parameters, got {parameters!r}")
+    if isinstance(names, str) or not isinstance(names, Iterable) or len(tuple(names)) != 2:
+        raise ParameterError(
+            f"a curve needs a pair of parameters, such as {model.parameter_names[:2]}, got "
+            f"{shown(parameters)}"
+        )
     one, other = parameters
     for name in (one, other):
         model.index_of(name)
     if one == other:
         raise ParameterError(f"a curve needs two different parameters, got '{one}' twice")
-    for name in ranges:
+    for name in mapping_of("ranges", ranges, f"{{'{one}': (lower, upper), ..}}"):
         if name not in (one, other):
             raise ParameterError(
                 f"'{name}' is none of the two parameters{did_you_mean(str(name), (one, other))}"
@@ -162,7 +165,7 @@ def _range_of(name: str, ranges: Mapping[str, tuple[float, float]]) -> tuple[flo
         low, high = (float(value) for value in ranges[name])
     except (TypeError, ValueError):
         raise ParameterError(
-            f"the range of '{name}' is a pair of numbers (lower, upper), got {ranges[name]!r}"
+            f"the range of '{name}' is a pair of numbers (lower, upper), got {shown(ranges[name])}"
         ) from None
     if not (math.isfinite(low) and math.isfinite(high)) or not low < high:
         raise ParameterError(

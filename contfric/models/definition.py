@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contfric.errors import ParameterError, did_you_mean
+from contfric.errors import ParameterError, did_you_mean, mapping_of, real_number, shown
 from contfric.models.parts import (
     Constraint,
     Departure,
@@ -285,9 +285,10 @@ class Model:
             If the model has no such parameter.
         """
         names = self.parameter_names
-        if name not in names:
+        given: object = name  # whatever the user gave
+        if not isinstance(given, str) or given not in names:
             raise ParameterError(
-                f"model '{self.name}' has no parameter '{name}'{did_you_mean(name, names)}"
+                f"model '{self.name}' has no parameter {shown(given)}{did_you_mean(given, names)}"
             )
         return names.index(name)
 
@@ -300,21 +301,20 @@ class Model:
             For an unknown name, a value that is no finite number, or a violated constraint.
         """
         values = self.defaults
-        for name, value in params.items():
+        example = ", ".join(f"'{n}': {v:g}" for n, v in list(values.items())[:2])
+        for name, value in mapping_of("params", params, f"{{{example}}}").items():
             self.index_of(name)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
                 raise ParameterError(
-                    f"parameter '{name}' must be a number, got {value!r} ({type(value).__name__})"
+                    f"parameter '{name}' must be a number, got {shown(value)} ({type(value).__name__})"
                 )
-            if not math.isfinite(value):
-                raise ParameterError(f"parameter '{name}' must be finite, got {value!r}")
-            values[name] = float(value)
+            values[name] = real_number(f"parameter '{name}'", value)
         for constraint in self.constraints:
             left = constraint.value(values)
             if left < 0 or (constraint.strict and left == 0):
-                shown = ", ".join(f"{n} = {values[n]!r}" for n in constraint.coefficients)
+                here = ", ".join(f"{n} = {values[n]!r}" for n in constraint.coefficients)
                 raise ParameterError(
-                    f"model '{self.name}' needs {constraint.text}, got {shown}. "
+                    f"model '{self.name}' needs {constraint.text}, got {here}. "
                     + (constraint.meaning or "Choose a value that obeys it.")
                 )
         return values

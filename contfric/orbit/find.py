@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contfric.errors import AperiodicError, ConvergenceError, whole_number
+from contfric.errors import AperiodicError, ConvergenceError, real_number, whole_number
 from contfric.journal import remembered
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import Model
@@ -71,9 +71,10 @@ def find_orbit(
     """
     model = load_model(model)
     if periods is not None:
-        whole_number("periods", periods, least=1, most=MOST_PERIODS)
-    whole_number("longest", longest, least=1)
-    return _wanted(_settled(model, dict(params or {}), state, time, longest), periods)
+        periods = whole_number("periods", periods, least=1, most=MOST_PERIODS)
+    longest = whole_number("longest", longest, least=1)
+    checked = model.check_params({} if params is None else params)
+    return _wanted(_settled(model, checked, state, real_number("time", time), longest), periods)
 
 
 @remembered()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.errors import ParameterError
+from contfric.errors import ParameterError, whole_number
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
@@ -35,6 +35,8 @@ SYMMETRY_TOLERANCE = 1e-9
 DEGENERATE = 1e-9
 
 
+#: Samples of one orbit: more are seen by nobody, and take minutes.
+_MOST_SAMPLES = 10_000_000
 #: A stick of length zero (at an event) has a duration of rounding over the rate of its release.
 _NO_TIME = 1e-10
 
@@ -345,6 +347,7 @@ class Orbit:
 
     def trajectory(self, points: int = 400) -> tuple[FloatArray, FloatArray, list[str]]:
         """Return times (k,), states (k, n) and domains (k) along one period, joints included."""
+        points = whole_number("points", points, least=1, most=_MOST_SAMPLES)
         times: list[float] = []
         states: list[FloatArray] = []
         names: list[str] = []

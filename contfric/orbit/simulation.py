@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contfric.errors import ParameterError, did_you_mean
+from contfric.errors import ParameterError, did_you_mean, real_number, shown, whole_number
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.orbit.counts import TALLY
@@ -208,12 +208,13 @@ def start_of(
 ) -> tuple[int, int]:
     """Return (mode, surfaces that the start lies on and leaves, as bits) of an initial state."""
     signs = signs_at(model, t, y, vector)
+    given: object = domain  # whatever the user gave
+    if given is not None and not (isinstance(given, str) and given in model.domain_by_name):
+        raise ParameterError(
+            f"unknown domain {shown(given)}{did_you_mean(given, model.domain_by_name)}"
+        )
     name = domain or model.domain_at(signs) or _side_of_rates(model, t, y, vector, signs)
-    if name is None or name not in model.domain_by_name:
-        if domain is not None:
-            raise ParameterError(
-                f"unknown domain '{domain}'{did_you_mean(domain, model.domain_by_name)}"
-            )
+    if name is None:
         raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
     mode = model.domain_by_name[name].mode
     surfaces = [s.name for s in model.surfaces]
@@ -277,10 +278,10 @@ def simulate(
     ('stick', 'F+')
     """
     model = load_model(model)
-    vector = model.vector(params or {})
+    vector = model.vector({} if params is None else params)
     y = _checked_state(model, vector, state)
-    if not (np.isfinite(time) and np.isfinite(periods) and periods >= 0):
-        raise ParameterError(f"time and periods must be finite, got {time!r} and {periods!r}")
+    time, periods = real_number("time", time), real_number("periods", periods, least=0.0)
+    events = whole_number("events", events, least=1)
     mode, on = start_of(model, time, y, vector, domain)
     return run(model, vector, mode, on, time, y, periods, events)
 
@@ -361,10 +362,13 @@ def _checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) ->
     if state is None:
         # away from rest, so that symmetric and asymmetric attractors can both be reached
         return displaced(model, vector)
-    y = np.array(state, dtype=np.float64)
+    try:
+        y = np.array(state, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        y = np.empty(0)
     if y.shape != (len(model.states),) or not np.all(np.isfinite(y)):
         raise ParameterError(
             f"a state of '{model.name}' is {len(model.states)} finite numbers "
-            f"({', '.join(model.states)}), got {state!r}"
+            f"({', '.join(model.states)}), got {shown(state)}"
         )
     return y

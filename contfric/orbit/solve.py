@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from contfric.errors import ConvergenceError, ParameterError
+from contfric.errors import ConvergenceError, ParameterError, whole_number
 from contfric.journal import SLOW, remembered
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray
@@ -93,6 +93,7 @@ def solve_orbit(
 
         signature = load_signature(signature, model)
     vector = model.vector(params)
+    seed = whole_number("seed", seed, least=0)
     word = reduced_word(signature)
     half = half_of(model, word, signature.periods) if signature.symmetric else None
     if half is not None:

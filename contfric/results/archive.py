@@ -22,7 +22,7 @@ from contfric.atlas.plane import Plane
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
 from contfric.curves.curve import Curve
-from contfric.errors import ModelError, ParameterError, ResultFileError
+from contfric.errors import ModelError, ParameterError, ResultFileError, path_of
 from contfric.files import replacing
 from contfric.models import load_model
 from contfric.models.definition import Model
@@ -71,6 +71,7 @@ def save(x: Saveable, path: str | Path) -> None:
             "only an Orbit, a Branch, a Diagram, a Curve, a Plane or a LyapunovMap can be saved, "
             f"got {type(x).__name__}"
         )
+    place = path_of("the file of a result", path)
     packer = Packer(x.model)
     content = _content(x, packer)
     header: Header = {
@@ -85,7 +86,7 @@ def save(x: Saveable, path: str | Path) -> None:
     }
     arrays = {_HEADER: _as_array(header), **packer.arrays}
     arrays[_DIGESTS] = _as_array(_digests(arrays))
-    with replacing(Path(path)) as temporary:
+    with replacing(place) as temporary:
         _write(temporary, arrays)
 
 
@@ -161,7 +162,7 @@ def load(path: str | Path, model: Model | None = None) -> Saveable:
     ResultFileError
         If the file is missing, damaged, of another program, or of a newer contfric.
     """
-    path = Path(path)
+    path = path_of("the file of a result", path)
     arrays = _read(path)
     listed = _DIGESTS in arrays
     wrong = _changed(arrays)

@@ -11,8 +11,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
-from contfric.errors import NotationError
+from contfric.errors import NotationError, shown
 from contfric.models import Model, load_model, model_names
 from contfric.signature.cyclic import least_rotation, rotated
 from contfric.signature.graph import crossing, successors, unknown_domain
@@ -259,15 +260,18 @@ def _read_pair(model: object, segments: object) -> tuple[Model, tuple[str, ...]]
         model = load_model(model)
     if not isinstance(model, Model):
         raise NotationError(
-            f"a signature needs a model or its name, such as 'coulomb', got {model!r}"
+            f"a signature needs a model or its name, such as 'coulomb', got {shown(model)}"
         )
     if isinstance(segments, str):
         return model, split_segments(segments, model)
-    listed = tuple(segments) if isinstance(segments, Iterable) else (segments,)
+    try:
+        listed: tuple[Any, ...] = tuple(segments)  # type: ignore[arg-type] # whatever was given
+    except TypeError:
+        listed = (segments,)
     if not all(isinstance(segment, str) for segment in listed):
         raise NotationError(
             "the segments of a signature are names of domains, as a list or joined by '->', got "
-            f"{segments!r}"
+            f"{shown(segments)}"
         )
     return model, listed
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from contfric.atlas.diagram import Diagram
 from contfric.continuation.events import EndReason
-from contfric.errors import ContfricError, ResultFileError
+from contfric.errors import ContfricError, ResultFileError, path_of
 from contfric.orbit.counts import Counts, counts
 from contfric.orbit.orbit import Orbit
 from contfric.results import save
@@ -108,7 +108,8 @@ def run_study(
     if not isinstance(study, Study):
         study = read_study(study)
     plan = make_plan(study)
-    path, key = Path(study.name if out is None else out), key_of(study)
+    path = Path(study.name) if out is None else path_of("the folder of the results", out)
+    key = key_of(study)
     check_unfinished(path, key, force)
     folder = open_folder(path, plan.files, force or goes_on(path, key))
     return _Run(plan, folder, checkpoint_in(folder.path, key), progress).run()
