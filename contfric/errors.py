@@ -151,6 +151,22 @@ def mapping_of(name: str, value: object, example: str) -> Mapping[Any, Any]:
     return value
 
 
+def items_of(value: object) -> tuple[Any, ...]:
+    """Return the items of a list that a user gave; empty if it is none (a text is none).
+
+    Examples
+    --------
+    >>> items_of(["SN", "BP"]), items_of("SN"), items_of(3)
+    (('SN', 'BP'), (), ())
+    """
+    if isinstance(value, (str, bytes)):
+        return ()
+    try:
+        return tuple(value)  # type: ignore[arg-type] # arrays without a length are no lists, too
+    except TypeError:
+        return ()
+
+
 def function_of(name: str, value: object) -> None:
     """Check a function that a user gave, or None.
 

@@ -39,6 +39,7 @@ from contfric.errors import (
     ParameterError,
     did_you_mean,
     function_of,
+    items_of,
     shown,
     whole_number,
 )
@@ -138,7 +139,7 @@ def explore_plane(
 
 def _kinds(kinds: Sequence[str | Kind]) -> frozenset[Kind]:
     known = [kind.value for kind in Kind if kind is not Kind.NS]
-    if isinstance(kinds, str) or not isinstance(kinds, Iterable):
+    if not items_of(kinds):
         raise ParameterError(f"kinds is a list, such as ['SN', 'BP'], got {shown(kinds)}")
     names = [kind.value if isinstance(kind, Kind) else str(kind) for kind in kinds]
     for name in names:

@@ -18,7 +18,7 @@ from contfric.chaos.running import Progress, Timer, compute_all
 from contfric.chaos.starts import StateLike, given_states, number_of_starts
 from contfric.chaos.store import TileFolder, digest, open_tiles
 from contfric.chaos.tiles import Place, Tile, TileRows, empty_tile, inside, places
-from contfric.errors import ParameterError, function_of, mapping_of, whole_number
+from contfric.errors import ParameterError, function_of, mapping_of, shown, whole_number
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
 
@@ -206,12 +206,12 @@ def _checked_axes(model: Model, axes: object) -> dict[str, FloatArray]:
         model.index_of(name)
         try:
             values = np.array(given, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             values = np.empty(0)
         fine = values.ndim == 1 and len(values) > 0 and bool(np.isfinite(values).all())
         if not fine or np.any(np.diff(values) <= 0.0):
             raise ParameterError(
-                f"the values of '{name}' are a list of finite numbers in ascending order, got {given!r}"
+                f"the values of '{name}' are a list of finite numbers in ascending order, got {shown(given)}"
             )
         grid[name] = values
     return grid

@@ -81,7 +81,7 @@ def given_states(model: Model, state: StateLike, params: Mapping[str, float]) ->
         ) from error
     try:
         states = np.array(given, dtype=np.float64, ndmin=2)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         states = np.empty((0, 0))
     n = len(model.states)
     if states.ndim != 2 or states.shape[1] != n or not len(states) or not np.isfinite(states).all():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -17,7 +17,7 @@ from contfric.continuation.events import (
     kind_of_margin,
     resting_domain,
 )
-from contfric.errors import ParameterError, did_you_mean, mapping_of, shown
+from contfric.errors import ParameterError, did_you_mean, items_of, mapping_of, shown
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.linear import jacobian_blocks
 from contfric.orbit.orbit import Orbit
@@ -137,8 +137,7 @@ def box_of(
     ParameterError
         For anything but two different parameters of the model with a finite range each.
     """
-    names: object = parameters  # whatever the user gave
-    if isinstance(names, str) or not isinstance(names, Iterable) or len(tuple(names)) != 2:
+    if len(items_of(parameters)) != 2:
         raise ParameterError(
             f"a curve needs a pair of parameters, such as {model.parameter_names[:2]}, got "
             f"{shown(parameters)}"
