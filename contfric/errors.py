@@ -57,7 +57,9 @@ def did_you_mean(word: object, valid: Iterable[str]) -> str:
     "; did you mean 'Omega'? Valid: Omega, S"
     """
     names, word = [str(name) for name in valid], str(word)
-    likeness = {name: difflib.SequenceMatcher(None, word, name).ratio() for name in names}
+    likeness = {  # a slip of the shift key is none
+        name: difflib.SequenceMatcher(None, word.lower(), name.lower()).ratio() for name in names
+    }
     best = max(likeness.values(), default=0.0)
     close = [f"'{name}'" for name in likeness if likeness[name] == best]
     hint = f"; did you mean {' or '.join(close)}?" if best >= 0.5 and len(close) <= 2 else "."

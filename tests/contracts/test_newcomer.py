@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.atlas.plane_sections import sections_of
+from contfric.curves.problem import box_of
 from contfric.extras import MissingPackageError
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
@@ -35,7 +37,7 @@ ODD = [
 #: Arguments of calls that end at once, whatever is given for them.
 CALLS = {
     "model": lambda o, d, x: cf.find_orbit(x, PARAMS),
-    "params": lambda o, d, x: cf.solve_orbit("coulomb", "nothing", x),
+    "params": lambda o, d, x: cf.simulate("coulomb", x, periods=1),
     "state": lambda o, d, x: cf.simulate("coulomb", PARAMS, state=x, periods=1),
     "time": lambda o, d, x: cf.simulate("coulomb", PARAMS, time=x, periods=1),
     "domain": lambda o, d, x: cf.simulate("coulomb", PARAMS, domain=x, periods=1),
@@ -50,10 +52,9 @@ CALLS = {
     "values": lambda o, d, x: cf.Seeds(values=x),
     "pair": lambda o, d, x: cf.continue_bifurcation(d.bifurcations[0], x, RANGES),
     "ranges": lambda o, d, x: cf.continue_bifurcation(d.bifurcations[0], ("Omega", "S"), x),
-    "sections": lambda o, d, x: cf.explore_plane(
-        o, ("Omega", "S"), RANGES, {"S": x}, max_sections=0
-    ),
-    "kinds": lambda o, d, x: cf.explore_plane(o, ("Omega", "S"), RANGES, kinds=x, max_sections=0),
+    "sections": lambda o, d, x: sections_of(o, box_of(o.model, ("Omega", "S"), RANGES), x),
+    "section": lambda o, d, x: sections_of(o, box_of(o.model, ("Omega", "S"), RANGES), {"S": x}),
+    "kinds": lambda o, d, x: cf.explore_plane(o, ("Omega", "S"), RANGES, kinds=x, max_step=2.0),
     "census": lambda o, d, x: cf.census("coulomb", {**PARAMS, "S": x}, periods=0),
     "axes": lambda o, d, x: cf.lyapunov_map("coulomb", x),
     "axis": lambda o, d, x: cf.lyapunov_map("coulomb", {"Omega": x, "S": [0.3]}, tile=0),
