@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Where an entry is: keys and list indices from the top.
 Address: TypeAlias = tuple[str | int, ...]
+#: Words for true and false beside these two, which are names elsewhere.
+_TRUTH = {"yes": True, "on": True, "no": False, "off": False}
 #: What keeps YAML from reading a text with a colon.
 _COLON = "; a text with ': ' in it needs quotes"
 #: Levels of nesting whose lines are kept.
@@ -100,6 +102,17 @@ def _text(path: Path) -> str:
         raise NotationError(f"cannot read {path}: {error.strerror or error}") from None
     except UnicodeDecodeError as error:
         raise NotationError(f"{path}:1: is no UTF-8 text: {error.reason}") from None
+
+
+def as_truth(value: Any) -> Any:
+    """Return True or False for a word that means it, where it cannot be a name; other values as they are.
+
+    Examples
+    --------
+    >>> as_truth("off"), as_truth("yes"), as_truth("perhaps")
+    (False, True, 'perhaps')
+    """
+    return _TRUTH.get(value.lower(), value) if isinstance(value, str) else value
 
 
 def comma_hint(key: str, value: object = "") -> str:

@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contfric.errors import ParameterError, did_you_mean, mapping_of, real_number, shown
+from contfric.errors import ParameterError, did_you_mean, mapping_of, shown
 from contfric.models.parts import (
     Constraint,
     Departure,
@@ -308,7 +308,12 @@ class Model:
                 raise ParameterError(
                     f"parameter '{name}' must be a number, got {shown(value)} ({type(value).__name__})"
                 )
-            values[name] = real_number(f"parameter '{name}'", value)
+            try:
+                values[name] = float(value)
+            except OverflowError:  # a whole number of hundreds of digits
+                values[name] = math.inf
+            if not math.isfinite(values[name]):
+                raise ParameterError(f"parameter '{name}' must be finite, got {shown(value)}")
         for constraint in self.constraints:
             left = constraint.value(values)
             if left < 0 or (constraint.strict and left == 0):

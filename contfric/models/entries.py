@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from contfric.errors import ModelError, did_you_mean
-from contfric.yaml_lines import Address, comma_hint
+from contfric.yaml_lines import Address, as_truth, comma_hint
 
 #: How a side of a surface can be written.
 SIDES = {
     **{"+": 1, "-": -1, "0": 0, "above": 1, "below": -1, "on": 0},
     **{"1": 1, "-1": -1, "+1": 1},
 }
-#: Other words for true and false, which are names elsewhere.
-TRUTH = {"yes": True, "on": True, "no": False, "off": False}
 
 
 class EntryError(ModelError):
@@ -89,9 +87,7 @@ class Part:
 
     def flag(self, key: str) -> bool | None:
         """Return an entry that is true or false, None if it is not there."""
-        value = self.data.get(key)
-        if isinstance(value, str):
-            value = TRUTH.get(value.lower(), value)
+        value = as_truth(self.data.get(key))
         if value is not None and not isinstance(value, bool):
             self.fail(key, f"'{key}' must be true or false, got {value!r}")
         return value

@@ -259,9 +259,7 @@ def _read_pair(model: object, segments: object) -> tuple[Model, tuple[str, ...]]
     if isinstance(model, (str, Path)):
         model = load_model(model)
     if not isinstance(model, Model):
-        raise NotationError(
-            f"a signature needs a model or its name, such as 'coulomb', got {shown(model)}"
-        )
+        raise NotationError(f"a signature needs a model, or the name of one, got {shown(model)}")
     if isinstance(segments, str):
         return model, split_segments(segments, model)
     try:

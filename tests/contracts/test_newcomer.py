@@ -93,7 +93,7 @@ def test_every_odd_argument_is_told_in_one_line(orbit, diagram, name) -> None:
         ("of_kind", "XX", "no kind of bifurcation 'XX'.*Valid: SN, BP, PD, NS, CS, SS, AS, GS, T"),
         ("of_kind", "sn", "'sn'.*did you mean 'SN'"),
         ("segments", 3, "names of domains, as a list or joined by '->', got 3"),
-        ("Signature", None, "needs a model or its name, such as 'coulomb', got None"),
+        ("Signature", None, "needs a model, or the name of one, got None"),
         ("time", "0.5", "time is a finite number, got '0.5'"),
         ("seeds", 3, r"Seeds\(values=20, states=3\), or None; got 3"),
         ("kinds", "SN", r"kinds is a list, such as \['SN', 'BP'\], got 'SN'"),
