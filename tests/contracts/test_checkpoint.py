@@ -27,7 +27,7 @@ PLANE = (
     HEAD + "plane: {parameters: [Omega, S], range: {Omega: [0.52, 0.56], S: [0.3, 0.39]}, "
     "max_sections: 1}\n"
 )
-MAP = HEAD + "lyapunov: {grid: {Omega: [0.3, 0.6, 40], S: [0.2, 0.3, 20]}, periods: 60}\n"
+MAP = HEAD + "lyapunov: {grid: {Omega: [0.3, 0.6, 24], S: [0.2, 0.3, 16]}, periods: 60}\n"
 
 
 def killed(folder: Path, rounds: int, seed: int, *command: str) -> dict[str, list[int]]:

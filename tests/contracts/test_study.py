@@ -85,7 +85,7 @@ def run_python(code: str, *args: object) -> subprocess.CompletedProcess[str]:
         (
             "model: coulomb\nparams: {S: yes}\n",
             2,
-            r"'S' must be a finite number, got True \(bool\)",
+            r"'S' must be a finite number, got 'yes' \(str\)",
         ),
         (
             "model: coulomb\nparams:\n  S: abc\n",
