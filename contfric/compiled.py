@@ -14,8 +14,9 @@ compiled anew in every process.
 The cache lives in ``$CONTFRIC_CACHE_DIR``, else in ``$NUMBA_CACHE_DIR``, else in the user's cache
 folder (``~/.cache/contfric``). Numba renews a cached kernel only when the file of the kernel itself
 changes, not when a helper in another file does; so the folder's name carries a digest of all
-compiled sources. Where no folder is writable the kernels are compiled in every process: slower,
-never broken.
+compiled sources. Each kernel has a folder of its own below that, with the digests of its files: damaged
+ones are thrown away, and the kernel is compiled again. Where no folder is writable the kernels are compiled
+in every process: slower, never broken.
 """
 
 from __future__ import annotations
@@ -36,7 +37,10 @@ from numba import types
 from numba.core import config
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
+from contfric.checked import discard, discard_damaged, list_files
+from contfric.errors import ResultFileError
 from contfric.inlined import part_options
+from contfric.resources import user_cache
 
 # First-class functions are what makes the cache possible; numba still calls them experimental.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
@@ -88,6 +92,11 @@ ResetType = types.FunctionType(reset_signature)
 SecondType = types.FunctionType(second_signature)
 
 
+#: How an entry point is compiled, and the files that numba caches it in.
+_OPTIONS = {"nogil": True, "error_model": "numpy"}
+_CACHED = (".nbi", ".nbc")
+
+
 class Kernel:
     """A compiled entry point: compiled, or loaded from the cache, when it is first needed.
 
@@ -108,17 +117,32 @@ class Kernel:
         aside = _ASIDE.get(f"{function.__module__}:{function.__name__}")
         if aside is not None:
             aside.wait()  # another process is compiling it into the cache
-        folder = cache_folder(Path(function.__code__.co_filename))
+        shelf = cache_folder(Path(function.__code__.co_filename))
+        folder = shelf / f"{function.__module__}.{function.__name__}"
         before = config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE
         config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = str(folder), _OPTIMISATION, _VECTORISE
-        options = {"nogil": True, "error_model": "numpy"}
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            return numba.njit(self.signature, cache=True, **options)(function)
-        except (OSError, RuntimeError):  # no folder is writable
-            return numba.njit(self.signature, **options)(function)
+            return self._from_cache(folder)
+        except (OSError, RuntimeError, ResultFileError):  # no folder is writable
+            return numba.njit(self.signature, **_OPTIONS)(function)
         finally:
             config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = before
+
+    def _from_cache(self, folder: Path) -> Any:
+        """Load the function from its folder, or compile it into that."""
+        sound = discard_damaged(folder, _CACHED)
+        cached = numba.njit(self.signature, cache=True, **_OPTIONS)
+        try:
+            found = cached(self.__wrapped__)
+        except Exception:  # what unpickling ends in, where the files are of another numba
+            if not sound:
+                raise
+            discard(folder, _CACHED)
+            found = cached(self.__wrapped__)
+        if not found.stats.cache_hits:
+            list_files(folder, _CACHED)
+        return found
 
     @cached_property
     def _entry(self) -> Callable[..., Any]:
@@ -219,17 +243,7 @@ def _digest(folder: Path) -> str:
 
 def cache_folder(source: Path) -> Path:
     """Return the folder that the kernels of a source file are cached in."""
-    chosen = os.environ.get("CONTFRIC_CACHE_DIR") or os.environ.get("NUMBA_CACHE_DIR")
-    base = Path(chosen) if chosen else _user_cache() / "contfric"
-    return base / _digest(source.parent)
-
-
-def _user_cache() -> Path:
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", str(Path.home())))
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches"
-    return Path(os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache")))
+    return user_cache() / _digest(source.parent)
 
 
 def kernel(signature: Any) -> Callable[[Callable[..., Any]], Kernel]:

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable
-from numbers import Integral, Real
+import operator
+import os
+from collections.abc import Iterable, Mapping
+from numbers import Real
+from pathlib import Path
+from typing import Any
 
 #: Largest whole number that counts something: beyond it a float no longer counts in ones.
 _MOST = 2**53
@@ -52,7 +56,7 @@ class AperiodicError(ConvergenceError):
     """The simulation did not settle on a periodic orbit within its allowance."""
 
 
-def did_you_mean(word: str, valid: Iterable[str]) -> str:
+def did_you_mean(word: object, valid: Iterable[str]) -> str:
     """Return ``"; did you mean 'x'?"`` for the closest valid words, and the list of valid words.
 
     Examples
@@ -60,8 +64,10 @@ def did_you_mean(word: str, valid: Iterable[str]) -> str:
     >>> did_you_mean("Omga", ["Omega", "S"])
     "; did you mean 'Omega'? Valid: Omega, S"
     """
-    names = [str(name) for name in valid]
-    likeness = {name: difflib.SequenceMatcher(None, word, name).ratio() for name in names}
+    names, word = [str(name) for name in valid], str(word)
+    likeness = {  # a slip of the shift key is none
+        name: difflib.SequenceMatcher(None, word.lower(), name.lower()).ratio() for name in names
+    }
     best = max(likeness.values(), default=0.0)
     close = [f"'{name}'" for name in likeness if likeness[name] == best]
     hint = f"; did you mean {' or '.join(close)}?" if best >= 0.5 and len(close) <= 2 else "."
@@ -82,9 +88,12 @@ def whole_number(name: str, value: object, least: int, most: int | None = None) 
     100
     """
     limits = f">= {least}" if most is None else f"from {least} to {most}"
-    if isinstance(value, bool) or not isinstance(value, Integral):
-        raise ParameterError(f"{name} is a whole number {limits}, got {shown(value)}")
-    number = int(value)
+    try:
+        if isinstance(value, bool):
+            raise TypeError
+        number = operator.index(value)  # type: ignore[arg-type] # whole numbers of numpy count
+    except TypeError:
+        raise ParameterError(f"{name} is a whole number {limits}, got {shown(value)}") from None
     if not least <= number <= (_MOST if most is None else most):
         raise ParameterError(f"{name} is a whole number {limits}, got {shown(value)}")
     return number
@@ -166,3 +175,92 @@ def shown(value: object) -> str:
     except ValueError:  # it holds such a number
         text = f"a {type(value).__name__} of numbers that are too large"
     return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
+
+
+def real_number(name: str, value: object, least: float | None = None) -> float:
+    """Return a finite number that a user gave, not below a limit.
+
+    Raises
+    ------
+    ParameterError
+        If it is none, or below its limit.
+
+    Examples
+    --------
+    >>> real_number("time", 1)
+    1.0
+    """
+    wanted = "is a finite number" if least is None else f"is a finite number >= {least:g}"
+    number = finite_number(name, value, wanted)
+    if least is not None and number < least:
+        raise ParameterError(f"{name} {wanted}, got {shown(value)}")
+    return number
+
+
+def truth(name: str, value: object) -> bool:
+    """Return True or False that a user gave.
+
+    Raises
+    ------
+    ParameterError
+        If it is neither.
+    """
+    if type(value).__name__ not in ("bool", "bool_"):  # the second is numpy's
+        raise ParameterError(f"{name} is True or False, got {shown(value)}")
+    return bool(value)
+
+
+def mapping_of(name: str, value: object, example: str) -> Mapping[Any, Any]:
+    """Return a mapping that a user gave.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    if not isinstance(value, Mapping):
+        raise ParameterError(f"{name} is a mapping, such as {example}; got {shown(value)}")
+    return value
+
+
+def items_of(value: object) -> tuple[Any, ...]:
+    """Return the items of a list that a user gave; empty if it is none (a text is none).
+
+    Examples
+    --------
+    >>> items_of(["SN", "BP"]), items_of("SN"), items_of(3)
+    (('SN', 'BP'), (), ())
+    """
+    if isinstance(value, (str, bytes)):
+        return ()
+    try:
+        return tuple(value)  # type: ignore[arg-type] # arrays without a length are no lists, too
+    except TypeError:
+        return ()
+
+
+def function_of(name: str, value: object) -> None:
+    """Check a function that a user gave, or None.
+
+    Raises
+    ------
+    ParameterError
+        If it can be neither called nor left out.
+    """
+    if value is not None and not callable(value):
+        raise ParameterError(
+            f"{name} is a function of one text, such as print, or None; got {shown(value)}"
+        )
+
+
+def path_of(what: str, value: object) -> Path:
+    """Return a path that a user gave.
+
+    Raises
+    ------
+    ResultFileError
+        If it is none.
+    """
+    if not isinstance(value, (str, os.PathLike)) or not str(value).strip() or "\0" in str(value):
+        raise ResultFileError(f"{what} is a path, such as 'results.npz', got {shown(value)}")
+    return Path(value)

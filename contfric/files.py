@@ -49,6 +49,13 @@ def replacing(path: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
+def remove_leftovers(path: Path) -> None:
+    """Delete what processes that were killed while they wrote a file have left beside it."""
+    for part in path.parent.glob(f".{path.stem}.*.part{path.suffix}"):
+        with suppress(OSError):
+            part.unlink()
+
+
 def _flush(path: Path) -> None:
     """Have the disk accept the data: some report that they are full only now."""
     descriptor = os.open(path, os.O_RDWR)

@@ -1,7 +1,9 @@
-"""Where the files that ship with contfric are: in a wheel, and in a source checkout."""
+"""Where files are: those that ship with contfric, in a wheel or a source checkout; and the user's cache."""
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
@@ -46,3 +48,17 @@ def bundled_dir(kind: Kind) -> Path:
     raise ContfricError(
         f"the bundled {kind} are missing (neither {tried} exists); reinstall contfric"
     )
+
+
+def user_cache() -> Path:
+    """Return the user's folder for what can be made again: kernels, and checkpoints of a census."""
+    chosen = os.environ.get("CONTFRIC_CACHE_DIR") or os.environ.get("NUMBA_CACHE_DIR")
+    if chosen:
+        return Path(chosen)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", str(Path.home())))
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache")))
+    return base / "contfric"

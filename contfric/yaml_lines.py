@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
@@ -15,6 +17,10 @@ if TYPE_CHECKING:
 Address: TypeAlias = tuple[str | int, ...]
 #: Largest file, and most entries in it: a model or a study has a few hundred. (Reading takes a second then.)
 _MOST_BYTES, _MOST_ENTRIES = 100_000, 20_000
+#: Words for true and false beside these two, which are names elsewhere.
+_TRUTH = {"yes": True, "on": True, "no": False, "off": False}
+#: What keeps YAML from reading a text with a colon.
+_COLON = "; a text with ': ' in it needs quotes"
 #: Levels of nesting whose lines are kept.
 _DEEPEST = 4
 
@@ -54,17 +60,18 @@ def read_yaml(path: Path) -> LocatedYaml:
     """
     import yaml
 
-    text = _text(path)
+    text, loader = _text(path), _loader()
     try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        node = yaml.compose(text, Loader=loader)
         if node is not None and _entries(node, {}) > _MOST_ENTRIES:
             raise NotationError(
                 f"{path}:1: has more than {_MOST_ENTRIES} entries, those that its aliases repeat among them"
             )
-        data = yaml.safe_load(text)
+        data = yaml.load(text, Loader=loader)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise NotationError(f"{path}:{line}: no valid YAML: {error.problem}") from None
+        hint = _COLON if str(error.problem).startswith("mapping values") else ""
+        raise NotationError(f"{path}:{line}: no valid YAML: {error.problem}{hint}") from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         # ValueError: scalars that look like a date but are none
         raise NotationError(f"{path}:1: no valid YAML: {error}") from None
@@ -91,6 +98,25 @@ def _entries(node: yaml.Node, known: dict[int, int]) -> int:
     return known[id(node)]
 
 
+@cache
+def _loader() -> type[yaml.SafeLoader]:
+    """Return PyYAML's safe loader, with the truth values of YAML 1.2: on, off, yes and no are names."""
+    import yaml
+
+    class Loader(yaml.SafeLoader):
+        """Reads plain data."""
+
+    truth = "tag:yaml.org,2002:bool"
+    Loader.yaml_implicit_resolvers = {
+        first: [(tag, pattern) for tag, pattern in found if tag != truth]
+        for first, found in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
+    Loader.add_implicit_resolver(
+        truth, re.compile("^(?:true|True|TRUE|false|False|FALSE)$"), list("tTfF")
+    )
+    return Loader
+
+
 def _text(path: Path) -> str:
     try:
         if path.exists() and not path.is_file() and not path.is_dir():
@@ -106,17 +132,36 @@ def _text(path: Path) -> str:
         raise NotationError(f"{path}:1: is no UTF-8 text: {error.reason}") from None
 
 
-def comma_hint(key: str) -> str:
-    """Return an explanation of a key that is half of an expression: ``{x: max(a, b)}``.
+def as_truth(value: Any) -> Any:
+    """Return True or False for a word that means it, where it cannot be a name; other values as they are.
+
+    Examples
+    --------
+    >>> as_truth("off"), as_truth("yes"), as_truth("perhaps")
+    (False, True, 'perhaps')
+    """
+    return _TRUTH.get(value.lower(), value) if isinstance(value, str) else value
+
+
+def comma_hint(key: str, value: object = "") -> str:
+    """Return an explanation of a key that is half of an expression or of a text: ``{x: max(a, b)}``.
+
+    Parameters
+    ----------
+    value : what it is the key of; what is behind a comma inside { } has none
 
     Examples
     --------
     >>> comma_hint("b)")
     '; inside { } an expression with a comma needs quotes: {x: "max(a, b)"}'
+    >>> comma_hint("of the wall", None)
+    '; inside { } a text with a comma needs quotes: {meaning: "a, b"}'
     """
-    if key.count(")") <= key.count("("):
-        return ""
-    return '; inside { } an expression with a comma needs quotes: {x: "max(a, b)"}'
+    if key.count(")") > key.count("("):
+        return '; inside { } an expression with a comma needs quotes: {x: "max(a, b)"}'
+    if value is None:
+        return '; inside { } a text with a comma needs quotes: {meaning: "a, b"}'
+    return ""
 
 
 def _locate(located: LocatedYaml, node: yaml.Node, address: Address) -> None:

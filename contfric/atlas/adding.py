@@ -25,7 +25,7 @@ from contfric.continuation.candidates import candidates
 from contfric.continuation.events import Bifurcation
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import follow_orbit
-from contfric.errors import ConvergenceError, ParameterError, whole_number
+from contfric.errors import ConvergenceError, ParameterError, shown, whole_number
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import polish
@@ -104,6 +104,11 @@ def period_adding(bridge: Branch, longest: int = 6) -> tuple[Window, ...]:
     ['1a-2a-2a', '1a-2a', '1a-1a-2a']
     """
     whole_number("longest", longest, least=2)
+    given: object = bridge  # whatever the user gave
+    if not isinstance(given, Branch):
+        raise ParameterError(
+            f"period adding starts from a bridge, a Branch of explore(...), got {shown(given)}"
+        )
     if bridge.model.autonomous or bridge.model.resets:
         raise ParameterError(
             f"model '{bridge.model.name}': period adding is offered for excited models without impacts"

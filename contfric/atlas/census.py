@@ -19,7 +19,7 @@ from contfric.atlas.census_limits import ROOM, limits_of
 from contfric.atlas.census_net import Limits, Net
 from contfric.atlas.census_orbits import Catalogue
 from contfric.atlas.census_result import Census, SectionSearch
-from contfric.atlas.census_search import Mesh, Progress, Search
+from contfric.atlas.census_search import Findings, Mesh, Progress, Search, Wanted, searched
 from contfric.atlas.census_sections import Section, exit_arcs, period_of, sections_of
 from contfric.atlas.census_words import canonical_pair, closed_words
 from contfric.errors import ParameterError, whole_number
@@ -145,11 +145,6 @@ class _Census:
         arcs = exit_arcs(self.model, self.vector)
         self.fates = fates_before(self.model, self.words, self.limits.periods, arcs)
 
-    def wanted(self, word: ReducedWord, periods: int) -> bool:
-        """Return whether a walk is within the limits, and no necessary condition rules it out."""
-        walk = canonical_pair(self.model, word), periods
-        return walk in self.fates and self.fates[walk] is None
-
     def search(self, section: Section) -> None:
         """Search one section, in boxes of several sizes if it has positions."""
         largest = float(np.sum(self.model.spread(self.model.mapping(self.vector))))
@@ -161,27 +156,30 @@ class _Census:
             sizes.insert(0, sizes[0] / _FACTOR)
         sizes += [largest * 2.0**k for k in range(1, _DOUBLINGS + 1)]
         for reach in sizes:
-            search = self._search(section, reach)
-            if search is None or (reach >= largest and search.farthest <= ROOM * reach):
+            found = self._search(section, reach)
+            if found is None or (reach >= largest and found.farthest <= ROOM * reach):
                 return
 
-    def _search(self, section: Section, reach: float) -> Search | None:
+    def _search(self, section: Section, reach: float) -> Findings | None:
         """Search one section in one box; None if no word needs it."""
         mesh = (_CURVE if section.dimension == 1 else _BOX).refined(self.finer)
         shift = np.random.default_rng(self.seed).uniform(size=section.dimension) / 2.0**mesh.coarse
         net = Net(section, self.vector, self.limits, shift, _BITS, reach)
         if not net.useful:
             return None
-        search = Search(net, mesh, self.catalogue, self.wanted, self.most_starts, self.progress)
+        wanted = Wanted(self.model, self.fates)
+        search = Search(net, mesh, self.catalogue, wanted, self.most_starts)
         try:
-            search.run()
-        finally:
-            self._record(search)
-        return search
+            found = searched(search, self.progress)
+        except BaseException:
+            self._record(net, mesh, search.findings())
+            raise
+        self._record(net, mesh, found)
+        return found
 
-    def _record(self, search: Search) -> None:
-        net = search.net
-        for codes in net.walked.values():
+    def _record(self, net: Net, mesh: Mesh, found: Findings) -> None:
+        self.catalogue = found.catalogue
+        for codes in found.walks:
             word = net.word_of(codes)
             half = codes[-1] != net.own
             self.walked.add(canonical_pair(self.model, whole_of(self.model, word, half)))
@@ -189,17 +187,17 @@ class _Census:
             SectionSearch(
                 str(net.section),
                 net.section.dimension,
-                0.5**search.mesh.coarse,
-                0.5 ** max(search.mesh.torn, search.mesh.near),
+                0.5**mesh.coarse,
+                0.5 ** max(mesh.torn, mesh.near),
                 net.reach if net.section.dimension > 1 else 0.0,
-                search.farthest if net.section.dimension > 1 else 0.0,
-                net.count,
-                search.solves,
-                net.held,
-                net.cut,
-                search.jumps,
-                search.open,
-                search.complete,
+                found.farthest,
+                found.starts,
+                found.solves,
+                found.held,
+                found.cut,
+                found.jumps,
+                found.open,
+                found.complete,
             )
         )
 

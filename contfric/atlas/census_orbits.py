@@ -33,6 +33,11 @@ class Catalogue:
     def __len__(self) -> int:
         return sum(len(found) for found in self.orbits.values())
 
+    def copy(self) -> Catalogue:
+        """Return a catalogue of the same orbits that grows by itself."""
+        found = {walk: list(orbits) for walk, orbits in self.orbits.items()}
+        return Catalogue(found, set(self.continua))
+
     def add(self, orbit: Orbit) -> None:
         """Add an orbit unless it is known, or repeats a shorter one."""
         if shortest(orbit) is not orbit:

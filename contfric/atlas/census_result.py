@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
 from contfric.atlas.census_conditions import Fate, Walk
+from contfric.extras import need_pandas
 from contfric.models.definition import Model
 from contfric.orbit.orbit import DEGENERATE, Orbit
 
@@ -100,7 +101,13 @@ class Census:
     def __iter__(self) -> Iterator[Orbit]:
         return iter(self.orbits)
 
-    def __getitem__(self, index: int) -> Orbit:
+    @overload
+    def __getitem__(self, index: int) -> Orbit: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Orbit, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Orbit | tuple[Orbit, ...]:
         return self.orbits[index]
 
     @cached_property
@@ -120,6 +127,7 @@ class Census:
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row an orbit (needs pandas)."""
+        need_pandas()
         import pandas as pd
 
         return pd.DataFrame(self.records())

@@ -32,9 +32,12 @@ from contfric.atlas.census_cells import (
     make_cells,
     near_cells,
 )
+from contfric.atlas.census_conditions import Fate
 from contfric.atlas.census_net import Net
 from contfric.atlas.census_orbits import Catalogue
-from contfric.models.definition import FloatArray
+from contfric.atlas.census_words import canonical_pair
+from contfric.journal import remembered
+from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import polish
 from contfric.orbit.system import IntArray, build_system
@@ -88,13 +91,50 @@ class Root:
     slope: float | None
 
 
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """Which walks may have an orbit: those within the limits that no necessary condition rules out."""
+
+    model: Model
+    fates: dict[tuple[ReducedWord, int], Fate | None]
+
+    def __call__(self, word: ReducedWord, periods: int) -> bool:
+        """Return whether a walk may have an orbit."""
+        walk = canonical_pair(self.model, word), periods
+        return walk in self.fates and self.fates[walk] is None
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """What a search has left behind.
+
+    Attributes
+    ----------
+    catalogue : the orbits known after it
+    walks : an example of each walk from the section back to it or to its mirror image
+    starts, held, cut, jumps, open, solves, complete : as of the net and of the search
+    farthest : largest position of a fixed point, 0 without any
+    """
+
+    catalogue: Catalogue
+    walks: tuple[tuple[int, ...], ...]
+    starts: int
+    held: int
+    cut: int
+    jumps: int
+    open: int
+    solves: int
+    complete: bool
+    farthest: float
+
+
 @dataclass(eq=False)
 class Search:
     """The search on one section.
 
     Attributes
     ----------
-    wanted : whether a walk (word, periods) may have an orbit, by the necessary conditions
+    wanted : which walks (word, periods) may have an orbit
     most : number of starts at which it ends
     jumps, open : discontinuities, and near returns without an orbit, that are left at the smallest size
     """
@@ -102,7 +142,7 @@ class Search:
     net: Net
     mesh: Mesh
     catalogue: Catalogue
-    wanted: Callable[[ReducedWord, int], bool]
+    wanted: Wanted
     most: int
     progress: Progress | None = None
     jumps: int = 0
@@ -124,9 +164,27 @@ class Search:
             chosen = self._judge(cells, level)
             cells, level = halved(self.net, cells, chosen), level + 1
 
+    def findings(self) -> Findings:
+        """Return what was found so far."""
+        net = self.net
+        return Findings(
+            self.catalogue.copy(),
+            tuple(net.walked.values()),
+            net.count,
+            net.held,
+            net.cut,
+            self.jumps,
+            self.open,
+            self.solves,
+            self.complete,
+            self.farthest,
+        )
+
     @property
     def farthest(self) -> float:
-        """Largest position of a fixed point, 0 without any."""
+        """Largest position of a fixed point, 0 without any, and on a section that is a curve."""
+        if self.net.section.dimension == 1:
+            return 0.0
         places = [np.abs(root.at[1:]).max() for found in self.roots.values() for root in found]
         return float(max(places, default=0.0))
 
@@ -262,6 +320,14 @@ class Search:
         if net.section.dimension == 1:
             slope = float(orbit.turn_multipliers[0].real) - 1.0
         return Root(at, slope)
+
+
+@remembered()
+def searched(search: Search, progress: Progress | None) -> Findings:
+    """Run a search to its end, and return what it has found."""
+    search.progress = progress
+    search.run()
+    return search.findings()
 
 
 def _keep(roots: list[Root], root: Root | None) -> None:

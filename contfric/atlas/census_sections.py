@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from contfric.atlas.census_conditions import Arcs
 from contfric.atlas.census_words import letters_of, modes_after
+from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.counts import TALLY
 from contfric.orbit.simulation import tables
@@ -158,6 +159,7 @@ class Sweep:
     outcome: IntArray
 
 
+@remembered()
 def sweep_from(
     section: Section,
     vector: FloatArray,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation, End, Kind, Proposal
+from contfric.extras import need_pandas
 from contfric.models.definition import Model
 
 if TYPE_CHECKING:
@@ -163,8 +164,15 @@ class Diagram:
         return tuple(sorted(found, key=lambda b: b.params[self.parameter]))
 
     def of_kind(self, kind: Kind | str) -> tuple[Bifurcation, ...]:
-        """Return the bifurcations of one kind."""
-        return tuple(b for b in self.bifurcations if b.kind is Kind(kind))
+        """Return the bifurcations of one kind.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such kind.
+        """
+        wanted = Kind.named(kind)
+        return tuple(b for b in self.bifurcations if b.kind is wanted)
 
     @cached_property
     def graph(self) -> nx.MultiGraph[int]:
@@ -194,6 +202,7 @@ class Diagram:
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the points of all branches as one table, with the branch's number and name."""
+        need_pandas()
         import pandas as pd
 
         tables = []

@@ -16,7 +16,7 @@ from contfric.atlas.seeds import Seeds, attractors
 from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import continue_orbit
-from contfric.errors import ConvergenceError, whole_number
+from contfric.errors import ConvergenceError, function_of, truth, whole_number
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 
@@ -79,6 +79,8 @@ def explore(
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
     whole_number("max_periods", max_periods, least=1)
     whole_number("max_branches", max_branches, least=1)
+    function_of("progress", progress)
+    bridges, seeds = truth("bridges", bridges), Seeds.given(seeds)
     orbit = shortest(orbit)
     state = Exploration(settings, max(max_periods, orbit.periods), max_branches, bridges, progress)
     if orbit.periods > max_periods:

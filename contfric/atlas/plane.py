@@ -12,6 +12,7 @@ from contfric.atlas.diagram import Diagram
 from contfric.continuation.events import Kind
 from contfric.curves.curve import Curve
 from contfric.curves.special import SpecialPoint
+from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 
 if TYPE_CHECKING:
@@ -122,8 +123,15 @@ class Plane:
         return same and (a.kind is b.kind and set(a.name.split("-")) == set(b.name.split("-")))
 
     def of_kind(self, kind: Kind | str) -> tuple[Curve, ...]:
-        """Return the curves of one kind."""
-        return tuple(c for c in self.curves if c.kind is Kind(kind))
+        """Return the curves of one kind.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such kind.
+        """
+        wanted = Kind.named(kind)
+        return tuple(c for c in self.curves if c.kind is wanted)
 
     def region_at(self, params: dict[str, float]) -> Region | None:
         """Return the region that a point lies in; None on a curve or outside."""
@@ -136,6 +144,7 @@ class Plane:
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the points of all curves as one table, with the curve's number and label (pandas)."""
+        need_pandas()
         import pandas as pd
 
         tables = []

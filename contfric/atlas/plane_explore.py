@@ -22,6 +22,7 @@ from contfric.atlas.seeds import Seeds
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.points import MOST_POINTS
 from contfric.curves.assembly import join_sides
+from contfric.curves.curve import CurvePart
 from contfric.curves.going_on import Start
 from contfric.curves.leaving import leaving, other_words
 from contfric.curves.points import CurvePoint
@@ -37,8 +38,12 @@ from contfric.errors import (
     ConvergenceError,
     ParameterError,
     did_you_mean,
+    function_of,
+    items_of,
+    shown,
     whole_number,
 )
+from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
 
 #: Kinds of curves that are followed by default: T changes labels, and nothing else.
@@ -115,7 +120,8 @@ def explore_plane(
         ("max_sections", max_sections),
     ):
         whole_number(name, most, least=1)
-    wanted = _kinds(kinds)
+    function_of("progress", progress)
+    wanted, seeds = _kinds(kinds), Seeds.given(seeds)
     largest = largest_step(max_step, orbit.model)
     state = PlaneExploration(
         box, orbit.vector.copy(), wanted, max_periods, max_curves, largest, progress
@@ -133,6 +139,8 @@ def explore_plane(
 
 def _kinds(kinds: Sequence[str | Kind]) -> frozenset[Kind]:
     known = [kind.value for kind in Kind if kind is not Kind.NS]
+    if not items_of(kinds):
+        raise ParameterError(f"kinds is a list, such as ['SN', 'BP'], got {shown(kinds)}")
     names = [kind.value if isinstance(kind, Kind) else str(kind) for kind in kinds]
     for name in names:
         if name not in known:
@@ -213,7 +221,7 @@ def _follow_words(state: PlaneExploration) -> None:
     """Follow CS curves in the other words for their motions."""
     while state.unread:
         for part in state.unread.popleft().parts:
-            for starts in _paired(other_words(part, state.largest)):
+            for starts in _of_other_words(part, state.largest):
                 if not state.full and state.wants(starts[0][0]):
                     _follow_starts(state, starts, None)
 
@@ -227,7 +235,7 @@ def _follow_special(state: PlaneExploration) -> None:
             continue
         if special.meets is Kind.T or special.kind in (CodimTwo.CUSP, CodimTwo.R1, CodimTwo.R2):
             continue
-        for starts in _paired(leaving(special, problem, state.largest)):
+        for starts in _that_leave(special, problem, state.largest):
             if state.full:
                 state.complete = False
                 state.notes.append(f"stopped at max_curves = {state.max_curves}")
@@ -242,6 +250,16 @@ def _is_at_limit(special: SpecialPoint, problem: Problem) -> bool:
     """Tell whether a point is at a physical limit (S0 = S), where conditions degenerate together."""
     here = np.array([[special.params[name] for name in problem.box.names]])
     return bool(problem.within_limits(here)[0] < _AT_LIMIT * np.min(problem.box.widths))
+
+
+@remembered()
+def _of_other_words(part: CurvePart, largest: float) -> list[list[Start]]:
+    return list(_paired(other_words(part, largest)))
+
+
+@remembered()
+def _that_leave(special: SpecialPoint, problem: Problem, largest: float) -> list[list[Start]]:
+    return list(_paired(leaving(special, problem, largest)))
 
 
 def _paired(starts: Iterable[Start]) -> Iterator[list[Start]]:

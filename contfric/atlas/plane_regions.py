@@ -19,6 +19,7 @@ from contfric.atlas.matching import identity
 from contfric.atlas.plane import Family, Region
 from contfric.curves.curve import Curve
 from contfric.curves.problem import Box
+from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import Word
 
@@ -45,6 +46,7 @@ class Living:
         return self.word, self.half
 
 
+@remembered()
 def regions_of(
     model: Model,
     vector: FloatArray,

@@ -15,7 +15,7 @@ from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import follow_orbit
 from contfric.curves.problem import Box
-from contfric.errors import ContfricError, ParameterError
+from contfric.errors import ContfricError, ParameterError, mapping_of, real_number, shown
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
 
@@ -28,17 +28,23 @@ def sections_of(
         second = box.names[1]
         return [(second, orbit.params[second])]
     found = []
-    for name, values in sections.items():
+    example = f"{{'{box.names[1]}': [{box.low[1]:g}]}}"
+    for name, values in mapping_of("sections", sections, example).items():
         if name not in box.names:
             raise ParameterError(f"sections are values of {' and '.join(box.names)}, got '{name}'")
-        for value in values:
+        if isinstance(values, str) or np.ndim(values) != 1:
+            raise ParameterError(
+                f"sections are lists of values, such as {example}; got {shown(values)} for '{name}'"
+            )
+        for given in values:
+            value = real_number(f"the section of '{name}'", given)
             k = box.names.index(name)
-            if not box.low[k] <= float(value) <= box.high[k]:
+            if not box.low[k] <= value <= box.high[k]:
                 raise ParameterError(
                     f"the section {name} = {value:g} is outside of its range "
                     f"({box.low[k]:g}, {box.high[k]:g})"
                 )
-            found.append((name, float(value)))
+            found.append((name, value))
     return found
 
 

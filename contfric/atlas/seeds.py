@@ -7,7 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contfric.errors import AperiodicError, ConvergenceError, whole_number
+from contfric.errors import (
+    AperiodicError,
+    ConvergenceError,
+    ParameterError,
+    shown,
+    whole_number,
+)
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
@@ -45,6 +51,21 @@ class Seeds:
         whole_number("values", self.values, least=1)
         whole_number("states", self.states, least=1)
         whole_number("seed", self.seed, least=0)
+
+    @staticmethod
+    def given(seeds: object) -> Seeds | None:
+        """Return what a user gave for seeds: some, or None.
+
+        Raises
+        ------
+        ParameterError
+            If it is something else.
+        """
+        if seeds is not None and not isinstance(seeds, Seeds):
+            raise ParameterError(
+                f"seeds are given as Seeds(values=20, states=3), or None; got {shown(seeds)}"
+            )
+        return seeds
 
     @property
     def count(self) -> int:

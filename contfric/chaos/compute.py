@@ -18,7 +18,7 @@ from contfric.chaos.running import Progress, Timer, compute_all
 from contfric.chaos.starts import StateLike, given_states, number_of_starts
 from contfric.chaos.store import TileFolder, digest, open_tiles
 from contfric.chaos.tiles import Place, Tile, TileRows, empty_tile, inside, places
-from contfric.errors import ParameterError, shown, whole_number
+from contfric.errors import ParameterError, function_of, mapping_of, shown, whole_number
 from contfric.memory import must_fit
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
@@ -149,7 +149,9 @@ def lyapunov_map(
     grid = _checked_axes(model, axes)
     shape = tuple(len(values) for values in grid.values())
     check_size(shape, whole_number("starts", starts, least=1), len(model.states))
-    vector, example = _checked_params(model, grid, params or {})
+    function_of("progress", progress)
+    fixed = mapping_of("params", {} if params is None else params, "{'S0': 0.4}")
+    vector, example = _checked_params(model, grid, fixed)
     count = number_of_starts(model, state, starts, example)
     check_size(shape, count, len(model.states))
     states = None if state is None else _all_states(model, grid, vector, state, count)

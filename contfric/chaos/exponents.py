@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from contfric.chaos.rows import Limits, follow
 from contfric.chaos.starts import StateLike, default_states, given_states
 from contfric.chaos.status import Motion
-from contfric.errors import ParameterError, finite_number, whole_number
+from contfric.errors import ParameterError, finite_number, real_number, whole_number
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
 
@@ -144,7 +144,7 @@ def checked_time(time: float) -> float:
     ParameterError
         If it is not finite.
     """
-    return finite_number("time", time, "must be finite")
+    return real_number("time", time)
 
 
 def lyapunov_exponent(
@@ -188,7 +188,7 @@ def lyapunov_exponent(
     """
     model = load_model(model)
     limits = limits_of(transient, periods, tolerance, confirm)
-    vector = model.vector(params or {})
+    vector = model.vector({} if params is None else params)
     named = model.mapping(vector)
     if state is None:
         states = default_states(model, named, 1)

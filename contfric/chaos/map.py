@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from contfric.chaos.exponents import lyapunov_dimension
 from contfric.chaos.status import Motion
 from contfric.chaos.tiles import TileRows
+from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 
 if TYPE_CHECKING:
@@ -175,6 +176,7 @@ class LyapunovMap:
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row for each motion: parameters, start, exponents, what it is (needs pandas)."""
+        need_pandas()
         import pandas as pd
 
         first, second = self.axes

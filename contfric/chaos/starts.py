@@ -73,7 +73,12 @@ def given_states(model: Model, state: StateLike, params: Mapping[str, float]) ->
     ParameterError
         If they are none of the model.
     """
-    given = state(params) if callable(state) else state
+    try:
+        given = state(params) if callable(state) else state
+    except TypeError as error:
+        raise ParameterError(
+            f"state is a function of the parameters, a mapping by their names: {error}"
+        ) from error
     try:
         states = np.array(given, dtype=np.float64, ndmin=2)
     except (TypeError, ValueError, OverflowError):

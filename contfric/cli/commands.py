@@ -54,10 +54,13 @@ def _print_summary(result: StudyResult) -> None:
 
 
 def _interrupted_text(result: StudyResult) -> str:
+    on = "; the same command goes on from there" if result.goes_on else ""
     if not result.files:
-        return "interrupted before an orbit was found: there is nothing to save"
+        return f"interrupted before an orbit was found: there is nothing to save{on}"
     found = f"{len(result.diagram.branches)} branches" if result.diagram else "the first orbit"
-    return f"interrupted: what was found until then ({found}) is saved in {result.out}"
+    if result.orbit is None:
+        found = "the finished part of the map"
+    return f"interrupted: what was found until then ({found}) is saved in {result.out}{on}"
 
 
 def explain(options: argparse.Namespace) -> int:
@@ -244,9 +247,14 @@ def census(options: argparse.Namespace) -> int:
     """``contfric census``: the orbits as a table, then what was tried and what bounds it."""
     from contfric.atlas.census import census as take
     from contfric.cli.progress import ProgressLine
+    from contfric.study.checkpoint import checkpoint_of
 
     params = dict(_assignment(text) for text in options.params)
-    with ProgressLine(options.quiet) as progress:
+    asked = (options.periods, options.stops, options.finer, options.seed)
+    checkpoint = checkpoint_of(("census", options.model, sorted(params.items()), *asked))
+    with ProgressLine(options.quiet) as progress, checkpoint.kept():
+        if checkpoint.earlier:
+            progress(f"goes on: {checkpoint.earlier} results of the census before are kept")
         found = take(
             options.model,
             params,
@@ -257,10 +265,12 @@ def census(options: argparse.Namespace) -> int:
             progress=progress,
         )
     print(json.dumps(found.to_dict(), indent=2) if options.json else found)
-    if found.interrupted:
-        say("interrupted: what was found until then is listed")
-        return Exit.INTERRUPTED
-    return Exit.DONE
+    if not found.interrupted:
+        checkpoint.done()
+        return Exit.DONE
+    on = "; the same command goes on from there" if checkpoint.leave() else ""
+    say(f"interrupted: what was found until then is listed{on}")
+    return Exit.INTERRUPTED
 
 
 def _assignment(text: str) -> tuple[str, float]:

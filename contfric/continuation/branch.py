@@ -6,12 +6,14 @@ import operator
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contfric.continuation.events import Bifurcation, End
+from contfric.errors import ParameterError
+from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.stops import stopping_segments
@@ -71,8 +73,16 @@ class Branch:
     def __len__(self) -> int:
         return len(self.values)
 
-    def __getitem__(self, index: int) -> Orbit:
-        """Return one point as an orbit."""
+    @overload
+    def __getitem__(self, index: int) -> Orbit: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Orbit]: ...
+
+    def __getitem__(self, index: int | slice) -> Orbit | list[Orbit]:
+        """Return one point as an orbit; a slice is a list of orbits."""
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
         index = operator.index(index)
         vector = self.vector.copy()
         vector[self.model.index_of(self.parameter)] = self.values[index]
@@ -177,7 +187,9 @@ class Branch:
         """Return the mirror image of the branch, with mirrored bifurcations."""
         symmetry = self.model.symmetry
         if symmetry is None:
-            raise ValueError(f"model '{self.model.name}' has no symmetry")
+            raise ParameterError(
+                f"model '{self.model.name}' has no symmetry: a branch has no mirror image"
+            )
         word = mirror_pairs(self.model, self.system.word)
         system = build_system(self.model, word, self.system.periods, self.system.half)
         joints = self.joints @ _block(symmetry.array()).T
@@ -206,6 +218,7 @@ class Branch:
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the points as a table: parameters, x_max, x_min, psi, stops, stability (pandas)."""
+        need_pandas()
         import pandas as pd
 
         columns: dict[str, Any] = dict(self.params)

@@ -29,6 +29,7 @@ from functools import cached_property
 
 import numpy as np
 
+from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import Domain
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
@@ -53,6 +54,21 @@ class Kind(str, Enum):
     def meaning(self) -> str:
         """One line for a legend or a table."""
         return _MEANINGS[self]
+
+    @classmethod
+    def named(cls, name: object) -> Kind:
+        """Return a kind by its name, or as it is.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such kind.
+        """
+        for kind in cls:
+            if name is kind or (isinstance(name, str) and name == kind.value):
+                return kind
+        hint = did_you_mean(str(name), [kind.value for kind in cls])
+        raise ParameterError(f"there is no kind of bifurcation {name!r}{hint}")
 
 
 _MEANINGS = {

@@ -114,6 +114,10 @@ class Rows:
         """Return the arrays up to a row, in the order in which the march takes them."""
         return tuple(a[:stop] for a in vars(self).values())
 
+    def first(self, count: int) -> Rows:
+        """Return the first rows."""
+        return Rows(*(array[:count].copy() for array in vars(self).values()))
+
     def point(self, k: int) -> Point:
         """Return one row as a point of its own."""
         return Point(

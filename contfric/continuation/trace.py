@@ -24,7 +24,8 @@ from contfric.continuation.sliding import ROUGHLY_REACHED, nearly_reached
 from contfric.continuation.smooth import SAME_PLACE, leapt_vertex, vertex_at
 from contfric.continuation.trial import locate_value
 from contfric.continuation.vertices import at_vertex, left_at, passed_vertex
-from contfric.errors import ConvergenceError
+from contfric.errors import ConvergenceError, function_of
+from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
 
 #: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).
@@ -103,6 +104,7 @@ def continue_orbit(
     >>> [end.reason.name for end in cf.continue_orbit(orbit, "Omega", (0.4, 0.6)).ends]
     ['SS', 'CS']
     """
+    function_of("progress", progress)
     settings = settings_of(orbit, parameter, range, max_step, stability, max_points)
     return follow_orbit(orbit, settings, progress, keep=True)
 
@@ -128,6 +130,11 @@ def follow_orbit(
     return join(orbit, settings, behind, ahead)
 
 
+def _went_to_its_end(side: Side) -> bool:
+    return side.end.reason is not EndReason.INTERRUPTED
+
+
+@remembered(finished=_went_to_its_end)
 def trace_side(
     orbit: Orbit,
     start: Point,
@@ -158,6 +165,7 @@ def trace_side(
         if progress is not None:
             progress(f"{side.count} points, {settings.parameter} = {side.tip.value:.6g}")
         if finished:
+            side.rows = side.rows.first(side.last + 1)
             return side
 
 

@@ -7,13 +7,14 @@ import operator
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contfric.continuation.events import Kind
 from contfric.curves.special import CurveEnd, SpecialPoint
+from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System, Test
@@ -103,8 +104,16 @@ class Curve:
     def __len__(self) -> int:
         return sum(len(part) for part in self.parts)
 
-    def __getitem__(self, index: int) -> Orbit:
-        """Return the orbit at one point."""
+    @overload
+    def __getitem__(self, index: int) -> Orbit: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Orbit]: ...
+
+    def __getitem__(self, index: int | slice) -> Orbit | list[Orbit]:
+        """Return the orbit at one point; a slice is a list of orbits."""
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
         index = operator.index(index)
         if index < 0:
             index += len(self)
@@ -206,6 +215,7 @@ class Curve:
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the points as a table: parameters, kind, stability, x_max, x_min (needs pandas)."""
+        need_pandas()
         import pandas as pd
 
         columns: dict[str, Any] = dict(self.params)

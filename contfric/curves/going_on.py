@@ -21,6 +21,7 @@ from contfric.curves.points import CurvePoint, CurveRows, first_curve_point, mar
 from contfric.curves.problem import Box, Problem, problem_of
 from contfric.curves.special import SpecialPoint
 from contfric.errors import ContfricError
+from contfric.journal import remembered
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, Margin, Test
@@ -116,6 +117,7 @@ def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation 
     return None
 
 
+@remembered()
 def goes_on(
     problem: Problem, tip: CurvePoint, special: SpecialPoint, largest: float
 ) -> Start | None:

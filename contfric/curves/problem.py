@@ -16,7 +16,7 @@ from contfric.continuation.events import (
     kind_of_margin,
     resting_domain,
 )
-from contfric.errors import ParameterError, checked_range, did_you_mean
+from contfric.errors import ParameterError, checked_range, did_you_mean, items_of, mapping_of, shown
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.linear import jacobian_blocks
 from contfric.orbit.orbit import Orbit
@@ -136,15 +136,17 @@ def box_of(
     ParameterError
         For anything but two different parameters of the model with a finite range each.
     """
-    names: object = parameters  # whatever the user gave
-    if isinstance(names, str) or len(tuple(parameters)) != 2:
-        raise ParameterError(f"a curve needs a pair of parameters, got {parameters!r}")
+    if len(items_of(parameters)) != 2:
+        raise ParameterError(
+            f"a curve needs a pair of parameters, such as {model.parameter_names[:2]}, got "
+            f"{shown(parameters)}"
+        )
     one, other = parameters
     for name in (one, other):
         model.index_of(name)
     if one == other:
         raise ParameterError(f"a curve needs two different parameters, got '{one}' twice")
-    for name in ranges:
+    for name in mapping_of("ranges", ranges, f"{{'{one}': (lower, upper), ..}}"):
         if name not in (one, other):
             raise ParameterError(
                 f"'{name}' is none of the two parameters{did_you_mean(str(name), (one, other))}"

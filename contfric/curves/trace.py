@@ -27,6 +27,7 @@ from contfric.curves.points import (
 from contfric.curves.problem import Problem, box_of, problem_of
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.errors import ConvergenceError, ParameterError, finite_number, whole_number
+from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
 
 #: A first point farther than this from the bifurcation (in widths of the ranges) is another one.
@@ -205,23 +206,7 @@ def trace_curve_side(
 
     ``keep`` is that of :func:`contfric.continuation.trace.trace_side`.
     """
-    side = CurveSide(problem, [start], border.copy())
-    step = FIRST_STEP * largest
-    while True:
-        try:
-            finished, step = _advance(side, step, largest, max_points)
-        except KeyboardInterrupt:
-            if not keep:
-                raise
-            side.end = CurveEnd(CurveEndReason.INTERRUPTED)
-            return side
-        if progress is not None:
-            where = ", ".join(
-                f"{n} = {v:.6g}" for n, v in zip(problem.box.names, side.tip.w, strict=True)
-            )
-            progress(f"{problem.kind.value}: {len(side.points)} points, {where}")
-        if finished:
-            break
+    side = _trace_piece(problem, start, border, largest, max_points, progress, keep)
     special = side.end.special
     if side.end.reason is CurveEndReason.MEETS and special is not None and changes > 0:
         try:
@@ -238,6 +223,40 @@ def trace_curve_side(
                 other, point, border, largest, max_points, progress, changes - 1, keep
             )
     return side
+
+
+def _went_to_its_end(side: CurveSide) -> bool:
+    return side.end.reason is not CurveEndReason.INTERRUPTED
+
+
+@remembered(finished=_went_to_its_end)
+def _trace_piece(
+    problem: Problem,
+    start: CurvePoint,
+    border: FloatArray,
+    largest: float,
+    max_points: int,
+    progress: Progress | None,
+    keep: bool,
+) -> CurveSide:
+    """Follow a curve from a point to its end, or to the next change of its signature."""
+    side = CurveSide(problem, [start], border.copy())
+    step = FIRST_STEP * largest
+    while True:
+        try:
+            finished, step = _advance(side, step, largest, max_points)
+        except KeyboardInterrupt:
+            if not keep:
+                raise
+            side.end = CurveEnd(CurveEndReason.INTERRUPTED)
+            return side
+        if progress is not None:
+            where = ", ".join(
+                f"{n} = {v:.6g}" for n, v in zip(problem.box.names, side.tip.w, strict=True)
+            )
+            progress(f"{problem.kind.value}: {len(side.points)} points, {where}")
+        if finished:
+            return side
 
 
 def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[bool, float]:

@@ -3,25 +3,26 @@
 A module lies in a folder of its own below the cache of compiled kernels, so that numba's cache of its
 kernels is renewed exactly when the module is. Its name carries a digest of the definition and of all
 compiled sources of contfric; what generates it is among those. It is written under another name and moved
-into place: two processes that build the same model at once do not disturb each other.
+into place: two processes that build the same model at once do not disturb each other. One that is damaged is
+generated again.
 """
 
 from __future__ import annotations
 
 import atexit
 import hashlib
-import importlib.util
 import shutil
 import sys
 import tempfile
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+from contfric.checked import read_sealed, write_sealed
 from contfric.errors import ResultFileError
-from contfric.files import replacing
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
@@ -44,31 +45,31 @@ def load_module(definition: str) -> ModuleType:
     """Import the generated module of a definition."""
     path = module_path(definition)
     name = path.stem
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
+    # from the text that was checked: Python's own copy of it (.pyc) could be damaged unseen
+    code = compile(read_sealed(path), str(path), "exec")
+    module = ModuleType(name)
+    module.__file__ = str(path)
     sys.modules[name] = module
-    spec.loader.exec_module(module)
+    exec(code, module.__dict__)
     return module
 
 
 @cache
 def module_path(definition: str) -> Path:
-    """Return the file of the generated module; it is written if it is not there."""
+    """Return the file of the generated module; it is written if it is not there, or damaged."""
     from contfric import compiled
 
     sources = compiled.cache_folder(Path(__file__))  # of the package, with what generates modules
     digest = hashlib.sha256(f"{sources.name}\n{definition}".encode()).hexdigest()[:16]
     path = sources / "models" / digest / f"contfric_model_{digest}.py"
-    if path.is_file():
+    with suppress(ResultFileError):
+        read_sealed(path)
         return path
     text = _generated(definition, f"{sources.name} {digest}")
     for folder in (path.parent, _temporary_folder()):
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            with replacing(folder / path.name) as part:
-                part.write_text(text, encoding="utf-8")
+            write_sealed(folder / path.name, text)
         except (OSError, ResultFileError):
             continue  # no such folder can be written: this process has one of its own
         return folder / path.name

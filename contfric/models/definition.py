@@ -24,13 +24,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contfric.errors import ParameterError, did_you_mean, shown
+from contfric.errors import ParameterError, did_you_mean, mapping_of, shown
 from contfric.models.parts import (
     Constraint,
     Departure,
@@ -43,6 +46,7 @@ from contfric.models.parts import (
     Surface,
     Symmetry,
 )
+from contfric.stored import given
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
@@ -281,9 +285,10 @@ class Model:
             If the model has no such parameter.
         """
         names = self.parameter_names
-        if name not in names:
+        given: object = name  # whatever the user gave
+        if not isinstance(given, str) or given not in names:
             raise ParameterError(
-                f"model '{self.name}' has no parameter '{name}'{did_you_mean(name, names)}"
+                f"model '{self.name}' has no parameter {shown(given)}{did_you_mean(given, names)}"
             )
         return names.index(name)
 
@@ -296,7 +301,8 @@ class Model:
             For an unknown name, a value that is no finite number, or a violated constraint.
         """
         values = self.defaults
-        for name, value in params.items():
+        example = ", ".join(f"'{n}': {v:g}" for n, v in list(values.items())[:2])
+        for name, value in mapping_of("params", params, f"{{{example}}}").items():
             self.index_of(name)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
                 raise ParameterError(
@@ -312,9 +318,9 @@ class Model:
         for constraint in self.constraints:
             left = constraint.value(values)
             if left < 0 or (constraint.strict and left == 0):
-                given = ", ".join(f"{n} = {values[n]!r}" for n in constraint.coefficients)
+                here = ", ".join(f"{n} = {values[n]!r}" for n in constraint.coefficients)
                 raise ParameterError(
-                    f"model '{self.name}' needs {constraint.text}, got {given}. "
+                    f"model '{self.name}' needs {constraint.text}, got {here}. "
                     + (constraint.meaning or "Choose a value that obeys it.")
                 )
         return values
@@ -347,3 +353,16 @@ class Model:
             elif c < 0 and bound <= high:
                 high, why_high = bound, constraint.text
         return low, high, why_low, why_high
+
+
+def _told_apart(model: Model) -> tuple[Any, ...]:
+    """Return what tells a model from others: its definition, or its name and the file that makes its flow."""
+    code = getattr(model.flow_factory, "__code__", None)
+    source = b""
+    if code is not None and not model.definition:
+        with suppress(OSError):
+            source = Path(code.co_filename).read_bytes()
+    return model.name, model.definition, model.parameter_names, sha256(source).hexdigest()
+
+
+given(Model, _told_apart)

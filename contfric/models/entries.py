@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from contfric.errors import ModelError, did_you_mean
-from contfric.yaml_lines import Address, comma_hint
+from contfric.yaml_lines import Address, as_truth, comma_hint
 
 #: How a side of a surface can be written.
 SIDES = {
@@ -40,7 +40,7 @@ class Part:
         known = tuple(valid)
         for key in self.data:
             if key not in known:
-                hint = comma_hint(key) or did_you_mean(key, known)
+                hint = comma_hint(key, self.data[key]) or did_you_mean(key, known)
                 self.fail(key, f"unknown key '{key}'{hint}")
 
     def needs(self, key: str, wanted: str) -> Any:
@@ -87,7 +87,7 @@ class Part:
 
     def flag(self, key: str) -> bool | None:
         """Return an entry that is true or false, None if it is not there."""
-        value = self.data.get(key)
+        value = as_truth(self.data.get(key))
         if value is not None and not isinstance(value, bool):
             self.fail(key, f"'{key}' must be true or false, got {value!r}")
         return value

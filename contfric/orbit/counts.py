@@ -6,8 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contfric.journal import counts_in
+
 #: Added to by the kernels, in the order of the fields of :class:`Counts`.
 TALLY = np.zeros(4, dtype=np.int64)
+counts_in(TALLY)
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contfric.errors import AperiodicError, ConvergenceError, whole_number
+from contfric.errors import AperiodicError, ConvergenceError, real_number, whole_number
+from contfric.journal import remembered
 from contfric.models import ModelSource, load_model
-from contfric.models.definition import FloatArray
+from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
@@ -73,19 +74,26 @@ def find_orbit(
     """
     model = load_model(model)
     if periods is not None:
-        whole_number("periods", periods, least=1, most=MOST_PERIODS)
-    whole_number("longest", longest, least=1)
+        periods = whole_number("periods", periods, least=1, most=MOST_PERIODS)
+    longest = whole_number("longest", longest, least=1)
+    checked = model.check_params({} if params is None else params)
+    return _wanted(_settled(model, checked, state, real_number("time", time), longest), periods)
+
+
+@remembered()
+def _settled(
+    model: Model, params: dict[str, float], state: ArrayLike | None, time: float, longest: int
+) -> Orbit:
+    """Return the orbit that a motion settles on."""
     span, done = _FIRST, 0
     y: ArrayLike | None = state
     while True:
-        trajectory = simulate(
-            model, dict(params or {}), state=y, time=time, periods=span, events=10_000_000
-        )
+        trajectory = simulate(model, params, state=y, time=time, periods=span, events=10_000_000)
         _check_motion(trajectory)
         done += span
         orbit = _read_off(trajectory, final=done >= longest)
         if orbit is not None:
-            return _wanted(orbit, periods)
+            return orbit
         if done >= longest:
             slow = next((r for r in recurrences(trajectory) if r[2] < _CREEPING), None)
             if slow is not None:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.errors import ParameterError, whole_number
+from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
@@ -33,6 +35,8 @@ SYMMETRY_TOLERANCE = 1e-9
 DEGENERATE = 1e-9
 
 
+#: Samples of one orbit: more are seen by nobody, and take minutes.
+_MOST_SAMPLES = 10_000_000
 #: A stick of length zero (at an event) has a duration of rounding over the rate of its release.
 _NO_TIME = 1e-10
 
@@ -176,7 +180,9 @@ class Orbit:
         """Return the mirror image under the model's symmetry (an orbit of the same parameters)."""
         symmetry = self.model.symmetry
         if symmetry is None:
-            raise ValueError(f"model '{self.model.name}' has no symmetry")
+            raise ParameterError(
+                f"model '{self.model.name}' has no symmetry: an orbit has no mirror image"
+            )
         joints = self.joints.copy()
         if not self.model.autonomous:
             joints[:, 0] += symmetry.fraction * self.period / self.periods
@@ -341,6 +347,7 @@ class Orbit:
 
     def trajectory(self, points: int = 400) -> tuple[FloatArray, FloatArray, list[str]]:
         """Return times (k,), states (k, n) and domains (k) along one period, joints included."""
+        points = whole_number("points", points, least=1, most=_MOST_SAMPLES)
         times: list[float] = []
         states: list[FloatArray] = []
         names: list[str] = []
@@ -361,6 +368,7 @@ class Orbit:
 
     def to_dataframe(self, points: int = 400) -> pd.DataFrame:
         """Return one period as a table: t, the states, the domain (needs pandas)."""
+        need_pandas()
         import pandas as pd
 
         times, states, names = self.trajectory(points)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contfric.errors import ParameterError, did_you_mean, finite_number, shown, whole_number
+from contfric.errors import ParameterError, did_you_mean, real_number, shown, whole_number
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.orbit.counts import TALLY
@@ -210,12 +210,13 @@ def start_of(
 ) -> tuple[int, int]:
     """Return (mode, surfaces that the start lies on and leaves, as bits) of an initial state."""
     signs = signs_at(model, t, y, vector)
+    given: object = domain  # whatever the user gave
+    if given is not None and not (isinstance(given, str) and given in model.domain_by_name):
+        raise ParameterError(
+            f"unknown domain {shown(given)}{did_you_mean(given, model.domain_by_name)}"
+        )
     name = domain or model.domain_at(signs) or _side_of_rates(model, t, y, vector, signs)
-    if name is None or name not in model.domain_by_name:
-        if domain is not None:
-            raise ParameterError(
-                f"unknown domain '{domain}'{did_you_mean(domain, model.domain_by_name)}"
-            )
+    if name is None:
         raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
     mode = model.domain_by_name[name].mode
     surfaces = [s.name for s in model.surfaces]
@@ -279,13 +280,10 @@ def simulate(
     ('stick', 'F+')
     """
     model = load_model(model)
-    vector = model.vector(params or {})
+    vector = model.vector({} if params is None else params)
     y = _checked_state(model, vector, state)
-    time = finite_number("time", time, "must be finite")
-    periods = finite_number("periods", periods, "must be finite")
-    events = whole_number("events", events, least=0)
-    if periods < 0.0:
-        raise ParameterError(f"periods must not be negative, got {periods!r}")
+    time, periods = real_number("time", time), real_number("periods", periods, least=0.0)
+    events = whole_number("events", events, least=1)
     mode, on = start_of(model, time, y, vector, domain)
     return run(model, vector, mode, on, time, y, periods, events)
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from contfric.errors import ConvergenceError, ParameterError
+from contfric.errors import ConvergenceError, ParameterError, whole_number
+from contfric.journal import SLOW, remembered
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
@@ -30,6 +31,7 @@ _LONGEST = 300.0
 CANDIDATES = 40
 
 
+@remembered(slow=SLOW)
 def polish(orbit: Orbit, damped: bool = True) -> Orbit:
     """Solve the boundary-value problem from an orbit's joints; the status says how it went.
 
@@ -91,6 +93,7 @@ def solve_orbit(
 
         signature = load_signature(signature, model)
     vector = model.vector(params)
+    seed = whole_number("seed", seed, least=0)
     word = reduced_word(signature)
     half = half_of(model, word, signature.periods) if signature.symmetric else None
     if half is not None:

@@ -39,6 +39,7 @@ from contfric.orbit.structure import (
     mode_domains,
 )
 from contfric.signature.holds import is_hold
+from contfric.stored import made_of
 
 __all__ = [
     "PLAIN",
@@ -205,6 +206,9 @@ def build_system(
         rounding=model.rounding,
     )
     return System(model, word, periods, half, layout, tests, domains, holds)
+
+
+made_of(System, lambda s: (s.model, s.word, s.periods, s.half, s.domains), build_system)
 
 
 def _turn(model: Model, periods: int, half: bool) -> float:

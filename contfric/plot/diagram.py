@@ -74,6 +74,7 @@ def plot_branches(
     >>> plot_branches([branch], "psi").get_ylabel()
     '$\\psi$'
     """
+    row_of(row)  # before a figure is opened for it
     found = [b for branch in branches for b in branch.bifurcations] if events else []
     return _plot_row(axes_or_new(ax), branches, found, row, legend, outside=ax is None)
 
@@ -105,6 +106,7 @@ def plot_diagram_row(
     >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     >>> ax = plot_diagram_row(cf.explore(orbit, "Omega", (0.4, 0.6)), "psi")
     """
+    row_of(row)  # before a figure is opened for it
     found = diagram.bifurcations if events else ()
     new = axes_or_new(ax)
     new.set_xlim(*diagram.range)

@@ -98,8 +98,9 @@ def row_of(name: str) -> Row:
     ParameterError
         If there is no such row.
     """
-    if name not in ROWS:
-        raise ParameterError(f"no row '{name}' in a diagram{did_you_mean(name, ROWS)}")
+    given: object = name  # whatever the user gave
+    if not isinstance(given, str) or given not in ROWS:
+        raise ParameterError(f"no row '{given}' in a diagram{did_you_mean(given, ROWS)}")
     return ROWS[name]
 
 

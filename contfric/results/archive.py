@@ -1,25 +1,28 @@
 """One file per result: an uncompressed npz of plain arrays, with a JSON header among them.
 
-Nothing in it is executed when it is read (no pickle). The header says what the file holds, the
+Nothing in it is executed when it is read (no pickle). A list of digests of all arrays and of the header is
+among them: what is not as it was written is refused. The header says what the file holds, the
 version of the format, and the name of the model, from which the equations are rebuilt; of a user's model
 it has the definition, too.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import zipfile
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contfric.atlas.diagram import Diagram
 from contfric.atlas.plane import Plane
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
 from contfric.curves.curve import Curve
-from contfric.errors import ModelError, ParameterError, ResultFileError
+from contfric.errors import ModelError, ParameterError, ResultFileError, path_of
 from contfric.files import replacing
 from contfric.models import load_model
 from contfric.models.definition import Model
@@ -31,11 +34,16 @@ from contfric.results.unpack import Unpacker
 
 Saveable: TypeAlias = Orbit | Branch | Diagram | Curve | Plane | LyapunovMap
 
-#: Version of the format; it grows when an older contfric could not read what is written.
-FORMAT = 1
+#: Version of the format; it grows when an older contfric could not read what is written. Files of version 1
+#: have no digests: that they are as they were written is not known.
+FORMAT, _WITHOUT_DIGESTS = 2, 1
 
 _MARK = "contfric result"
-_HEADER = "header"
+_HEADER, _DIGESTS = "header", "digests"
+#: Bytes of a digest: damage by chance is missed once in 2**128 times.
+_SIZE = 16
+#: Arrays that a message names.
+_NAMED = 3
 #: What reading a header that is not ours, or entries that do not fit each other, ends in.
 _DAMAGE = (ValueError, LookupError, TypeError, AttributeError, AssertionError)
 
@@ -63,6 +71,7 @@ def save(x: Saveable, path: str | Path) -> None:
             "only an Orbit, a Branch, a Diagram, a Curve, a Plane or a LyapunovMap can be saved, "
             f"got {type(x).__name__}"
         )
+    place = path_of("the file of a result", path)
     packer = Packer(x.model)
     content = _content(x, packer)
     header: Header = {
@@ -75,16 +84,55 @@ def save(x: Saveable, path: str | Path) -> None:
         "content": content,
         "pool": packer.finish(),
     }
-    text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
-    with replacing(Path(path)) as temporary:
-        _write(temporary, {_HEADER: text, **packer.arrays})
+    arrays = {_HEADER: _as_array(header), **packer.arrays}
+    arrays[_DIGESTS] = _as_array(_digests(arrays))
+    with replacing(place) as temporary:
+        _write(temporary, arrays)
 
 
 def _write(path: Path, arrays: Arrays) -> None:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for name, array in arrays.items():
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+            # without the time: the same result is the same file
+            entry = zipfile.ZipInfo(f"{name}.npy")
+            with archive.open(entry, "w", force_zip64=True) as file:
                 np.lib.format.write_array(file, array, allow_pickle=False)
+
+
+def _as_array(data: Any) -> NDArray[np.uint8]:
+    return np.frombuffer(json.dumps(data).encode(), dtype=np.uint8)
+
+
+def _digests(arrays: Arrays) -> dict[str, str]:
+    """Return a digest of each array: of its type, its shape and its bytes."""
+    found = {}
+    for name, array in arrays.items():
+        content = hashlib.sha256(f"{array.dtype.str}{array.shape}".encode())
+        if array.size:
+            content.update(np.ascontiguousarray(array).data)
+        found[name] = content.hexdigest()[: 2 * _SIZE]
+    return found
+
+
+def _changed(arrays: Arrays) -> str:
+    """Take the digests from the arrays of a file, and say what does not fit to them; empty if all does."""
+    listed = arrays.pop(_DIGESTS, None)
+    if listed is None:
+        return "it has no digests of its arrays"
+    try:
+        wanted = dict(json.loads(bytes(listed).decode()))
+    except (ValueError, TypeError):
+        return "its list of digests cannot be read"
+    found = _digests(arrays)
+    return "; ".join(
+        f"{what}: {', '.join(names[:_NAMED])}{', ...' if len(names) > _NAMED else ''}"
+        for what, names in (
+            ("missing", [n for n in wanted if n not in found]),
+            ("of another file", [n for n in found if n not in wanted]),
+            ("not as it was written", [n for n in found if wanted.get(n, found[n]) != found[n]]),
+        )
+        if names
+    )
 
 
 def _content(x: Saveable, packer: Packer) -> Header:
@@ -114,8 +162,12 @@ def load(path: str | Path, model: Model | None = None) -> Saveable:
     ResultFileError
         If the file is missing, damaged, of another program, or of a newer contfric.
     """
-    path = Path(path)
+    path = path_of("the file of a result", path)
     arrays = _read(path)
+    listed = _DIGESTS in arrays
+    wrong = _changed(arrays)
+    if listed and wrong:
+        raise ResultFileError(_damaged(path, wrong))
     try:
         header: Header = json.loads(bytes(arrays.pop(_HEADER)).decode())
         if header["mark"] != _MARK:
@@ -124,16 +176,18 @@ def load(path: str | Path, model: Model | None = None) -> Saveable:
         raise ResultFileError(
             f"{path} was not written by contfric: give a file of cf.save"
         ) from None
-    if header.get("format") != FORMAT:
+    if header.get("format") not in (FORMAT, _WITHOUT_DIGESTS):
         raise ResultFileError(
-            f"{path} is in format {header.get('format')}, this contfric reads format {FORMAT}: "
-            "read it with the version that wrote it, or run its study again"
+            f"{path} is in format {header.get('format')}, this contfric reads formats "
+            f"{_WITHOUT_DIGESTS} and {FORMAT}: read it with the version that wrote it, or run its study again"
         )
+    if wrong and header["format"] != _WITHOUT_DIGESTS:
+        raise ResultFileError(_damaged(path, wrong))
     try:
         owner = _owner(path, header, model)
         return _restored(header["content"], Unpacker(owner, header["pool"], arrays))
     except _DAMAGE as error:
-        raise ResultFileError(_damaged(path, error)) from None
+        raise ResultFileError(_damaged(path, _told(error))) from None
 
 
 def _restored(content: Header, pool: Unpacker) -> Saveable:
@@ -167,14 +221,16 @@ def _read(path: Path) -> Arrays:
     except OSError as error:
         raise ResultFileError(f"cannot read {path}: {error.strerror or error}") from None
     except Exception as error:  # the readers of zip and npy raise a dozen kinds on damaged bytes
-        raise ResultFileError(_damaged(path, error)) from None
+        raise ResultFileError(_damaged(path, _told(error))) from None
 
 
-def _damaged(path: Path, error: Exception) -> str:
-    return (
-        f"{path} is damaged or incomplete ({type(error).__name__}: {error}): restore a copy, or "
-        "run its study again"
-    )
+def _told(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"
+
+
+def _damaged(path: Path, what: str) -> str:
+    text = " ".join(what.split())
+    return f"{path} is damaged or incomplete ({text}): restore a copy, or run its study again"
 
 
 def _model_of(header: Header) -> Model:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from contfric.errors import NotationError, did_you_mean
-from contfric.models import Model
+from contfric.models import Model, ModelSource, load_model
 
 if TYPE_CHECKING:
     import networkx as nx
 
 
-def transition_graph(model: Model) -> nx.MultiDiGraph[str]:
-    """Return the domains of a model as nodes and its transitions as edges.
+def transition_graph(model: ModelSource) -> nx.MultiDiGraph[str]:
+    """Return the domains of a model (or of its name) as nodes and its transitions as edges.
 
     Returns
     -------
@@ -28,6 +28,7 @@ def transition_graph(model: Model) -> nx.MultiDiGraph[str]:
     """
     import networkx as nx
 
+    model = load_model(model)
     graph: nx.MultiDiGraph[str] = nx.MultiDiGraph(model=model.name)
     for domain in model.domains:
         graph.add_node(domain.name, mode=domain.mode, label=domain.label or domain.name)

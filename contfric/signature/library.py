@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from importlib.metadata import entry_points
 from pathlib import Path
 
-from contfric.errors import NotationError, did_you_mean
+from contfric.errors import NotationError, ParameterError, did_you_mean, shown
 from contfric.models import Model
 from contfric.resources import bundled_dir
 from contfric.yaml_lines import read_yaml
@@ -32,6 +32,9 @@ def signature_names(model: str | Model | None = None) -> list[str]:
     >>> signature_names("coulomb")[:3]
     ['0s', '1a', '1a-9seg']
     """
+    given: object = model  # whatever the user gave
+    if given is not None and not isinstance(given, (str, Model)):
+        raise ParameterError(f"model is a name or a Model, got {shown(given)}")
     wanted = _model_name(model)
     kept = (path for path in _files() if wanted in (None, _entry(path, "model")))
     return sorted({path.stem for path in kept})

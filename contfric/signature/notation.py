@@ -10,9 +10,11 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
-from contfric.errors import NotationError
-from contfric.models import Model
+from contfric.errors import NotationError, shown
+from contfric.models import Model, load_model, model_names
 from contfric.signature.cyclic import least_rotation, rotated
 from contfric.signature.graph import crossing, successors, unknown_domain
 from contfric.signature.holds import TOUCH, hold_at, hold_fault, is_hold, surface_into
@@ -41,10 +43,11 @@ class Signature:
     Attributes
     ----------
     model : Model
-        The model; compared by its name.
+        The model, or its name; compared by its name.
     segments : tuple of str
-        Names of the domains in the order of the visit; the last leads back to the first. Between two
-        of them may stand a hold (``hold@F+``) or an impact (``impact@wall``).
+        Names of the domains in the order of the visit, or their notation as one text; the last leads back
+        to the first. Between two of them may stand a hold (``hold@F+``) or an impact (``impact@wall``).
+        The two may be given the other way round, as a signature is printed.
     periods : int
         Number of periods of the excitation.
     symmetric : bool or None
@@ -65,6 +68,8 @@ class Signature:
     >>> from contfric.models import load_model
     >>> parse_signature("stick -> x-v+ -> x0v+", load_model("coulomb")).surfaces
     ('F-', 'F-', 'v')
+    >>> Signature("stick -> x-v+ -> x0v+", "coulomb").stops
+    1
     """
 
     model: Model
@@ -75,7 +80,9 @@ class Signature:
     example: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "segments", tuple(self.segments))
+        model, segments = _read_pair(self.model, self.segments)
+        object.__setattr__(self, "model", model)
+        object.__setattr__(self, "segments", segments)
         fault = walk_fault(self.model, self.segments)
         if fault is not None:
             raise NotationError(fault.message)
@@ -235,6 +242,40 @@ def split_segments(text: str | Iterable[str], model: Model) -> tuple[str, ...]:
     else:
         parts = [str(part).strip() for part in text]
     return tuple(_unalias(part, model) for part in parts)
+
+
+def _read_pair(model: object, segments: object) -> tuple[Model, tuple[str, ...]]:
+    """Return the model and the segments of what a user gave for them, in either order.
+
+    Raises
+    ------
+    NotationError
+        If the segments are none.
+    ParameterError
+        If there is no such model.
+    """
+    if not isinstance(model, Model) and _is_model(segments):
+        model, segments = segments, model
+    if isinstance(model, (str, Path)):
+        model = load_model(model)
+    if not isinstance(model, Model):
+        raise NotationError(f"a signature needs a model, or the name of one, got {shown(model)}")
+    if isinstance(segments, str):
+        return model, split_segments(segments, model)
+    try:
+        listed: tuple[Any, ...] = tuple(segments)  # type: ignore[arg-type] # whatever was given
+    except TypeError:
+        listed = (segments,)
+    if not all(isinstance(segment, str) for segment in listed):
+        raise NotationError(
+            "the segments of a signature are names of domains, as a list or joined by '->', got "
+            f"{shown(segments)}"
+        )
+    return model, listed
+
+
+def _is_model(value: object) -> bool:
+    return isinstance(value, Model) or (isinstance(value, str) and value in model_names())
 
 
 def is_sliding(model: Model, domain: str) -> bool:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NoReturn, TypeAlias
+from typing import Annotated, Any, NoReturn, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from contfric.errors import NotationError, ParameterError, did_you_mean
 from contfric.models import Model, load_model
 from contfric.models.files import is_path, relative_model
 from contfric.signature.library import SUFFIXES, signature_path
 from contfric.signature.notation import Signature, split_segments, walk_fault
-from contfric.yaml_lines import Address, LocatedYaml, read_yaml
+from contfric.yaml_lines import Address, LocatedYaml, as_truth, comma_hint, read_yaml
 
+_Truth = Annotated[bool, BeforeValidator(as_truth)]
 SignatureLike: TypeAlias = str | Path | Signature
 
 #: What an entry must be, for messages; the keys are those of the schema.
@@ -44,7 +45,7 @@ class SignatureFile(BaseModel):
     model: str = Field(description="name of the model that the domains belong to")
     periods: int = Field(1, ge=1, description="number of periods of the excitation")
     segments: str | list[str] = Field(description="the domains in the order of the visit")
-    symmetric: bool | None = Field(None, description="whether the orbit is its own mirror image")
+    symmetric: _Truth | None = Field(None, description="whether the orbit is its own mirror image")
     example: dict[str, float] | None = Field(None, description="where it is known to exist")
     description: str | None = Field(None, description="free text")
 
@@ -142,7 +143,8 @@ def _check_example(located: LocatedYaml, model: Model, example: dict[str, float]
 def _validated(located: LocatedYaml) -> SignatureFile:
     for key in located.data:
         if key not in SignatureFile.model_fields:
-            hint = did_you_mean(str(key), SignatureFile.model_fields)
+            hint = comma_hint(str(key), located.data[key])
+            hint = hint or did_you_mean(str(key), SignatureFile.model_fields)
             located.fail((str(key),), f"unknown key '{key}'{hint}")
     try:
         return SignatureFile.model_validate(located.data)

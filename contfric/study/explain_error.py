@@ -25,6 +25,7 @@ from contfric.study.schema import (
     StudyFile,
     Want,
 )
+from contfric.yaml_lines import comma_hint
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -63,7 +64,8 @@ def fail_with(located: LocatedYaml, error: ValidationError) -> NoReturn:
 
 def _message(entry: ErrorDetails, address: Address) -> str:
     if entry["type"] == "extra_forbidden":
-        hint = did_you_mean(str(address[-1]), _fields(_part(address[:-1])))
+        hint = comma_hint(str(address[-1]), entry["input"])
+        hint = hint or did_you_mean(str(address[-1]), _fields(_part(address[:-1])))
         return f"unknown key '{address[-1]}'{hint}"
     key, info = _described(address)
     wanted = f"it must be {info.description}" if info else "see the guide"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from contfric.errors import ResultFileError
-from contfric.files import unwritable
+from contfric.files import remove_leftovers, unwritable
 from contfric.study.plan import RECORD, RESULT_FILES
 
 
@@ -35,6 +35,11 @@ class Folder:
             with suppress(OSError):
                 (self.path / name).unlink()
 
+    def remove_leftovers(self, names: Iterable[str]) -> None:
+        """Remove the halves of files that a killed run has left."""
+        for name in names:
+            remove_leftovers(self.path / name)
+
     def free_name(self, stem: str, suffix: str) -> Path:
         """Return a file name that is not taken yet: ``stem.npz``, ``stem-2.npz``, ..."""
         path, number = self.path / f"{stem}{suffix}", 2
@@ -51,7 +56,7 @@ def open_folder(path: Path, files: Iterable[str], force: bool) -> Folder:
     files : iterable of str
         Names of the files that the run writes.
     force : bool
-        Whether results of an earlier run may be replaced.
+        Whether results of an earlier run may be replaced (a run that goes on replaces its own).
 
     Raises
     ------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from contfric.errors import StudyError, did_you_mean
+from contfric.errors import StudyError, did_you_mean, shown
 from contfric.resources import bundled_dir
 
 SUFFIXES = (".yaml", ".yml")
@@ -40,6 +40,9 @@ def study_path(source: str | Path) -> Path:
     >>> study_path("fig05").name
     'fig05.yaml'
     """
+    given: object = source  # whatever the user gave
+    if not isinstance(given, (str, Path)) or not str(given).strip() or "\0" in str(given):
+        raise StudyError(f"a study is a path or the name of a bundled one, got {shown(given)}")
     text = str(source)
     if isinstance(source, Path) or text.endswith(SUFFIXES) or "/" in text or "\\" in text:
         return _file(Path(source))

@@ -50,6 +50,8 @@ class StudyResult:
         The content of ``run.json``.
     files : tuple of Path
         The files written.
+    goes_on : bool
+        Whether a checkpoint was left, from which the same call goes on.
     """
 
     study: Study
@@ -62,6 +64,7 @@ class StudyResult:
     lyapunov: LyapunovMap | None
     info: dict[str, Any]
     files: tuple[Path, ...]
+    goes_on: bool = False
 
     def __repr__(self) -> str:
         return f"<StudyResult {self.study.name}: {self.status.value}, in {self.out}>"

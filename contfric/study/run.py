@@ -11,10 +11,18 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from contfric.atlas.diagram import Diagram
 from contfric.continuation.events import EndReason
-from contfric.errors import ContfricError, ResultFileError
+from contfric.errors import ContfricError, ResultFileError, path_of
 from contfric.orbit.counts import Counts, counts
 from contfric.orbit.orbit import Orbit
 from contfric.results import save
+from contfric.study.checkpoint import (
+    TILES,
+    Checkpoint,
+    check_unfinished,
+    checkpoint_in,
+    goes_on,
+    key_of,
+)
 from contfric.study.compute import (
     compile_continuation,
     continue_from,
@@ -53,8 +61,6 @@ if TYPE_CHECKING:
     from contfric.chaos.map import LyapunovMap
 
 Progress = Callable[[str], None]
-#: Folder of the finished tiles of a map, inside that of the run, until the map is complete.
-_TILES = "lyapunov-tiles"
 _T = TypeVar("_T")
 
 
@@ -67,7 +73,9 @@ def run_study(
 ) -> StudyResult:
     """Compute what a study wants, and nothing else, and write the results.
 
-    Ctrl-C ends the computation; what was found until then is written, and the status says so.
+    Ctrl-C ends the computation; what was found until then is written, and the status says so. While a run
+    goes on its folder holds a checkpoint: after Ctrl-C, or if the process was killed, the same call goes on
+    from it, and ends with the files of a run that was not disturbed.
 
     Parameters
     ----------
@@ -76,7 +84,7 @@ def run_study(
     out : str or Path, optional
         Folder of the results; by default the study's name, in the current folder.
     force : bool
-        Whether results of an earlier run in that folder may be replaced.
+        Whether results of an earlier run in that folder, or the checkpoint of another one, may be replaced.
     progress : callable, optional
         Called with one line of text now and then.
 
@@ -100,8 +108,11 @@ def run_study(
     if not isinstance(study, Study):
         study = read_study(study)
     plan = make_plan(study)
-    folder = open_folder(Path(study.name if out is None else out), plan.files, force)
-    return _Run(plan, folder, progress).run()
+    path = Path(study.name) if out is None else path_of("the folder of the results", out)
+    key = key_of(study)
+    check_unfinished(path, key, force)
+    folder = open_folder(path, plan.files, force or goes_on(path, key))
+    return _Run(plan, folder, checkpoint_in(folder.path, key), progress).run()
 
 
 @dataclass(eq=False)
@@ -110,12 +121,14 @@ class _Run:
 
     plan: Plan
     folder: Folder
+    checkpoint: Checkpoint
     progress: Progress | None
     status: RunStatus = RunStatus.DONE
     found: Findings = field(default_factory=Findings)
     timings: dict[str, float] = field(default_factory=dict)
     written: list[str] = field(default_factory=list)
     failures: list[Exception] = field(default_factory=list)
+    goes_on: bool = False
     before: Counts = field(default_factory=counts)
 
     @property
@@ -127,18 +140,27 @@ class _Run:
             self.progress(text)
 
     def run(self) -> StudyResult:
+        self.folder.remove_leftovers(self.plan.files)
+        if self.checkpoint.earlier:
+            self.say(f"goes on: {self.checkpoint.earlier} results of the run before are kept")
         try:
-            self._compute()
+            with self.checkpoint.kept():
+                self._compute()
         except KeyboardInterrupt:
             self.status = RunStatus.INTERRUPTED
         except BaseException as error:
             self._rescue(error)
             raise
         if self.found.empty:
+            self.goes_on = self.checkpoint.leave()
             self.folder.discard_if_empty()
             return self._result({})
         self._write_all()
         record = self._write_record()
+        if self.status is RunStatus.DONE:
+            self.checkpoint.done()
+        else:
+            self.goes_on = self.checkpoint.leave()
         result = self._result(record)
         if self.failures:
             raise UnwrittenError(self._failure_text(), result) from self.failures[0]
@@ -157,7 +179,7 @@ class _Run:
         self._find_plane()
         grid = study.content.lyapunov
         if grid is not None:
-            tiles = self.folder.path / _TILES
+            tiles = self.folder.path / TILES
             lmap = self._timed(
                 StepName.LYAPUNOV, lambda: lyapunov_from(study, grid, tiles, self.say)
             )
@@ -307,6 +329,7 @@ class _Run:
             self.found.lyapunov,
             record,
             tuple(self.folder.path / name for name in self.written),
+            self.goes_on,
         )
 
 

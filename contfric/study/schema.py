@@ -5,7 +5,11 @@ from __future__ import annotations
 from enum import Enum
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from contfric.yaml_lines import as_truth
+
+_Truth = Annotated[bool, BeforeValidator(as_truth)]
 
 
 class Want(str, Enum):
@@ -130,7 +134,7 @@ class ExploreTask(_Task):
     """Follow all branches that can be reached from the first orbit."""
 
     seeds: SeedsTask | None = Field(None, description="a mapping with any of values, states, seed")
-    bridges: bool | None = Field(
+    bridges: _Truth | None = Field(
         None,
         description="true or false: whether orbits with holds lead on where the flow jumps",
     )

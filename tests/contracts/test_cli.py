@@ -240,7 +240,7 @@ def test_interrupted_run_is_saved_and_says_so(study, tmp_path) -> None:
     code, printed, err = finish(command("run", path, "--out", out, "--json", before=before))
     assert code == Exit.INTERRUPTED
     assert err.startswith("contfric: interrupted: what was found until then (")
-    assert err.endswith(f"is saved in {out}\n")
+    assert err.endswith(f"is saved in {out}; the same command goes on from there\n")
     assert json.loads(printed)["status"] == "interrupted"
     assert (out / "diagram.npz").is_file()
     assert main(["info", str(out)]) == Exit.DONE
@@ -267,7 +267,8 @@ def test_a_full_disk(study, tmp_path) -> None:
     assert "points.csv: File too large; free some space" in err
     assert "diagram.npz: File too large" in err
     assert f"(written to {out}: bifurcations.csv, orbit.npz, run.json)" in err
-    assert {p.name for p in out.iterdir()} == {"bifurcations.csv", "orbit.npz", "run.json"}
+    left = {p.name for p in out.iterdir()}
+    assert left == {"bifurcations.csv", "checkpoint", "orbit.npz", "run.json"}
 
 
 def test_a_folder_that_cannot_be_made(study, tmp_path, capsys) -> None:

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from contfric.compiled import allocating_helper, f8, helper, kernel
 from contfric.inlined import part_options
+
+MODELS = Path(__file__).parents[1] / "models"
 
 
 @helper
@@ -56,3 +62,88 @@ def test_helpers_are_not_compiled_by_themselves(fresh_cache):
     for part in (square, fourth, total):
         (result,) = part.overloads.values()
         assert result.library.get_pointer_to_function(result.fndesc.mangled_name) == 0
+
+
+def garbled(content, rng):
+    """Return bytes with some in the middle changed."""
+    damaged = bytearray(content)
+    for place in rng.integers(0, len(content), size=8):
+        damaged[place] ^= int(rng.integers(1, 256))
+    return bytes(damaged)
+
+
+DAMAGE = {
+    "emptied": lambda content, rng: b"",
+    "cut": lambda content, rng: content[: int(rng.integers(1, len(content)))],
+    "garbled": garbled,
+    "garbled again": garbled,
+    "of something else": lambda content, rng: b"\x80\x04\x95 no pickle",
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc", ".json"])
+def test_a_damaged_file_of_the_cache_is_compiled_again(fresh_cache, damage, suffix):
+    rng = np.random.default_rng([len(damage), len(suffix), ord(suffix[-1])])
+    value = kernel(f8(f8))(twice)(1.5)
+    (path,) = (p for p in fresh_cache.rglob("*") if p.suffix == suffix)
+    path.write_bytes(DAMAGE[damage](path.read_bytes(), rng))
+    again, later = kernel(f8(f8))(twice), kernel(f8(f8))(twice)
+    assert again(1.5) == later(1.5) == value
+    assert not again.dispatcher.stats.cache_hits
+    assert sum(later.dispatcher.stats.cache_hits.values()) == 1  # mended for good
+
+
+def test_a_damaged_file_that_cannot_be_deleted_is_not_used(fresh_cache, monkeypatch):
+    value = kernel(f8(f8))(twice)(1.5)
+    for path in fresh_cache.rglob("*.nbc"):
+        path.write_bytes(b"")
+
+    def refused(path, missing_ok=False):
+        raise PermissionError(13, "read-only")
+
+    monkeypatch.setattr("pathlib.Path.unlink", refused)
+    again = kernel(f8(f8))(twice)
+    assert again(1.5) == value
+    assert not again.dispatcher.stats.cache_hits
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_a_damaged_module_of_a_model_is_generated_again(fresh_cache, damage, monkeypatch):
+    from contfric.models import build
+    from contfric.models.files import read_model
+
+    definition = read_model(MODELS / "bilinear.yaml").definition
+    text = build._generated(definition, "x")
+    asked = []
+    monkeypatch.setattr(build, "_generated", lambda *arguments: asked.append(1) or text)
+    path = build.module_path.__wrapped__(definition)
+    path.unlink()
+    asked.clear()
+    assert build.module_path.__wrapped__(definition) == path
+    assert build.module_path.__wrapped__(definition) == path
+    assert len(asked) == 1
+    path.write_bytes(DAMAGE[damage](path.read_bytes(), np.random.default_rng(len(damage))))
+    assert build.module_path.__wrapped__(definition) == path
+    assert len(asked) == 2
+    assert callable(build.load_module.__wrapped__(definition).compiled_flow)
+
+
+def test_a_damaged_cache_is_mended_in_a_run_from_the_shell(tmp_path):
+    """The whole way, in processes of their own: kernels of a file that lies beside nothing."""
+    source = "from contfric.compiled import f8, kernel\n\n\n@kernel(f8(f8))\ndef f(x):\n    return 3 * x\n"
+    (tmp_path / "tiny.py").write_text(source)
+    cache = tmp_path / "cache"
+    environment = {**os.environ, "CONTFRIC_CACHE_DIR": str(cache)}
+    code = "import tiny; print(tiny.f(2.0), sum(tiny.f.dispatcher.stats.cache_hits.values()))"
+    command = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {code}"]
+
+    def printed():
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
+    assert printed() == "6.0 0"
+    for path in [p for p in cache.rglob("*") if p.is_file()]:
+        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    assert printed() == "6.0 0"
+    assert printed() == "6.0 1"

@@ -19,6 +19,7 @@ import contfric as cf
 from contfric import files
 from contfric.continuation.events import EndReason
 from contfric.orbit.system import build_system
+from contfric.results.archive import _digests
 from contfric.signature import load_signature
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
@@ -236,13 +237,100 @@ def edit_header(path: Path, **changes: object) -> None:
     header = json.loads(bytes(arrays["header"]))
     header |= changes
     arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    del arrays["digests"]
+    arrays["digests"] = np.frombuffer(json.dumps(_digests(arrays)).encode(), dtype=np.uint8)
     np.savez(path, **arrays)
+
+
+# ----------------------------------------------------------------- what is not as it was written
+
+
+def flip(arrays, rng):
+    """Change some bytes of one array."""
+    name = rng.choice([n for n in arrays if arrays[n].size])
+    content = bytearray(arrays[name].tobytes())
+    for place in rng.integers(0, len(content), size=int(rng.integers(1, 5))):
+        content[place] ^= int(rng.integers(1, 256))
+    changed = np.frombuffer(bytes(content), arrays[name].dtype).reshape(arrays[name].shape)
+    return arrays | {name: changed}, name
+
+
+def zero(arrays, rng):
+    name = rng.choice([n for n in arrays if np.any(arrays[n])])
+    return arrays | {name: np.zeros_like(arrays[name])}, name
+
+
+def drop(arrays, rng):
+    name = rng.choice(list(arrays))
+    return {n: a for n, a in arrays.items() if n != name}, name
+
+
+def swap(arrays, rng):
+    one, other = rng.choice(list(arrays), size=2, replace=False)
+    return arrays | {one: arrays[other], other: arrays[one]}, one
+
+
+def shorten(arrays, rng):
+    name = rng.choice([n for n in arrays if arrays[n].size > 1])
+    return arrays | {name: arrays[name][:-1]}, name
+
+
+def reinterpret(arrays, rng):
+    """Keep the bytes, and call them something else."""
+    name = rng.choice([n for n in arrays if arrays[n].dtype == np.float64 and arrays[n].size])
+    return arrays | {name: arrays[name].view(np.int64)}, name
+
+
+def add(arrays, rng):
+    return arrays | {"branch99_values": rng.normal(size=3)}, "branch99_values"
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("mutate", [flip, zero, drop, swap, shorten, reinterpret, add])
+def test_an_altered_array_is_refused(orbit, branch, diagram, tmp_path, mutate, seed) -> None:
+    """The archive itself is sound: its check sums are those of the altered arrays."""
+    rng = np.random.default_rng(seed)
+    path = tmp_path / "x.npz"
+    cf.save((orbit, branch, diagram)[seed % 3], path)
+    with np.load(path) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    changed, name = mutate(arrays, rng)
+    np.savez(path, **changed)
+    if all(n in changed and changed[n].tobytes() == a.tobytes() for n, a in arrays.items()) and (
+        mutate is swap
+    ):
+        pytest.skip("two arrays of the same bytes")
+    with pytest.raises(cf.ResultFileError) as caught:
+        cf.load(path)
+    (line,) = str(caught.value).splitlines()
+    assert line.startswith(str(path))
+    if name not in ("header", "digests") and mutate is not swap:
+        assert name in line
+    assert "restore a copy, or run its study again" in line or "not written by contfric" in line
+
+
+@pytest.mark.parametrize("which", ["orbit", "branch", "diagram"])
+def test_a_file_without_digests_still_loads(which, request, tmp_path) -> None:
+    """Format 1 had none."""
+    path, saved = tmp_path / "x.npz", request.getfixturevalue(which)
+    cf.save(saved, path)
+    edit_header(path, format=1)
+    with np.load(path) as archive:
+        arrays = {name: archive[name] for name in archive.files if name != "digests"}
+    np.savez(path, **arrays)
+    assert_same(cf.load(path), saved)
+
+
+def test_the_same_result_is_the_same_file(diagram, tmp_path) -> None:
+    cf.save(diagram, tmp_path / "a.npz")
+    cf.save(cf.load(tmp_path / "a.npz"), tmp_path / "b.npz")
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"format": 2}, "is in format 2, this contfric reads format 1"),
+        ({"format": 3}, "is in format 3, this contfric reads formats 1 and 2"),
         ({"mark": "other"}, "was not written by contfric"),
         ({"model": "lugre7"}, "model 'lugre7', which is not installed .*pass load"),
         ({"parameters": ["Omega", "S"]}, r"was written for parameters \['Omega', 'S'\]"),

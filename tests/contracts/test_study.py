@@ -85,7 +85,7 @@ def run_python(code: str, *args: object) -> subprocess.CompletedProcess[str]:
         (
             "model: coulomb\nparams: {S: yes}\n",
             2,
-            r"'S' must be a finite number, got True \(bool\)",
+            r"'S' must be a finite number, got 'yes' \(str\)",
         ),
         (
             "model: coulomb\nparams:\n  S: abc\n",
@@ -625,6 +625,7 @@ def test_interrupted_while_writing(tmp_path, study, monkeypatch) -> None:
     assert sorted(contents(result.out)) == [
         "bifurcations.csv",
         "branch.npz",
+        "checkpoint",
         "orbit.npz",
         "run.json",
     ]
@@ -653,6 +654,7 @@ def test_a_full_disk_loses_no_result(tmp_path, study, monkeypatch) -> None:
     assert sorted(contents(result.out)) == [
         "bifurcations.csv",
         "branch.npz",
+        "checkpoint",
         "orbit.npz",
         "run.json",
     ]
