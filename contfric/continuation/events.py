@@ -15,6 +15,7 @@ joint      the state at a stop meets a surface     CS if it leaves the stick the
                                                    CS where there is no rest
 entry      behind a reset the state is on another  CS: another mode follows
            surface
+lasting    slide between two holds                 GS: the first can be left no more
 =========  ======================================  ==========================================
 
 For CS and SS the sign of the observable's rate at the stop decides: rest is left if the state moves
@@ -263,6 +264,8 @@ def kind_of_hold(hold: Hold, test: Test) -> Kind:
         return Kind.AS
     if test.margin is Margin.HELD:
         return Kind.GS
+    if test.margin is Margin.LASTING and test.segment != hold.segment:
+        return Kind.GS  # the slide behind it has vanished
     if hold.pin is not None:
         return Kind.SS
     return Kind.AS if hold.after_rest else Kind.GS
