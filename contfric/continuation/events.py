@@ -101,8 +101,8 @@ class EndReason(str, Enum):
     INTERRUPTED = "interrupted"
 
 
-#: Accuracy of a located event, relative to the range: far above what it is located to (1e-10), far below
-#: what a diagram resolves.
+#: An event that is located better than this, relative to the range, is well conditioned: far above what
+#: most are located to (1e-12), far below what a diagram resolves.
 ACCURACY = 1e-8
 
 
@@ -153,12 +153,15 @@ class Bifurcation:
     position : float
         Arclength on the branch.
     stable_before, stable_after : bool or None
-        Stability on the two sides in the order of the branch; None if not computed or no side.
+        Stability of the branch at smaller and at larger values of the parameter, whichever way it was traced;
+        None if not computed or if the branch has no such side. At a fold (SN) both sides lie at the same
+        values: there it is the order of the branch.
     located : bool
         False if a test changed sign but Newton failed on the way to the place: the parameters are
         those of the last solved point before it.
     accuracy : float
-        How well the parameter is located, relative to the range.
+        How well the parameter is located, relative to the range: a bound of what rounding does to the
+        equations of the event (:mod:`contfric.continuation.accuracy`).
     proposals : tuple of Proposal
         What an exploration proposed to follow it, in order, and what became of it.
     """

@@ -144,6 +144,7 @@ class Side:
     at_event : whether the first point is at a sliding event
     autonomous : whether the duration of a turn is one of the unknowns
     largest : longest step, where the settings' would leap over what is near
+    notes : what changed on it and is no event
     """
 
     first: Point
@@ -158,6 +159,7 @@ class Side:
     _kept: Columns = field(default_factory=lambda: Columns({}))
     _fresh: int = 0
     autonomous: bool = False
+    notes: list[str] = field(default_factory=list)
 
     @classmethod
     def starting(cls, point: Point, system: System, end: End, stability: bool) -> Side:

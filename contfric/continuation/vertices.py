@@ -27,6 +27,13 @@ _NEARLY = 1e-2
 #: At such a vertex the symmetric (the undoubled) orbit has a multiplier -1 of its turn; what vanishes
 #: there is zero to the accuracy of the parameter, far below this.
 _OPENS = 1e-4
+#: The same where the vertex is located: rounding, and where a multiplier touches -1 the root of it.
+_LOCATED = 1e-7
+#: Farthest in the parameter (relative to 1 + its value) from which a vertex is located: orbits this far from
+#: it are within :data:`_NEARLY` of each other.
+_FAR = 1e-2
+#: Most steps of the secant: two or three where a multiplier passes -1, many where it touches it.
+_SECANTS = 40
 #: Distance in the parameter at which a multiplier that passes -1 is told from one that touches it.
 _BESIDE = 1e-6
 #: Odd parts below this (nondimensional) are what a singular system leaves undetermined.
@@ -166,7 +173,9 @@ def _vertex(orbit: Orbit, active: int) -> Orbit | None:
     solved = polish(orbit, damped=False)
     if not solved.converged or not abs(_opening(solved)) < _OPENS:
         return None
-    return _refined(solved, active)
+    refined = _refined(solved, active)
+    same = float(np.max(np.abs(refined.joints - solved.joints))) < _NEARLY
+    return refined if same and abs(_opening(refined)) < _LOCATED else None
 
 
 def _opening(orbit: Orbit) -> float:
@@ -201,22 +210,30 @@ def opens_through(orbit: Orbit, active: int) -> bool:
 
 
 def _refined(orbit: Orbit, active: int) -> Orbit:
-    """Return the orbit whose turn has the multiplier -1 exactly, by secants in the parameter."""
+    """Return the orbit whose turn has the multiplier -1 exactly, by secants in the parameter.
+
+    The best one that was met: whether it has the multiplier is for the caller to ask.
+    """
     value = float(orbit.vector[active])
     offset = 1e-7 * (1.0 + abs(value))  # far above rounding, far below the branch's curvature
-    orbits = [orbit, _moved(orbit, active, value + offset)]
-    for _ in range(8):
-        a, b = orbits[-2:]
-        open_a, open_b = _opening(a), _opening(b)
-        if not b.converged or open_a == open_b:
-            return orbit
+    a, b = orbit, _moved(orbit, active, value + offset)
+    open_a, open_b = _opening(a), _opening(b)
+    best, least = orbit, abs(open_a)
+    for _ in range(_SECANTS):
+        if not np.isfinite(open_b) or open_a == open_b:
+            break
         step = -open_b * float(b.vector[active] - a.vector[active]) / (open_b - open_a)
-        if abs(step) > 100.0 * offset:
-            return orbit
-        orbits.append(_moved(b, active, float(b.vector[active]) + step))
+        there = float(b.vector[active]) + step
+        if not abs(there - value) < _FAR * (1.0 + abs(value)):
+            break
+        a, open_a = b, open_b
+        b = _moved(b, active, there)
+        open_b = _opening(b)
+        if abs(open_b) <= least:
+            best, least = b, abs(open_b)
         if abs(step) < 1e-15 * (1.0 + abs(value)):
             break
-    return orbits[-1]
+    return best
 
 
 def _moved(orbit: Orbit, active: int, value: float) -> Orbit:

@@ -4,13 +4,14 @@ The equations and their exact Jacobian are those of :mod:`contfric.orbit.equatio
 down as many parameters as are free. Each step solves for the correction and, with the same
 elimination, for the tangent along the first border row.
 
-One rule ends it here and along curves in two parameters (:func:`verdict`), on an estimate of its own error: with quadratic convergence the error after a
-correction of size d_k, following one of size d_{k-1}, is about ``d_k^3 / d_{k-1}^2``; at the floor of
-rounding the corrections stop falling. How high that floor is, the residual says: a flow that is integrated
-through large accelerations rounds to 1e-13 of its state, not to 1e-16, and beside the vertex of a pitchfork
-the corrections are that divided by the distance to it. A residual that is small and no longer falls is
-rounding, and no iterate can be better. (Where the system itself is singular corrections stop falling
-quadratically, too; but the residual goes on by a factor of 4 a step, being quadratic in the distance.)
+One rule ends the iteration here and along curves in two parameters (:func:`verdict`), on an estimate of its
+own error: with quadratic convergence the error after a correction of size d_k, following one of size d_{k-1},
+is about ``d_k^3 / d_{k-1}^2``; at the floor of rounding the corrections stop falling. How high that floor is,
+the residual says: a flow that is integrated through large accelerations rounds to 1e-13 of its state, not to
+1e-16, and beside the vertex of a pitchfork the corrections are that divided by the distance to it. A residual
+that is small and no longer falls is rounding, and no iterate can be better. (Where the system itself is
+singular corrections stop falling quadratically, too; but the residual goes on by a factor of 4 a step, being
+quadratic in the distance.)
 
 At fixed parameters an orbit that the equations do not determine (one of a continuum, or beside one) has no
 residual to speak of wherever Newton stops. So the last elimination also says what an error of rounding in
@@ -86,7 +87,9 @@ def newton_step(functions, layout, z, p, which, d, e, s, probe, room, work, penc
         worst = max(worst, here)
         if probe > 0.0:
             for j in range(m):  # signs and sizes without a pattern: no null vector is normal to it
-                rows[m + j, second] = probe * math.cos(1.0 + 7.0 * i + 3.0 * j) * (1.0 + abs(after[j]))
+                rows[m + j, second] = (
+                    probe * math.cos(1.0 + 7.0 * i + 3.0 * j) * (1.0 + abs(after[j]))
+                )
         if i > 0 and not take_out(work, i, m):
             return False, worst
     return finish(work, room.close, room.close_w, pencil[0], pencil[1]), worst
@@ -94,7 +97,7 @@ def newton_step(functions, layout, z, p, which, d, e, s, probe, room, work, penc
 
 @helper
 def correction_size(dz, dw, z, p, which, column):  # type: ignore[no-untyped-def]
-    """Return the largest component of a solution against the scale of its unknown; the correction is column 0."""
+    """Return the largest component of a solution against the scale of its unknown; 0 is the correction."""
     size = 0.0
     for i in range(z.shape[0]):
         for j in range(z.shape[1]):
