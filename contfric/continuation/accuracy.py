@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.continuation.events import ACCURACY, Kind
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.standstill import stationary_values
 from contfric.models.definition import FloatArray
@@ -41,6 +41,11 @@ _BESIDE, _BESIDE_RANGE = 1e-6, 1e-4
 _NEIGHBOURS = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
 #: Unknowns of the largest system that is solved as a full matrix; a longer one is solved as a sparse one.
 _FULL = 200
+#: Kinds that a multiplier on the unit circle makes, and how far it may be from there: the root of rounding
+#: times the largest multiplier (a fold is located that well along the branch), or a share of what it
+#: changes by over the step, where it changes fast.
+_CRITICAL = frozenset({Kind.SN, Kind.BP, Kind.PD})
+_ON_CIRCLE, _OF_CHANGE = 1e-6, 1e-4
 #: An event whose equations are singular together is located to the root of rounding at best.
 _SINGULAR = 1e-6
 
@@ -233,6 +238,27 @@ def _multiplier_error(kind: Kind, here: Orbit, active: int, width: float) -> flo
     if abs(fit[1]) <= missed:
         return None
     return float(distance * (abs(fit[0]) + 3.0 * missed) / abs(fit[1]))
+
+
+def not_critical(bifurcation: Bifurcation, before: Point, after: Point) -> str:
+    """Return what a change of sign is if no multiplier is on the unit circle there; empty for an event.
+
+    The multiplier is that of the orbit's own joints. It may miss the circle by rounding, or by a small share
+    of what it changes by over the step.
+    """
+    kind, orbit = bifurcation.kind, bifurcation.orbit
+    if kind not in _CRITICAL or not bifurcation.located or orbit.system.holds:
+        return ""
+    off = abs(off_circle(kind, orbit))
+    largest = float(np.max(np.abs(orbit.turn_multipliers), initial=0.0))
+    changes = 0.0
+    if before.mu.size and np.all(np.isfinite([before.mu, after.mu])):
+        s = critical(kind, orbit)
+        changes = min(float(np.min(np.abs(point.mu - s))) for point in (before, after))
+    if off <= max(_ON_CIRCLE * (1.0 + largest), _OF_CHANGE * changes):
+        return ""
+    where = ", ".join(f"{k} = {v:.10g}" for k, v in bifurcation.params.items())
+    return f"no {kind.value} at {where}: its test changes sign, the multiplier is {off:.2g} off the circle"
 
 
 def critical(kind: Kind, orbit: Orbit) -> float:

@@ -24,13 +24,14 @@ out of the region where it can stay.
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 
 import numpy as np
 
-from contfric.models.definition import Domain
+from contfric.models.definition import Domain, Model
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, System, Test, inside_sign
@@ -200,6 +201,11 @@ class Bifurcation:
             return f"{self.kind.value}_{'s' if self.symmetric else 'a'}"
         return self.kind.value if self.kind is Kind.T else f"{self.kind.value}_{self.orbit.name}"
 
+    @property
+    def meaning(self) -> str:
+        """What happens, in words: that of its kind, but only where something slides it is a sliding."""
+        return meaning_of(self.kind, self.orbit.model, {test.surface for test in self.tests})
+
     def mirror(self) -> Bifurcation:
         """Return the mirror image, at the same parameters."""
         symmetry = self.orbit.model.symmetry
@@ -212,6 +218,20 @@ class Bifurcation:
     def __repr__(self) -> str:
         values = ", ".join(f"{k}={v:.12g}" for k, v in self.params.items())
         return f"<{self.label}: {values}{'' if self.located else ' (not located)'}>"
+
+
+def meaning_of(kind: Kind, model: Model, surfaces: Set[str]) -> str:
+    """Return what happens at an event on surfaces of a model: a sliding only where something slides."""
+    if kind is not Kind.GS:
+        return kind.meaning
+    if surfaces & set(model.reset_by_surface):
+        return "grazing impact"
+    return kind.meaning if any(_is_rested_on(model, s) for s in surfaces) else "grazing"
+
+
+def _is_rested_on(model: Model, surface: str) -> bool:
+    """Tell whether motion can stay on a surface."""
+    return any(d.signs[surface] == 0 and model.mode_by_name[d.mode].sliding for d in model.domains)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from contfric.continuation.accuracy import not_critical
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
@@ -291,6 +292,9 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             side.put_tip(point)
             side.end = End(EndReason.POINT)
             return True
+        if not point.lost and (note := not_critical(bifurcation, before, after)):
+            side.notes.append(note)
+            continue
         ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, orbit)
         if ends is None:
             side.bifurcations.append(bifurcation)
@@ -301,7 +305,7 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             side.put_tip(at_vertex(point, bifurcation.orbit, active))
         else:
             side.put_tip(point)
-        message = end_message(bifurcation) if ends.name == bifurcation.kind.name else ""
+        message = _end_message(bifurcation) if ends.name == bifurcation.kind.name else ""
         side.end = End(ends, message, None if point.lost else bifurcation)
         return True
     reached = after if limit is None else limit[0]
@@ -316,6 +320,15 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     side.put_tip(limit[0])
     side.end = _limit_end(after.value > settings.high, settings)
     return True
+
+
+def _end_message(bifurcation: Bifurcation) -> str:
+    """Return why a branch ends at an event, in words that fit what happens there."""
+    kind, meaning = bifurcation.kind, bifurcation.meaning
+    message = end_message(bifurcation)
+    if meaning == kind.meaning or not TERMINAL & {kind}:
+        return message
+    return (message or EndReason[kind.name].value).replace(kind.meaning, meaning)
 
 
 def _comes_closer(side: Side, located: list[tuple[Bifurcation, Point]], step: float) -> bool:
