@@ -79,7 +79,10 @@ def sliding_events(
         )
     )
     found = bifurcation_at(kind, here, before, None, point, settings, group)
-    return [(replace(found, accuracy=ROUGHLY_REACHED) if rough else found, point)]
+    point.rough = rough
+    return [
+        (replace(found, accuracy=max(found.accuracy, ROUGHLY_REACHED)) if rough else found, point)
+    ]
 
 
 def _stop_behind(here: Orbit, point: Point, first: int) -> int:

@@ -21,7 +21,7 @@ from contfric.continuation.points import (
     settings_of,
 )
 from contfric.continuation.side import Side, first_point
-from contfric.continuation.sliding import ROUGHLY_REACHED, nearly_reached
+from contfric.continuation.sliding import nearly_reached
 from contfric.continuation.smooth import SAME_PLACE, leapt_vertex, vertex_at
 from contfric.continuation.trial import locate_value
 from contfric.continuation.vertices import at_vertex, left_at, passed_vertex
@@ -267,6 +267,7 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     located = locate_events(orbit, before, after, settings)
     if _comes_closer(side, located, after.arc - before.arc):
         return False
+    side.largest = np.inf  # what asked for shorter steps is behind
     for bifurcation, point in located:
         if limit is not None and (
             point.arc > limit[0].arc - _AT_LIMIT * (after.arc - before.arc)
@@ -337,7 +338,7 @@ def _comes_closer(side: Side, located: list[tuple[Bifurcation, Point]], step: fl
     Where two curves of orbits cross, Newton converges from no farther than the crossing is away: a step
     across may end on the other curve, and what is between its ends belongs to neither.
     """
-    fails = any(point.lost or b.accuracy >= ROUGHLY_REACHED for b, point in located)
+    fails = any(point.lost or point.rough for _, point in located)
     if not fails or step < _NEAREST:
         return False
     side.drop_tip()
