@@ -237,7 +237,8 @@ def _multiplier_error(kind: Kind, here: Orbit, active: int, width: float) -> flo
     missed = float(np.max(np.abs(np.polynomial.polynomial.polyval(x, fit) - found)))
     if abs(fit[1]) <= missed:
         return None
-    return float(distance * (abs(fit[0]) + 3.0 * missed) / abs(fit[1]))
+    own = _UNITS * np.finfo(float).eps * (1.0 + abs(value))
+    return float(distance * (abs(fit[0]) + 3.0 * missed) / abs(fit[1]) + own)
 
 
 def not_critical(bifurcation: Bifurcation, before: Point, after: Point) -> str:
