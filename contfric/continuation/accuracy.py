@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.standstill import stationary_values
+from contfric.continuation.vertices import opening
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import linearised
 from contfric.orbit.orbit import Orbit
@@ -229,7 +230,9 @@ def _multiplier_error(kind: Kind, here: Orbit, active: int, width: float) -> flo
         orbit = polish(replace(here, vector=vector), damped=False)
         if orbit.converged:
             shifts.append(float(vector[active]) - value)
-            found.append(off_circle(kind, orbit))
+            # where -1 is what it is, the pencil says it without multipliers, and on a bridge too
+            minus = kind is not Kind.NS and critical(kind, orbit) < 0.0
+            found.append(opening(orbit) if minus else off_circle(kind, orbit))
     if len(found) < len(_NEIGHBOURS) or not np.all(np.isfinite(found)):
         return None
     x = np.array(shifts) / distance
@@ -241,14 +244,14 @@ def _multiplier_error(kind: Kind, here: Orbit, active: int, width: float) -> flo
     return float(distance * (abs(fit[0]) + 3.0 * missed) / abs(fit[1]) + own)
 
 
-def not_critical(bifurcation: Bifurcation, before: Point, after: Point) -> str:
+def not_critical(bifurcation: Bifurcation, before: Point, after: Point, settings: Settings) -> str:
     """Return what a change of sign is if no multiplier is on the unit circle there; empty for an event.
 
     The multiplier is that of the orbit's own joints. It may miss the circle by rounding, or by a small share
     of what it changes by over the step.
     """
     kind, orbit = bifurcation.kind, bifurcation.orbit
-    if kind not in _CRITICAL or not bifurcation.located or orbit.system.holds:
+    if not settings.stability or kind not in _CRITICAL or not bifurcation.located:
         return ""
     off = abs(off_circle(kind, orbit))
     largest = float(np.max(np.abs(orbit.turn_multipliers), initial=0.0))

@@ -293,7 +293,7 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             side.put_tip(point)
             side.end = End(EndReason.POINT)
             return True
-        if not point.lost and (note := not_critical(bifurcation, before, after)):
+        if not point.lost and (note := not_critical(bifurcation, before, after, settings)):
             side.notes.append(note)
             continue
         ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, orbit)

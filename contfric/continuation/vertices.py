@@ -80,14 +80,14 @@ def left_at(before: Point, after: Orbit, active: int) -> Point | None:
     if part is None:
         return None
     low, high = (_moved(part, active, w) for w in (before.value, float(after.vector[active])))
-    if not (low.converged and high.converged and _opening(low) * _opening(high) < 0.0):
+    if not (low.converged and high.converged and opening(low) * opening(high) < 0.0):
         return None
-    side = _opening(low)
+    side = opening(low)
     for _ in range(_HALVINGS):
         middle = _moved(high, active, 0.5 * float(low.vector[active] + high.vector[active]))
         if not middle.converged:
             return None
-        if side * _opening(middle) > 0.0:
+        if side * opening(middle) > 0.0:
             low = middle
         else:
             high = middle
@@ -171,14 +171,14 @@ def at_vertex(point: Point, simple: Orbit, active: int) -> Point:
 def _vertex(orbit: Orbit, active: int) -> Orbit | None:
     """Return the orbit solved if its turn has a multiplier -1, else None."""
     solved = polish(orbit, damped=False)
-    if not solved.converged or not abs(_opening(solved)) < _OPENS:
+    if not solved.converged or not abs(opening(solved)) < _OPENS:
         return None
     refined = _refined(solved, active)
     same = float(np.max(np.abs(refined.joints - solved.joints))) < _NEARLY
-    return refined if same and abs(_opening(refined)) < _LOCATED else None
+    return refined if same and abs(opening(refined)) < _LOCATED else None
 
 
-def _opening(orbit: Orbit) -> float:
+def opening(orbit: Orbit) -> float:
     """Return what vanishes where a disturbance that changes sign after one turn solves the equations.
 
     The pencil of one turn, ``P z_0 + Q z_N = 0``, with ``z_N = -K z_0``: the least singular value of
@@ -205,7 +205,7 @@ def opens_through(orbit: Orbit, active: int) -> bool:
     """
     value = float(orbit.vector[active])
     offset = _BESIDE * (1.0 + abs(value))
-    sides = [_opening(_moved(orbit, active, value + s * offset)) for s in (-1.0, 1.0)]
+    sides = [opening(_moved(orbit, active, value + s * offset)) for s in (-1.0, 1.0)]
     return sides[0] * sides[1] < 0.0
 
 
@@ -217,7 +217,7 @@ def _refined(orbit: Orbit, active: int) -> Orbit:
     value = float(orbit.vector[active])
     offset = 1e-7 * (1.0 + abs(value))  # far above rounding, far below the branch's curvature
     a, b = orbit, _moved(orbit, active, value + offset)
-    open_a, open_b = _opening(a), _opening(b)
+    open_a, open_b = opening(a), opening(b)
     best, least = orbit, abs(open_a)
     for _ in range(_SECANTS):
         if not np.isfinite(open_b) or open_a == open_b:
@@ -228,7 +228,7 @@ def _refined(orbit: Orbit, active: int) -> Orbit:
             break
         a, open_a = b, open_b
         b = _moved(b, active, there)
-        open_b = _opening(b)
+        open_b = opening(b)
         if abs(open_b) <= least:
             best, least = b, abs(open_b)
         if abs(step) < 1e-15 * (1.0 + abs(value)):
