@@ -39,7 +39,9 @@ _DIFFERENCE = 1e-7
 #: Neighbours at which a multiplier is evaluated: distance in the parameter, as a share of 1 + its value and
 #: of the range. Far above rounding, and multipliers are parabolas there.
 _BESIDE, _BESIDE_RANGE = 1e-6, 1e-4
-_NEIGHBOURS = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
+_NEIGHBOURS = (-2.0, -1.0, 1.0, 2.0)
+#: Four points leave one of their errors in what a parabola misses: this many times that bounds them all.
+_MISSED = 10.0
 #: Unknowns of the largest system that is solved as a full matrix; a longer one is solved as a sparse one.
 _FULL = 200
 #: Kinds that a multiplier on the unit circle makes, and how far it may be from there: the root of rounding
@@ -177,32 +179,42 @@ def _rounding(orbit: Orbit) -> FloatArray:
 
 def _weights(a: FloatArray, b: FloatArray, c: FloatArray, row: FloatArray) -> FloatArray | None:
     """Return the last row of the inverse of the Jacobian of a chain with one parameter and one condition."""
+    count, m = c.shape
+    size = count * m
+    wanted = np.zeros(size + 1)
+    wanted[size] = 1.0
+    try:
+        if size <= _FULL:
+            full = np.zeros((size + 1, size + 1))
+            for i in range(count):
+                rows, following = slice(i * m, (i + 1) * m), (i + 1) % count * m
+                full[rows, rows] += a[i]
+                full[rows, following : following + m] += b[i]
+            full[:size, size], full[size] = c.ravel(), row
+            return np.asarray(np.linalg.solve(full.T, wanted), dtype=np.float64)
+        return _sparse_weights(a, b, c, row, wanted)
+    except (np.linalg.LinAlgError, RuntimeError, ValueError):
+        return None
+
+
+def _sparse_weights(
+    a: FloatArray, b: FloatArray, c: FloatArray, row: FloatArray, wanted: FloatArray
+) -> FloatArray:
+    """Do the same for a long chain."""
     from scipy.sparse import csc_matrix
     from scipy.sparse.linalg import splu
 
     count, m = c.shape
     size = count * m
     places: NDArray[np.int64] = np.arange(size).reshape(count, m)
-    across = np.repeat(places[:, :, None], m, axis=2)
+    across = np.repeat(places[:, :, None], m, axis=2).ravel()
     own = np.repeat(places[:, None, :], m, axis=1)
-    rows = [across.ravel(), across.ravel(), places.ravel(), np.full(size + 1, size)]
-    columns = [
-        own.ravel(),
-        np.roll(own, -1, axis=0).ravel(),
-        np.full(size, size),
-        np.arange(size + 1),
-    ]
+    rows = np.concatenate([across, across, places.ravel(), np.full(size + 1, size)])
+    following = np.roll(own, -1, axis=0).ravel()
+    columns = np.concatenate([own.ravel(), following, np.full(size, size), np.arange(size + 1)])
     values = np.concatenate([a.ravel(), b.ravel(), c.ravel(), row])
-    places_of_all = np.concatenate(rows), np.concatenate(columns)
-    matrix = csc_matrix((values, places_of_all), shape=(size + 1, size + 1))
-    wanted = np.zeros(size + 1)
-    wanted[size] = 1.0
-    try:
-        if size <= _FULL:
-            return np.asarray(np.linalg.solve(matrix.toarray().T, wanted), dtype=np.float64)
-        return np.asarray(splu(matrix).solve(wanted, trans="T"), dtype=np.float64)
-    except (np.linalg.LinAlgError, RuntimeError, ValueError):
-        return None
+    matrix = csc_matrix((values, (rows, columns)), shape=(size + 1, size + 1))
+    return np.asarray(splu(matrix).solve(wanted, trans="T"), dtype=np.float64)
 
 
 def _fold_error(
@@ -241,7 +253,7 @@ def _multiplier_error(kind: Kind, here: Orbit, active: int, width: float) -> flo
     if abs(fit[1]) <= missed:
         return None
     own = _UNITS * np.finfo(float).eps * (1.0 + abs(value))
-    return float(distance * (abs(fit[0]) + 3.0 * missed) / abs(fit[1]) + own)
+    return float(distance * (abs(fit[0]) + _MISSED * missed) / abs(fit[1]) + own)
 
 
 def not_critical(bifurcation: Bifurcation, before: Point, after: Point, settings: Settings) -> str:
