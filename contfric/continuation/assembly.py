@@ -9,42 +9,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation, End
+from contfric.continuation.events import Bifurcation, End, Kind
 from contfric.continuation.openings import with_openings
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
+from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 
 
 def join(orbit: Orbit, settings: Settings, behind: Side, ahead: Side) -> Branch:
     """Return one branch from the two sides of its start."""
     shift = behind.tip.arc
-    back = [
-        replace(
-            b,
-            position=shift - b.position,
-            stable_before=b.stable_after,
-            stable_after=b.stable_before,
-        )
-        for b in reversed(behind.bifurcations)
-    ]
+    back = [_turned(b, shift) for b in reversed(behind.bifurcations)]
     front = [replace(b, position=shift + b.position) for b in ahead.bifurcations]
     first, last = behind.end, ahead.end
     if first.bifurcation is not None:
-        b = first.bifurcation
-        first = replace(
-            first,
-            bifurcation=replace(
-                b,
-                position=shift - b.position,
-                stable_before=b.stable_after,
-                stable_after=b.stable_before,
-            ),
-        )
+        first = replace(first, bifurcation=_turned(first.bifurcation, shift))
     if last.bifurcation is not None:
         moved = replace(last.bifurcation, position=shift + last.bifurcation.position)
         last = replace(last, bifurcation=moved)
     return _branch(orbit, settings, behind, ahead, (*back, *front), (first, last))
+
+
+def _turned(b: Bifurcation, shift: float) -> Bifurcation:
+    """Return an event of a side that the branch runs through backwards."""
+    turned = replace(b, position=shift - b.position)
+    if b.kind is not Kind.SN:
+        return turned
+    # at a fold both sides lie at the same values: only the order of the branch tells them apart
+    return replace(turned, stable_before=b.stable_after, stable_after=b.stable_before)
 
 
 def assemble(
@@ -53,6 +46,17 @@ def assemble(
     """Return a branch of one side, with the end at which it starts and, if known, the point there."""
     ends = first, side.end
     return _branch(orbit, settings, None, side, tuple(side.bifurcations), ends, origin)
+
+
+def _told_upward(first: End, values: FloatArray) -> End:
+    """Return the event that a branch starts from with the stability in the order of the parameter."""
+    b = first.bifurcation
+    if b is None or b.kind is Kind.SN or b.stable_before is not None:
+        return first
+    if len(values) < 2 or values[1] >= values[0]:
+        return first
+    upward = replace(b, stable_before=b.stable_after, stable_after=None)
+    return replace(first, bifurcation=upward)
 
 
 def _branch(
@@ -64,13 +68,16 @@ def _branch(
     ends: tuple[End, End],
     origin: Point | None = None,
 ) -> Branch:
+    columns = _joined(behind, ahead, origin)
+    if behind is None:
+        ends = _told_upward(ends[0], columns["values"]), ends[1]
     events = [end.bifurcation for end in ends]
     listed = (
         *([events[0]] if events[0] is not None else []),
         *bifurcations,
         *([events[1]] if events[1] is not None else []),
     )
-    columns = _joined(behind, ahead, origin)
+    notes = (*(() if behind is None else behind.notes), *ahead.notes)
     branch = Branch(
         orbit.system,
         settings.parameter,
@@ -82,8 +89,22 @@ def _branch(
         columns["mu"][:, : orbit.model.directions] if settings.stability else None,
         listed,
         ends,
+        notes=tuple(dict.fromkeys(notes)),
     )
+    _renew_ends(branch)
     return with_openings(branch, settings.width)
+
+
+def _renew_ends(branch: Branch) -> None:
+    """Evaluate the multipliers at both ends anew, from the joints that stand there.
+
+    At an end an exit may be tangential. What the march knows are the multipliers of its last Jacobian, from
+    beside the event, and beside it they change with the root of the distance.
+    """
+    if branch.turn_multipliers is None:
+        return
+    for k in (0, -1):
+        branch.turn_multipliers[k] = branch[k].turn_multipliers
 
 
 def _joined(behind: Side | None, ahead: Side, origin: Point | None) -> dict[str, NDArray[Any]]:

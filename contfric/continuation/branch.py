@@ -56,6 +56,8 @@ class Branch:
         Why it ends at its first and at its last point.
     mirrored : bool
         Whether this is the mirror image of a computed branch.
+    notes : tuple of str
+        What was met on it that is no event: a test that changed sign with no multiplier on the unit circle.
     """
 
     system: System
@@ -69,6 +71,7 @@ class Branch:
     bifurcations: tuple[Bifurcation, ...]
     ends: tuple[End, End]
     mirrored: bool = False
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.values)

@@ -27,7 +27,7 @@ from contfric.continuation.incident import Form, Unit, vanishing
 from contfric.continuation.standstill import touch_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
-from contfric.orbit.linear import jacobian_blocks
+from contfric.orbit.linear import jacobian_blocks, linearised
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test
 
@@ -166,18 +166,7 @@ def _effect(orbit: Orbit, direction: FloatArray, rest: FloatArray) -> tuple[Floa
 
 def _residual(orbit: Orbit, joints: FloatArray) -> FloatArray:
     """Return the residuals of all equations, shape (N m,)."""
-    from contfric.orbit.newton import linearise
-
-    count, m = joints.shape
-    a, b, c = (
-        np.empty((count, m, m)),
-        np.empty((count, m, m)),
-        np.empty((count, m, len(orbit.vector))),
-    )
-    r, close = np.empty((count, m, 1)), np.empty((m, m))
-    system = orbit.system
-    linearise(system.functions(), system.layout, joints, orbit.vector, a, b, c, r, close)
-    return -r.ravel()
+    return -linearised(orbit.system, joints, orbit.vector, parameters=False)[4]
 
 
 # ---------------------------------------------------------------------- the margins that vanish

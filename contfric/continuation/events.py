@@ -15,6 +15,7 @@ joint      the state at a stop meets a surface     CS if it leaves the stick the
                                                    CS where there is no rest
 entry      behind a reset the state is on another  CS: another mode follows
            surface
+lasting    slide between two holds                 GS: the first can be left no more
 =========  ======================================  ==========================================
 
 For CS and SS the sign of the observable's rate at the stop decides: rest is left if the state moves
@@ -23,6 +24,7 @@ out of the region where it can stay.
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
@@ -30,7 +32,7 @@ from functools import cached_property
 import numpy as np
 
 from contfric.errors import ParameterError, did_you_mean
-from contfric.models.definition import Domain
+from contfric.models.definition import Domain, Model
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import Outline, outline_of
@@ -120,8 +122,8 @@ class EndReason(str, Enum):
     INTERRUPTED = "interrupted"
 
 
-#: Accuracy of a located event, relative to the range: far above what it is located to (1e-10), far below
-#: what a diagram resolves.
+#: An event that is located better than this, relative to the range, is well conditioned: far above what
+#: most are located to (1e-12), far below what a diagram resolves.
 ACCURACY = 1e-8
 
 
@@ -172,12 +174,15 @@ class Bifurcation:
     position : float
         Arclength on the branch.
     stable_before, stable_after : bool or None
-        Stability on the two sides in the order of the branch; None if not computed or no side.
+        Stability of the branch at smaller and at larger values of the parameter, whichever way it was traced;
+        None if not computed or if the branch has no such side. At a fold (SN) both sides lie at the same
+        values: there it is the order of the branch.
     located : bool
         False if a test changed sign but Newton failed on the way to the place: the parameters are
         those of the last solved point before it.
     accuracy : float
-        How well the parameter is located, relative to the range.
+        How well the parameter is located, relative to the range: a bound of what rounding does to the
+        equations of the event (:mod:`contfric.continuation.accuracy`).
     proposals : tuple of Proposal
         What an exploration proposed to follow it, in order, and what became of it.
     """
@@ -221,6 +226,11 @@ class Bifurcation:
             return f"{self.kind.value}_{'s' if self.symmetric else 'a'}"
         return self.kind.value if self.kind is Kind.T else f"{self.kind.value}_{self.orbit.name}"
 
+    @property
+    def meaning(self) -> str:
+        """What happens, in words: that of its kind, but only where something slides it is a sliding."""
+        return meaning_of(self.kind, self.orbit.model, {test.surface for test in self.tests})
+
     def mirror(self) -> Bifurcation:
         """Return the mirror image, at the same parameters."""
         symmetry = self.orbit.model.symmetry
@@ -233,6 +243,20 @@ class Bifurcation:
     def __repr__(self) -> str:
         values = ", ".join(f"{k}={v:.12g}" for k, v in self.params.items())
         return f"<{self.label}: {values}{'' if self.located else ' (not located)'}>"
+
+
+def meaning_of(kind: Kind, model: Model, surfaces: Set[str]) -> str:
+    """Return what happens at an event on surfaces of a model: a sliding only where something slides."""
+    if kind is not Kind.GS:
+        return kind.meaning
+    if surfaces & set(model.reset_by_surface):
+        return "grazing impact"
+    return kind.meaning if any(_is_rested_on(model, s) for s in surfaces) else "grazing"
+
+
+def _is_rested_on(model: Model, surface: str) -> bool:
+    """Tell whether motion can stay on a surface."""
+    return any(d.signs[surface] == 0 and model.mode_by_name[d.mode].sliding for d in model.domains)
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,6 +312,8 @@ def kind_of_hold(hold: Hold, test: Test) -> Kind:
         return Kind.AS
     if test.margin is Margin.HELD:
         return Kind.GS
+    if test.margin is Margin.LASTING and test.segment != hold.segment:
+        return Kind.GS  # the slide behind it has vanished
     if hold.pin is not None:
         return Kind.SS
     return Kind.AS if hold.after_rest else Kind.GS

@@ -64,7 +64,11 @@ class Settings:
 
 @dataclass(eq=False)
 class Point:
-    """One solved point with its unit tangent and everything that is watched."""
+    """One solved point with its unit tangent and everything that is watched.
+
+    ``lost`` says that Newton fails behind it before what is sought is reached, ``rough`` that it is reached
+    to the root of rounding only.
+    """
 
     joints: FloatArray
     value: float
@@ -75,6 +79,7 @@ class Point:
     mu: NDArray[np.complex128]
     arc: float = 0.0
     lost: bool = False
+    rough: bool = False
 
     def orbit(self, system: System, vector: FloatArray, active: int) -> Orbit:
         """Return the point as an orbit."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from contfric.continuation.events import ACCURACY, Bifurcation, Kind, outward_rate
+from contfric.continuation.accuracy import accuracy_of
+from contfric.continuation.events import Bifurcation, Kind, outward_rate
 from contfric.continuation.points import Point, Settings
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Test
@@ -26,16 +27,26 @@ def bifurcation_at(
     tests: tuple[Test, ...] = (),
 ) -> Bifurcation:
     """Return the event at a point, with the stability of the points before and after it."""
+    accuracy = accuracy_of(kind, here, tests, (before, after), point, settings)
     return Bifurcation(
         kind,
         here.params,
         here,
         tests,
         point.arc,
-        _stable(before, here, settings),
-        None if after is None else _stable(after, here, settings),
-        accuracy=ROUGH if _is_rough(kind, here, tests) else ACCURACY,
+        *_stability(kind, here, before, after, point, settings),
+        accuracy=max(accuracy, ROUGH) if _is_rough(kind, here, tests) else accuracy,
     )
+
+
+def _stability(
+    kind: Kind, here: Orbit, before: Point, after: Point | None, point: Point, settings: Settings
+) -> tuple[bool | None, bool | None]:
+    """Return the stability below and above an event; at a fold, before and after it on the branch."""
+    first = _stable(before, here, settings)
+    second = None if after is None else _stable(after, here, settings)
+    ahead = point.value if after is None else after.value
+    return (second, first) if kind is not Kind.SN and ahead < before.value else (first, second)
 
 
 def _is_rough(kind: Kind, here: Orbit, tests: tuple[Test, ...]) -> bool:

@@ -155,6 +155,7 @@ class Side:
     autonomous : whether the duration of a turn is one of the unknowns
     largest : longest step, where the settings' would leap over what is near
     solves : points solved for by the march, those among them that it refused
+    notes : what changed on it and is no event
     """
 
     first: Point
@@ -171,6 +172,7 @@ class Side:
     autonomous: bool = False
     solves: int = 0
     _pace: Pace = field(default_factory=Pace)
+    notes: list[str] = field(default_factory=list)
 
     @classmethod
     def starting(cls, point: Point, system: System, end: End, stability: bool) -> Side:

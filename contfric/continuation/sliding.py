@@ -79,7 +79,10 @@ def sliding_events(
         )
     )
     found = bifurcation_at(kind, here, before, None, point, settings, group)
-    return [(replace(found, accuracy=ROUGHLY_REACHED) if rough else found, point)]
+    point.rough = rough
+    return [
+        (replace(found, accuracy=max(found.accuracy, ROUGHLY_REACHED)) if rough else found, point)
+    ]
 
 
 def _stop_behind(here: Orbit, point: Point, first: int) -> int:
@@ -90,6 +93,8 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
     """
     tests = here.system.tests
     test = tests[first]
+    if test.margin is Margin.LASTING:
+        return _hold_behind(here, first)
     if test.margin in (Margin.ENTRY, Margin.JOINT):
         return _grazed_stop(here, point, _grazed_wall(here, point, first))
     if test.margin is not Margin.EXIT or hold_of_test(test, here) is not None:
@@ -107,6 +112,17 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
         and abs(point.tests[k]) < _NEARLY_REACHED
     ]
     return at_stop[0] if at_stop else first
+
+
+def _hold_behind(here: Orbit, first: int) -> int:
+    """Return the margin of the hold that a slide of no length any more leaves: it cannot be left any more."""
+    tests = here.system.tests
+    if here.model.mode_by_name[here.system.word[tests[first].segment][0]].sliding:
+        return first  # a rest, and what that means is known
+    hold = hold_of_test(tests[first], here)
+    if hold is None:
+        return first
+    return tests.index(Test(Margin.HELD, hold.segment, hold.leaves))
 
 
 def _grazed_wall(here: Orbit, point: Point, first: int) -> int:
@@ -200,6 +216,8 @@ def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation 
     # meets a surface says more
     rank = {Margin.LASTING: 0, Margin.JOINT: 1}
     first = min(near, key=lambda test: rank.get(test.margin, 2))
+    if first.margin is Margin.LASTING:
+        first = orbit.system.tests[_hold_behind(here, orbit.system.tests.index(first))]
     kind = kind_of_margin(orbit.system, first, here)
     group = tuple(test for test in near if kind_of_margin(orbit.system, test, here) is kind)
     return bifurcation_at(kind, here, tip, None, tip, settings, group)

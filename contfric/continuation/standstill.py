@@ -107,7 +107,7 @@ def joint_within(orbit: Orbit, i: int, time: float) -> FloatArray:
     return np.array([time, *out])
 
 
-def _turnings(orbit: Orbit, i: int, c: int) -> list[tuple[float, float]]:
+def stationary_values(orbit: Orbit, i: int, c: int) -> list[tuple[float, float]]:
     """Return times and values of the stationary points of observable c along a segment."""
     modes = [m.name for m in orbit.model.modes]
     start, end = orbit.begins[i], float(orbit.ends[i, 0])
@@ -129,7 +129,9 @@ def _turnings(orbit: Orbit, i: int, c: int) -> list[tuple[float, float]]:
 
 def _stationary(orbit: Orbit, i: int) -> list[float]:
     """Return the stationary times of all observables along a segment."""
-    return sorted(t for c in range(len(orbit.model.observables)) for t, _ in _turnings(orbit, i, c))
+    return sorted(
+        t for c in range(len(orbit.model.observables)) for t, _ in stationary_values(orbit, i, c)
+    )
 
 
 def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
@@ -152,7 +154,7 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
     c = [o.name for o in model.observables].index(model.surfaces[k].observable)
     level = model.flow.level(k, orbit.vector, _NONE, _EMPTY)
     sign = inside_sign(model, orbit.word[i][0], surface)
-    found = _turnings(orbit, i, c)
+    found = stationary_values(orbit, i, c)
     if not found:
         raise NotationError(f"segment {i + 1} touches {surface} nowhere inside")
     time = min(found, key=lambda pair: sign * (pair[1] - level))[0]

@@ -142,6 +142,7 @@ def settle(functions, layout, z, p, which, tz, tw, scale, accuracy, counts, room
         room.s,
         np.inf,
         accuracy,
+        0.0,
         room.equations,
         work,
         room.pencil,

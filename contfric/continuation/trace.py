@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from contfric.continuation.accuracy import not_critical
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
@@ -20,7 +21,7 @@ from contfric.continuation.points import (
     settings_of,
 )
 from contfric.continuation.side import Side, first_point
-from contfric.continuation.sliding import ROUGHLY_REACHED, nearly_reached
+from contfric.continuation.sliding import nearly_reached
 from contfric.continuation.smooth import SAME_PLACE, leapt_vertex, vertex_at
 from contfric.continuation.trial import locate_value
 from contfric.continuation.vertices import at_vertex, left_at, passed_vertex
@@ -287,6 +288,7 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     located = locate_events(orbit, before, after, settings)
     if _comes_closer(side, located, after.arc - before.arc):
         return False
+    side.largest = np.inf  # what asked for shorter steps is behind
     for bifurcation, point in located:
         if limit is not None and (
             point.arc > limit[0].arc - _AT_LIMIT * (after.arc - before.arc)
@@ -312,6 +314,9 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             side.put_tip(point)
             side.end = End(EndReason.POINT)
             return True
+        if not point.lost and (note := not_critical(bifurcation, before, after, settings)):
+            side.notes.append(note)
+            continue
         ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, orbit)
         if ends is None:
             side.bifurcations.append(bifurcation)
@@ -322,7 +327,7 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             side.put_tip(at_vertex(point, bifurcation.orbit, active))
         else:
             side.put_tip(point)
-        message = end_message(bifurcation) if ends.name == bifurcation.kind.name else ""
+        message = _end_message(bifurcation) if ends.name == bifurcation.kind.name else ""
         side.end = End(ends, message, None if point.lost else bifurcation)
         return True
     reached = after if limit is None else limit[0]
@@ -339,13 +344,22 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     return True
 
 
+def _end_message(bifurcation: Bifurcation) -> str:
+    """Return why a branch ends at an event, in words that fit what happens there."""
+    kind, meaning = bifurcation.kind, bifurcation.meaning
+    message = end_message(bifurcation)
+    if meaning == kind.meaning or not TERMINAL & {kind}:
+        return message
+    return (message or EndReason[kind.name].value).replace(kind.meaning, meaning)
+
+
 def _comes_closer(side: Side, located: list[tuple[Bifurcation, Point]], step: float) -> bool:
     """Go back to the point before an event beside which Newton fails, and on in shorter steps.
 
     Where two curves of orbits cross, Newton converges from no farther than the crossing is away: a step
     across may end on the other curve, and what is between its ends belongs to neither.
     """
-    fails = any(point.lost or b.accuracy >= ROUGHLY_REACHED for b, point in located)
+    fails = any(point.lost or point.rough for _, point in located)
     if not fails or step < _NEAREST:
         return False
     side.drop_tip()

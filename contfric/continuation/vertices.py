@@ -27,6 +27,13 @@ _NEARLY = 1e-2
 #: At such a vertex the symmetric (the undoubled) orbit has a multiplier -1 of its turn; what vanishes
 #: there is zero to the accuracy of the parameter, far below this.
 _OPENS = 1e-4
+#: The same where the vertex is located: rounding, and where a multiplier touches -1 the root of it.
+_LOCATED = 1e-7
+#: Farthest in the parameter (relative to 1 + its value) from which a vertex is located: orbits this far from
+#: it are within :data:`_NEARLY` of each other.
+_FAR = 1e-2
+#: Most steps of the secant: two or three where a multiplier passes -1, many where it touches it.
+_SECANTS = 40
 #: Distance in the parameter at which a multiplier that passes -1 is told from one that touches it.
 _BESIDE = 1e-6
 #: Odd parts below this (nondimensional) are what a singular system leaves undetermined.
@@ -73,14 +80,14 @@ def left_at(before: Point, after: Orbit, active: int) -> Point | None:
     if part is None:
         return None
     low, high = (_moved(part, active, w) for w in (before.value, float(after.vector[active])))
-    if not (low.converged and high.converged and _opening(low) * _opening(high) < 0.0):
+    if not (low.converged and high.converged and opening(low) * opening(high) < 0.0):
         return None
-    side = _opening(low)
+    side = opening(low)
     for _ in range(_HALVINGS):
         middle = _moved(high, active, 0.5 * float(low.vector[active] + high.vector[active]))
         if not middle.converged:
             return None
-        if side * _opening(middle) > 0.0:
+        if side * opening(middle) > 0.0:
             low = middle
         else:
             high = middle
@@ -166,13 +173,15 @@ def _vertex(orbit: Orbit, active: int) -> Orbit | None:
     solved = polish(orbit, damped=False)
     if not solved.converged and orbit.system.holds:  # the symmetric bridge turns there, too
         solved = replace(orbit, status=Status.CONVERGED)
-        return solved if abs(_opening(solved)) < _OPENS else None
-    if not solved.converged or not abs(_opening(solved)) < _OPENS:
+        return solved if abs(opening(solved)) < _OPENS else None
+    if not solved.converged or not abs(opening(solved)) < _OPENS:
         return None
-    return _refined(solved, active)
+    refined = _refined(solved, active)
+    same = float(np.max(np.abs(refined.joints - solved.joints))) < _NEARLY
+    return refined if same and abs(opening(refined)) < _LOCATED else None
 
 
-def _opening(orbit: Orbit) -> float:
+def opening(orbit: Orbit) -> float:
     """Return what vanishes where a disturbance that changes sign after one turn solves the equations.
 
     The pencil of one turn, ``P z_0 + Q z_N = 0``, with ``z_N = -K z_0``: the least singular value of
@@ -199,33 +208,41 @@ def opens_through(orbit: Orbit, active: int) -> bool:
     """
     value = float(orbit.vector[active])
     offset = _BESIDE * (1.0 + abs(value))
-    sides = [_opening(_moved(orbit, active, value + s * offset)) for s in (-1.0, 1.0)]
+    sides = [opening(_moved(orbit, active, value + s * offset)) for s in (-1.0, 1.0)]
     return sides[0] * sides[1] < 0.0
 
 
 def refined_opening(orbit: Orbit, active: int) -> Orbit | None:
     """Return the orbit nearby at which a disturbance opens that changes sign after a turn; or None."""
     found = _refined(orbit, active)
-    return found if found.converged and abs(_opening(found)) < _EVEN else None
+    return found if found.converged and abs(opening(found)) < _EVEN else None
 
 
 def _refined(orbit: Orbit, active: int) -> Orbit:
-    """Return the orbit whose turn has the multiplier -1 exactly, by secants in the parameter."""
+    """Return the orbit whose turn has the multiplier -1 exactly, by secants in the parameter.
+
+    The best one that was met: whether it has the multiplier is for the caller to ask.
+    """
     value = float(orbit.vector[active])
     offset = 1e-7 * (1.0 + abs(value))  # far above rounding, far below the branch's curvature
-    orbits = [orbit, _moved(orbit, active, value + offset)]
-    for _ in range(8):
-        a, b = orbits[-2:]
-        open_a, open_b = _opening(a), _opening(b)
-        if not b.converged or open_a == open_b:
-            return orbit
+    a, b = orbit, _moved(orbit, active, value + offset)
+    open_a, open_b = opening(a), opening(b)
+    best, least = orbit, abs(open_a)
+    for _ in range(_SECANTS):
+        if not np.isfinite(open_b) or open_a == open_b:
+            break
         step = -open_b * float(b.vector[active] - a.vector[active]) / (open_b - open_a)
-        if abs(step) > 100.0 * offset:
-            return orbit
-        orbits.append(_moved(b, active, float(b.vector[active]) + step))
+        there = float(b.vector[active]) + step
+        if not abs(there - value) < _FAR * (1.0 + abs(value)):
+            break
+        a, open_a = b, open_b
+        b = _moved(b, active, there)
+        open_b = opening(b)
+        if abs(open_b) <= least:
+            best, least = b, abs(open_b)
         if abs(step) < 1e-15 * (1.0 + abs(value)):
             break
-    return orbits[-1]
+    return best
 
 
 def _moved(orbit: Orbit, active: int, value: float) -> Orbit:

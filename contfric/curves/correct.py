@@ -20,11 +20,13 @@ from contfric.orbit.equations import close_chain, segment_rows
 from contfric.orbit.monitor import find_behind, find_turnings, watch
 from contfric.orbit.newton import (
     CHECKS,
+    CONVERGED,
+    GOES_ON,
     MULTIPLIERS,
     SOLVES,
     correction_size,
-    has_settled,
     move,
+    verdict,
 )
 from contfric.orbit.spectrum import multipliers
 from contfric.orbit.system import RETURNS
@@ -203,7 +205,7 @@ def settle_curve(  # type: ignore[no-untyped-def]
 def correct_curve(functions, second, layout, condition, z, p, which, border, accuracy, room):  # type: ignore[no-untyped-def]
     """Correct (z, p) on the plane that is anchored in the room; False if Newton fails."""
     work, equations, s = room.elimination, room.equations, room.s
-    before = np.inf
+    before, worst_before = np.inf, np.inf
     for step in range(_MOST_STEPS):
         close_chain(functions, layout, z, p, which, equations)
         g = condition_value(functions, second, layout, condition, z, p, which, border, room)
@@ -214,16 +216,17 @@ def correct_curve(functions, second, layout, condition, z, p, which, border, acc
         solved, worst = curve_step(functions, layout, condition, z, p, which, room)
         if not solved:
             return False
-        size = correction_size(work.z, work.w, z, p, which)
+        size = correction_size(work.z, work.w, z, p, which, 0)
         if size == np.inf:
             return False
         move(z, p, which, work.z, work.w, 1.0)
-        if has_settled(size, before, max(worst, abs(g)), accuracy):
+        worst = max(worst, abs(g))
+        found = verdict(step, size, before, worst, worst_before, accuracy, layout.rounding)
+        if found == CONVERGED:
             close_chain(functions, layout, z, p, which, equations)
-            return True
-        if step > 1 and size > 2.0 * before:
-            return False
-        before = size
+        if found != GOES_ON:
+            return found == CONVERGED
+        before, worst_before = size, worst
     return False
 
 

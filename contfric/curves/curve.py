@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.continuation.events import Kind
+from contfric.continuation.events import Kind, meaning_of
 from contfric.curves.special import CurveEnd, SpecialPoint
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
@@ -75,6 +75,12 @@ class CurvePart:
         others = np.abs(mu)
         others[np.arange(len(mu)), critical] = 0.0
         return np.asarray(np.all(others < 1.0, axis=1))
+
+    @property
+    def meaning(self) -> str:
+        """What happens at its points, in words."""
+        surfaces = set() if self.test is None else {self.test.surface}
+        return meaning_of(self.kind, self.system.model, surfaces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +170,11 @@ class Curve:
     def kinds(self) -> list[Kind]:
         """The bifurcation at every point."""
         return [part.kind for part in self.parts for _ in range(len(part))]
+
+    @property
+    def meanings(self) -> dict[str, str]:
+        """What happens on the curve, in words, for each kind of its points."""
+        return {part.kind.value: part.meaning for part in self.parts}
 
     @property
     def stable(self) -> BoolArray:

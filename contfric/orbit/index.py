@@ -67,7 +67,7 @@ def opening_sign(orbit: Orbit) -> int | None:
 
 def _turn_sign(orbit: Orbit, times: int, sign: float) -> int | None:
     system, m = orbit.system, orbit.joints.shape[1]
-    a, b, _, close = jacobian_blocks(system, orbit.joints, orbit.vector)
+    a, b, _, close = jacobian_blocks(system, orbit.joints, orbit.vector, parameters=False)
     pins = _pins(system, a, b)
     holds = len(pins)
     moved: FloatArray = np.eye(m, m + holds * times)

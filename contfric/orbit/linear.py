@@ -23,6 +23,14 @@ def jacobian_blocks(
     Shapes (N, m, m), (N, m, m), (N, m, parameters) and (m, m). Without ``parameters`` the third has none:
     where motion is integrated most of the time goes to them.
     """
+    a, b, c, close, _ = linearised(system, joints, vector, parameters)
+    return a, b, c, close
+
+
+def linearised(
+    system: System, joints: FloatArray, vector: FloatArray, parameters: bool = True
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the blocks and, as the last one, what is left of every equation, shape (N m,)."""
     from contfric.orbit.newton import linearise
 
     count, m = joints.shape
@@ -30,7 +38,7 @@ def jacobian_blocks(
     c, r = np.empty((count, m, len(vector) if parameters else 0)), np.empty((count, m, 1))
     close = np.empty((m, m))
     linearise(system.functions(), system.layout, joints, vector, a, b, c, r, close)
-    return a, b, c, close
+    return a, b, c, close, r.ravel()
 
 
 def assembled(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:

@@ -39,6 +39,9 @@ DEGENERATE = 1e-9
 _MOST_SAMPLES = 10_000_000
 #: A stick of length zero (at an event) has a duration of rounding over the rate of its release.
 _NO_TIME = 1e-10
+#: A margin that vanishes is rounding of the motion (relative to the size of the orbit's times and states)
+#: times the number of terms that it is made of, about this many.
+_ROUNDING = 10.0
 
 
 class Status(str, Enum):
@@ -270,13 +273,18 @@ class Orbit:
 
     @property
     def _slack(self) -> FloatArray:
-        """A joint may touch a surface to rounding (at an event), and a hold its limits; nothing else may."""
+        """What a margin may miss zero by: at an event it vanishes, and its sign is rounding.
+
+        A joint that touches a surface, and a hold at its limits, are located to the root of that where two
+        conditions meet.
+        """
         held = {hold.segment for hold in self.system.holds}
         may = [
             t.margin in (Margin.JOINT, Margin.LASTING) or t.segment in held
             for t in self.system.tests
         ]
-        return np.where(np.array(may), -1e-9, 0.0)
+        rounding = _ROUNDING * self.model.rounding * (1.0 + float(np.max(np.abs(self.joints))))
+        return np.where(np.array(may), -1e-9, -rounding)
 
     def violations(self) -> list[str]:
         """Return what makes the orbit not admissible, one line each."""

@@ -13,7 +13,8 @@ Crossings of transparent surfaces inside a segment do not matter to the motion; 
 
 A hold (:mod:`contfric.orbit.holds`) has a pin at its start in the place of the exit surface. Its exit
 margin is the acceleration with which it is left, which must not be negative anywhere on the way (HELD);
-one that follows a stick must last, and so must that stick, whose end is tangential (LASTING).
+one that follows a stick must last, and so must that stick, whose end is tangential, and a slide that leads
+from one hold to the touch of another (LASTING).
 
 Everything here derives from the model's definition; nothing knows what moves.
 """
@@ -77,7 +78,8 @@ class Layout(NamedTuple):
     departs : mode in which each hold is left, shape (N,). Where there is no hold it says how the segment
         begins: PLAIN, or as far below that as bit 0 if it begins on its exit surface (RETURNS), so that it
         may shrink to nothing, and above it the surface of the reset that it begins behind, plus one
-    lasting : segments that must last: holds after a stick, and that stick, shape (k,)
+    lasting : segments that must last: holds after a stick, and that stick; a slide from a hold to a touch at
+        which another begins, shape (k,)
     held : all holds, which could be left at any time, shape (k,)
     closure : state matrix of the closure, shape (n, n)
     turn : duration of one turn in periods of the excitation; 0 of an autonomous model
@@ -321,14 +323,18 @@ def _lasting(word: Word, holds: tuple[Hold, ...]) -> list[tuple[int, str]]:
     """Segments that no other margin keeps from shrinking through zero, each with the surface that it ends on.
 
     A hold after a touch of its limit, and the stick up to that touch: where it shrinks to nothing, the
-    margin of the stop before it has a double zero.
+    margin of the stop before it has a double zero. And the slide from one hold to the touch at which the
+    next begins: where it shrinks to nothing, the acceleration with which the first is left has one.
     """
-    return [
-        pair
-        for hold in holds
-        if hold.after_rest
-        for pair in ((hold.segment - 1, word[hold.segment - 1][1]), (hold.segment, hold.leaves))
-    ]
+    found: list[tuple[int, str]] = []
+    left = {(hold.segment + 1) % len(word) for hold in holds}
+    for hold in holds:
+        before = (hold.segment - 1) % len(word)
+        if hold.after_rest:
+            found += [(before, word[before][1]), (hold.segment, hold.leaves)]
+        elif hold.pin is None and before in left:
+            found.append((before, word[before][1]))
+    return found
 
 
 def _rows(rows: list[tuple[int, ...]], width: int = 3) -> IntArray:

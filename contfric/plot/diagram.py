@@ -276,9 +276,9 @@ def _handles(
         handles.append(_line("stability not computed", GREY, width=UNKNOWN_WIDTH))
     if len(regular) < len(branches):
         handles.append(_line(BRIDGE_NAME, BRIDGE_COLOUR, style=BRIDGE, width=BRIDGE_WIDTH))
-    kinds = {m.kind.value: m.kind for m in marks}
+    kinds = {m.kind.value: m.meaning for m in marks}
     order = [*MARKERS, *(k for k in kinds if k not in MARKERS)]
-    return handles + [_marker(k, kinds[k].meaning) for k in order if k in kinds]
+    return handles + [_marker(k, kinds[k]) for k in order if k in kinds]
 
 
 def _line(label: str, colour: str, style: Any = STABLE, width: float = LINE_WIDTH) -> Line2D:

@@ -30,7 +30,7 @@ _SMALLER = 0.6
 class Mark:
     """One event of a row: its images (mirror images, several stops) at one parameter value.
 
-    ``on_bridges`` tells whether it lies on bridges only.
+    ``on_bridges`` tells whether it lies on bridges only, ``meaning`` what the legend says of it.
     """
 
     kind: KindLike
@@ -38,6 +38,7 @@ class Mark:
     x: float
     y: FloatArray
     on_bridges: bool = False
+    meaning: str = ""
 
 
 def marks_of(
@@ -60,7 +61,8 @@ def marks_of(
         y = np.concatenate([quantity(b.orbit, attribute) for b in (event, *images)])
         label = event.label if event in there or not there else there[0].label
         if not any(m.label == label and abs(m.x - x) <= _SAME * abs(x) for m in found):
-            found.append(Mark(event.kind, label, x, _distinct(y), bool(images) and not there))
+            only = bool(images) and not there
+            found.append(Mark(event.kind, label, x, _distinct(y), only, event.meaning))
     return found
 
 

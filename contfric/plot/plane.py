@@ -199,9 +199,9 @@ def _legend(
     ax: Axes, curves: Sequence[CurveLike], special: Sequence[SpecialLike], where: Mapping[str, Any]
 ) -> None:
     """Say what colours and dashes mean."""
-    kinds = {kind.value: kind for curve in curves for kind in curve.kinds}
+    kinds = {name: text for curve in curves for name, text in curve.meanings.items()}
     handles = [
-        Line2D([], [], color=colour, linewidth=width, label=f"{name}: {kinds[name].meaning}")
+        Line2D([], [], color=colour, linewidth=width, label=f"{name}: {kinds[name]}")
         for name, (colour, width) in _LOOKS.items()
         if name in kinds
     ]

@@ -110,16 +110,20 @@ class BifurcationLike(Protocol):
         """Name such as ``CS_s``."""
 
     @property
+    def meaning(self) -> str:
+        """One line for a legend, of what happens in this model."""
+
+    @property
     def position(self) -> float:
         """Arclength on the branch."""
 
     @property
     def stable_before(self) -> bool | None:
-        """Stability before the event, in the order of the branch."""
+        """Stability at smaller values of the parameter; at a fold, before it on the branch."""
 
     @property
     def stable_after(self) -> bool | None:
-        """Stability after the event, in the order of the branch."""
+        """Stability at larger values of the parameter; at a fold, behind it on the branch."""
 
 
 class EndLike(Protocol):
@@ -279,6 +283,10 @@ class CurveLike(Protocol):
     @property
     def kinds(self) -> Sequence[KindLike]:
         """The bifurcation at each point."""
+
+    @property
+    def meanings(self) -> Mapping[str, str]:
+        """One line for a legend for each kind of its points."""
 
     @property
     def stable(self) -> NDArray[np.bool_]:

@@ -102,7 +102,16 @@ def _event_vertex(
     near = np.array([np.interp(arc, branch.arc, column) for column in columns.T])
     y = aligned(quantity(event.orbit, attribute), near)
     x = event.params[branch.parameter]
-    return _Vertex(arc, x, y, event.stable_before, event.stable_after, True)
+    sides = event.stable_before, event.stable_after
+    if event.kind.value != "SN" and _falls(branch, arc):  # told upward, but drawn along the branch
+        sides = sides[1], sides[0]
+    return _Vertex(arc, x, y, *sides, True)
+
+
+def _falls(branch: BranchLike, arc: float) -> bool:
+    """Tell whether the parameter falls along a branch at an arclength."""
+    k = int(np.clip(np.searchsorted(branch.arc, arc), 1, len(branch.arc) - 1))
+    return bool(branch.values[k] < branch.values[k - 1])
 
 
 def _position(branch: BranchLike, event: BifurcationLike) -> float:

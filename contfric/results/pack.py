@@ -88,6 +88,7 @@ class Packer:
                 "bifurcations": [self.bifurcation(b) for b in branch.bifurcations],
                 "ends": [self.end(end) for end in branch.ends],
                 "mirrored": branch.mirrored,
+                "notes": list(branch.notes),
                 "stability": branch.turn_multipliers is not None,
             }
         )

@@ -123,6 +123,7 @@ class Unpacker:
             bifurcations=tuple(self.bifurcations[i] for i in entry["bifurcations"]),
             ends=(first, last),
             mirrored=entry["mirrored"],
+            notes=tuple(entry.get("notes", ())),
             **found,
         )
 

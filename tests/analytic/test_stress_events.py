@@ -11,9 +11,10 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from mpmath import mp
+from mpmath import mp, mpf
 
 import contfric as cf
+from contfric.continuation import accuracy
 from contfric.continuation.events import ACCURACY
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "stress"))
@@ -37,6 +38,29 @@ def found(parameter: str) -> tuple[cf.Bifurcation, ...]:
     diagram = cf.explore(cf.find_orbit("coulomb", params), parameter, bounds, bridges=False)
     # at a continuum (Omega = 1/2) events are located to the root of rounding, and say so
     return tuple(b for b in diagram.bifurcations if b.accuracy <= ACCURACY)
+
+
+@pytest.mark.parametrize("parameter", DIAGRAMS)
+def test_accuracy_is_a_bound_of_the_error(parameter: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the least value that is claimed: no smaller than the error, and not empty."""
+    monkeypatch.setattr(accuracy, "LEAST", 0.0)
+    params, (low, high) = DIAGRAMS[parameter]
+    orbit = cf.find_orbit("coulomb", params)
+    diagram = cf.explore(orbit, parameter, (low, high), bridges=False)
+    asked = 0
+    for event in diagram.bifurcations:
+        claimed = event.accuracy * (high - low)
+        with mp.workdps(chain.DIGITS):
+            try:
+                exact = bordered.locate(event, parameter)
+            except chain.NoReference:  # of two conditions at once, which says so
+                assert event.accuracy > ACCURACY
+                continue
+            error = float(abs(exact.value - mpf(event.params[parameter])))
+        assert error <= claimed, event
+        assert claimed <= 1e3 * exact.allowed or event.accuracy > ACCURACY, event
+        asked += 1
+    assert asked > 0
 
 
 def test_random_events() -> None:

@@ -110,6 +110,7 @@ def event(position: float, x: float, y: float, before: bool | None, after: bool 
         params={"p": x},
         orbit=SimpleNamespace(x_max=y, stops=np.array([y, -y])),
         label="SN_1a",
+        meaning="fold",
         position=position,
         stable_before=before,
         stable_after=after,

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import contfric as cf
+from contfric.continuation.events import meaning_of
 from contfric.continuation.points import LARGEST_STEP
 from contfric.curves.trace import largest_step
 from contfric.models.describe import from_text
@@ -209,3 +210,21 @@ def test_sympy_is_imported_only_to_build(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
         seen.append(done.stdout.strip())
     assert seen[1] == "False"
+
+
+@pytest.mark.parametrize(
+    ("model", "surface", "meaning"),
+    [
+        ("coulomb", "v", "grazing-sliding"),
+        ("impact", "wall", "grazing impact"),
+        (Path(__file__).parents[1] / "models" / "bilinear.yaml", None, "grazing"),
+    ],
+)
+def test_grazing_is_a_sliding_only_where_something_slides(
+    model: str | Path, surface: str | None, meaning: str
+) -> None:
+    found = cf.load_model(model)
+    surfaces = {surface} if surface else {s.name for s in found.surfaces}
+    assert surfaces <= {s.name for s in found.surfaces}
+    assert meaning_of(cf.Kind.GS, found, surfaces) == meaning
+    assert meaning_of(cf.Kind.T, found, surfaces) == cf.Kind.T.meaning

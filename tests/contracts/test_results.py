@@ -97,6 +97,14 @@ def test_branch_without_stability(orbit, tmp_path) -> None:
     assert_same(branch, loaded)
 
 
+def test_notes_of_a_branch(branch, tmp_path) -> None:
+    noted = dataclasses.replace(branch, notes=("no BP at Omega = 0.5", "no SN at Omega = 0.51"))
+    path = tmp_path / "branch.npz"
+    cf.save(noted, path)
+    assert cf.load(path).notes == noted.notes
+    assert branch.mirror().notes == branch.notes == ()
+
+
 def test_diagram(diagram, tmp_path) -> None:
     assert {b.mirrored for b in diagram.branches} == {True, False}
     assert {b.symmetric for b in diagram.branches} == {True, False}

@@ -1,0 +1,292 @@
+"""How well the parameter of a located event is known: what rounding does to the equations of the event.
+
+The equations of the orbit and that of the event fix the joints and the parameter together. Errors in these
+equations move the parameter by the last row of the inverse of their Jacobian. An error is what is left of
+an equation at the located point, and the rounding of the motion there. The sum of their moduli is a bound.
+
+* Sliding events: the margin that vanishes. T: the distance of the touch to its surface.
+* SN: a place along the branch that is held, as the parameter is stationary there; and the square of what
+  is left of its slope.
+* BP, PD, NS: a multiplier as a function of the parameter, at a few neighbours that are solved for. A
+  parabola through them has its zero there, and what they miss it by is rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind
+from contfric.continuation.points import Point, Settings
+from contfric.continuation.standstill import stationary_values
+from contfric.continuation.vertices import opening
+from contfric.models.definition import FloatArray
+from contfric.orbit.linear import linearised
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.solve import polish
+from contfric.orbit.system import Test
+
+#: Least accuracy that is claimed, relative to the range: two ways to one event differ by a little more than
+#: the rounding of one, and no diagram resolves it.
+LEAST = 1e-11
+#: Units of rounding in one equation of a segment: its phases, its duration and its state have some each.
+_UNITS = 4.0
+#: Differences of a margin, relative: its second derivative costs this much of the first, which is enough.
+_DIFFERENCE = 1e-7
+#: Neighbours at which a multiplier is evaluated: distance in the parameter, as a share of 1 + its value and
+#: of the range. Far above rounding, and multipliers are parabolas there.
+_BESIDE, _BESIDE_RANGE = 1e-6, 1e-4
+_NEIGHBOURS = (-2.0, -1.0, 1.0, 2.0)
+#: Four points leave one of their errors in what a parabola misses: this many times that bounds them all.
+_MISSED = 10.0
+#: Unknowns of the largest system that is solved as a full matrix; a longer one is solved as a sparse one.
+_FULL = 200
+#: Kinds that a multiplier on the unit circle makes, and how far it may be from there: the root of rounding
+#: times the largest multiplier (a fold is located that well along the branch), or a share of what it
+#: changes by over the step, where it changes fast.
+_CRITICAL = frozenset({Kind.SN, Kind.BP, Kind.PD})
+_ON_CIRCLE, _OF_CHANGE = 1e-6, 1e-4
+#: An event whose equations are singular together is located to the root of rounding at best.
+_SINGULAR = 1e-6
+
+
+@dataclass(frozen=True)
+class _Condition:
+    """What vanishes at an event, and the segment on whose joints it depends."""
+
+    value: Callable[[Orbit], float]
+    segment: int
+
+
+def accuracy_of(
+    kind: Kind,
+    here: Orbit,
+    tests: tuple[Test, ...],
+    sides: tuple[Point, Point | None],
+    point: Point,
+    settings: Settings,
+) -> float:
+    """Return a bound of the error of an event's parameter, relative to the range.
+
+    Parameters
+    ----------
+    here : the orbit at the event
+    tests : the margins that vanish; at T the segment and the observable
+    sides, point : the points before and after it, and the located one
+    """
+    active = here.model.index_of(settings.parameter)
+    if tests:
+        condition = _touch(here, tests[0]) if kind is Kind.T else _margin(here, tests[0])
+        error = None if condition is None else _error_of(here, active, condition)
+        otherwise = _SINGULAR
+    elif kind is Kind.SN:
+        error, otherwise = _fold_error(here, active, sides, point), _SINGULAR
+    else:
+        error, otherwise = _multiplier_error(kind, here, active, settings.width), ACCURACY
+    if error is None or not np.isfinite(error):
+        return otherwise
+    return max(LEAST, error / settings.width)
+
+
+def _margin(here: Orbit, test: Test) -> _Condition:
+    k = here.system.tests.index(test)
+    return _Condition(lambda orbit: float(orbit.margins[k]), test.segment)
+
+
+def _touch(here: Orbit, test: Test) -> _Condition | None:
+    """Return the distance of a stationary point or a joint to the surface that it meets at a tangency."""
+    gaps = _gaps(here, test)
+    if not len(gaps):
+        return None
+    k = int(np.argmin(np.abs(gaps)))
+
+    def value(orbit: Orbit) -> float:
+        beside = _gaps(orbit, test)
+        return float(beside[k]) if len(beside) == len(gaps) else float("nan")
+
+    return _Condition(value, test.segment)
+
+
+def _gaps(orbit: Orbit, test: Test) -> FloatArray:
+    """Return the distances of an observable to its surfaces, at its stationary points and both joints."""
+    model, i = orbit.model, test.segment
+    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
+    c = [o.name for o in model.observables].index(test.surface)
+    row = next(r for r in orbit.system.layout.labels if r[0] == i and r[1] == c)
+    own = [k for k, surface in enumerate(model.surfaces) if surface.observable == test.surface]
+    levels = np.array([model.flow.level(k, orbit.vector, none, empty) for k in own])
+    values = np.array([value for _, value in stationary_values(orbit, i, c)])
+    gaps = [np.subtract.outer(values, levels).ravel()]
+    for joint, lies_on in ((orbit.begins[i], row[2]), (orbit.ends[i], row[3])):
+        state = np.ascontiguousarray(joint[1:])
+        there = model.flow.observe(c, float(joint[0]), state, orbit.vector, none, empty)
+        gaps.append((there - levels)[[k != lies_on for k in own]])
+    return np.asarray(np.concatenate(gaps), dtype=np.float64)
+
+
+def _error_of(orbit: Orbit, active: int, condition: _Condition) -> float | None:
+    """Return the error of a parameter that the orbit and a condition fix together."""
+    value = condition.value(orbit)
+    if not np.isfinite(value):
+        return None
+    scale = 1.0 + float(np.max(np.abs(orbit.joints)))
+    left = abs(value) + orbit.model.rounding * scale
+    return _moved(orbit, active, _gradient(orbit, active, condition, value), left)
+
+
+def _gradient(orbit: Orbit, active: int, condition: _Condition, value: float) -> FloatArray:
+    """Return the derivatives of a condition by the joints and the parameter, shape (N m + 1,)."""
+    count, m = orbit.joints.shape
+    row = np.zeros(count * m + 1)
+    for i in {condition.segment, (condition.segment + 1) % count}:
+        for j in range(m):
+            joints = orbit.joints.copy()
+            step = _DIFFERENCE * (1.0 + abs(joints[i, j]))
+            joints[i, j] += step
+            row[i * m + j] = (condition.value(replace(orbit, joints=joints)) - value) / step
+    vector = orbit.vector.copy()
+    step = _DIFFERENCE * (1.0 + abs(vector[active]))
+    vector[active] += step
+    row[-1] = (condition.value(replace(orbit, vector=vector)) - value) / step
+    return row
+
+
+def _moved(orbit: Orbit, active: int, row: FloatArray, left: float) -> float | None:
+    """Return how far the errors of all equations move the parameter.
+
+    ``row`` is the gradient of the condition, and ``left`` its error.
+    """
+    a, b, c, close, residual = linearised(orbit.system, orbit.joints, orbit.vector)
+    b[-1] = b[-1] @ close
+    weights = _weights(a, b, c[:, :, active], row)
+    if weights is None or not np.all(np.isfinite(weights)):
+        return None
+    errors = np.abs(residual) + _rounding(orbit)
+    own = np.finfo(float).eps * abs(float(orbit.vector[active]))
+    return float(np.abs(weights[:-1]) @ errors + abs(weights[-1]) * left + own)
+
+
+def _rounding(orbit: Orbit) -> FloatArray:
+    """Return the rounding of every equation of a chain, shape (N m,)."""
+    size = np.max(np.abs(orbit.joints), axis=1)
+    size = 1.0 + np.maximum(size, np.roll(size, -1))
+    unit = _UNITS * np.finfo(float).eps + orbit.model.rounding
+    return np.repeat(unit * size, orbit.joints.shape[1])
+
+
+def _weights(a: FloatArray, b: FloatArray, c: FloatArray, row: FloatArray) -> FloatArray | None:
+    """Return the last row of the inverse of the Jacobian of a chain with one parameter and one condition."""
+    count, m = c.shape
+    size = count * m
+    wanted = np.zeros(size + 1)
+    wanted[size] = 1.0
+    try:
+        if size <= _FULL:
+            full = np.zeros((size + 1, size + 1))
+            for i in range(count):
+                rows, following = slice(i * m, (i + 1) * m), (i + 1) % count * m
+                full[rows, rows] += a[i]
+                full[rows, following : following + m] += b[i]
+            full[:size, size], full[size] = c.ravel(), row
+            return np.asarray(np.linalg.solve(full.T, wanted), dtype=np.float64)
+        return _sparse_weights(a, b, c, row, wanted)
+    except (np.linalg.LinAlgError, RuntimeError, ValueError):
+        return None
+
+
+def _sparse_weights(
+    a: FloatArray, b: FloatArray, c: FloatArray, row: FloatArray, wanted: FloatArray
+) -> FloatArray:
+    """Do the same for a long chain."""
+    from scipy.sparse import csc_matrix
+    from scipy.sparse.linalg import splu
+
+    count, m = c.shape
+    size = count * m
+    places: NDArray[np.int64] = np.arange(size).reshape(count, m)
+    across = np.repeat(places[:, :, None], m, axis=2).ravel()
+    own = np.repeat(places[:, None, :], m, axis=1)
+    rows = np.concatenate([across, across, places.ravel(), np.full(size + 1, size)])
+    following = np.roll(own, -1, axis=0).ravel()
+    columns = np.concatenate([own.ravel(), following, np.full(size, size), np.arange(size + 1)])
+    values = np.concatenate([a.ravel(), b.ravel(), c.ravel(), row])
+    matrix = csc_matrix((values, (rows, columns)), shape=(size + 1, size + 1))
+    return np.asarray(splu(matrix).solve(wanted, trans="T"), dtype=np.float64)
+
+
+def _fold_error(
+    orbit: Orbit, active: int, sides: tuple[Point, Point | None], point: Point
+) -> float | None:
+    """Return the error of the parameter at a fold, where it is stationary along the branch."""
+    before, after = sides
+    if after is None or after.arc == before.arc or orbit.joints.shape != point.tangent.shape:
+        return None
+    error = _moved(orbit, active, np.append(point.tangent.ravel(), point.slope), 0.0)
+    bend = (after.slope - before.slope) / (after.arc - before.arc)
+    if error is None or bend == 0.0:
+        return None
+    return error + 0.5 * point.slope**2 / abs(bend)
+
+
+def _multiplier_error(kind: Kind, here: Orbit, active: int, width: float) -> float | None:
+    """Return the error of the parameter at which a multiplier is on the unit circle."""
+    value = float(here.vector[active])
+    distance = min(_BESIDE * (1.0 + abs(value)), _BESIDE_RANGE * width)
+    shifts, found = [], []
+    for k in _NEIGHBOURS:
+        vector = here.vector.copy()
+        vector[active] += k * distance
+        orbit = polish(replace(here, vector=vector), damped=False)
+        if orbit.converged:
+            shifts.append(float(vector[active]) - value)
+            # where -1 is what it is, the pencil says it without multipliers, and on a bridge too
+            minus = kind is not Kind.NS and critical(kind, orbit) < 0.0
+            found.append(opening(orbit) if minus else off_circle(kind, orbit))
+    if len(found) < len(_NEIGHBOURS) or not np.all(np.isfinite(found)):
+        return None
+    x = np.array(shifts) / distance
+    fit = np.polynomial.polynomial.polyfit(x, found, 2)
+    missed = float(np.max(np.abs(np.polynomial.polynomial.polyval(x, fit) - found)))
+    if abs(fit[1]) <= missed:
+        return None
+    own = _UNITS * np.finfo(float).eps * (1.0 + abs(value))
+    return float(distance * (abs(fit[0]) + _MISSED * missed) / abs(fit[1]) + own)
+
+
+def not_critical(bifurcation: Bifurcation, before: Point, after: Point, settings: Settings) -> str:
+    """Return what a change of sign is if no multiplier is on the unit circle there; empty for an event.
+
+    The multiplier is that of the orbit's own joints. It may miss the circle by rounding, or by a small share
+    of what it changes by over the step.
+    """
+    kind, orbit = bifurcation.kind, bifurcation.orbit
+    if not settings.stability or kind not in _CRITICAL or not bifurcation.located:
+        return ""
+    off = abs(off_circle(kind, orbit))
+    largest = float(np.max(np.abs(orbit.turn_multipliers), initial=0.0))
+    changes = 0.0
+    if before.mu.size and np.all(np.isfinite([before.mu, after.mu])):
+        s = critical(kind, orbit)
+        changes = min(float(np.min(np.abs(point.mu - s))) for point in (before, after))
+    if off <= max(_ON_CIRCLE * (1.0 + largest), _OF_CHANGE * changes):
+        return ""
+    where = ", ".join(f"{k} = {v:.10g}" for k, v in bifurcation.params.items())
+    return f"no {kind.value} at {where}: its test changes sign, the multiplier is {off:.2g} off the circle"
+
+
+def critical(kind: Kind, orbit: Orbit) -> float:
+    """Return the multiplier of a turn that a smooth event has: of the half map -1 stands for both."""
+    minus = kind is Kind.PD or (kind is Kind.BP and orbit.system.half)
+    return -1.0 if minus else 1.0
+
+
+def off_circle(kind: Kind, orbit: Orbit) -> float:
+    """Return how far a multiplier of a turn is from where an event has it; at NS the pair from the circle."""
+    mu = orbit.turn_multipliers
+    if kind is Kind.NS:
+        return float(abs(mu[0]) ** 2 - 1.0)
+    apart = mu - critical(kind, orbit)
+    return float(apart[int(np.argmin(np.abs(apart)))].real)
