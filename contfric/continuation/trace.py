@@ -50,6 +50,9 @@ _SHORTER, _NEAREST = 8.0, 1e-8
 #: A step this short after hundreds of points (arclength) gets nowhere.
 _CRAWLS = 1e-6
 
+#: Why a branch ends at a branch point at which its parameter turns, and no declared symmetry is broken.
+CROSSED = "branch point: the parameter turns there, and another branch crosses"
+
 Progress = Callable[[str], None]
 
 
@@ -291,7 +294,7 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             side.put_tip(point)
             side.end = End(EndReason.POINT)
             return True
-        ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, orbit)
+        ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, point, orbit)
         if ends is None:
             side.bifurcations.append(bifurcation)
             continue
@@ -302,6 +305,8 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         else:
             side.put_tip(point)
         message = end_message(bifurcation) if ends.name == bifurcation.kind.name else ""
+        if ends is EndReason.BP and bifurcation.orbit.system.half == orbit.system.half:
+            message = CROSSED
         side.end = End(ends, message, None if point.lost else bifurcation)
         return True
     reached = after if limit is None else limit[0]
@@ -363,10 +368,12 @@ def _limit_crossed(
     return point, settings.high_reason if upper else settings.low_reason
 
 
-def _ends_branch(bifurcation: Bifurcation, orbit: Orbit) -> EndReason | None:
+def _ends_branch(bifurcation: Bifurcation, point: Point, orbit: Orbit) -> EndReason | None:
     """Return why a branch ends at a bifurcation, or None if it goes on."""
     if bifurcation.kind in TERMINAL:
         return EndReason[bifurcation.kind.name]
+    if bifurcation.kind is Kind.BP and point.slope == 0.0:  # another curve crosses at its vertex
+        return EndReason.BP
     if not orbit.system.half and bifurcation.kind is Kind.BP and bifurcation.orbit.system.half:
         return EndReason.BP
     if bifurcation.kind is Kind.PD and bifurcation.orbit.periods < orbit.periods:

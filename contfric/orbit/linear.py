@@ -18,6 +18,14 @@ def jacobian_blocks(
 
     Shapes (N, m, m), (N, m, m), (N, m, parameters) and (m, m).
     """
+    a, b, c, close, _ = _linearised(system, joints, vector)
+    return a, b, c, close
+
+
+def _linearised(
+    system: System, joints: FloatArray, vector: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the blocks, the closure, and the residuals with the sign of a correction, (N, m)."""
     from contfric.orbit.newton import linearise
 
     count, m = joints.shape
@@ -25,13 +33,26 @@ def jacobian_blocks(
     c, r = np.empty((count, m, len(vector))), np.empty((count, m, 1))
     close = np.empty((m, m))
     linearise(system.functions(), system.layout, joints, vector, a, b, c, r, close)
-    return a, b, c, close
+    return a, b, c, close, r[:, :, 0]
+
+
+def equations_at(
+    system: System, joints: FloatArray, vector: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return residuals and Jacobians by joints and parameters: (N m,), (N m, N m), (N m, parameters)."""
+    a, b, c, close, correction = _linearised(system, joints, vector)
+    return -correction.ravel(), _stacked(a, b, close), c.reshape(joints.size, -1)
 
 
 def assembled(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:
     """Return the Jacobian with respect to all joints, shape (N m, N m)."""
     a, b, _, close = jacobian_blocks(system, joints, vector)
-    count, m = joints.shape
+    return _stacked(a, b, close)
+
+
+def _stacked(a: FloatArray, b: FloatArray, close: FloatArray) -> FloatArray:
+    """Return the cyclic blocks as one matrix."""
+    count, m = a.shape[:2]
     full = np.zeros((count * m, count * m))
     for i in range(count):
         rows = slice(i * m, (i + 1) * m)
