@@ -67,9 +67,10 @@ def smooth_events(
                 between = parabola_vertex(before, after, a / (a - b))
                 vertex = _fold(orbit, before, beyond, between, settings)
                 if vertex[0].kind is Kind.SN:
-                    vertex = _vertex_of_crossing(
-                        orbit, before, after, beyond, a / (a - b), settings
-                    ) or vertex
+                    vertex = (
+                        _vertex_of_crossing(orbit, before, after, beyond, a / (a - b), settings)
+                        or vertex
+                    )
                 folded = True
                 if vertex[0].kind is Kind.SN:
                     if not _is_vertical(before, after, settings):

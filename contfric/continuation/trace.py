@@ -22,6 +22,7 @@ from contfric.continuation.points import (
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.sliding import ROUGHLY_REACHED, nearly_reached
 from contfric.continuation.smooth import SAME_PLACE, leapt_vertex, vertex_at
+from contfric.continuation.stalls import stalled_at
 from contfric.continuation.trial import locate_value
 from contfric.continuation.vertices import at_vertex, left_at, passed_vertex
 from contfric.errors import ConvergenceError
@@ -176,7 +177,8 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
             upper = side.tip.value > 0.5 * (settings.low + settings.high)
             side.end = _limit_end(upper, settings)
         elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
-            _stuck_at_vertex(orbit, side, settings)
+            if not _stuck_at_vertex(orbit, side, settings):
+                _end_stalled(orbit, side, settings)
         if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and _slows_down(side, settings):
             side.end = End(EndReason.PERIOD)
         return True, step
@@ -221,6 +223,17 @@ def _stuck_at_vertex(orbit: Orbit, side: Side, settings: Settings) -> bool:
     if found is not None:
         _end_at_vertex(orbit, side, settings, found, side.tip)
     return found is not None
+
+
+def _end_stalled(orbit: Orbit, side: Side, settings: Settings) -> None:
+    """End a side that gets no farther; its message says whether a multiplier is at +1 there."""
+    message, found = stalled_at(orbit, side.tip, settings)
+    if found is None:
+        side.end = End(EndReason.STEP, message)
+        return
+    active = orbit.model.index_of(settings.parameter)
+    side.put_tip(at_vertex(side.tip, found.orbit, active))
+    side.end = End(EndReason.BP, CROSSED, found)
 
 
 def _end_at_vertex(
