@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from contfric.continuation.events import Bifurcation, End
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.stops import stopping_segments
+from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
 from contfric.orbit.system import IntArray, System, build_system
 from contfric.orbit.words import decode, encode, mirror_pairs
 
@@ -158,15 +158,28 @@ class Branch:
         second = np.concatenate([mirrored[:, 1:], x[:, :1]], axis=1)
         return np.concatenate([ends[:, at], second[:, at]], axis=1)
 
+    @cached_property
+    def _reach(self) -> FloatArray:
+        """Least and largest displacement at each point, shape (2, k)."""
+        if not reaches_at_joints(self.model):
+            return np.array([reach_of(orbit) for orbit in self]).reshape(-1, 2).T
+        x = self.joints[:, :, 1]
+        low, high = x.min(axis=1), x.max(axis=1)
+        if self.system.half:
+            image = self.joints[:, :, 1:] @ self.system.layout.closure[0]
+            low = np.minimum(low, image.min(axis=1))
+            high = np.maximum(high, image.max(axis=1))
+        return np.array([low, high])
+
     @property
     def x_max(self) -> FloatArray:
         """Largest displacement at each point, shape (k,)."""
-        return np.asarray(np.nanmax(self.stops, axis=1, initial=-np.inf))
+        return self._reach[1]
 
     @property
     def x_min(self) -> FloatArray:
         """Smallest displacement at each point, shape (k,)."""
-        return np.asarray(np.nanmin(self.stops, axis=1, initial=np.inf))
+        return self._reach[0]
 
     @property
     def asymmetry(self) -> FloatArray:

@@ -177,8 +177,7 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
             upper = side.tip.value > 0.5 * (settings.low + settings.high)
             side.end = _limit_end(upper, settings)
         elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
-            if not _stuck_at_vertex(orbit, side, settings):
-                _end_stalled(orbit, side, settings)
+            _end_stalled(orbit, side, settings)
         if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and _slows_down(side, settings):
             side.end = End(EndReason.PERIOD)
         return True, step
@@ -227,13 +226,14 @@ def _stuck_at_vertex(orbit: Orbit, side: Side, settings: Settings) -> bool:
 
 def _end_stalled(orbit: Orbit, side: Side, settings: Settings) -> None:
     """End a side that gets no farther; its message says whether a multiplier is at +1 there."""
-    message, found = stalled_at(orbit, side.tip, settings)
-    if found is None:
-        side.end = End(EndReason.STEP, message)
+    if _stuck_at_vertex(orbit, side, settings):
         return
-    active = orbit.model.index_of(settings.parameter)
-    side.put_tip(at_vertex(side.tip, found.orbit, active))
-    side.end = End(EndReason.BP, CROSSED, found)
+    message, found = stalled_at(orbit, side.tip, settings)
+    side.end = End(EndReason.STEP, message)
+    if found is not None:
+        active = orbit.model.index_of(settings.parameter)
+        side.put_tip(at_vertex(side.tip, found.orbit, active))
+        side.end = End(EndReason.BP, CROSSED, found)
 
 
 def _end_at_vertex(

@@ -16,7 +16,7 @@ from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.reading import read_signature
 from contfric.orbit.simulation import signs_at
-from contfric.orbit.stops import displacements, stopping_segments
+from contfric.orbit.stops import displacements, reach_of, stopping_segments, turning_points
 from contfric.orbit.system import Margin, System, Word, build_system
 from contfric.orbit.words import half_of, mirror_pairs, whole_of
 from contfric.signature import Signature
@@ -298,19 +298,25 @@ class Orbit:
     @cached_property
     def stops(self) -> FloatArray:
         """Displacements at the stops and impacts in the order of the orbit, shape (stops,)."""
+        if not self.model.stop_surface:
+            return turning_points(self)
         if not self.model.cuts(self.model.stop_surface):
             return displacements(self, self.model.stop_surface)
         return self.ends[stopping_segments(self.model, self.word), 1]
 
+    @cached_property
+    def _reach(self) -> tuple[float, float]:
+        return reach_of(self)
+
     @property
     def x_max(self) -> float:
         """Largest displacement, x k / F_0."""
-        return float(self.stops.max(initial=-np.inf))
+        return self._reach[1]
 
     @property
     def x_min(self) -> float:
         """Smallest displacement, x k / F_0."""
-        return float(self.stops.min(initial=np.inf))
+        return self._reach[0]
 
     @property
     def asymmetry(self) -> float:

@@ -1,4 +1,4 @@
-"""Stops: where the displacement is stationary, at joints or inside of segments."""
+"""Stops and extrema: where the displacement is stationary, at joints or inside of segments."""
 
 from __future__ import annotations
 
@@ -56,3 +56,49 @@ def displacements(orbit: Orbit, surface: str) -> FloatArray:
         if exit_ in model.reset_by_surface:
             found.append(float(orbit.ends[i, 1]))
     return np.array(found)
+
+
+def turning_points(orbit: Orbit) -> FloatArray:
+    """Return the displacement at its local extrema and at impacts, in order, shape (extrema,).
+
+    For models that name no surface on which it is stationary.
+    """
+    model, flow = orbit.model, orbit.model.flow
+    modes, names = [m.name for m in model.modes], [o.name for o in model.observables]
+    times, values = np.empty(_MOST), np.empty(_MOST)
+    x: list[float] = []
+    struck: list[bool] = []
+    for i, (mode, exit_) in enumerate(orbit.word):
+        start, end = orbit.begins[i], orbit.ends[i]
+        found = 0
+        if model.displacement and end[0] > start[0]:
+            segment = modes.index(mode), names.index(model.displacement), float(start[0])
+            lasts = float(end[0] - start[0])
+            found = flow.turning(*segment, start[1:].copy(), lasts, orbit.vector, times, values)
+        x += [*values[: max(found, 0)].tolist(), float(end[1])]
+        struck += [False] * max(found, 0) + [exit_ in model.reset_by_surface]
+    before, after = np.roll(x, 1) - x, np.roll(x, -1) - x
+    return np.asarray(np.array(x)[(before * after > 0.0) | np.array(struck)])
+
+
+def reach_of(orbit: Orbit) -> tuple[float, float]:
+    """Return the least and the largest displacement of an orbit, over joints and stationary points."""
+    model, whole = orbit.model, orbit.as_whole()
+    x = [orbit.cycle[:, 1]]
+    if model.displacement:
+        from contfric.orbit.extent import extent
+
+        c, out = [o.name for o in model.observables].index(model.displacement), np.empty(2)
+        system, joints = whole.system, np.ascontiguousarray(whole.joints)
+        if not extent(system.functions(), system.layout, c, joints, orbit.vector, out):
+            out[:] = np.nan
+        x.append(out)
+    elif not model.cuts(model.stop_surface):  # a definition by hand that says no more
+        x.append(orbit.stops)
+    every = np.concatenate(x)
+    return float(np.min(every)), float(np.max(every))
+
+
+def reaches_at_joints(model: Model) -> bool:
+    """Tell whether the extrema of the displacement are among the joints of orbits."""
+    return not model.displacement and model.cuts(model.stop_surface)

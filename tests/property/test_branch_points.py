@@ -1,4 +1,4 @@
-"""Branch points need no declared symmetry: located where two curves of orbits cross, and both are followed."""
+"""Branch points need no declared symmetry: where two curves of orbits cross, both are followed."""
 
 from __future__ import annotations
 
