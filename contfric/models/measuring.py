@@ -27,7 +27,9 @@ def measured(description: Description) -> Description:
     """Return a description in which the displacement is an observable, if its extrema ask for one."""
     try:
         surfaces = engine_order(description)
-        needed = not extrema_at_joints(Sampler(floats(description), defaults(description)), surfaces)
+        needed = not extrema_at_joints(
+            Sampler(floats(description), defaults(description)), surfaces
+        )
     except (ModelError, ArithmeticError, StopIteration):
         return description  # whoever builds the model says what is wrong, and where
     x = description.states[0]

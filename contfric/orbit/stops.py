@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 #: Most stops of one segment that are looked for: a segment with more would be no segment.
 _MOST = 1000
+#: A stop this near to a joint (in time, and in the distance to its surface) is at the joint: events at which
+#: that is so are located to about 1e-10.
+_AT_JOINT = 1e-8
 
 
 def stopping_segments(model: Model, word: Word) -> list[int]:
@@ -37,7 +40,7 @@ def displacements(orbit: Orbit, surface: str) -> FloatArray:
         level = flow.level(k, orbit.vector, none, empty)
     c = [o.name for o in model.observables].index(observable)
     modes = [m.name for m in model.modes]
-    found: list[float] = []
+    found: list[tuple[float, float]] = []
     for i, (mode, exit_) in enumerate(orbit.word):
         if model.mode_by_name[mode].sliding and exit_ in model.surface_by_name:
             lies = {d.signs.get(surface) for d in model.domains if d.mode == mode}
@@ -51,11 +54,26 @@ def displacements(orbit: Orbit, surface: str) -> FloatArray:
             )
             if tau < 0.0:
                 break
-            found.append(float(out[0]))
+            found.append((start + tau, float(out[0])))
             start, state, on = start + tau, out.copy(), True
-        if exit_ in model.reset_by_surface:
-            found.append(float(orbit.ends[i, 1]))
-    return np.array(found)
+        state = orbit.ends[i, 1:].copy()
+        apart = flow.observe(c, end, state, orbit.vector, none, empty) - level
+        if exit_ in model.reset_by_surface or abs(apart) < _AT_JOINT:
+            found.append((end, float(state[0])))
+    return _apart(found, orbit.period)
+
+
+def _apart(found: list[tuple[float, float]], period: float) -> FloatArray:
+    """Return the displacements of (time, displacement) pairs, those that are one but once.
+
+    A stop at a joint, within rounding of it, is met by either of its segments, by both or by none.
+    """
+    every = sorted(found)
+    near = [
+        (every[k - 1][0] - (period if k == 0 else 0.0)) > time - _AT_JOINT and len(every) > 1
+        for k, (time, _) in enumerate(every)
+    ]
+    return np.array([x for (_, x), known in zip(every, near, strict=True) if not known])
 
 
 def turning_points(orbit: Orbit) -> FloatArray:

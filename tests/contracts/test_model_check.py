@@ -7,11 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import contfric as cf
 from contfric.cli import main
-from contfric.models.check import Severity, Topic, check_model
+from contfric.models.check import ModelReport, Severity, Topic, check_model
+from contfric.models.check.hidden import check_hidden, hidden_symmetry
+from contfric.models.check.probe import Probe
 from contfric.resources import bundled_dir
 
 GOOD = """\
@@ -192,3 +195,68 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path.write_text(GOOD.replace("states", "sates"), encoding="utf-8")
     assert main(["check", str(path)]) == 2
     assert f"{path}:2: unknown key 'sates'; did you mean 'states'?" in capsys.readouterr().err
+
+
+#: Models that have the symmetry they declare, and some that have none at all.
+SYMMETRIC, PLAIN = ("coulomb-yaml", "dead-band", "bang-bang", "stribeck"), ("popp", "belt")
+
+
+@pytest.mark.parametrize("name", SYMMETRIC)
+def test_a_symmetry_that_is_not_declared_is_proposed(name: str) -> None:
+    declared = cf.load_model(name)
+    assert declared.symmetry is not None
+    report = ModelReport(name)
+    check_hidden(report, Probe(replace(declared, symmetry=None), {}))
+    (finding,) = report.findings
+    assert finding.topic is Topic.UNDECLARED and finding.severity is Severity.NOTE and report.ok
+    assert "Declare it, 'symmetry: x -> -x, v -> -v, t -> t + T/2'" in finding.message
+    found = hidden_symmetry(Probe(declared, {}))
+    assert found is not None
+    assert np.array_equal(np.diag(found.signs), declared.symmetry.array())
+    check_hidden(report, Probe(declared, {}))
+    assert report.counts[Topic.UNDECLARED] == 1  # what is declared is not looked for
+
+
+@pytest.mark.parametrize("name", PLAIN)
+def test_no_symmetry_is_proposed_where_there_is_none(name: str) -> None:
+    assert hidden_symmetry(Probe(cf.load_model(name), {})) is None
+
+
+@pytest.mark.parametrize(
+    "old, new, wanted",
+    [
+        ("u: k*x", "u: k*(x - S)", ["x -> 2*S - x", "Measure x from half of that shift"]),
+        ("S*sign(v)", "(S + (k-1)*v)*sign(v)", ["at these parameters", "x -> -x, v -> -v"]),
+        ("k*x - cos", "x + (k-1)*x**2 - cos", ["at these parameters", "x -> -x, v -> -v"]),
+        ("S*sign(v)", "(S + 0.01*v)*sign(v)", []),
+        ("- S*sign(v)", "- S*sign(v) - 0.1", []),
+        ("level: -S", "level: -0.9*S", []),
+        ("cos(Omega*t)", "cos(Omega*t) - 0.2*cos(2*Omega*t)", []),
+        ("cos(Omega*t)", "cos(Omega*t) - 0.2*cos(3*Omega*t)", ["Declare it"]),
+    ],
+)
+def test_shifts_are_found_and_nothing_false_is(
+    tmp_path: Path, old: str, new: str, wanted: list[str]
+) -> None:
+    text = "\n".join(line for line in GOOD.splitlines() if not line.startswith("symmetry"))
+    assert old in text
+    path = tmp_path / "checked.yaml"
+    path.write_text(text.replace(old, new) + "\n", encoding="utf-8")
+    report = ModelReport("checked")
+    check_hidden(report, Probe(cf.load_model(path), {}))
+    messages = [f.message for f in report.findings]
+    assert len(messages) == bool(wanted)
+    assert all(part in messages[0] for part in wanted)
+
+
+def test_a_shift_of_differing_frictions_is_an_expression_of_them(tmp_path: Path) -> None:
+    path = tmp_path / "checked.yaml"
+    shifted = GOOD.replace("S: 0.2", "S: 0.2, R: 0.4").replace("level: -S", "level: -R")
+    fields = "  forward: {in: {v: +}, field: {x: v, v: -u - R}}\n  backward: {in: {v: -}, field: {x: v, v: -u + S}}\n"
+    head, _, rest = shifted.partition("  forward: {in: {v: +}}\n  backward: {in: {v: -}}\n")
+    text = head.replace("field: {x: v, v: -u - S*sign(v)}\n", "") + fields + rest
+    path.write_text(text.partition("symmetry:")[0], encoding="utf-8")
+    report = ModelReport("checked")
+    check_hidden(report, Probe(cf.load_model(path), {}))
+    (finding,) = report.findings
+    assert "x -> -0.2 - x" in finding.message or "x -> S - R - x" in finding.message
