@@ -174,12 +174,12 @@ class Branch:
     @property
     def x_max(self) -> FloatArray:
         """Largest displacement at each point, shape (k,)."""
-        return self._reach[1]
+        return np.asarray(self._reach[1])
 
     @property
     def x_min(self) -> FloatArray:
         """Smallest displacement at each point, shape (k,)."""
-        return self._reach[0]
+        return np.asarray(self._reach[0])
 
     @property
     def asymmetry(self) -> FloatArray:

@@ -370,8 +370,8 @@ def displaced(model: Model, vector: FloatArray) -> FloatArray:
             return y
     within = ", ".join(f"|{s}| <= {w:g}" for s, w in zip(model.states, half_width, strict=True))
     raise ParameterError(
-        f"no start was found: of {_DRAWS} states of '{model.name}' at t = 0 with {within}, its 'spread', none is in a "
-        "domain. Give one (state=...), or correct 'spread' or the sides of the modes"
+        f"no start was found: of {_DRAWS} states of '{model.name}' at t = 0 with {within}, its 'spread', "
+        "none is in a domain. Give one (state=...), or correct 'spread' or the sides of the modes"
     )
 
 

@@ -209,7 +209,8 @@ def test_a_symmetry_that_is_not_declared_is_proposed(name: str) -> None:
     check_hidden(report, Probe(replace(declared, symmetry=None), {}))
     (finding,) = report.findings
     assert finding.topic is Topic.UNDECLARED and finding.severity is Severity.NOTE and report.ok
-    assert "Declare it, 'symmetry: x -> -x, v -> -v, t -> t + T/2'" in finding.message
+    later = "" if declared.autonomous else ", t -> t + T/2"
+    assert f"Declare it, 'symmetry: x -> -x, v -> -v{later}'" in finding.message
     found = hidden_symmetry(Probe(declared, {}))
     assert found is not None
     assert np.array_equal(np.diag(found.signs), declared.symmetry.array())
@@ -251,12 +252,16 @@ def test_shifts_are_found_and_nothing_false_is(
 
 def test_a_shift_of_differing_frictions_is_an_expression_of_them(tmp_path: Path) -> None:
     path = tmp_path / "checked.yaml"
-    shifted = GOOD.replace("S: 0.2", "S: 0.2, R: 0.4").replace("level: -S", "level: -R")
-    fields = "  forward: {in: {v: +}, field: {x: v, v: -u - R}}\n  backward: {in: {v: -}, field: {x: v, v: -u + S}}\n"
-    head, _, rest = shifted.partition("  forward: {in: {v: +}}\n  backward: {in: {v: -}}\n")
-    text = head.replace("field: {x: v, v: -u - S*sign(v)}\n", "") + fields + rest
+    text = GOOD.replace("S: 0.2", "S: 0.2, R: 0.4").replace("level: -S", "level: -R")
+    for old, new in (
+        ("u: k*x", "u: x"),
+        ("forward: {in: {v: +}}", "forward: {in: {v: +}, field: {x: v, v: -u - R}}"),
+        ("backward: {in: {v: -}}", "backward: {in: {v: -}, field: {x: v, v: -u + S}}"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
     path.write_text(text.partition("symmetry:")[0], encoding="utf-8")
     report = ModelReport("checked")
     check_hidden(report, Probe(cf.load_model(path), {}))
     (finding,) = report.findings
-    assert "x -> -0.2 - x" in finding.message or "x -> S - R - x" in finding.message
+    assert "x -> S - R - x, v -> -v" in finding.message and "Measure x" in finding.message

@@ -103,7 +103,8 @@ def _shift(
 
     def missing(shift: FloatArray) -> FloatArray:
         images = (Affine(signs, shift, pair).of(p, probe.period) for p in places)
-        return np.concatenate([probe.field(pair[1], *image) for image in images]) - wanted
+        found = np.concatenate([probe.field(pair[1], *image) for image in images])
+        return np.asarray(found - wanted)
 
     for _ in range(_STEPS):
         here = missing(k)
@@ -198,8 +199,8 @@ def _advice(probe: Probe, found: Affine) -> str:
     pairs = "orbits come in pairs of mirror images, and branch points where that symmetry is broken"
     if not always:
         return (
-            f"at these parameters the model has a symmetry that is not declared: {shown}. Expect that {pairs}. It "
-            "does not hold at parameters beside these, so that it cannot be declared"
+            f"at these parameters the model has a symmetry that is not declared: {shown}. Expect that "
+            f"{pairs}. It does not hold at parameters beside these, so that it cannot be declared"
         )
     if np.any(found.shift):
         moved = [s for s, k in zip(probe.model.states, found.shift, strict=True) if k != 0.0]
