@@ -1,6 +1,6 @@
 """Symmetries that a model has and does not declare: changes of sign of states, with shifts.
 
-A map ``y -> K y + k``, K diagonal with entries 1 and -1, with a shift by half a period, is looked for that takes
+A map ``y -> K y + k``, K diagonal with entries 1 and -1, and half a period later, is looked for that takes
 the fields of all modes to those of others, surfaces to surfaces with their sides exchanged, and resets to
 resets. The shift k follows from one pair of modes by least squares; everything else is a test of it.
 """
@@ -106,12 +106,14 @@ def _shift(
         found = np.concatenate([probe.field(pair[1], *image) for image in images])
         return np.asarray(found - wanted)
 
+    converged = False
     for _ in range(_STEPS):
         here = missing(k)
         if not np.all(np.isfinite(here)):
             return None
-        if np.max(np.abs(here)) <= _SAME * (1.0 + np.max(np.abs(wanted))):
+        if converged:  # by one step more than it takes
             return np.where(np.abs(k) < _SAME, 0.0, k)
+        converged = bool(np.max(np.abs(here)) <= _SAME * (1.0 + np.max(np.abs(wanted))))
         slopes = np.empty((len(here), len(free)))
         for column, i in enumerate(free):
             step = np.zeros(len(k))
