@@ -163,12 +163,14 @@ class Branch:
         """Least and largest displacement at each point, shape (2, k)."""
         if not reaches_at_joints(self.model):
             return np.array([reach_of(orbit) for orbit in self]).reshape(-1, 2).T
-        x = self.joints[:, :, 1]
-        low, high = x.min(axis=1), x.max(axis=1)
+        count = self.system.segments
+        x = [self.joints[:, i, 1] for i in range(count)]
         if self.system.half:
-            image = self.joints[:, :, 1:] @ self.system.layout.closure[0]
-            low = np.minimum(low, image.min(axis=1))
-            high = np.maximum(high, image.max(axis=1))
+            x += [self.joints[:, i, 1:] @ self.system.layout.closure[0] for i in range(count)]
+        low, high = x[0].copy(), x[0].copy()
+        for column in x[1:]:  # one after the other: numpy is slow where an axis is short
+            np.minimum(low, column, out=low)
+            np.maximum(high, column, out=high)
         return np.array([low, high])
 
     @property
