@@ -15,12 +15,13 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.atlas.collect import Event
+from contfric.atlas.crossings import follow_crossing, whole_branch
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.matching import SAME_MOTION, part_distance
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, candidates, directions, wider_candidates
-from contfric.continuation.crossing import Crossing, Direction, crossing_near, starts_along
+from contfric.continuation.crossing import LOCATED, Direction, crossing_near
 from contfric.continuation.events import (
     ACCURACY,
     TERMINAL,
@@ -39,7 +40,7 @@ from contfric.continuation.switching import (
     null_vector,
     settings_value,
 )
-from contfric.continuation.trace import continue_orbit, trace_side
+from contfric.continuation.trace import trace_side
 from contfric.continuation.walked import walked
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
@@ -262,9 +263,9 @@ def where(bifurcation: Bifurcation, parameter: str) -> str:
 
 def _follow_branch_point(state: Exploration, event: Event) -> None:
     orbit = event.bifurcation.orbit
-    crossing = crossing_near(orbit, state.settings)
+    crossing = crossing_near(orbit, state.settings, LOCATED)
     if crossing is not None:
-        _follow_crossing(state, crossing, event)
+        follow_crossing(state, crossing, event, _follow_departure)
         return
     if not orbit.system.half:
         _follow_both_ways(state, orbit, event)
@@ -274,55 +275,6 @@ def _follow_branch_point(state: Exploration, event: Event) -> None:
     if any(not state.branches[i].system.half for i in event.branches):
         return
     _follow_departure(state, orbit.as_whole(), event, EndReason.BP)
-
-
-def _follow_crossing(state: Exploration, crossing: Crossing, event: Event) -> None:
-    """Trace the two curves of orbits that cross at a branch point.
-
-    A curve whose parameter turns there is two branches, as it is where a declared symmetry is broken.
-    """
-    for direction in crossing.directions:
-        if not direction.turns:
-            _follow_through(state, crossing, direction, event)
-            continue
-        for way in (direction, direction.reversed()):
-            known = (
-                i
-                for i in event.branches
-                if starts_along(state.branches[i], crossing, way, state.settings.scale)
-            )
-            text = "the branch that leaves along the null vector"
-            if (index := next(known, None)) is not None:
-                state.judge(event, text, Verdict.KNOWN, index)
-            else:
-                _follow_departure(state, crossing.orbit, event, EndReason.BP, way)
-
-
-def _follow_through(
-    state: Exploration, crossing: Crossing, direction: Direction, event: Event
-) -> None:
-    """Continue the branch that passes a branch point in a direction, from just beside it."""
-    orbit, settings = crossing.orbit, state.settings
-    reason = "the branch that goes on through the event"
-    for way in (direction, direction.reversed()):
-        start = leave_along(orbit, settings, way, EndReason.BP.value)
-        if start is None or not settings.low <= start.point.value <= settings.high:
-            continue
-        active = orbit.model.index_of(settings.parameter)
-        there = polish(start.point.orbit(orbit.system, orbit.vector, active), damped=False)
-        if not (there.converged and there.admissible):
-            continue
-        known = state.known(there)
-        branch = None if known is not None else _whole_branch(there, settings)
-        if branch is not None:
-            known = state.known(branch[len(branch) // 2])
-        if known is not None or branch is None:
-            state.judge(event, reason, Verdict.KNOWN, known)
-        else:
-            state.judge(event, reason, Verdict.ACCEPTED, len(state.branches))
-            state.add_from(branch, event)
-        return
-    state.judge(event, reason, Verdict.REFUSED, why="no orbit beside the event was found")
 
 
 def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
@@ -385,20 +337,8 @@ def _through(state: Exploration, orbit: Orbit) -> Branch | None:
         vector[active] = beside
         solved = polish(Orbit(orbit.system, orbit.joints, vector, np.inf))
         if solved.converged and solved.admissible:
-            return _whole_branch(shortest(solved), settings)
+            return whole_branch(shortest(solved), settings)
     return None
-
-
-def _whole_branch(orbit: Orbit, settings: Settings) -> Branch:
-    """Return the branch of an orbit, both ways."""
-    return continue_orbit(
-        orbit,
-        settings.parameter,
-        (settings.low, settings.high),
-        max_step=settings.largest,
-        stability=settings.stability and not orbit.system.holds,
-        max_points=settings.most_points,
-    )
 
 
 # ------------------------------------------------------------------------- period doubling

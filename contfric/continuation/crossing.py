@@ -51,6 +51,8 @@ _CROSSES = 1e-8
 _TURNS = 1e-6
 #: Share of a step by which a branch point may lie outside of it: a change of sign at its very end.
 _BESIDE = 1e-3
+#: A located branch point is good to far less than this (scaled product).
+LOCATED = 1e-5
 #: Cosine above which two directions are the same.
 _ALONG = 0.9
 #: Joints that agree to this are those of the same motion: ends of branches at a branch point are located.
@@ -100,8 +102,8 @@ class Crossing:
         return first if first.cosine(joints, slope, scale) >= 0.0 else first.reversed()
 
 
-def crossing_near(orbit: Orbit, settings: Settings) -> Crossing | None:
-    """Return the branch point that an orbit is near to; None if there is none."""
+def crossing_near(orbit: Orbit, settings: Settings, within: float) -> Crossing | None:
+    """Return the branch point within a distance of an orbit (scaled product); None if there is none."""
     system = orbit.system
     active = orbit.model.index_of(settings.parameter)
     problem = _Problem(system, orbit.vector, active, settings.width)
@@ -109,8 +111,10 @@ def crossing_near(orbit: Orbit, settings: Settings) -> Crossing | None:
     located = _moore(problem, x)
     if located is None:
         return None
+    moved = located[0] - x
+    far = np.sum(moved[:-1] ** 2) / system.segments + moved[-1] ** 2 > within**2
     x, psi = located
-    directions = _directions(problem, x, psi)
+    directions = None if far else _directions(problem, x, psi)
     if directions is None:
         return None
     joints, vector = problem.split(x)
@@ -228,15 +232,16 @@ def crossing_between(
         joints=before.joints + share * (after.joints - before.joints),
         value=before.value + share * (after.value - before.value),
     )
-    crossing = crossing_near(near.orbit(orbit.system, orbit.vector, active), settings)
+    chord = after.joints - before.joints, after.value - before.value
+    square = _product(chord, chord, settings.scale)
+    here = near.orbit(orbit.system, orbit.vector, active)
+    crossing = crossing_near(here, settings, 2.0 * float(np.sqrt(square)))
     if crossing is None:
         return None
-    chord = after.joints - before.joints, after.value - before.value
     way = (
         crossing.orbit.joints - before.joints,
         float(crossing.orbit.vector[active]) - before.value,
     )
-    square = _product(chord, chord, settings.scale)
     at = _product(chord, way, settings.scale) / square
     far = _product(way, way, settings.scale) > (1.0 + _BESIDE) * square
     if far or not -_BESIDE < at < 1.0 + _BESIDE:

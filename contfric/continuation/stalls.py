@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contfric.continuation.crossing import Crossing, crossing_near
+from contfric.continuation.crossing import crossing_near
 from contfric.continuation.events import Bifurcation, EndReason, Kind
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import bifurcation_at
@@ -28,8 +28,8 @@ def stalled_at(orbit: Orbit, tip: Point, settings: Settings) -> tuple[str, Bifur
     """
     active = orbit.model.index_of(settings.parameter)
     here = tip.orbit(orbit.system, orbit.vector, active)
-    crossing = crossing_near(here, settings)
-    if crossing is None or _distance(crossing, tip, settings) > _NEAR:
+    crossing = crossing_near(here, settings, _NEAR)
+    if crossing is None:
         return _multipliers(here), None
     found = crossing.orbit
     where = f"{settings.parameter} = {found.params[settings.parameter]:.12g}"
@@ -38,13 +38,6 @@ def stalled_at(orbit: Orbit, tip: Point, settings: Settings) -> tuple[str, Bifur
     if not turns:
         return message, None
     return message, bifurcation_at(Kind.BP, found, tip, None, tip, settings)
-
-
-def _distance(crossing: Crossing, tip: Point, settings: Settings) -> float:
-    found, active = crossing.orbit, crossing.orbit.model.index_of(settings.parameter)
-    gap = float(found.vector[active]) - tip.value
-    square = np.sum((found.joints - tip.joints) ** 2) / len(tip.joints)
-    return float(np.sqrt(square + gap**2 * settings.scale))
 
 
 def _multipliers(here: Orbit) -> str:

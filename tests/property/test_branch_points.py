@@ -112,9 +112,8 @@ def test_an_imperfect_pitchfork_has_a_fold_and_no_branch_point(imperfection: flo
     branch = cf.continue_orbit(orbit_at(far, terms), "mu", BOUNDS)
     (event,) = branch.bifurcations
     assert event.kind is cf.Kind.SN and abs(event.params["mu"] - fold) < 1e-9
-    assert (
-        crossing_near(event.orbit, settings_of(event.orbit, "mu", BOUNDS, None, True, 100)) is None
-    )
+    settings = settings_of(event.orbit, "mu", BOUNDS, None, True, 100)
+    assert crossing_near(event.orbit, settings, np.inf) is None
 
 
 @pytest.mark.parametrize(
