@@ -62,6 +62,8 @@ def returns(model: Model, word: ReducedWord) -> bool:
     False
     """
     surface = model.stop_surface
+    if not surface:
+        return True
     moving = {mode for mode, _ in word if not model.mode_by_name[mode].sliding}
     sides = {inside_sign(model, mode, surface) for mode in moving}
     return 0 in sides or {1, -1} <= sides

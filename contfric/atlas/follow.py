@@ -15,11 +15,13 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.atlas.collect import Event
+from contfric.atlas.crossings import follow_crossing, whole_branch
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.matching import SAME_MOTION, part_distance, same_place
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, directions, sequences_of
+from contfric.continuation.crossing import LOCATED, Direction, crossing_near
 from contfric.continuation.events import (
     ACCURACY,
     TERMINAL,
@@ -30,9 +32,15 @@ from contfric.continuation.events import (
     Verdict,
 )
 from contfric.continuation.incident import incident_forms
-from contfric.continuation.points import Point, Settings, settings_of
+from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side, first_point
-from contfric.continuation.switching import NEARER, leaps, leave_branch_point, settings_value
+from contfric.continuation.switching import (
+    NEARER,
+    leaps,
+    leave_along,
+    null_vector,
+    settings_value,
+)
 from contfric.continuation.trace import follow_orbit, trace_side
 from contfric.continuation.vertices import symmetrised
 from contfric.continuation.walked import walked
@@ -368,6 +376,10 @@ def where(bifurcation: Bifurcation, parameter: str) -> str:
 
 def _follow_branch_point(state: Exploration, event: Event) -> None:
     orbit = event.bifurcation.orbit
+    crossing = crossing_near(orbit, state.settings, LOCATED)
+    if crossing is not None:
+        follow_crossing(state, crossing, event, _follow_departure)
+        return
     if not orbit.system.half:
         _follow_both_ways(state, orbit, event)
         return
@@ -391,13 +403,20 @@ def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
         state.add_from(branch, event)
 
 
-def _follow_departure(state: Exploration, orbit: Orbit, event: Event, reason: EndReason) -> None:
-    """Trace the branch that leaves a branch point or a period doubling."""
+def _follow_departure(
+    state: Exploration,
+    orbit: Orbit,
+    event: Event,
+    reason: EndReason,
+    direction: Direction | None = None,
+) -> None:
+    """Trace the branch that leaves a branch point or a period doubling; by default along the null vector."""
     settings = settings_for(orbit, state.settings)
     text = "the branch that leaves along the null vector"
     active = orbit.model.index_of(settings.parameter)
+    along = direction or Direction(null_vector(orbit), 0.0)
     for distance in NEARER:
-        departure = leave_branch_point(orbit, settings, reason.value, distance)
+        departure = leave_along(orbit, settings, along, reason.value, distance)
         if departure is None:
             continue
         there = departure.point.orbit(orbit.system, orbit.vector, active)
@@ -407,7 +426,7 @@ def _follow_departure(state: Exploration, orbit: Orbit, event: Event, reason: En
         if known is not None:
             state.judge(event, text, Verdict.KNOWN, known)
             return
-        if distance != NEARER[-1] and leaps(orbit, settings, departure, distance):
+        if distance != NEARER[-1] and leaps(orbit, settings, departure, distance, along):
             continue
         side = trace_side(orbit, departure.point, settings, progress=state.progress)
         if _went_somewhere(side, event):
@@ -431,16 +450,7 @@ def _through(state: Exploration, orbit: Orbit) -> Branch | None:
         vector[active] = beside
         solved = polish(Orbit(orbit.system, orbit.joints, vector, np.inf))
         if solved.converged and solved.admissible:
-            found = shortest(solved)
-            own = settings_of(
-                found,
-                settings.parameter,
-                (settings.low, settings.high),
-                settings.largest,
-                settings.stability and not orbit.system.holds,
-                settings.most_points,
-            )
-            return follow_orbit(found, own)
+            return whole_branch(shortest(solved), settings)
     return None
 
 

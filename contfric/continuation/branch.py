@@ -16,7 +16,7 @@ from contfric.errors import ParameterError
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.stops import stopping_segments
+from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
 from contfric.orbit.system import IntArray, System, build_system
 from contfric.orbit.words import decode, encode, mirror_pairs
 
@@ -171,15 +171,30 @@ class Branch:
         second = np.concatenate([mirrored[:, 1:], x[:, :1]], axis=1)
         return np.concatenate([ends[:, at], second[:, at]], axis=1)
 
+    @cached_property
+    def _reach(self) -> FloatArray:
+        """Least and largest displacement at each point, shape (2, k)."""
+        if not reaches_at_joints(self.model):
+            return np.array([reach_of(orbit) for orbit in self]).reshape(-1, 2).T
+        count = self.system.segments
+        x = [self.joints[:, i, 1] for i in range(count)]
+        if self.system.half:
+            x += [self.joints[:, i, 1:] @ self.system.layout.closure[0] for i in range(count)]
+        low, high = x[0].copy(), x[0].copy()
+        for column in x[1:]:  # one after the other: numpy is slow where an axis is short
+            np.minimum(low, column, out=low)
+            np.maximum(high, column, out=high)
+        return np.array([low, high])
+
     @property
     def x_max(self) -> FloatArray:
         """Largest displacement at each point, shape (k,)."""
-        return np.asarray(np.nanmax(self.stops, axis=1, initial=-np.inf))
+        return np.asarray(self._reach[1])
 
     @property
     def x_min(self) -> FloatArray:
         """Smallest displacement at each point, shape (k,)."""
-        return np.asarray(np.nanmin(self.stops, axis=1, initial=np.inf))
+        return np.asarray(self._reach[0])
 
     @property
     def asymmetry(self) -> FloatArray:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from contfric.continuation.crossing import crossing_between
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.report import ROUGH, bifurcation_at
@@ -55,6 +56,11 @@ def smooth_events(
         a, b = before.tests[base + column], after.tests[base + column]
         if not a * b < 0.0 or (column == CHI_ONE and folded):
             continue  # chi(1) of a fold vanishes with it
+        if column == CHI_ONE:
+            crossing = _crossing(orbit, before, after, beyond, a / (a - b), settings)
+            if crossing is not None:
+                found.append(crossing)
+                continue
         point = locate_change(orbit, before, after, settings, BY_TEST, base + column)
         if point is None or point.lost or _is_pole(point.tests[base + column], a, b):
             if column == FOLD:
@@ -62,6 +68,11 @@ def smooth_events(
                 # singular, and Newton may be lost around it: look from between the two points
                 between = parabola_vertex(before, after, a / (a - b))
                 vertex = _fold(orbit, before, beyond, between, settings)
+                if vertex[0].kind is Kind.SN:
+                    vertex = (
+                        _vertex_of_crossing(orbit, before, after, beyond, a / (a - b), settings)
+                        or vertex
+                    )
                 folded = True
                 if vertex[0].kind is Kind.SN:
                     if not _is_vertical(before, after, settings):
@@ -77,6 +88,10 @@ def smooth_events(
         if column == FOLD:
             folded = True
             vertex = _fold(orbit, before, beyond, point, settings)
+            if vertex[0].kind is Kind.SN:
+                share = (point.arc - before.arc) / (after.arc - before.arc)
+                crossing = _vertex_of_crossing(orbit, before, after, beyond, share, settings)
+                vertex = crossing or vertex
             vertical = _is_vertical(before, after, settings, point) or _is_idle(
                 orbit, before, point, after, settings
             )
@@ -99,6 +114,25 @@ def smooth_events(
             event = replace(event, accuracy=ROUGH)
         found.append((event, point))
     return [*found, *_tangencies(orbit, before, beyond, settings)]
+
+
+def _crossing(
+    orbit: Orbit, before: Point, after: Point, beyond: Point, share: float, settings: Settings
+) -> tuple[Bifurcation, Point] | None:
+    """Return the branch point in a step, if there is one: another curve of orbits crosses there."""
+    found = crossing_between(orbit, before, after, share, settings)
+    if found is None:
+        return None
+    crossing, point = found
+    return bifurcation_at(Kind.BP, crossing.orbit, before, beyond, point, settings), point
+
+
+def _vertex_of_crossing(
+    orbit: Orbit, before: Point, after: Point, beyond: Point, share: float, settings: Settings
+) -> tuple[Bifurcation, Point] | None:
+    """Return the branch point at which the parameter turns, if that is what a fold is."""
+    found = _crossing(orbit, before, after, beyond, share, settings)
+    return found if found is not None and found[1].slope == 0.0 else None
 
 
 def leapt_vertex(

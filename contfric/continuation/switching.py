@@ -1,5 +1,6 @@
 """What leaves a branch point or a period doubling.
 
+Where two curves of orbits of one problem cross, :mod:`contfric.continuation.crossing` has their directions.
 At a branch point of a symmetric orbit the problem on the *whole* cycle, at fixed
 parameters, has a null vector phi that is antisymmetric; at a period doubling the problem on the cycle
 run through twice has one that changes sign after one turn. The branch that leaves is tangent to
@@ -12,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from contfric.continuation.crossing import Direction
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.side import first_point
 from contfric.models.definition import FloatArray
@@ -56,15 +58,28 @@ def leave_branch_point(
     orbit: Orbit, settings: Settings, reason: str, distance: float = LEAVE
 ) -> Departure | None:
     """Return a start on the branch that leaves a singular orbit along its null vector."""
-    phi = null_vector(orbit)
+    return leave_along(orbit, settings, Direction(null_vector(orbit), 0.0), reason, distance)
+
+
+def leave_along(
+    orbit: Orbit,
+    settings: Settings,
+    direction: Direction,
+    reason: str,
+    distance: float = LEAVE,
+) -> Departure | None:
+    """Return a start on the branch that leaves a singular orbit in a direction."""
     origin = first_point(orbit, settings)
-    moved = replace(orbit, joints=orbit.joints + distance * phi)
-    point = first_point(moved, settings, phi, 0.0)
+    vector = orbit.vector.copy()
+    vector[orbit.model.index_of(settings.parameter)] += distance * direction.slope
+    joints = orbit.joints + distance * direction.joints
+    moved = replace(orbit, joints=joints, vector=vector)
+    point = first_point(moved, settings, direction.joints, direction.slope)
     if point is None:
         return None
     # the tangent points away from the branch point
-    away = point.joints - orbit.joints
-    if float(np.sum(away * point.tangent)) < 0.0:
+    away = Direction(point.joints - orbit.joints, point.value - settings_value(orbit, settings))
+    if away.cosine(point.tangent, point.slope, settings.scale) < 0.0:
         point = point.reversed()
     if origin is None:
         origin = replace(point)
@@ -73,7 +88,13 @@ def leave_branch_point(
     return Departure(orbit, point, origin, reason)
 
 
-def leaps(orbit: Orbit, settings: Settings, departure: Departure, distance: float) -> bool:
+def leaps(
+    orbit: Orbit,
+    settings: Settings,
+    departure: Departure,
+    distance: float,
+    direction: Direction | None = None,
+) -> bool:
     """Tell whether a start lies behind a period doubling that belongs to the branch, too.
 
     What watches a multiplier -1 has another sign there than beside the branch point. Multipliers may
@@ -81,7 +102,8 @@ def leaps(orbit: Orbit, settings: Settings, departure: Departure, distance: floa
     """
     from contfric.continuation.steps import CHI_MINUS
 
-    nearer = leave_branch_point(orbit, settings, departure.reason, _AT_ONCE * distance)
+    along = direction or Direction(null_vector(orbit), 0.0)
+    nearer = leave_along(orbit, settings, along, departure.reason, _AT_ONCE * distance)
     if nearer is None:
         return False
     watched = [float(p.tests[CHI_MINUS - EXTRA]) for p in (departure.point, nearer.point)]

@@ -23,6 +23,7 @@ from contfric.continuation.points import (
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.sliding import nearly_reached
 from contfric.continuation.smooth import SAME_PLACE, leapt_vertex, vertex_at
+from contfric.continuation.stalls import stalled_at
 from contfric.continuation.trial import locate_value
 from contfric.continuation.vertices import at_vertex, left_at, passed_vertex
 from contfric.errors import ConvergenceError, function_of
@@ -51,6 +52,9 @@ _NO_SIZE = 1e-5
 _SHORTER, _NEAREST = 8.0, 1e-8
 #: A step this short after hundreds of points (arclength) gets nowhere.
 _CRAWLS = 1e-6
+
+#: Why a branch ends at a branch point at which its parameter turns, and no declared symmetry is broken.
+CROSSED = "branch point: the parameter turns there, and another branch crosses"
 
 Progress = Callable[[str], None]
 
@@ -195,7 +199,7 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
             upper = side.tip.value > 0.5 * (settings.low + settings.high)
             side.end = _limit_end(upper, settings)
         elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
-            _stuck_at_vertex(orbit, side, settings)
+            _end_stalled(orbit, side, settings)
         if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and _slows_down(side, settings):
             side.end = End(EndReason.PERIOD)
         return True, step
@@ -240,6 +244,18 @@ def _stuck_at_vertex(orbit: Orbit, side: Side, settings: Settings) -> bool:
     if found is not None:
         _end_at_vertex(orbit, side, settings, found, side.tip)
     return found is not None
+
+
+def _end_stalled(orbit: Orbit, side: Side, settings: Settings) -> None:
+    """End a side that gets no farther; its message says whether a multiplier is at +1 there."""
+    if _stuck_at_vertex(orbit, side, settings):
+        return
+    message, found = stalled_at(orbit, side.tip, settings)
+    side.end = End(EndReason.STEP, message)
+    if found is not None:
+        active = orbit.model.index_of(settings.parameter)
+        side.put_tip(at_vertex(side.tip, found.orbit, active))
+        side.end = End(EndReason.BP, CROSSED, found)
 
 
 def _end_at_vertex(
@@ -317,7 +333,7 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         if not point.lost and (note := not_critical(bifurcation, before, after, settings)):
             side.notes.append(note)
             continue
-        ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, orbit)
+        ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, point, orbit)
         if ends is None:
             side.bifurcations.append(bifurcation)
             continue
@@ -328,6 +344,8 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         else:
             side.put_tip(point)
         message = _end_message(bifurcation) if ends.name == bifurcation.kind.name else ""
+        if ends is EndReason.BP and bifurcation.orbit.system.half == orbit.system.half:
+            message = CROSSED
         side.end = End(ends, message, None if point.lost else bifurcation)
         return True
     reached = after if limit is None else limit[0]
@@ -398,10 +416,12 @@ def _limit_crossed(
     return point, settings.high_reason if upper else settings.low_reason
 
 
-def _ends_branch(bifurcation: Bifurcation, orbit: Orbit) -> EndReason | None:
+def _ends_branch(bifurcation: Bifurcation, point: Point, orbit: Orbit) -> EndReason | None:
     """Return why a branch ends at a bifurcation, or None if it goes on."""
     if bifurcation.kind in TERMINAL:
         return EndReason[bifurcation.kind.name]
+    if bifurcation.kind is Kind.BP and point.slope == 0.0:  # another curve crosses at its vertex
+        return EndReason.BP
     if not orbit.system.half and bifurcation.kind is Kind.BP and bifurcation.orbit.system.half:
         return EndReason.BP
     if bifurcation.kind is Kind.PD and bifurcation.orbit.periods < orbit.periods:

@@ -77,7 +77,7 @@ class Model:
     surfaces : tuple of Surface
         Those of one observable from the highest level down.
     stop_surface : str
-        Surface (or kink) on which the displacement is stationary: stops and extrema lie on it.
+        Surface (or kink) on which the displacement is stationary: stops lie on it; empty if there is none.
     flow_factory : callable
         Returns the :class:`~contfric.flow.interface.CompiledFlow`; called at first use only.
     spread : callable
@@ -100,6 +100,9 @@ class Model:
     rounding : float
         Relative rounding of its motion, the floor of what Newton's method can reach: that of integrated
         flows with large accelerations by default; a closed form has less.
+    displacement : str
+        The displacement as an observable, where it may have extrema inside of segments; empty where they
+        are at joints, as they are with a joint wherever the mass stops.
     definition : str
         Text from which the model can be built anywhere (:mod:`contfric.models.description`); empty if
         it is known by its name only.
@@ -126,6 +129,7 @@ class Model:
     filippov: bool = False
     max_step: float | None = None
     rounding: float = 1e-13
+    displacement: str = ""
     definition: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
@@ -183,7 +187,7 @@ class Model:
 
     def cuts(self, surface: str) -> bool:
         """Return whether motion is cut at a surface: it is switching, or has a reset."""
-        if surface in self.kinks:
+        if surface in self.kinks or not surface:
             return False
         return self.surface_by_name[surface].switching or surface in self.reset_by_surface
 

@@ -10,6 +10,7 @@ from contfric.errors import ModelError
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.description import Description, DomainText, ModeText
 from contfric.models.entries import Part
+from contfric.models.measuring import measured
 from contfric.models.names import Names
 
 KEYS = (
@@ -92,7 +93,7 @@ def describe(data: Mapping[str, Any]) -> Description:
         max_step=_max_step(top),
     )
     _check_expressions(found, names)
-    return found
+    return measured(found)
 
 
 def _states(top: Part) -> tuple[str, ...]:

@@ -16,9 +16,9 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import pencil_of_turn
-from contfric.orbit.reading import read_signature
+from contfric.orbit.reading import read_signature, segment_domains
 from contfric.orbit.simulation import signs_at
-from contfric.orbit.stops import displacements, stopping_segments
+from contfric.orbit.stops import displacements, reach_of, stopping_segments, turning_points
 from contfric.orbit.system import Margin, System, Word, build_system
 from contfric.orbit.words import half_of, mirror_pairs, whole_of
 from contfric.signature import Signature
@@ -312,19 +312,25 @@ class Orbit:
     @cached_property
     def stops(self) -> FloatArray:
         """Displacements at the stops and impacts in the order of the orbit, shape (stops,)."""
+        if not self.model.stop_surface:
+            return turning_points(self)
         if not self.model.cuts(self.model.stop_surface):
             return displacements(self, self.model.stop_surface)
         return self.ends[stopping_segments(self.model, self.word), 1]
 
+    @cached_property
+    def _reach(self) -> tuple[float, float]:
+        return reach_of(self)
+
     @property
     def x_max(self) -> float:
         """Largest displacement, x k / F_0."""
-        return float(self.stops.max(initial=-np.inf))
+        return self._reach[1]
 
     @property
     def x_min(self) -> float:
         """Smallest displacement, x k / F_0."""
-        return float(self.stops.min(initial=np.inf))
+        return self._reach[0]
 
     @property
     def asymmetry(self) -> float:
@@ -359,20 +365,32 @@ class Orbit:
         times: list[float] = []
         states: list[FloatArray] = []
         names: list[str] = []
+        paths = segment_domains(self, self._watched[1])
         for i, (start, end) in enumerate(zip(self.cycle[:, 0], self.ends[:, 0], strict=True)):
             count = max(3, int(np.ceil(points * (end - start) / self.period)))
-            for duration in np.linspace(0.0, end - start, count):
+            path = paths[i]
+            for k, duration in enumerate(np.linspace(0.0, end - start, count)):
                 times.append(float(start + duration))
                 states.append(self._within(i, float(duration)))
-                names.append(self._domain_in(i, times[-1], states[-1]))
+                if k == count - 1:  # a segment begins and ends where its word says
+                    path = path[-1:]
+                elif k > 0:
+                    path = self._rest_of(path, times[-1], states[-1])
+                names.append(path[0])
         return np.array(times), np.array(states), names
 
-    def _domain_in(self, i: int, time: float, state: FloatArray) -> str:
+    def _rest_of(self, path: list[str], time: float, state: FloatArray) -> list[str]:
+        """Return the domains of a segment from that of one of its samples on.
+
+        It is the first that the sample fits, on a surface either side of it: none is left for an earlier one.
+        """
         signs = signs_at(self.model, time, state, self.vector)
-        mode = self.word[i][0]
-        own = [d for d in self.model.domains if d.mode == mode]
-        fitting = [d for d in own if all(d.signs[s] * signs[s] >= 0 for s in signs)]
-        return (fitting or own)[0].name
+        clear = [s.name for s in self.model.surfaces if not s.switching]
+        for k, name in enumerate(path):
+            own = self.model.domain_by_name[name].signs
+            if all(own[s] * signs[s] >= 0 for s in clear):
+                return path[k:]
+        return path
 
     def to_dataframe(self, points: int = 400) -> pd.DataFrame:
         """Return one period as a table: t, the states, the domain (needs pandas)."""

@@ -29,22 +29,45 @@ def read_signature(orbit: Orbit, labels: IntArray) -> Signature:
     return replace(plain, name=plain.auto_name(orbit.symmetric))
 
 
-def _domains(orbit: Orbit, labels: IntArray) -> list[str]:
-    """Domains of the whole orbit, with its holds and impacts between them."""
+def segment_domains(orbit: Orbit, labels: IntArray) -> list[list[str]]:
+    """Return the domains that each segment of the whole orbit passes, in order.
+
+    Those of a hold are the domain that it rests in.
+    """
+    model, system = orbit.model, orbit.system
+    if system.domains:  # in full form each segment is one of them
+        found = [[name] for name in system.domains]
+    else:
+        found = _paths(orbit, labels)
+    return (
+        found + [[model.mirror_domain[d] for d in own] for own in found] if system.half else found
+    )
+
+
+def _paths(orbit: Orbit, labels: IntArray) -> list[list[str]]:
+    """Domains of each segment of one turn."""
     model, system = orbit.model, orbit.system
     surfaces = [s.name for s in model.surfaces]
     ends, word = _end_domains(orbit), orbit.word
     crossed: list[list[str]] = [[] for _ in system.word]
     for row, code in zip(system.layout.labels, labels, strict=True):
         crossed[row[0]] += decode(int(code), surfaces)
+    return [
+        [ends[i]]
+        if is_hold(word[i][1])
+        else passed_domains(model, _start_domain(orbit, i, ends), ends[i], passed)
+        for i, passed in enumerate(crossed)
+    ]
+
+
+def _domains(orbit: Orbit, labels: IntArray) -> list[str]:
+    """Domains of the whole orbit, with its holds and impacts between them."""
+    model, system = orbit.model, orbit.system
     domains: list[str] = []
-    for i, passed in enumerate(crossed):
-        if is_hold(word[i][1]):
-            domains.append(word[i][1])
-            continue
-        domains += passed_domains(model, _start_domain(orbit, i, ends), ends[i], passed)
-        if word[i][1] in model.reset_by_surface:
-            domains.append(impact_at(word[i][1]))
+    for path, (_, exit_) in zip(_paths(orbit, labels), system.word, strict=True):
+        domains += [exit_] if is_hold(exit_) else path
+        if exit_ in model.reset_by_surface:
+            domains.append(impact_at(exit_))
     if system.half:
         assert model.symmetry is not None
         image = {**model.symmetry.surfaces, **model.mirror_domain}

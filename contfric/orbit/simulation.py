@@ -351,20 +351,44 @@ def run(
 
 #: Events that the first call of the simulation may follow: milliseconds, or half a second of a stiff one.
 _FIRST_EVENTS = 256
-#: Displacements that a start is looked for at where the region is one-sided, in half-widths of the model.
+#: Displacements that a start is looked for at, in half-widths of the model: where the first is in no
+#: domain (behind a wall, or on a surface that motion does not leave), the next.
 _PLACES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
+#: States that are drawn where none of these is: enough to hit a region of a hundredth of the spread.
+_DRAWS = 1000
 
 
 def displaced(model: Model, vector: FloatArray) -> FloatArray:
-    """Return the initial state by default: displaced from rest, on the right side of walls."""
+    """Return the initial state by default: displaced from rest, else drawn; in a domain.
+
+    Raises
+    ------
+    ParameterError
+        If no state that was tried is in a domain.
+    """
     half_width: FloatArray = model.spread(model.mapping(vector))
-    y = np.zeros(len(model.states))
-    for place in _PLACES if model.resets else _PLACES[:1]:
+    rest = np.zeros(len(model.states))
+    for place in _PLACES:
+        y = rest.copy()
         y[0] = place * half_width[0]
-        signs = signs_at(model, 0.0, y, vector)
-        if model.domain_at(signs) or _side_of_rates(model, 0.0, y, vector, signs):
-            break
-    return y
+        if _is_start(model, y, vector):
+            return y
+    rng = np.random.default_rng(1)  # always the same start
+    for _ in range(_DRAWS):
+        y = rng.uniform(-1.0, 1.0, half_width.shape) * half_width
+        if _is_start(model, y, vector):
+            return y
+    within = ", ".join(f"|{s}| <= {w:g}" for s, w in zip(model.states, half_width, strict=True))
+    raise ParameterError(
+        f"no start was found: of {_DRAWS} states of '{model.name}' at t = 0 with {within}, its 'spread', "
+        "none is in a domain. Give one (state=...), or correct 'spread' or the sides of the modes"
+    )
+
+
+def _is_start(model: Model, y: FloatArray, vector: FloatArray) -> bool:
+    """Tell whether a state at time 0 is in a domain, or leads into one."""
+    signs = signs_at(model, 0.0, y, vector)
+    return bool(model.domain_at(signs) or _side_of_rates(model, 0.0, y, vector, signs))
 
 
 def _checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Stops: where the displacement is stationary, at joints or inside of segments."""
+"""Stops and extrema: where the displacement is stationary, at joints or inside of segments."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 #: Most stops of one segment that are looked for: a segment with more would be no segment.
 _MOST = 1000
+#: A stop this near to a joint (in time, and in the distance to its surface) is at the joint: events at which
+#: that is so are located to about 1e-10.
+_AT_JOINT = 1e-8
 
 
 def stopping_segments(model: Model, word: Word) -> list[int]:
@@ -37,7 +40,7 @@ def displacements(orbit: Orbit, surface: str) -> FloatArray:
         level = flow.level(k, orbit.vector, none, empty)
     c = [o.name for o in model.observables].index(observable)
     modes = [m.name for m in model.modes]
-    found: list[float] = []
+    found: list[tuple[float, float]] = []
     for i, (mode, exit_) in enumerate(orbit.word):
         if model.mode_by_name[mode].sliding and exit_ in model.surface_by_name:
             lies = {d.signs.get(surface) for d in model.domains if d.mode == mode}
@@ -51,8 +54,69 @@ def displacements(orbit: Orbit, surface: str) -> FloatArray:
             )
             if tau < 0.0:
                 break
-            found.append(float(out[0]))
+            found.append((start + tau, float(out[0])))
             start, state, on = start + tau, out.copy(), True
-        if exit_ in model.reset_by_surface:
-            found.append(float(orbit.ends[i, 1]))
-    return np.array(found)
+        state = orbit.ends[i, 1:].copy()
+        apart = flow.observe(c, end, state, orbit.vector, none, empty) - level
+        if exit_ in model.reset_by_surface or abs(apart) < _AT_JOINT:
+            found.append((end, float(state[0])))
+    return _apart(found, orbit.period)
+
+
+def _apart(found: list[tuple[float, float]], period: float) -> FloatArray:
+    """Return the displacements of (time, displacement) pairs, those that are one but once.
+
+    A stop at a joint, within rounding of it, is met by either of its segments, by both or by none.
+    """
+    every = sorted(found)
+    near = [
+        (every[k - 1][0] - (period if k == 0 else 0.0)) > time - _AT_JOINT and len(every) > 1
+        for k, (time, _) in enumerate(every)
+    ]
+    return np.array([x for (_, x), known in zip(every, near, strict=True) if not known])
+
+
+def turning_points(orbit: Orbit) -> FloatArray:
+    """Return the displacement at its local extrema and at impacts, in order, shape (extrema,).
+
+    For models that name no surface on which it is stationary.
+    """
+    model, flow = orbit.model, orbit.model.flow
+    modes, names = [m.name for m in model.modes], [o.name for o in model.observables]
+    times, values = np.empty(_MOST), np.empty(_MOST)
+    x: list[float] = []
+    struck: list[bool] = []
+    for i, (mode, exit_) in enumerate(orbit.word):
+        start, end = orbit.begins[i], orbit.ends[i]
+        found = 0
+        if model.displacement and end[0] > start[0]:
+            segment = modes.index(mode), names.index(model.displacement), float(start[0])
+            lasts = float(end[0] - start[0])
+            found = flow.turning(*segment, start[1:].copy(), lasts, orbit.vector, times, values)
+        x += [*values[: max(found, 0)].tolist(), float(end[1])]
+        struck += [False] * max(found, 0) + [exit_ in model.reset_by_surface]
+    before, after = np.roll(x, 1) - x, np.roll(x, -1) - x
+    return np.asarray(np.array(x)[(before * after > 0.0) | np.array(struck)])
+
+
+def reach_of(orbit: Orbit) -> tuple[float, float]:
+    """Return the least and the largest displacement of an orbit, over joints and stationary points."""
+    model, whole = orbit.model, orbit.as_whole()
+    x = [orbit.cycle[:, 1]]
+    if model.displacement:
+        from contfric.orbit.extent import extent
+
+        c, out = [o.name for o in model.observables].index(model.displacement), np.empty(2)
+        system, joints = whole.system, np.ascontiguousarray(whole.joints)
+        if not extent(system.functions(), system.layout, c, joints, orbit.vector, out):
+            out[:] = np.nan
+        x.append(out)
+    elif not model.cuts(model.stop_surface):  # a definition by hand that says no more
+        x.append(orbit.stops)
+    every = np.concatenate(x)
+    return float(np.min(every)), float(np.max(every))
+
+
+def reaches_at_joints(model: Model) -> bool:
+    """Tell whether the extrema of the displacement are among the joints of orbits."""
+    return not model.displacement and model.cuts(model.stop_surface)

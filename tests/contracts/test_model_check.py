@@ -7,11 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import contfric as cf
 from contfric.cli import main
-from contfric.models.check import Severity, Topic, check_model
+from contfric.models.check import ModelReport, Severity, Topic, check_model
+from contfric.models.check.hidden import check_hidden, hidden_symmetry
+from contfric.models.check.probe import Probe
 from contfric.resources import bundled_dir
 
 GOOD = """\
@@ -192,3 +195,80 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path.write_text(GOOD.replace("states", "sates"), encoding="utf-8")
     assert main(["check", str(path)]) == 2
     assert f"{path}:2: unknown key 'sates'; did you mean 'states'?" in capsys.readouterr().err
+
+
+#: Models that have the symmetry they declare, and some that have none at all.
+SYMMETRIC, PLAIN = ("coulomb-yaml", "dead-band", "bang-bang", "stribeck"), ("popp", "belt")
+
+
+@pytest.mark.parametrize("name", SYMMETRIC)
+def test_a_symmetry_that_is_not_declared_is_proposed(name: str) -> None:
+    declared = cf.load_model(name)
+    assert declared.symmetry is not None
+    report = ModelReport(name)
+    check_hidden(report, Probe(replace(declared, symmetry=None), {}))
+    (finding,) = report.findings
+    assert finding.topic is Topic.UNDECLARED and finding.severity is Severity.NOTE and report.ok
+    later = "" if declared.autonomous else ", t -> t + T/2"
+    assert f"Declare it, 'symmetry: x -> -x, v -> -v{later}'" in finding.message
+    found = hidden_symmetry(Probe(declared, {}))
+    assert found is not None
+    assert np.array_equal(np.diag(found.signs), declared.symmetry.array())
+    check_hidden(report, Probe(declared, {}))
+    assert report.counts[Topic.UNDECLARED] == 1  # what is declared is not looked for
+
+
+@pytest.mark.parametrize("name", PLAIN)
+def test_no_symmetry_is_proposed_where_there_is_none(name: str) -> None:
+    assert hidden_symmetry(Probe(cf.load_model(name), {})) is None
+
+
+#: A model whose symmetry goes with any but the first of these parameters.
+BROKEN = """\
+name: broken
+states: [x, v]
+parameters: {Omega: 0.7, S: 0.2, a: 0, b: 0, d: 0, f: 0, m: 0}
+period: 2*pi/Omega
+observables: {u: x - a + b*x**2 - cos(Omega*t) - m*cos(2*Omega*t)}
+surfaces:
+  F+: {observable: u, level: S}
+  F-: {observable: u, level: -S - f}
+  v: {observable: v, level: 0}
+field: {x: v, v: -u - S*sign(v) - d*v**2}
+modes:
+  forward: {in: {v: +}}
+  backward: {in: {v: -}}
+  stick: {in: {v: 0, F+: -, F-: +}, field: {x: 0, v: 0}}
+"""
+
+
+def test_shifts_are_found_and_nothing_false_is(tmp_path: Path) -> None:
+    path = tmp_path / "broken.yaml"
+    path.write_text(BROKEN, encoding="utf-8")
+    model = cf.load_model(path)
+    for params, image in (({}, "-x"), ({"a": 0.3}, "0.6 - x"), ({"a": -1.0, "S": 0.4}, "-2 - x")):
+        report = ModelReport("broken")
+        check_hidden(report, Probe(model, params))
+        (finding,) = report.findings
+        assert f"x -> {image}, v -> -v, t -> t + T/2" in finding.message
+        assert "at these parameters" in finding.message
+    for name in "bdfm":
+        for value in (0.1, -1e-4):
+            assert hidden_symmetry(Probe(model, {"a": 0.3, name: value})) is None
+
+
+def test_a_shift_of_differing_frictions_is_an_expression_of_them(tmp_path: Path) -> None:
+    path = tmp_path / "checked.yaml"
+    text = GOOD.replace("S: 0.2", "S: 0.2, R: 0.4").replace("level: -S", "level: -R")
+    for old, new in (
+        ("u: k*x", "u: x"),
+        ("forward: {in: {v: +}}", "forward: {in: {v: +}, field: {x: v, v: -u - R}}"),
+        ("backward: {in: {v: -}}", "backward: {in: {v: -}, field: {x: v, v: -u + S}}"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text.partition("symmetry:")[0], encoding="utf-8")
+    report = ModelReport("checked")
+    check_hidden(report, Probe(cf.load_model(path), {}))
+    (finding,) = report.findings
+    assert "x -> S - R - x, v -> -v" in finding.message and "Measure x" in finding.message

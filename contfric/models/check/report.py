@@ -17,16 +17,18 @@ class Topic(str, Enum):
     KINKS = "kinks of the fields lie on surfaces that their modes know"
     SLIDING = "sliding modes stay on their surfaces"
     SYMMETRY = "the symmetry holds for fields, surfaces and domains"
+    UNDECLARED = "symmetries that are not declared"
     PERIOD = "the field repeats itself after the period"
     CONSTRAINTS = "the defaults obey the constraints"
     NAMES = "every parameter is used, and every state is driven"
 
 
 class Severity(str, Enum):
-    """How bad a finding is: an error makes results wrong, a warning deserves a look."""
+    """How bad a finding is: an error makes results wrong, a warning deserves a look, a note is of use."""
 
     ERROR = "error"
     WARNING = "warning"
+    NOTE = "note"
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ class ModelReport:
     ----------
     model : name of the model
     counts : how many single comparisons were made for each topic; 0 where a topic does not apply
-    findings : what is wrong, errors and warnings
+    findings : what is wrong, errors and warnings, and what is of use to know, notes
     """
 
     model: str
@@ -72,6 +74,10 @@ class ModelReport:
     def warn(self, topic: Topic, message: str) -> None:
         """Note a warning, once."""
         self._note(Finding(topic, Severity.WARNING, message))
+
+    def note(self, topic: Topic, message: str) -> None:
+        """Note what is no fault, once."""
+        self._note(Finding(topic, Severity.NOTE, message))
 
     def _note(self, finding: Finding) -> None:
         if finding not in self.findings:
@@ -98,7 +104,8 @@ class ModelReport:
         for topic, count in self.counts.items():
             own = [f for f in self.findings if f.topic is topic]
             bad = any(f.severity is Severity.ERROR for f in own)
-            mark = "WRONG" if bad else "look" if own else "fine" if count else "-"
+            look = any(f.severity is not Severity.NOTE for f in own)
+            mark = "WRONG" if bad else "look" if look else "fine" if count else "-"
             note = f" ({count} comparisons)" if count else " (does not apply)"
             lines.append(f"  {mark:5}  {topic.value}{note}")
             lines.extend(f"           {f}" for f in own)

@@ -1,0 +1,317 @@
+"""Branch points: orbits at which two curves of orbits cross, with or without a declared symmetry.
+
+The equations of the chain of segments are ``F(z, p) = 0``, N equations for N + 1 unknowns. Along a curve of
+orbits the Jacobian ``J = [F_z, F_p]`` has rank N, at a fold as well as elsewhere; where two curves cross its
+null space has two dimensions. So a fold (SN) and a branch point (BP) are told apart by J, whatever the
+multipliers are: at both of them one is +1.
+
+A branch point is a regular solution of Moore's system (SIAM J. Numer. Anal. 17 (1980) 567-576)
+
+    F + beta psi = 0,    J^T psi = 0,    psi . psi = 1
+
+in (z, p, psi, beta), with beta = 0 if it is one: with another beta it is that of neighbouring equations,
+whose two curves have come apart. The directions of the two curves solve the algebraic branching equation
+``d^T H d = 0`` in the null space of J, with ``H = (psi . F)''`` (H. B. Keller, 1977).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contfric.continuation.branch import Branch
+from contfric.continuation.points import Point, Settings
+from contfric.models.definition import FloatArray
+from contfric.orbit.clock import clocked
+from contfric.orbit.linear import equations_at
+from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.system import System
+
+#: Smallest singular value of J against the largest, above which no branch point is near. Beside one it is
+#: about the distance; steps of a branch are 1e-2 at most.
+_REGULAR = 3e-2
+#: Newton's method converges from there in 3 to 6 steps.
+_MOST_STEPS = 12
+#: Corrections that end it: far below what the derivatives, which are differences, leave in the next one.
+_SETTLED = 1e-12
+#: One that is this small and no longer falls is rounding.
+_ROUNDED = 1e-8
+#: Unfolding beta, in relative roundings of the flow, below which it is one of rounding.
+_UNFOLDED = 1e3
+#: Roundings of a closed form are less than this, and its sums are good to it.
+_LEAST_ROUNDING = 1e-14
+#: Step of the differences of the Jacobian: the cube root of its rounding.
+_STEP = 6e-6
+#: Discriminant of the branching equation, relative to the square of its coefficients, above which two
+#: curves cross: below are isolated points and curves that touch.
+_CROSSES = 1e-8
+#: A direction whose share of the parameter is below this has none: the curve turns there (a pitchfork).
+#: Directions are good to the square of the step of differences, about 1e-10.
+_TURNS = 1e-6
+#: Share of a step by which a branch point may lie outside of it: a change of sign at its very end.
+_BESIDE = 1e-3
+#: A located branch point is good to far less than this (scaled product).
+LOCATED = 1e-5
+#: Cosine above which two directions are the same.
+_ALONG = 0.9
+#: Joints that agree to this are those of the same motion: ends of branches at a branch point are located.
+_SAME = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Direction:
+    """Direction of a curve of orbits at a branch point, of length 1 in the scaled product.
+
+    ``slope`` is its share of the parameter; exactly 0 where the curve turns there.
+    """
+
+    joints: FloatArray
+    slope: float
+
+    @property
+    def turns(self) -> bool:
+        """Whether the parameter turns there: the curve lies on one side of it."""
+        return self.slope == 0.0
+
+    def reversed(self) -> Direction:
+        """Return the opposite direction."""
+        return Direction(-self.joints, -self.slope)
+
+    def cosine(self, joints: FloatArray, slope: float, scale: float) -> float:
+        """Return the cosine of the angle with another direction, in the scaled product."""
+        size = np.sqrt(_product((joints, slope), (joints, slope), scale))
+        return _product((self.joints, self.slope), (joints, slope), scale) / float(size)
+
+
+def _product(a: tuple[FloatArray, float], b: tuple[FloatArray, float], scale: float) -> float:
+    """Return the scaled product of two directions (joints, parameter)."""
+    return float(np.sum(a[0] * b[0]) / len(a[0]) + a[1] * b[1] * scale)
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """A branch point: the orbit there, and the directions of the two curves that cross."""
+
+    orbit: Orbit
+    directions: tuple[Direction, Direction]
+
+    def nearest(self, joints: FloatArray, slope: float, scale: float) -> Direction:
+        """Return the direction, of the four, that is nearest to a tangent."""
+        first = max(self.directions, key=lambda d: abs(d.cosine(joints, slope, scale)))
+        return first if first.cosine(joints, slope, scale) >= 0.0 else first.reversed()
+
+
+def crossing_near(orbit: Orbit, settings: Settings, within: float) -> Crossing | None:
+    """Return the branch point within a distance of an orbit (scaled product); None if there is none."""
+    system = orbit.system
+    active = orbit.model.index_of(settings.parameter)
+    problem = _Problem(system, orbit.vector, active, settings.width)
+    x = np.append(orbit.joints.ravel(), orbit.vector[active] / settings.width)
+    located = _moore(problem, x)
+    if located is None:
+        return None
+    moved = located[0] - x
+    far = np.sum(moved[:-1] ** 2) / system.segments + moved[-1] ** 2 > within**2
+    x, psi = located
+    directions = None if far else _directions(problem, x, psi)
+    if directions is None:
+        return None
+    joints, vector = problem.split(x)
+    found = Orbit(system, joints, vector, float(np.max(np.abs(problem.at(x)[0]))), Status.CONVERGED)
+    return Crossing(found, directions)
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """The equations in the unknowns (joints, parameter over the width of its range)."""
+
+    system: System
+    vector: FloatArray
+    active: int
+    width: float
+
+    def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return joints and parameters."""
+        vector = self.vector.copy()
+        vector[self.active] = x[-1] * self.width
+        return x[:-1].reshape(self.system.segments, -1).copy(), vector
+
+    def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return F, shape (N,), and J, shape (N, N + 1)."""
+        residual, jacobian, by_parameters = equations_at(self.system, *self.split(x))
+        column = by_parameters[:, self.active] * self.width
+        return residual, np.column_stack([jacobian, column])
+
+    def hessian(self, x: FloatArray, psi: FloatArray) -> FloatArray:
+        """Return the second derivatives of psi . F, shape (N + 1, N + 1), by central differences."""
+        rows = np.empty((len(x), len(x)))
+        for k in range(len(x)):
+            step = _STEP * (1.0 + abs(float(x[k])))
+            ahead, behind = x.copy(), x.copy()
+            ahead[k] += step
+            behind[k] -= step
+            rows[k] = (psi @ (self.at(ahead)[1] - self.at(behind)[1])) / (2.0 * step)
+        return np.asarray(0.5 * (rows + rows.T))
+
+
+def _moore(problem: _Problem, x: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """Return unknowns and left null vector at the branch point near a point; None if there is none."""
+    residual, jacobian = problem.at(x)
+    if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
+        return None
+    left, values, _ = np.linalg.svd(jacobian)
+    if not values[-1] < _REGULAR * values[0]:
+        return None
+    size, psi, beta, before = len(residual), left[:, -1], 0.0, np.inf
+    rounding = max(problem.system.model.rounding, _LEAST_ROUNDING)
+    full = np.zeros((2 * size + 2, 2 * size + 2))
+    for _ in range(_MOST_STEPS):
+        full[:size, : size + 1] = jacobian
+        full[:size, size + 1 : -1] = beta * np.eye(size)
+        full[:size, -1] = psi
+        full[size:-1, : size + 1] = problem.hessian(x, psi)
+        full[size:-1, size + 1 : -1] = jacobian.T
+        full[-1, size + 1 : -1] = 2.0 * psi
+        right = -np.concatenate([residual + beta * psi, psi @ jacobian, [psi @ psi - 1.0]])
+        if not np.all(np.isfinite(full)):
+            return None
+        try:
+            step = np.linalg.solve(full, right)
+        except np.linalg.LinAlgError:
+            return None
+        x, psi, beta = x + step[: size + 1], psi + step[size + 1 : -1], beta + float(step[-1])
+        moved = float(np.max(np.abs(step[: size + 1])))
+        if not moved < 1.0:
+            return None
+        if moved < _SETTLED or (moved < _ROUNDED and moved > 0.5 * before):
+            unfolded = abs(beta) > _UNFOLDED * rounding * max(1.0, float(values[0]))
+            return None if unfolded else (x, psi)
+        before = moved
+        residual, jacobian = problem.at(x)
+    return None
+
+
+def _directions(
+    problem: _Problem, x: FloatArray, psi: FloatArray
+) -> tuple[Direction, Direction] | None:
+    """Return the directions of the two curves that cross; None if no two do."""
+    basis = np.linalg.svd(problem.at(x)[1])[2][-2:]
+    form = basis @ problem.hessian(x, psi) @ basis.T
+    product = form[0, 0] * form[1, 1]
+    discriminant = form[0, 1] ** 2 - product
+    if not discriminant > _CROSSES * np.sum(form**2):
+        return None
+    # the symmetric form is a difference of two squares: its null directions lie between its axes
+    values, axes = np.linalg.eigh(form)
+    low, high = np.sqrt(-values[0]), np.sqrt(values[1])
+    found = [(high * axes[:, 0] + sign * low * axes[:, 1]) @ basis for sign in (1.0, -1.0)]
+    first, second = (_direction(problem, d) for d in found)
+    return first, second
+
+
+def _direction(problem: _Problem, d: FloatArray) -> Direction:
+    count = problem.system.segments
+    d = d / np.sqrt(np.sum(d[:-1] ** 2) / count + d[-1] ** 2)
+    slope = 0.0 if abs(d[-1]) < _TURNS else float(d[-1]) * problem.width
+    return Direction(d[:-1].reshape(count, -1).copy(), slope)
+
+
+def crossing_between(
+    orbit: Orbit, before: Point, after: Point, share: float, settings: Settings
+) -> tuple[Crossing, Point] | None:
+    """Return the branch point between two points of a branch, and the point of the branch there.
+
+    Parameters
+    ----------
+    share : where it is looked for, as a share of the step
+    """
+    active = orbit.model.index_of(settings.parameter)
+    near = replace(
+        before,
+        joints=before.joints + share * (after.joints - before.joints),
+        value=before.value + share * (after.value - before.value),
+    )
+    chord = after.joints - before.joints, after.value - before.value
+    square = _product(chord, chord, settings.scale)
+    here = near.orbit(orbit.system, orbit.vector, active)
+    crossing = crossing_near(here, settings, 2.0 * float(np.sqrt(square)))
+    if crossing is None:
+        return None
+    way = (
+        crossing.orbit.joints - before.joints,
+        float(crossing.orbit.vector[active]) - before.value,
+    )
+    at = _product(chord, way, settings.scale) / square
+    far = _product(way, way, settings.scale) > (1.0 + _BESIDE) * square
+    if far or not -_BESIDE < at < 1.0 + _BESIDE:
+        return None
+    arc = min(1.0, max(0.0, at)) * (after.arc - before.arc)
+    return crossing, crossing_point(crossing, before, arc, settings)
+
+
+def crossing_point(crossing: Crossing, before: Point, arc: float, settings: Settings) -> Point:
+    """Return the point of a branch at a branch point, an arclength behind another of its points."""
+    direction = crossing.nearest(before.tangent, before.slope, settings.scale)
+    orbit = crossing.orbit
+    mu = np.zeros_like(before.mu)
+    if settings.stability:
+        mu[: orbit.model.directions] = orbit.turn_multipliers
+    return replace(
+        before,
+        joints=orbit.joints,
+        value=float(orbit.vector[orbit.model.index_of(settings.parameter)]),
+        tangent=direction.joints,
+        slope=direction.slope,
+        mu=mu,
+        arc=before.arc + arc,
+        lost=False,
+    )
+
+
+def starts_along(branch: Branch, crossing: Crossing, direction: Direction, scale: float) -> bool:
+    """Tell whether a branch has an end at a branch point and leaves it in a direction."""
+    orbit = crossing.orbit
+    if len(branch) < 2 or branch.system.half != orbit.system.half:
+        return False
+    for tip, inner in ((0, 1), (-1, -2)):
+        end = _aligned(branch, tip, tip, orbit)
+        near = _aligned(branch, inner, tip, orbit)
+        if end is None or near is None or np.max(np.abs(end - orbit.joints)) > _SAME:
+            continue
+        slope = float(branch.values[inner] - branch.values[tip])
+        if direction.cosine(near - end, slope, scale) > _ALONG:
+            return True
+    return False
+
+
+def _aligned(branch: Branch, k: int, reference: int, orbit: Orbit) -> FloatArray | None:
+    """Return the joints of a point, turned so that those of another one are next to an orbit's.
+
+    A branch may begin with another segment of the same motion, and in another period.
+    """
+    word, wanted = branch.system.word, orbit.system.word
+    if len(word) != len(wanted) or branch.system.half:
+        return branch.joints[k] if word == wanted else None
+    best: tuple[float, FloatArray] | None = None
+    for first in range(len(word)):
+        if word[first:] + word[:first] != wanted:
+            continue
+        turned = [_turned(branch[i], first) for i in (reference, k)]
+        shift = 0.0
+        if not orbit.model.autonomous:
+            unit = orbit.period / orbit.periods
+            shift = unit * round(float(turned[0][0, 0] - orbit.joints[0, 0]) / unit)
+        for joints in turned:
+            joints[:, 0] -= shift
+        gap = float(np.max(np.abs(turned[0] - orbit.joints)))
+        if best is None or gap < best[0]:
+            best = gap, turned[1]
+    return None if best is None else best[1]
+
+
+def _turned(orbit: Orbit, first: int) -> FloatArray:
+    """Return the joints of an orbit from another segment on."""
+    joints = np.roll(orbit.joints, -first, axis=0)
+    joints[len(joints) - first :, 0] += orbit.period
+    return clocked(orbit.model, joints, float(joints[0, 0]) + orbit.period)

@@ -1,0 +1,41 @@
+"""How far an orbit reaches: the extrema of its displacement, at joints or inside of segments, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import types
+
+from contfric.compiled import i8, kernel, matrix, vector
+from contfric.orbit.equations import FunctionsType, LayoutType, close_chain, equation_room
+from contfric.orbit.monitor import find_behind, find_turnings, start_value, turning_room
+from contfric.orbit.system import RETURNS
+
+
+@kernel(types.boolean(FunctionsType, LayoutType, i8, matrix, vector, vector))
+def extent(functions, layout, c, z, p, out):  # type: ignore[no-untyped-def]
+    """Write the least and the largest displacement of a whole orbit; False if a search fails.
+
+    Parameters
+    ----------
+    c : the displacement as an observable, whose stationary points are found inside of segments
+    z : joints of the whole orbit, shape (N, 1 + n)
+    """
+    count, m = z.shape
+    free = min(count, 0)  # no parameter, and no literal
+    room, turnings = equation_room(count, m, free), turning_room()
+    close_chain(functions, layout, z, p, room.none, room)
+    low, high = np.inf, -np.inf
+    for i in range(count):
+        low, high = min(low, z[i, 1]), max(high, z[i, 1])
+        if layout.departs[i] < RETURNS:
+            found = find_behind(functions, layout, i, c, z, p, room, turnings)
+            begin = start_value(functions, layout, i, c, z, p, room)
+            low, high = min(low, begin), max(high, begin)
+        else:
+            found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
+        if found < 0:
+            return False
+        for k in range(found):
+            low, high = min(low, turnings.values[k]), max(high, turnings.values[k])
+    out[0], out[1] = low, high
+    return True

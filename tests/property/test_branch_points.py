@@ -1,0 +1,138 @@
+"""Branch points need no declared symmetry: where two curves of orbits cross, both are followed."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.continuation.crossing import crossing_near
+from contfric.continuation.events import EndReason
+from contfric.continuation.points import settings_of
+from contfric.continuation.side import first_point
+from contfric.continuation.stalls import stalled_at
+
+MODEL = Path(__file__).parents[1] / "models" / "crossing.yaml"
+#: The state z of the model obeys z' = mu z + q z^2 - c z^3 + e, whatever the oscillator does, and shifts
+#: the displacement by z / 10.
+BOUNDS = (-0.4, 0.5)
+
+
+@cache
+def symmetric_diagram() -> cf.Diagram:
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.25, "S0": 0.35})
+    return cf.explore(orbit, "Omega", (0.3, 0.8))
+
+
+def outline(diagram: cf.Diagram, shift: float) -> list[list[tuple[str, float, float, float]]]:
+    """Return the ends of all branches, without what depends on where they were computed from."""
+    found = []
+    for branch in diagram.branches:
+        ends = [
+            (end.reason.name, *(round(float(v), 6) for v in (value, high - shift, low - shift)))
+            for end, value, high, low in zip(
+                branch.ends,
+                branch.values[[0, -1]],
+                branch.x_max[[0, -1]],
+                branch.x_min[[0, -1]],
+                strict=True,
+            )
+        ]
+        found.append(sorted(ends))
+    return sorted(found)
+
+
+@pytest.mark.parametrize("start", [0.5, 0.38])
+def test_a_hidden_symmetry_gives_the_diagram_of_the_declared_one(start: float) -> None:
+    shift = float(np.random.default_rng(int(100 * start)).uniform(-0.1, 0.1))
+    params = {"Sp": 0.25 - shift, "Sm": 0.25 + shift, "Sp0": 0.35 - shift, "Sm0": 0.35 + shift}
+    orbit = cf.find_orbit(MODEL, params | {"Omega": start})
+    diagram = cf.explore(orbit, "Omega", (0.3, 0.8))
+    wanted = symmetric_diagram()
+    assert diagram.loose_ends == () == diagram.notes
+    assert outline(diagram, shift) == outline(wanted, 0.0)
+    assert {b.kind for b in diagram.bifurcations} == {b.kind for b in wanted.bifurcations}
+    for event in wanted.bifurcations:
+        same = [b for b in diagram.bifurcations if b.kind is event.kind]
+        gaps = [abs(b.params["Omega"] - event.params["Omega"]) for b in same]
+        twice = 1 if event.symmetric else 2
+        assert sum(gap < 1e-9 for gap in gaps) == twice, event
+
+
+@pytest.mark.parametrize(
+    "terms, place, branches",
+    [
+        ({"q": -1.0}, 0.3, 2),
+        ({"q": 0.5, "c": 0.3}, 0.4, 2),
+        ({"c": 1.0}, 0.4, 3),
+        ({"c": -0.5}, -0.3, 3),
+    ],
+    ids=["transcritical", "beside a fold", "pitchfork", "subcritical"],
+)
+def test_both_curves_through_a_branch_point_are_found_from_each(
+    terms: dict[str, float], place: float, branches: int
+) -> None:
+    q, c = terms.get("q", 0.0), terms.get("c", 0.0)
+    roots = np.roots([-c, q, place]) if c else np.array([-place / q])
+    for z in [0.0, *np.real(roots[np.isreal(roots)])]:
+        diagram = cf.explore(orbit_at(float(z), {"mu": place, **terms}), "mu", BOUNDS)
+        assert len(diagram.branches) == branches and not diagram.loose_ends
+        (event,) = [b for b in diagram.bifurcations if b.kind is cf.Kind.BP]
+        assert abs(event.params["mu"]) < 1e-12
+        assert np.min(np.abs(event.orbit.multipliers - 1.0)) < 1e-9
+        folds = [b for b in diagram.bifurcations if b.kind is cf.Kind.SN]
+        wanted = [-(q**2) / (4.0 * c)] if q and c else []
+        assert np.allclose([b.params["mu"] for b in folds], wanted, atol=1e-10)
+        tips = [end for b in diagram.branches for end in b.ends if end.reason is EndReason.BP]
+        assert len(tips) == (2 if branches == 3 else 0)
+        assert not any("symmetric" in str(end) for end in tips)
+
+
+def orbit_at(z: float, params: dict[str, float]) -> cf.Orbit:
+    """Return the orbit with a value of z, stable or not: that of z = 0, moved."""
+    orbit = cf.find_orbit(MODEL, {"mu": -1.0})
+    joints = orbit.joints.copy()
+    joints[:, 1] += 0.1 * z
+    joints[:, 3] = z
+    vector = orbit.model.vector({**orbit.params, **params})
+    moved = cf.Orbit(orbit.system, joints, vector, np.inf)
+    assert moved.violations() == []
+    return moved
+
+
+@pytest.mark.parametrize("imperfection", [1e-3, -1e-4])
+def test_an_imperfect_pitchfork_has_a_fold_and_no_branch_point(imperfection: float) -> None:
+    fold = 3.0 * abs(0.5 * imperfection) ** (2 / 3)  # of mu z - z^3 + e
+    outer = np.roots([-1.0, 0.0, 0.4, imperfection])
+    far = float(np.min(outer.real) if imperfection > 0.0 else np.max(outer.real))
+    terms = {"mu": 0.4, "c": 1.0, "e": imperfection}
+    branch = cf.continue_orbit(orbit_at(far, terms), "mu", BOUNDS)
+    (event,) = branch.bifurcations
+    assert event.kind is cf.Kind.SN and abs(event.params["mu"] - fold) < 1e-9
+    settings = settings_of(event.orbit, "mu", BOUNDS, None, True, 100)
+    assert crossing_near(event.orbit, settings, np.inf) is None
+
+
+@pytest.mark.parametrize(
+    "terms, mu, text",
+    [
+        ({"c": 1.0}, -1e-5, "a branch point is at mu"),
+        ({"c": 1.0, "e": 1e-3}, -0.3, "no multiplier is at"),
+        ({"e": -1e-9, "q": 1.0}, 2.1 * 1e-9**0.5, "a multiplier is at +1 ("),
+    ],
+)
+def test_a_stalled_branch_says_whether_a_multiplier_is_at_one(
+    terms: dict[str, float], mu: float, text: str
+) -> None:
+    q, c, e = (terms.get(name, 0.0) for name in "qce")
+    roots = np.roots(np.trim_zeros([-c, q, mu, e], "f"))
+    orbit = orbit_at(float(np.min(roots[np.isreal(roots)].real)), {"mu": mu, **terms})
+    settings = settings_of(orbit, "mu", BOUNDS, None, True, 100)
+    tip = first_point(orbit, settings)
+    assert tip is not None
+    message, event = stalled_at(orbit, tip, settings)
+    assert message.startswith(EndReason.STEP.value) and text in message
+    assert event is None  # the curve of the orbit passes there, or there is none
