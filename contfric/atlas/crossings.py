@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
@@ -81,4 +82,4 @@ def whole_branch(orbit: Orbit, settings: Settings) -> Branch:
         settings.stability and not orbit.system.holds,
         settings.most_points,
     )
-    return follow_orbit(orbit, own)
+    return follow_orbit(orbit, replace(own, copies=settings.copies))

@@ -71,13 +71,15 @@ class Asked:
     stability : whether multipliers were evaluated
     bridges : whether jumps were bridged
     max_periods : longest orbits, in periods; raised to that of a longer start
+    copies : most copies of the shortest period that were tried at sliding events
     max_branches, max_points : most branches, and most points of each half-branch
     """
 
     max_step: float | None = None
     stability: bool = True
     bridges: bool = True
-    max_periods: int = 1
+    max_periods: int = 4
+    copies: int = 1
     max_branches: int = 200
     max_points: int = 20_000
 

@@ -9,7 +9,15 @@ from dataclasses import dataclass, field
 from contfric.atlas.collect import Event
 from contfric.atlas.matching import identity, on_branch, same_event, stops_distance
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation, End, EndReason, Kind, Proposal, Verdict
+from contfric.continuation.events import (
+    TERMINAL,
+    Bifurcation,
+    End,
+    EndReason,
+    Kind,
+    Proposal,
+    Verdict,
+)
 from contfric.continuation.points import Settings
 from contfric.orbit.orbit import Orbit
 
@@ -33,6 +41,7 @@ class Exploration:
 
     settings: Settings
     max_periods: int
+    copies: int
     max_branches: int
     bridges: bool
     progress: Progress | None
@@ -63,6 +72,18 @@ class Exploration:
         self.add(branch)
         if index not in event.branches:
             event.branches.append(index)
+
+    def raise_copies(self, copies: int) -> None:
+        """Try more copies at sliding events from now on, those that were followed already among them."""
+        if copies <= self.copies:
+            return
+        self.copies = copies
+        self.notes.append(f"copies raised to {copies}: a branch arrives with that many")
+        waiting = {id(event) for event in self.waiting}
+        for event in self.events:
+            if event.bifurcation.kind in TERMINAL and id(event) not in waiting:
+                event.proposals.clear()
+                self.waiting.append(event)
 
     def judge(
         self,

@@ -15,10 +15,13 @@ from contfric.atlas.follow import follow
 from contfric.atlas.seeds import Seeds, attractors
 from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, settings_of
-from contfric.continuation.trace import continue_orbit
+from contfric.continuation.trace import continue_orbit, follow_orbit
 from contfric.errors import ConvergenceError, function_of, truth, whole_number
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
+
+#: Longest orbits, in periods, that doublings are followed to by default: two doublings.
+MOST_PERIODS = 4
 
 
 def explore(
@@ -29,7 +32,8 @@ def explore(
     max_step: float | None = None,
     stability: bool = True,
     bridges: bool = True,
-    max_periods: int = 1,
+    max_periods: int | None = None,
+    copies: int | None = None,
     max_branches: int = 200,
     max_points: int = MOST_POINTS,
     seeds: Seeds | None = None,
@@ -44,10 +48,15 @@ def explore(
     bridges : bool
         Whether the jumps of the flow (SS, AS, GS) are bridged by orbits with holds; without them
         branches end there.
-    max_periods : int
+    max_periods : int, optional
         Longest orbits, in periods of the excitation: the diagram is the connected component, through
-        events, of all orbits whose shortest period is at most this. A start of longer period raises
-        it, and ``diagram.notes`` says so.
+        events, of all orbits whose shortest period is at most this. A start of longer period raises it,
+        and ``diagram.notes`` says so. By default period doublings are followed to 4 periods, with one copy.
+    copies : int, optional
+        At a sliding event orbits of so many times the shortest period of the motion are tried: it has several
+        outcomes, and each period may have its own. ``max_periods`` if that is given, else 1; a branch that
+        arrives with more raises it. Between the ends of a bridge there may be many such orbits
+        (period adding).
     max_branches : int
         Most branches to compute; reached, it is said in the diagram's notes.
 
@@ -74,29 +83,39 @@ def explore(
     ['0s', '1a', '1a, 7seg, 1hold', '2a', '2s']
     """
     settings = settings_of(orbit, parameter, range, max_step, stability, max_points)
-    settings = replace(settings, stability=stability)  # also where the start itself is on a bridge
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
-    whole_number("max_periods", max_periods, least=1)
+    if copies is not None:
+        whole_number("copies", copies, least=1)
+    if max_periods is not None:
+        whole_number("max_periods", max_periods, least=1)
     whole_number("max_branches", max_branches, least=1)
     function_of("progress", progress)
     bridges, seeds = truth("bridges", bridges), Seeds.given(seeds)
     orbit = shortest(orbit)
-    state = Exploration(settings, max(max_periods, orbit.periods), max_branches, bridges, progress)
-    if orbit.periods > max_periods:
+    most = MOST_PERIODS if max_periods is None else max_periods
+    again = max(copies or max_periods or 1, orbit.periods)
+    # multipliers are asked for also where the start itself is on a bridge
+    settings = replace(settings, stability=stability, copies=again)
+    state = Exploration(
+        settings,
+        max(most, orbit.periods),
+        again,
+        max_branches,
+        bridges,
+        progress,
+    )
+    if orbit.periods > (max_periods or MOST_PERIODS):
         state.notes.append(
             f"max_periods raised to {orbit.periods}: the start has that many periods"
         )
     try:
         state.add(
-            continue_orbit(
+            follow_orbit(
                 orbit,
-                parameter,
-                range,
-                max_step=max_step,
-                stability=stability,
-                max_points=max_points,
-                progress=progress,
+                replace(settings, stability=stability and not orbit.system.holds),
+                progress,
+                keep=True,
             )
         )
         _follow_all(state)
@@ -113,7 +132,15 @@ def explore(
         state.events,
         tuple(state.notes),
         state.complete,
-        Asked(max_step, stability, bridges, state.max_periods, max_branches, max_points),
+        Asked(
+            max_step,
+            stability,
+            bridges,
+            state.max_periods,
+            state.copies,
+            max_branches,
+            max_points,
+        ),
     )
 
 

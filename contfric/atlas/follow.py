@@ -167,7 +167,9 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
     for wide in (False, True) if edits else ():
         incident = incident_forms(event.bifurcation, wide)
         words: set[Word] = set()
-        for candidate in sequences_of(incident, active, state.max_periods, state.bridges):
+        state.raise_copies(shortest(orbit).periods // incident.unit.periods)
+        most = min(state.max_periods, state.copies * incident.unit.periods)
+        for candidate in sequences_of(incident, active, most, state.bridges):
             jumps = jumps or candidate.has_hold
             accepted = _judge(state, event, candidate) or accepted
             if event.proposals and event.proposals[-1].verdict is not Verdict.REFUSED:

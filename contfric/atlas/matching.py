@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import TERMINAL, Bifurcation, Kind
+from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, Kind
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import polish
@@ -65,7 +65,8 @@ def same_event(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> 
 
 def same_place(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> bool:
     """Tell whether two events have the same parameters and the same motion (or its mirror image)."""
-    if abs(a.params[parameter] - b.params[parameter]) > max(a.accuracy, b.accuracy) * width:
+    near = max(ACCURACY, a.accuracy, b.accuracy) * width
+    if abs(a.params[parameter] - b.params[parameter]) > near:
         return False
     return a.outline.apart(b.outline) < SAME_MOTION
 

@@ -221,6 +221,7 @@ def _restart(diagram: Diagram, i: int, step: float) -> Restart:
         stability=asked.stability,
         bridges=asked.bridges,
         max_periods=asked.max_periods,
+        copies=asked.copies,
         max_branches=asked.max_branches,
         max_points=max(asked.max_points, int(asked.max_points / step)),
     )
@@ -279,7 +280,8 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
         if period == 0:
             continue
         families = list(_families(diagram, node, value, slack))
-        for times in range(1, diagram.settings.max_periods // period + 1):
+        most = min(diagram.settings.copies, diagram.settings.max_periods // period)
+        for times in range(1, most + 1):
             below, above = (_sum(families, side, period, times * period) for side in (-1, 1))
             yield Balance(number, b.label, value, times * period, below, above)
 

@@ -92,7 +92,7 @@ def _branch(
         notes=tuple(dict.fromkeys(notes)),
     )
     _renew_ends(branch)
-    return with_openings(branch, settings.width)
+    return with_openings(branch, settings)
 
 
 def _renew_ends(branch: Branch) -> None:

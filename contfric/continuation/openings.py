@@ -14,66 +14,81 @@ from itertools import pairwise
 import numpy as np
 
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation, Kind
-from contfric.continuation.vertices import refined_opening
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind
+from contfric.continuation.points import Settings
+from contfric.continuation.side import first_point
+from contfric.continuation.vertices import opening, refined_opening
 from contfric.orbit.index import opening_sign
 from contfric.orbit.orbit import Orbit
 
-#: Share of the range within which an opening that is located must lie beside the step that it was seen in.
-_NEAR = 1e-3
+#: Halvings of the step in which an opening is seen: to far below where secants take over.
+_HALVINGS = 24
+#: An opening is open to this (relative to the size of the equations); beside a pole it is not.
+_OPEN = 1e-5
 
 
-def with_openings(branch: Branch, width: float) -> Branch:
-    """Return a bridge with its branch points and period doublings; other branches as they are.
-
-    Parameters
-    ----------
-    width : width of the range of the parameter
-    """
+def with_openings(branch: Branch, settings: Settings) -> Branch:
+    """Return a bridge with its branch points; with its doublings, too, where several copies are asked for."""
     if not branch.bridge or branch.model.autonomous or len(branch) < 2:
+        return branch
+    if not (branch.system.half or settings.copies > 1):
         return branch
     signs = [opening_sign(orbit) for orbit in branch]
     found = []
     for k, (a, b) in enumerate(pairwise(signs)):
         if a is not None and b is not None and a * b < 0:
-            event = _located(branch, k, width)
-            if event is not None and not _is_at_fold(branch, event, width):
+            event = _located(branch, k, a, settings)
+            if event is not None and not _belongs_to_another(branch, event, settings.width):
                 found.append(event)
     if not found:
         return branch
     return replace(branch, bifurcations=_in_order(branch, found))
 
 
-def _located(branch: Branch, k: int, width: float) -> Bifurcation | None:
-    """Return the event in the step behind a point; None if it cannot be located."""
+def _located(branch: Branch, k: int, before: int, settings: Settings) -> Bifurcation | None:
+    """Return the event in the step behind a point; None where the sign changes through a pole."""
     active = branch.model.index_of(branch.parameter)
-    values = branch.values[[k, k + 1]]
-    for orbit in (branch[k], branch[k + 1]):
-        there = refined_opening(orbit, active)
-        if there is None:
-            continue
-        value = float(there.vector[active])
-        if values.min() - _NEAR * width <= value <= values.max() + _NEAR * width:
-            kind = Kind.BP if branch.system.half else Kind.PD
-            share = float(np.clip(_share(branch, k, there), 0.0, 1.0))
-            position = float(branch.arc[k] + share * (branch.arc[k + 1] - branch.arc[k]))
-            return Bifurcation(kind, there.params, there, (), position, False, False)
-    return None
+    settings = replace(settings, stability=False)
+    low, high = 0.0, 1.0
+    best: Orbit | None = None
+    for _ in range(_HALVINGS):
+        share = 0.5 * (low + high)
+        orbit = _between(branch, k, share, active, settings)
+        sign = None if orbit is None else opening_sign(orbit)
+        if sign is None:
+            break
+        best = orbit
+        low, high = (share, high) if sign == before else (low, share)
+    if best is None:
+        return None
+    there = refined_opening(best, active) or best
+    if not abs(opening(there)) < _OPEN:
+        return None
+    kind = Kind.BP if branch.system.half else Kind.PD
+    position = branch.arc[k] + low * (branch.arc[k + 1] - branch.arc[k])
+    return Bifurcation(kind, there.params, there, (), float(position), False, False)
 
 
-def _is_at_fold(branch: Branch, event: Bifurcation, width: float) -> bool:
-    """Tell whether the branch turns there: what opens at a fold belongs to it."""
+def _between(branch: Branch, k: int, share: float, active: int, settings: Settings) -> Orbit | None:
+    """Return the orbit at a share of the step behind a point, solved normal to the chord."""
+    chord = branch.joints[k + 1] - branch.joints[k]
+    slope = float(branch.values[k + 1] - branch.values[k])
+    vector = branch.vector.copy()
+    vector[active] = branch.values[k] + share * slope
+    guess = Orbit(branch.system, branch.joints[k] + share * chord, vector, 0.0)
+    size = float(np.sqrt(np.sum(chord**2) / len(chord) + slope**2 * settings.scale))
+    point = first_point(guess, settings, chord / size, slope / size)
+    return None if point is None else point.orbit(branch.system, branch.vector, active)
+
+
+def _belongs_to_another(branch: Branch, event: Bifurcation, width: float) -> bool:
+    """Tell whether the branch turns or ends there: what opens there is a part of that."""
+    value = event.params[branch.parameter]
     return any(
-        b.kind is Kind.SN
-        and abs(b.params[branch.parameter] - event.params[branch.parameter]) < b.accuracy * width
+        abs(b.params[branch.parameter] - value) < max(ACCURACY, b.accuracy) * width
         for b in branch.bifurcations
+        if b.kind is not Kind.T
     )
-
-
-def _share(branch: Branch, k: int, orbit: Orbit) -> float:
-    """Return where between two points an orbit is, by its joints."""
-    step = branch.joints[k + 1] - branch.joints[k]
-    return float(np.sum(step * (orbit.joints - branch.joints[k])) / np.sum(step * step))
 
 
 def _in_order(branch: Branch, found: list[Bifurcation]) -> tuple[Bifurcation, ...]:

@@ -44,6 +44,7 @@ class Settings:
     largest : largest step
     stability : whether multipliers are evaluated (and PD detected)
     most_points : most points of one side
+    copies : most copies of its shortest period that an orbit of the diagram has at a sliding event
     """
 
     parameter: str
@@ -55,6 +56,7 @@ class Settings:
     largest: float = LARGEST_STEP
     stability: bool = True
     most_points: int = MOST_POINTS
+    copies: int = 1
 
     @property
     def scale(self) -> float:

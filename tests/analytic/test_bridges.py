@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.orbit.index import index_of
 
 DIGITS = 40
 #: Located events are good to 1e-12; what a diagram says of an end is asked to this.
@@ -89,8 +90,10 @@ def fig05() -> cf.Diagram:
     return cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.4, 0.6))
 
 
-def the_bridge(found: cf.Diagram) -> cf.Branch:
-    (bridge,) = [b for b in found.branches if b.bridge and not b.mirrored]
+def the_bridge(found: cf.Diagram, symmetric: bool = False) -> cf.Branch:
+    (bridge,) = [
+        b for b in found.branches if b.bridge and not b.mirrored and b.symmetric is symmetric
+    ]
     return bridge
 
 
@@ -132,7 +135,9 @@ def test_inner_points_of_the_bridge_from_1a() -> None:
     bridge = the_bridge(fig05())
     assert len(bridge) > 4
     for orbit in bridge:
-        starts = orbit.cycle[:, 0]
+        first = orbit.system.holds[0].segment - 1  # the slide that ends where the hold begins
+        starts = np.roll(orbit.cycle[:, 0], -first)
+        starts[len(starts) - first :] += orbit.period
         tau = mp.mpf(float(starts[2] - starts[1]))
         guess = [repr(float(c)) for c in (*starts[[0, 1, 3]], orbit.params["Omega"])]
         exact = solved(lambda *z, tau=tau: one_hold(*z, tau)[0], guess)
@@ -194,7 +199,7 @@ def symmetric_diagram() -> cf.Diagram:
 
 @pytest.mark.parametrize("side", [0, 1])
 def test_ends_of_the_symmetric_bridge(side: int) -> None:
-    bridge = the_bridge(symmetric_diagram())
+    bridge = the_bridge(symmetric_diagram(), symmetric=True)
     assert bridge.symmetric and bridge[0].signature.holds == 2
     exact, tip = exact_ends_of_0s_bridge()[side], bridge[-side]
     assert abs(tip.params["Omega"] - float(exact[2])) < CLOSE
@@ -205,7 +210,7 @@ def test_ends_of_the_symmetric_bridge(side: int) -> None:
 @pytest.mark.parametrize(("name", "side"), [("0s, 10seg", 0), ("2s, 10seg", 1)])
 def test_symmetric_ends_are_those_of_the_regular_branches(name: str, side: int) -> None:
     found = symmetric_diagram()
-    tip = the_bridge(found)[-side]
+    tip = the_bridge(found, symmetric=True)[-side]
     regular = next(b for b in found.branches if b.name == name)
     k = [end.reason is cf.EndReason.SS for end in regular.ends].index(True)
     end = regular[-k]
@@ -213,7 +218,34 @@ def test_symmetric_ends_are_those_of_the_regular_branches(name: str, side: int) 
     assert np.allclose(np.sort(end.stops), np.sort(tip.stops), rtol=0, atol=CLOSE)
 
 
+def test_the_index_tells_of_the_bridge_with_one_hold() -> None:
+    """Where 2s ends and the bridge with two holds begins, one with one hold and its image must be, too.
+
+    2s (-1) is on the one side, the bridge (+1) on the other: without the pair (+1 each) nothing balances.
+    """
+    found = symmetric_diagram()
+    (event,) = [e for e in found.events if abs(e.bifurcation.params["Omega"] - 0.4285234) < 1e-6]
+    meeting = [found.branches[i] for i in event.branches]
+    assert sorted((b.symmetric, b.bridge) for b in meeting) == [
+        (False, True),
+        (False, True),
+        (True, False),
+        (True, True),
+    ]
+    sides: dict[bool, int] = {}
+    for branch in meeting:
+        at = int(np.argmin(np.abs(branch.values - event.bifurcation.params["Omega"])))
+        beside = branch[at + 1 if at + 1 < len(branch) else at - 1]
+        above = beside.params["Omega"] > event.bifurcation.params["Omega"]
+        sides[above] = sides.get(above, 0) + (index_of(beside) or 0)
+    assert sides == {False: 1, True: 1}
+
+
 def test_fold_of_the_symmetric_bridge() -> None:
-    (fold,) = [b for b in the_bridge(symmetric_diagram()).bifurcations if b.kind is cf.Kind.SN]
+    (fold,) = [
+        b
+        for b in the_bridge(symmetric_diagram(), symmetric=True).bifurcations
+        if b.kind is cf.Kind.SN
+    ]
     assert abs(fold.params["Omega"] - float(exact_fold())) < CLOSE
     assert fold.params["Omega"] == pytest.approx(0.42970, abs=1e-5)
