@@ -245,6 +245,10 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
             state.judge(event, candidate.reason, Verdict.KNOWN, known)
             return True
     if branch is not None and _has_no_width(branch, event, state.settings):
+        assert candidate.orbit is not None
+        own = settings_for(candidate.orbit, state.settings)
+        branch = _leave_singular(state, candidate.orbit, event, own) or branch
+    if branch is not None and _has_no_width(branch, event, state.settings):
         why = "it begins and ends at the event, without any width"
         state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
         return False

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
+from contfric.continuation.gradients import carried, closing, gradient_of, surface_gradient
 from contfric.continuation.points import Point, Settings
-from contfric.continuation.standstill import stationary_values
+from contfric.continuation.standstill import joint_within, stationary_values
 from contfric.continuation.vertices import opening
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import linearised
@@ -55,10 +56,14 @@ _SINGULAR = 1e-6
 
 @dataclass(frozen=True)
 class _Condition:
-    """What vanishes at an event, and the segment on whose joints it depends."""
+    """What vanishes at an event, and the segment on whose joints it depends.
+
+    ``gradient`` is that on the joints, shape (N + 1, m), and on the parameter, where it is known.
+    """
 
     value: Callable[[Orbit], float]
     segment: int
+    gradient: tuple[FloatArray, float] | None = None
 
 
 def accuracy_of(
@@ -79,7 +84,9 @@ def accuracy_of(
     """
     active = here.model.index_of(settings.parameter)
     if tests:
-        condition = _touch(here, tests[0]) if kind is Kind.T else _margin(here, tests[0])
+        condition = (
+            _touch(here, tests[0], active) if kind is Kind.T else _margin(here, tests[0], active)
+        )
         error = None if condition is None else _error_of(here, active, condition)
         otherwise = _SINGULAR
     elif kind is Kind.SN:
@@ -91,12 +98,13 @@ def accuracy_of(
     return max(LEAST, error / settings.width)
 
 
-def _margin(here: Orbit, test: Test) -> _Condition:
+def _margin(here: Orbit, test: Test, active: int) -> _Condition:
     k = here.system.tests.index(test)
-    return _Condition(lambda orbit: float(orbit.margins[k]), test.segment)
+    gradient = gradient_of(here.as_whole(), test, here.system.segments, active)
+    return _Condition(lambda orbit: float(orbit.margins[k]), test.segment, gradient)
 
 
-def _touch(here: Orbit, test: Test) -> _Condition | None:
+def _touch(here: Orbit, test: Test, active: int) -> _Condition | None:
     """Return the distance of a stationary point or a joint to the surface that it meets at a tangency."""
     gaps = _gaps(here, test)
     if not len(gaps):
@@ -107,7 +115,33 @@ def _touch(here: Orbit, test: Test) -> _Condition | None:
         beside = _gaps(orbit, test)
         return float(beside[k]) if len(beside) == len(gaps) else float("nan")
 
-    return _Condition(value, test.segment)
+    return _Condition(value, test.segment, _gap_gradient(here, test, k, active))
+
+
+def _gap_gradient(orbit: Orbit, test: Test, k: int, active: int) -> tuple[FloatArray, float]:
+    """Return the gradient of one of the distances of :func:`_gaps`."""
+    model, i, count = orbit.model, test.segment, orbit.system.segments
+    c = [o.name for o in model.observables].index(test.surface)
+    own = [surface.name for surface in model.surfaces if surface.observable == test.surface]
+    row = next(r for r in orbit.system.layout.labels if r[0] == i and r[1] == c)
+    names = [surface.name for surface in model.surfaces]
+    times = [time for time, _ in stationary_values(orbit, i, c)]
+    gradient, slope = np.zeros((count + 1, orbit.joints.shape[1])), 0.0
+    whole = orbit.as_whole()
+    if k < len(times) * len(own):
+        touch = joint_within(whole, i, times[k // len(own)])
+        there, slope = surface_gradient(whole, own[k % len(own)], touch, active)
+        gradient[i], moves = carried(whole, i, touch, there, active)
+        return gradient, slope + moves
+    k -= len(times) * len(own)
+    for at, lies_on in ((i, row[2]), (i + 1, row[3])):
+        beside = [name for name in own if names.index(name) != lies_on]
+        if k < len(beside):
+            joint = whole.begins[i] if at == i else whole.ends[i]
+            gradient[at], slope = surface_gradient(whole, beside[k], joint, active)
+            break
+        k -= len(beside)
+    return gradient, slope
 
 
 def _gaps(orbit: Orbit, test: Test) -> FloatArray:
@@ -141,6 +175,15 @@ def _gradient(orbit: Orbit, active: int, condition: _Condition, value: float) ->
     """Return the derivatives of a condition by the joints and the parameter, shape (N m + 1,)."""
     count, m = orbit.joints.shape
     row = np.zeros(count * m + 1)
+    if condition.gradient is not None and not orbit.model.resets:
+        on_joints, row[-1] = condition.gradient
+        close = np.eye(m)
+        close[0, 0] = 0.0 if orbit.model.autonomous else 1.0
+        close[1:, 1:] = orbit.system.layout.closure
+        row[:-1] = on_joints[:-1].ravel()
+        row[:m] += on_joints[-1] @ close
+        row[-1] += on_joints[-1] @ closing(orbit, active)
+        return row
     for i in {condition.segment, (condition.segment + 1) % count}:
         for j in range(m):
             joints = orbit.joints.copy()

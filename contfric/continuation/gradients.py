@@ -1,0 +1,115 @@
+"""Exact gradients of what vanishes at an event, on the joints and on the parameter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.continuation.standstill import touch_of
+from contfric.errors import NotationError
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Margin, Test
+
+#: A hold this short is one that vanishes: what its margins say is its length.
+_SHORT = 1e-3
+
+
+def closing(orbit: Orbit, active: int) -> FloatArray:
+    """Return how the end of a turn moves with the parameter, shape (m,): the period does."""
+    model, out = orbit.model, np.zeros(orbit.joints.shape[1])
+    if not model.autonomous:
+        grad = np.empty(1)
+        model.flow.period(orbit.vector, np.array([active], dtype=np.int64), grad)
+        out[0] = orbit.system.layout.turn * grad[0]
+    return out
+
+
+def gradient_of(
+    orbit: Orbit, place: Test, count: int, active: int
+) -> tuple[FloatArray, float] | None:
+    """Return the gradient of one margin; None if it has none to first order."""
+    i, m = place.segment, orbit.joints.shape[1]
+    gradient, slope = np.zeros((count + 1, m)), 0.0
+    held = next((hold for hold in orbit.system.holds if hold.segment == i), None)
+    short = held is not None and orbit.ends[i, 0] - orbit.cycle[i, 0] < _SHORT
+    if place.margin is Margin.LASTING or short:
+        gradient[i + 1, 0], gradient[i, 0] = 1.0, -1.0
+        return gradient, slope
+    sign = _sign(orbit, place)
+    if place.margin is Margin.JOINT:
+        gradient[i + 1], slope = surface_gradient(orbit, place.surface, orbit.ends[i], active)
+    elif place.margin is Margin.EXIT:
+        mode = held.departs if held is not None else orbit.word[i][0]
+        gradient[i + 1], slope = _rate_gradient(orbit, mode, place.surface, orbit.ends[i], active)
+    elif place.margin is Margin.INTERIOR:
+        try:
+            touch = touch_of(orbit, i, place.surface)
+        except NotationError:
+            return None
+        there, slope = surface_gradient(orbit, place.surface, touch, active)
+        gradient[i], moves = carried(orbit, i, touch, there, active)
+        slope += moves
+    else:
+        return None
+    return sign * gradient, sign * slope
+
+
+def _sign(orbit: Orbit, place: Test) -> float:
+    """Return the sign with which a margin counts what it watches."""
+    layout, i = orbit.system.layout, place.segment
+    if place.margin is Margin.EXIT:
+        return float(layout.exit_signs[i])
+    k = [s.name for s in orbit.model.surfaces].index(place.surface)
+    rows = layout.joint if place.margin is Margin.JOINT else layout.interior
+    return float(next((row[2] for row in rows if row[0] == i and row[1] == k), 0.0))
+
+
+def _which(active: int) -> np.ndarray:
+    return np.array([active], dtype=np.int64)
+
+
+def surface_gradient(
+    orbit: Orbit, surface: str, joint: FloatArray, active: int
+) -> tuple[FloatArray, float]:
+    """Return the gradient of an observable less the level of a surface on (t, y), and on the parameter."""
+    model, m = orbit.model, len(joint)
+    k = [s.name for s in model.surfaces].index(surface)
+    c = [o.name for o in model.observables].index(model.surfaces[k].observable)
+    grad, level = np.empty(m + 1), np.empty(1)
+    time, y = float(joint[0]), np.ascontiguousarray(joint[1:])
+    model.flow.observe(c, time, y, orbit.vector, _which(active), grad)
+    model.flow.level(k, orbit.vector, _which(active), level)
+    return grad[:m], float(grad[m] - level[0])
+
+
+def _rate_gradient(
+    orbit: Orbit, mode: str, surface: str, joint: FloatArray, active: int
+) -> tuple[FloatArray, float]:
+    """Return the gradient of the rate of a surface's observable along a mode."""
+    model, m = orbit.model, len(joint)
+    number = [mo.name for mo in model.modes].index(mode)
+    observable = model.surface_by_name[surface].observable
+    c = [o.name for o in model.observables].index(observable)
+    grad = np.empty(m + 1)
+    time, y = float(joint[0]), np.ascontiguousarray(joint[1:])
+    model.flow.rate(number, c, time, y, orbit.vector, _which(active), grad)
+    return grad[:m], float(grad[m])
+
+
+def carried(
+    orbit: Orbit, i: int, touch: FloatArray, there: FloatArray, active: int
+) -> tuple[FloatArray, float]:
+    """Return a gradient at a touch inside of a segment as one on the start of the segment.
+
+    The time of the touch is stationary: it does not move the value.
+    """
+    model, m = orbit.model, len(touch)
+    start, n = orbit.begins[i], len(touch) - 1
+    jac, out = np.empty((n, 3 + n)), np.empty(n)
+    number = [mo.name for mo in model.modes].index(orbit.word[i][0])
+    time, y = float(start[0]), np.ascontiguousarray(start[1:])
+    model.flow.flow(number, time, y, float(touch[0]) - time, orbit.vector, _which(active), out, jac)
+    gradient = np.empty(m)
+    gradient[0] = there[1:] @ (jac[:, 0] - jac[:, 1 + n])
+    gradient[1:] = there[1:] @ jac[:, 1 : 1 + n]
+    return gradient, float(there[1:] @ jac[:, 2 + n])
