@@ -56,7 +56,7 @@ def smooth_events(
         a, b = before.tests[base + column], after.tests[base + column]
         if not a * b < 0.0 or (column == CHI_ONE and folded):
             continue  # chi(1) of a fold vanishes with it
-        if column == CHI_ONE:
+        if column == CHI_ONE and not _passes_vertex(orbit, before, after, a / (a - b), settings):
             crossing = _crossing(orbit, before, after, beyond, a / (a - b), settings)
             if crossing is not None:
                 found.append(crossing)
@@ -114,6 +114,17 @@ def smooth_events(
             event = replace(event, accuracy=ROUGH)
         found.append((event, point))
     return [*found, *_tangencies(orbit, before, beyond, settings)]
+
+
+def _passes_vertex(
+    orbit: Orbit, before: Point, after: Point, share: float, settings: Settings
+) -> bool:
+    """Tell whether a step passes the vertex of a pitchfork or a doubling: its fold says what it is."""
+    if orbit.system.half:
+        return False
+    active = orbit.model.index_of(settings.parameter)
+    between = parabola_vertex(before, after, share)
+    return _is_vertex(between.orbit(orbit.system, orbit.vector, active), active)
 
 
 def _crossing(
