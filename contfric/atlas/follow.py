@@ -9,31 +9,36 @@ A candidate is accepted when it is solved, and admissible beyond the event in on
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from contfric.atlas.collect import Event
 from contfric.atlas.crossings import follow_crossing, whole_branch
-from contfric.atlas.exploration import Exploration, Progress
+from contfric.atlas.exploration import Exploration
+from contfric.atlas.folds import follow_fold
+from contfric.atlas.leaving_event import (
+    first_end,
+    leave_event,
+    leave_singular,
+    settings_for,
+    went_somewhere,
+)
 from contfric.atlas.matching import SAME_MOTION, part_distance, same_place
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
-from contfric.continuation.candidates import Candidate, directions, sequences_of
+from contfric.continuation.candidates import Candidate, sequences_of
 from contfric.continuation.crossing import LOCATED, Direction, crossing_near
 from contfric.continuation.events import (
     ACCURACY,
     TERMINAL,
-    Bifurcation,
     End,
     EndReason,
     Kind,
     Verdict,
 )
 from contfric.continuation.incident import incident_forms
-from contfric.continuation.points import Point, Settings
-from contfric.continuation.side import Side, first_point
+from contfric.continuation.points import Settings
 from contfric.continuation.switching import (
     NEARER,
     leaps,
@@ -41,36 +46,20 @@ from contfric.continuation.switching import (
     null_vector,
     settings_value,
 )
-from contfric.continuation.trace import follow_orbit, trace_side
-from contfric.continuation.vertices import symmetrised
+from contfric.continuation.trace import trace_side
 from contfric.continuation.walked import walked
-from contfric.models.definition import FloatArray
-from contfric.orbit.linear import null_space
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish
 from contfric.orbit.system import Word
 from contfric.signature.edits import show
 
-#: First step away from an event, in largest steps: the new word is proved close to it.
-_NEAR_EVENT = 0.01
 #: Where an orbit beside an event is looked for, relative to the range.
 _SHARES = (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6)
-#: Null vectors where two curves may cross, and the directions between them that are tried: the corrector
-#: reaches a curve from 30 degrees beside it.
-_PLANE, _ANGLES = 2, 12
-#: An orbit this much (of its distance from a symmetric one) off its own symmetry image is asymmetric.
-_ODD = 0.1
-#: A branch that gets no farther than this (arclength) from the event it starts at has left it in the
-#: direction in which it is not admissible.
-_NOWHERE = 1e-7
 #: The same for an event that is located to the root of rounding only.
 _NOWHERE_ROUGHLY = 1e-3
 #: A branch shorter than this (arclength) that comes back to its event has been nowhere.
 _NO_WIDTH = 1e-3
-#: One that gets this far has left it in the right one. A shorter one may have gone back the way that the
-#: start was beside the event: a touch at the very end of a segment is located to the root of rounding.
-_SURELY_AWAY = 1e-4
 
 
 def follow(state: Exploration, event: Event) -> None:
@@ -83,75 +72,7 @@ def follow(state: Exploration, event: Event) -> None:
     elif kind is Kind.PD:
         _follow_doubling(state, event)
     elif kind is Kind.SN:
-        _follow_fold(state, event)
-
-
-def _follow_fold(state: Exploration, event: Event) -> None:
-    """Try the families that cross a symmetric bridge where it turns.
-
-    A hold has an effect that is stationary in its length: there each of two symmetric holds may be shorter
-    or longer, so that the bridge with one of either passes the same motion, and turns there as well.
-    """
-    orbit = event.bifurcation.orbit
-    half = orbit if orbit.system.half else symmetrised(orbit)
-    if half is None:
-        return
-    _try_crossing(
-        state, event, half.as_whole(), "the asymmetric branch with one hold of either length"
-    )
-    if not any(state.branches[i].system.half for i in event.branches):
-        _try_crossing(state, event, half, "the symmetric branch through the fold")
-
-
-def _try_crossing(state: Exploration, event: Event, orbit: Orbit, reason: str) -> None:
-    settings = settings_for(orbit, state.settings)
-    active = orbit.model.index_of(settings.parameter)
-    for distance in NEARER:
-        for direction in _plane_of(orbit, active):
-            moved = replace(orbit, joints=orbit.joints + distance * direction)
-            point = first_point(moved, settings, direction, 0.0)
-            if point is None:
-                continue
-            there = point.orbit(orbit.system, orbit.vector, active)
-            off = there.mirror_distance > _ODD * distance
-            if not there.admissible or off is orbit.system.half:
-                continue
-            if (known := state.known(there)) is not None:
-                state.judge(event, reason, Verdict.KNOWN, known)
-                return
-            _add_crossing(state, event, orbit, point, reason)
-            return
-
-
-def _add_crossing(
-    state: Exploration, event: Event, orbit: Orbit, point: Point, reason: str
-) -> None:
-    """Trace a family that crosses a fold: both ways, or to one side of it where the other is its image."""
-    settings = settings_for(orbit, state.settings)
-    active = orbit.model.index_of(settings.parameter)
-    if orbit.system.half:
-        there = point.orbit(orbit.system, orbit.vector, active)
-        branch = follow_orbit(there, settings)
-    else:
-        if float(np.sum((point.joints - orbit.joints) * point.tangent)) < 0.0:
-            point = point.reversed()
-        origin = replace(point, joints=orbit.joints, value=settings_value(orbit, settings), arc=0.0)
-        point.arc = float(np.linalg.norm(point.joints - orbit.joints)) / len(orbit.joints) ** 0.5
-        side = trace_side(orbit, point, settings, progress=state.progress)
-        first = _first_end(EndReason.BP, event, side, settings)
-        branch = assemble(orbit, settings, side, first, origin)
-    state.judge(event, reason, Verdict.ACCEPTED, len(state.branches))
-    state.add_from(branch, event)
-
-
-def _plane_of(orbit: Orbit, active: int) -> Iterator[FloatArray]:
-    """Yield directions in the plane of two null vectors; none where the curve has a unique direction."""
-    vectors, _ = null_space(orbit.system, orbit.joints, orbit.vector, active)
-    if len(vectors) != _PLANE:
-        return
-    for angle in np.arange(_ANGLES) * (2.0 * np.pi / _ANGLES):
-        away = np.cos(angle) * vectors[0] + np.sin(angle) * vectors[1]
-        yield away / np.max(np.abs(away))
+        follow_fold(state, event)
 
 
 # -------------------------------------------------------------------------- sliding events
@@ -234,7 +155,7 @@ def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:
 
 
 def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
-    branch = _leave_event(state, candidate, event)
+    branch = leave_event(state, candidate, event)
     if branch is None and event.bifurcation.accuracy > ACCURACY:
         assert candidate.orbit is not None
         branch = _through(state, candidate.orbit)
@@ -247,7 +168,7 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
     if branch is not None and _has_no_width(branch, event, state.settings):
         assert candidate.orbit is not None
         own = settings_for(candidate.orbit, state.settings)
-        branch = _leave_singular(state, candidate.orbit, event, own) or branch
+        branch = leave_singular(state, candidate.orbit, event, own) or branch
     if branch is not None and _has_no_width(branch, event, state.settings):
         why = "it begins and ends at the event, without any width"
         state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
@@ -267,114 +188,6 @@ def _has_no_width(branch: Branch, event: Event, settings: Settings) -> bool:
     if last is None or branch.arc[-1] > _NO_WIDTH:
         return False
     return same_place(last, b, settings.parameter, settings.width)
-
-
-def _leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branch | None:
-    """Trace away from an event, in the direction in which the orbit is admissible."""
-    orbit = candidate.orbit
-    assert orbit is not None
-    settings = settings_for(orbit, state.settings)
-    if candidate.away is not None:
-        return _leave_beside(state, orbit, candidate.away, event, settings)
-    longest: tuple[Orbit, Side] | None = None
-    for there, side in _ways(orbit, settings, state.progress):
-        if _went_somewhere(side, event) and (longest is None or side.length > longest[1].length):
-            longest = there, side
-        if longest is not None and side.length > _SURELY_AWAY:
-            break
-    if longest is None:
-        return _leave_singular(state, orbit, event, settings)
-    there, side = longest
-    first = _first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
-    return assemble(there, settings, side, first)
-
-
-def _ways(
-    orbit: Orbit, settings: Settings, progress: Progress | None
-) -> Iterator[tuple[Orbit, Side]]:
-    """Yield what is traced in each direction from an orbit at an event."""
-    active = orbit.model.index_of(settings.parameter)
-    for tangent, slope in directions(orbit, active):
-        start = first_point(orbit, settings, tangent, slope)
-        if start is None:
-            continue
-        there = start.orbit(orbit.system, orbit.vector, active)
-        for point in (start, start.reversed()):
-            yield there, _trace(there, point, settings, progress)
-
-
-def _leave_beside(
-    state: Exploration, orbit: Orbit, away: FloatArray, event: Event, settings: Settings
-) -> Branch | None:
-    """Trace away from an event at which the new orbit is singular, from a little beside it."""
-    active = orbit.model.index_of(settings.parameter)
-    for distance in NEARER:
-        moved = replace(orbit, joints=orbit.joints + distance * orbit.period * away)
-        for tangent, slope in directions(moved, active):
-            point = first_point(moved, settings, tangent, slope)
-            if point is None:
-                continue
-            there = point.orbit(orbit.system, orbit.vector, active)
-            if float(np.sum(away * point.tangent)) < 0.0:
-                point = point.reversed()
-            point.arc = float(np.linalg.norm(there.joints - orbit.joints)) / len(away) ** 0.5
-            side = _trace(there, point, settings, state.progress)
-            if there.admissible and side.count > 1:
-                origin = replace(point, joints=orbit.joints, value=settings_value(orbit, settings))
-                origin.arc = 0.0
-                first = _first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
-                return assemble(there, settings, side, first, origin)
-    return None
-
-
-def _leave_singular(
-    state: Exploration, orbit: Orbit, event: Event, settings: Settings
-) -> Branch | None:
-    """Trace away from an event at which the curve has no unique direction.
-
-    Its directions lie in the plane of two null vectors; those at regular angles are tried.
-    """
-    for away in _plane_of(orbit, orbit.model.index_of(settings.parameter)):
-        branch = _leave_beside(state, orbit, away, event, settings)
-        if branch is not None and branch.arc[-1] > _SURELY_AWAY:
-            return branch
-    return None
-
-
-def _trace(orbit: Orbit, point: Point, settings: Settings, progress: Progress | None) -> Side:
-    return trace_side(
-        orbit, point, settings, first_step=_NEAR_EVENT, at_event=True, progress=progress
-    )
-
-
-def settings_for(orbit: Orbit, settings: Settings) -> Settings:
-    """Return the settings for a branch: on a bridge there are no multipliers."""
-    return replace(settings, stability=False) if orbit.system.holds else settings
-
-
-def _went_somewhere(side: Side, event: Event) -> bool:
-    rough = event.bifurcation.accuracy > ACCURACY
-    return side.length > (_NOWHERE_ROUGHLY if rough else _NOWHERE)
-
-
-def _first_end(reason: EndReason, event: Event, side: Side, settings: Settings) -> End:
-    """Return the end of a branch at the event that it starts from."""
-    b = event.bifurcation
-    stable: bool | None = False if side_is_bridge(side) else None
-    if settings.stability and not side_is_bridge(side):
-        stable = bool(np.all(np.abs(side.second_multipliers) < 1.0))
-    here = replace(b, position=0.0, stable_before=None, stable_after=stable)
-    return End(reason, f"{EndReason.START.value}: {where(b, settings.parameter)}", here)
-
-
-def side_is_bridge(side: Side) -> bool:
-    """Return whether a side was traced without multipliers because it has holds."""
-    return "mu" not in side.names
-
-
-def where(bifurcation: Bifurcation, parameter: str) -> str:
-    """Return what a bifurcation is and where, for a message."""
-    return f"{bifurcation.label} at {parameter} = {bifurcation.params[parameter]:.10g}"
 
 
 # --------------------------------------------------------------------------- branch points
@@ -435,8 +248,8 @@ def _follow_departure(
         if distance != NEARER[-1] and leaps(orbit, settings, departure, distance, along):
             continue
         side = trace_side(orbit, departure.point, settings, progress=state.progress)
-        if _went_somewhere(side, event):
-            first = _first_end(reason, event, side, settings)
+        if went_somewhere(side, event):
+            first = first_end(reason, event, side, settings)
             state.judge(event, text, Verdict.ACCEPTED, len(state.branches))
             state.add_from(assemble(orbit, settings, side, first, departure.origin), event)
             return

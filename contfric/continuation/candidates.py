@@ -16,15 +16,10 @@ import numpy as np
 
 from contfric.continuation.conditions import Relation, possible, relation_of
 from contfric.continuation.events import Bifurcation
-from contfric.continuation.incident import (
-    Form,
-    Incident,
-    Unit,
-    edited_whole,
-    incident_forms,
-)
+from contfric.continuation.incident import Incident, edited_whole, incident_forms
 from contfric.continuation.outcomes import Outcome
 from contfric.continuation.sequences import MOST_SEQUENCES, count, lengths, necklaces
+from contfric.continuation.unit import Form, Unit
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked

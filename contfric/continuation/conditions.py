@@ -24,7 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from contfric.continuation.gradients import closing, gradient_of
-from contfric.continuation.incident import Form, Unit, vanishing
+from contfric.continuation.incident import vanishing
+from contfric.continuation.unit import Form, Unit
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import jacobian_blocks, linearised
 from contfric.orbit.orbit import Orbit

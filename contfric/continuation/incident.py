@@ -31,13 +31,13 @@ from contfric.continuation.outcomes import (
     outcome_at,
     places_of,
 )
+from contfric.continuation.unit import Form, Unit, pieces, unit_of
 from contfric.errors import NotationError
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.slides import SAME_MOTION, repeats, repetitions, slides_of
-from contfric.orbit.system import Margin, Test, Word, build_system, mirror_mode
-from contfric.orbit.words import mirror_pairs
+from contfric.orbit.slides import SAME_MOTION
+from contfric.orbit.system import Margin, Test, Word, build_system
 from contfric.signature.edits import apply_edit, edited_pieces
 
 #: Margins below this vanish at an event: it is located to about 1e-13.
@@ -46,93 +46,6 @@ _VANISHES = 1e-9
 _NEARLY = 1e-6
 #: Most forms of a unit: six places with two outcomes each.
 _MOST_FORMS = 64
-
-
-@dataclass(frozen=True, eq=False)
-class Form:
-    """One word of the unit of a motion.
-
-    Attributes
-    ----------
-    word : mode and exit of each segment
-    joints : start joints (t, y) of the segments, shape (k, 1 + n)
-    away : how fast the start joints move in time where the new orbit is singular at the event, shape (k,)
-    reason : what happens at its places, in words
-    """
-
-    word: Word
-    joints: FloatArray
-    away: FloatArray
-    reason: str = ""
-
-    @property
-    def has_hold(self) -> bool:
-        """Whether something is held."""
-        return any(exit_.startswith("hold@") for _, exit_ in self.word)
-
-
-@dataclass(frozen=True, eq=False)
-class Unit:
-    """The shortest part of a motion that it consists of.
-
-    Attributes
-    ----------
-    model : the model that moves
-    vector : parameters
-    periods : shortest period of the motion, in periods of the excitation
-    half : whether the unit is half of it, the other half being its symmetry image
-    duration : of the unit
-    mode : mode of the slide that it begins with
-    cut : joint (t, y) at which it begins, shape (1 + n,)
-    """
-
-    model: Model
-    vector: FloatArray
-    periods: int
-    half: bool
-    duration: float
-    mode: str
-    cut: FloatArray
-
-    def image(self, joints: FloatArray, times: int) -> FloatArray:
-        """Return joints of the unit as those of the unit that is some number of times later."""
-        moved = joints.copy()
-        moved[:, 0] += times * self.duration
-        if self.half and times % 2:
-            assert self.model.symmetry is not None
-            moved[:, 1:] = moved[:, 1:] @ self.model.symmetry.array().T
-        return moved
-
-    def image_word(self, word: Word, times: int) -> Word:
-        """Return a word of the unit as one of the unit that is some number of times later."""
-        return mirror_pairs(self.model, word) if self.half and times % 2 else word
-
-    def orbit(self, forms: tuple[Form, ...]) -> tuple[Orbit, FloatArray]:
-        """Return the motion as an orbit of forms one after the other, and how its joints move away.
-
-        An odd number of half units is the half of a symmetric orbit.
-
-        Raises
-        ------
-        NotationError
-            If there is no such word.
-        """
-        count = len(forms)
-        word = tuple(pair for j, f in enumerate(forms) for pair in self.image_word(f.word, j))
-        joints = np.concatenate([self.image(f.joints, j) for j, f in enumerate(forms)])
-        away = np.concatenate([f.away for f in forms])
-        half = self.half and count % 2 == 1
-        periods = self.periods * count // (2 if self.half and not half else 1)
-        joints = clocked(self.model, joints, float(joints[0, 0]) + count * self.duration)
-        try:
-            system = build_system(self.model, word, periods, half)
-        except ValueError as error:
-            raise NotationError(str(error)) from None
-        return Orbit(system, joints, self.vector.copy(), 0.0, Status.CONVERGED), away
-
-    def whole(self, form: Form) -> Orbit:
-        """Return the motion as an orbit of one form alone, on its whole cycle."""
-        return self.orbit((form,))[0].as_whole()
 
 
 @dataclass(frozen=True)
@@ -347,54 +260,3 @@ def edited_whole(
     except ValueError as error:
         raise NotationError(str(error)) from None
     return replace(orbit, system=system, joints=starts, status=Status.CONVERGED), moves
-
-
-# ------------------------------------------------------------------------ the unit of a motion
-
-
-def unit_of(orbit: Orbit) -> Unit:
-    """Return the unit of the motion of a whole orbit."""
-    slides = slides_of(orbit)
-    turns = repetitions(orbit, slides)
-    periods = orbit.periods // turns
-    half = periods % 2 == 1 and repeats(orbit, slides, 2 * turns, mirrored=True)
-    longest = max(slides, key=lambda i: orbit.ends[i, 0] - orbit.cycle[i, 0])
-    duration = orbit.period / (turns * (2 if half else 1))
-    mode = orbit.word[longest][0]
-    cut = np.array(orbit.cycle[longest])
-    return Unit(orbit.model, orbit.vector, periods, half, duration, mode, cut)
-
-
-def pieces(orbit: Orbit, away: FloatArray, unit: Unit, reason: str = "") -> Iterator[Form]:
-    """Yield the units of a whole orbit as forms, each as the first unit of the motion."""
-    cuts = _cuts(orbit, unit)
-    if cuts is None:
-        raise NotationError("the edited word does not begin with a slide where the motion does")
-    count = len(orbit.word)
-    for j, (start, stop) in enumerate(zip(cuts, [*cuts[1:], cuts[0]], strict=True)):
-        places = range(start, stop if stop > start else stop + count)
-        word = tuple(orbit.word[i % count] for i in places)
-        joints = np.array([orbit.cycle[i % count] for i in places])
-        joints[:, 0] += np.array([orbit.period * (i // count) for i in places])
-        joints[:, 0] += unit.cut[0] + j * unit.duration - joints[0, 0]
-        back = unit.image(joints, -j)
-        yield Form(unit.image_word(word, j), back, away[[i % count for i in places]], reason)
-
-
-def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
-    """Return the segments with which the units of a whole orbit begin; None if one is not there."""
-    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
-    cuts = []
-    for j in range(round(orbit.period / unit.duration)):
-        mode = mirror_mode(unit.model)[unit.mode] if unit.half and j % 2 else unit.mode
-        joint = unit.image(unit.cut[None, :], j)[0]
-        gap = np.abs(orbit.cycle - joint)
-        gap[:, 0] = np.abs((gap[:, 0] + 0.5 * orbit.period) % orbit.period - 0.5 * orbit.period)
-        if orbit.model.autonomous:
-            gap[:, 0] = 0.0
-        fits = (np.max(gap, axis=1) < SAME_MOTION) & (lasts > SAME_MOTION)
-        found = [i for i in np.flatnonzero(fits) if orbit.word[i][0] == mode]
-        if not found:
-            return None
-        cuts.append(int(found[0]))
-    return cuts

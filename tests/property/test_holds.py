@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import contfric as cf
-from contfric.continuation.incident import pieces, unit_of
+from contfric.continuation.unit import pieces, unit_of
 from contfric.continuation.vertices import passed_vertex
 from contfric.errors import NotationError
 from contfric.models import load_model

@@ -1,0 +1,229 @@
+"""Sums of fixed-point indices in a diagram: beside every event, and over all orbits of one period.
+
+The index is that of :mod:`contfric.orbit.index`. Both sums are told by topology; one that is not as it must
+be says that something is not in the diagram.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contfric.atlas.matching import same_event
+from contfric.continuation.branch import Branch
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind
+from contfric.continuation.unit import unit_of
+from contfric.orbit.index import index_at_infinity, index_of
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.solve import polish
+
+if TYPE_CHECKING:
+    from contfric.atlas.diagram import Diagram, Node
+
+#: Points this near to an event (in accuracies of its place) are on no side of it.
+_BESIDE = 10.0
+#: Values of the parameter between two neighbouring events at which indices are summed.
+_SHARES = (0.381966, 0.618034)
+#: Events nearer than this share of the range have nothing between them that could be told from them.
+_APART = 1e-6
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Sums of indices on both sides of an event, for orbits of some periods.
+
+    Attributes
+    ----------
+    event : index of the node
+    label, value : its name, and its place
+    periods : length of the orbits, in periods
+    below, above : sums of the indices; None where one has no sign
+    """
+
+    event: int
+    label: str
+    value: float
+    periods: int
+    below: int | None
+    above: int | None
+
+    @property
+    def holds(self) -> bool:
+        """Whether both sums agree (or one cannot be told)."""
+        return self.below is None or self.above is None or self.below == self.above
+
+    def __str__(self) -> str:
+        return (
+            f"{self.label} at {self.value:.10g}, orbits of {self.periods} period(s): "
+            f"{self.below} below, {self.above} above"
+        )
+
+
+@dataclass(frozen=True)
+class IndexSum:
+    """The sum of the indices of all orbits of one period at a parameter value, and what it should be."""
+
+    value: float
+    found: int | None
+    wanted: int
+
+    @property
+    def holds(self) -> bool:
+        """Whether it is what it should be (or cannot be told)."""
+        return self.found is None or self.found == self.wanted
+
+    def __str__(self) -> str:
+        return (
+            f"at {self.value:.10g} the indices of all orbits of one period add up to "
+            f"{self.found}, not {self.wanted}"
+        )
+
+
+def balances(diagram: Diagram) -> Iterator[Balance]:
+    """Yield the sums of indices beside every event that is no tangency."""
+    width = diagram.range[1] - diagram.range[0]
+    for number, node in enumerate(diagram.nodes):
+        b = node.bifurcation
+        if node.mirrored or b.kind in (Kind.T, Kind.NS) or not b.located:
+            continue
+        value, slack = b.params[diagram.parameter], _BESIDE * max(ACCURACY, b.accuracy) * width
+        if not diagram.range[0] + slack < value < diagram.range[1] - slack:
+            continue
+        period = unit_of(b.orbit.as_whole()).periods if not b.orbit.model.autonomous else 0
+        if period == 0:
+            continue
+        families = list(_families(diagram, node, value, slack))
+        most = min(diagram.settings.copies, diagram.settings.max_periods // period)
+        for times in range(1, most + 1):
+            below, above = (_sum(families, side, period, times * period) for side in (-1, 1))
+            yield Balance(number, b.label, value, times * period, below, above)
+
+
+def _families(
+    diagram: Diagram, node: Node, value: float, slack: float
+) -> Iterator[tuple[int, Orbit]]:
+    """Yield (side, orbit) for each half-branch that meets an event."""
+    for i in node.branches:
+        branch = diagram.branches[i]
+        for position, event in _positions(diagram, node, branch):
+            for way in (-1, 1):
+                found = _beside(branch, position, event, way, value, slack)
+                if found is not None:
+                    yield found
+
+
+def _positions(diagram: Diagram, node: Node, branch: Branch) -> list[tuple[float, Bifurcation]]:
+    """Return the places along a branch at which it meets an event, and the event as the branch has it."""
+    width = diagram.range[1] - diagram.range[0]
+    b = node.bifurcation
+    images = (b, b.mirror()) if branch.mirrored and b.orbit.model.symmetry is not None else (b,)
+    return [
+        (_position(branch, e), e)
+        for e in branch.bifurcations
+        if any(same_event(e, image, diagram.parameter, width) for image in images)
+    ]
+
+
+def _position(branch: Branch, event: Bifurcation) -> float:
+    if branch.ends[0].bifurcation is event:
+        return float(branch.arc[0])
+    return float(branch.arc[-1]) if branch.ends[1].bifurcation is event else event.position
+
+
+def _beside(
+    branch: Branch, position: float, event: Bifurcation, way: int, value: float, slack: float
+) -> tuple[int, Orbit] | None:
+    """Return an orbit of a branch on one side of an event, before the branch meets the next one."""
+    others = [(_position(branch, e), e) for e in branch.bifurcations if e.kind is not Kind.T]
+    ahead = [pair for pair in others if (pair[0] - position) * way > 0.0]
+    reach, following = min(
+        ahead, key=lambda pair: abs(pair[0] - position), default=(np.inf * way, None)
+    )
+    between = ((branch.arc - position) * way > 0.0) & ((reach - branch.arc) * way > 0.0)
+    far = between & (np.abs(branch.values - value) > slack)
+    if np.any(far):
+        k = int(min(np.flatnonzero(far), key=lambda j: abs(branch.arc[j] - position)))
+        return int(np.sign(branch.values[k] - value)), branch[k]
+    if following is None or following.orbit.joints.shape != event.orbit.joints.shape:
+        return None
+    middle = replace(
+        event.orbit,
+        joints=0.5 * (event.orbit.joints + following.orbit.joints),
+        vector=0.5 * (event.orbit.vector + following.orbit.vector),
+    )
+    solved = polish(middle, damped=False)
+    gap = solved.params[branch.parameter] - value
+    return (int(np.sign(gap)), solved) if solved.converged and abs(gap) > slack else None
+
+
+def _sum(
+    families: list[tuple[int, Orbit]], side: int, shortest_period: int, periods: int
+) -> int | None:
+    total = 0
+    for where, orbit in families:
+        if where != side or periods % orbit.periods:
+            continue
+        index = index_of(orbit, periods // orbit.periods)
+        if index is None:
+            return None
+        total += index * (orbit.periods // shortest_period)
+    return total
+
+
+def index_sums(diagram: Diagram) -> Iterator[IndexSum]:
+    """Yield the sums of the indices of all orbits of one period, between the events."""
+    if not diagram.settings.bridges:
+        return
+    low, high = _covered(diagram)
+    places = sorted({low, high, *(b.params[diagram.parameter] for b in diagram.bifurcations)})
+    width = diagram.range[1] - diagram.range[0]
+    for a, b in pairwise(places):
+        if b - a < _APART * width:
+            continue
+        for share in _SHARES:
+            value = a + share * (b - a)
+            wanted = _wanted(diagram, value)
+            if wanted is not None:
+                yield IndexSum(value, _sum_at(diagram, value), wanted)
+
+
+def _covered(diagram: Diagram) -> tuple[float, float]:
+    """Return the range within the limits of the model."""
+    values = [v for branch in diagram.branches for v in (branch.values.min(), branch.values.max())]
+    return max(diagram.range[0], min(values)), min(diagram.range[1], max(values))
+
+
+def _wanted(diagram: Diagram, value: float) -> int | None:
+    vector = diagram.branches[0].vector.copy()
+    vector[diagram.model.index_of(diagram.parameter)] = value
+    return index_at_infinity(diagram.model, vector)
+
+
+def _sum_at(diagram: Diagram, value: float) -> int | None:
+    total = 0
+    for branch in diagram.branches:
+        if branch.system.periods != 1:
+            continue
+        for orbit in orbits_at(branch, value):
+            index = index_of(orbit)
+            if index is None:
+                return None
+            total += index
+    return total
+
+
+def orbits_at(branch: Branch, value: float) -> Iterator[Orbit]:
+    """Yield the orbits of a branch at a parameter value, solved there: one for each time it takes it."""
+    ahead = branch.values - value
+    vector = branch.vector.copy()
+    vector[branch.model.index_of(branch.parameter)] = value
+    for k in np.flatnonzero(ahead[:-1] * ahead[1:] < 0.0):
+        share = ahead[k] / (ahead[k] - ahead[k + 1])
+        joints = branch.joints[k] + share * (branch.joints[k + 1] - branch.joints[k])
+        solved = polish(Orbit(branch.system, joints, vector, np.inf), damped=False)
+        nearest = int(k) if share < 0.5 else int(k) + 1
+        yield solved if solved.converged else branch[nearest]

@@ -1,0 +1,163 @@
+"""Tracing away from an event: in the direction in which an orbit of another word is admissible."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from contfric.atlas.collect import Event
+from contfric.atlas.exploration import Exploration, Progress
+from contfric.continuation.assembly import assemble
+from contfric.continuation.branch import Branch
+from contfric.continuation.candidates import Candidate, directions
+from contfric.continuation.events import (
+    ACCURACY,
+    Bifurcation,
+    End,
+    EndReason,
+)
+from contfric.continuation.points import Point, Settings
+from contfric.continuation.side import Side, first_point
+from contfric.continuation.switching import (
+    NEARER,
+    settings_value,
+)
+from contfric.continuation.trace import trace_side
+from contfric.models.definition import FloatArray
+from contfric.orbit.linear import null_space
+from contfric.orbit.orbit import Orbit
+
+#: First step away from an event, in largest steps: the new word is proved close to it.
+_NEAR_EVENT = 0.01
+#: Null vectors where two curves may cross, and the directions between them that are tried: the corrector
+#: reaches a curve from 30 degrees beside it.
+_PLANE, _ANGLES = 2, 12
+#: A branch that gets no farther than this (arclength) from the event it starts at has left it in the
+#: direction in which it is not admissible.
+_NOWHERE = 1e-7
+#: The same for an event that is located to the root of rounding only.
+_NOWHERE_ROUGHLY = 1e-3
+#: One that gets this far has left it in the right one. A shorter one may have gone back the way that the
+#: start was beside the event: a touch at the very end of a segment is located to the root of rounding.
+_SURELY_AWAY = 1e-4
+
+
+def leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branch | None:
+    """Trace away from an event, in the direction in which the orbit is admissible."""
+    orbit = candidate.orbit
+    assert orbit is not None
+    settings = settings_for(orbit, state.settings)
+    if candidate.away is not None:
+        return _leave_beside(state, orbit, candidate.away, event, settings)
+    longest: tuple[Orbit, Side] | None = None
+    for there, side in _ways(orbit, settings, state.progress):
+        if went_somewhere(side, event) and (longest is None or side.length > longest[1].length):
+            longest = there, side
+        if longest is not None and side.length > _SURELY_AWAY:
+            break
+    if longest is None:
+        return leave_singular(state, orbit, event, settings)
+    there, side = longest
+    first = first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
+    return assemble(there, settings, side, first)
+
+
+def _ways(
+    orbit: Orbit, settings: Settings, progress: Progress | None
+) -> Iterator[tuple[Orbit, Side]]:
+    """Yield what is traced in each direction from an orbit at an event."""
+    active = orbit.model.index_of(settings.parameter)
+    for tangent, slope in directions(orbit, active):
+        start = first_point(orbit, settings, tangent, slope)
+        if start is None:
+            continue
+        there = start.orbit(orbit.system, orbit.vector, active)
+        for point in (start, start.reversed()):
+            yield there, _trace(there, point, settings, progress)
+
+
+def _leave_beside(
+    state: Exploration, orbit: Orbit, away: FloatArray, event: Event, settings: Settings
+) -> Branch | None:
+    """Trace away from an event at which the new orbit is singular, from a little beside it."""
+    active = orbit.model.index_of(settings.parameter)
+    for distance in NEARER:
+        moved = replace(orbit, joints=orbit.joints + distance * orbit.period * away)
+        for tangent, slope in directions(moved, active):
+            point = first_point(moved, settings, tangent, slope)
+            if point is None:
+                continue
+            there = point.orbit(orbit.system, orbit.vector, active)
+            if float(np.sum(away * point.tangent)) < 0.0:
+                point = point.reversed()
+            point.arc = float(np.linalg.norm(there.joints - orbit.joints)) / len(away) ** 0.5
+            side = _trace(there, point, settings, state.progress)
+            if there.admissible and side.count > 1:
+                origin = replace(point, joints=orbit.joints, value=settings_value(orbit, settings))
+                origin.arc = 0.0
+                first = first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
+                return assemble(there, settings, side, first, origin)
+    return None
+
+
+def leave_singular(
+    state: Exploration, orbit: Orbit, event: Event, settings: Settings
+) -> Branch | None:
+    """Trace away from an event at which the curve has no unique direction.
+
+    Its directions lie in the plane of two null vectors; those at regular angles are tried.
+    """
+    for away in plane_of(orbit, orbit.model.index_of(settings.parameter)):
+        branch = _leave_beside(state, orbit, away, event, settings)
+        if branch is not None and branch.arc[-1] > _SURELY_AWAY:
+            return branch
+    return None
+
+
+def plane_of(orbit: Orbit, active: int) -> Iterator[FloatArray]:
+    """Yield directions in the plane of two null vectors; none where the curve has a unique direction."""
+    vectors, _ = null_space(orbit.system, orbit.joints, orbit.vector, active)
+    if len(vectors) != _PLANE:
+        return
+    for angle in np.arange(_ANGLES) * (2.0 * np.pi / _ANGLES):
+        away = np.cos(angle) * vectors[0] + np.sin(angle) * vectors[1]
+        yield away / np.max(np.abs(away))
+
+
+def _trace(orbit: Orbit, point: Point, settings: Settings, progress: Progress | None) -> Side:
+    return trace_side(
+        orbit, point, settings, first_step=_NEAR_EVENT, at_event=True, progress=progress
+    )
+
+
+def settings_for(orbit: Orbit, settings: Settings) -> Settings:
+    """Return the settings for a branch: on a bridge there are no multipliers."""
+    return replace(settings, stability=False) if orbit.system.holds else settings
+
+
+def went_somewhere(side: Side, event: Event) -> bool:
+    """Tell whether what was traced away from an event got anywhere."""
+    rough = event.bifurcation.accuracy > ACCURACY
+    return side.length > (_NOWHERE_ROUGHLY if rough else _NOWHERE)
+
+
+def first_end(reason: EndReason, event: Event, side: Side, settings: Settings) -> End:
+    """Return the end of a branch at the event that it starts from."""
+    b = event.bifurcation
+    stable: bool | None = False if side_is_bridge(side) else None
+    if settings.stability and not side_is_bridge(side):
+        stable = bool(np.all(np.abs(side.second_multipliers) < 1.0))
+    here = replace(b, position=0.0, stable_before=None, stable_after=stable)
+    return End(reason, f"{EndReason.START.value}: {where(b, settings.parameter)}", here)
+
+
+def side_is_bridge(side: Side) -> bool:
+    """Return whether a side was traced without multipliers because it has holds."""
+    return "mu" not in side.names
+
+
+def where(bifurcation: Bifurcation, parameter: str) -> str:
+    """Return what a bifurcation is and where, for a message."""
+    return f"{bifurcation.label} at {parameter} = {bifurcation.params[parameter]:.10g}"
