@@ -60,6 +60,7 @@ def _diagram(record: Record) -> Iterator[str]:
     else:
         yield "no loose ends"
     yield from (f"note: {text}" for text in record.get("notes", []))
+    yield from record.get("verification", [])
     if not record["complete"]:
         yield "incomplete: the exploration was stopped before it was done"
 

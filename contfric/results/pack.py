@@ -6,7 +6,7 @@ after loading. All floating-point numbers are in arrays, so that nothing is roun
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -114,6 +114,8 @@ class Packer:
             ],
             "complete": diagram.complete,
             "notes": list(diagram.notes),
+            "settings": asdict(diagram.settings),
+            "verification": None if diagram.verification is None else asdict(diagram.verification),
         }
 
     def finish(self) -> Header:

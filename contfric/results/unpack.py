@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 
-from contfric.atlas.diagram import Diagram, LooseEnd, Node
+from contfric.atlas.balance import Balance, IndexSum
+from contfric.atlas.diagram import Asked, Diagram, LooseEnd, Node
+from contfric.atlas.verification import Restart, Verification
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import (
     ACCURACY,
@@ -145,9 +147,23 @@ class Unpacker:
             ),
             complete=entry["complete"],
             notes=tuple(entry["notes"]),
+            settings=Asked(**entry.get("settings", {})),
+            verification=_verification(entry.get("verification")),
         )
 
     @staticmethod
     def _expect(holds: bool) -> None:
         if not holds:
             raise ValueError("arrays do not fit each other")
+
+
+def _verification(entry: Header | None) -> Verification | None:
+    """Return what a diagram was held against, from its header entry."""
+    if entry is None:
+        return None
+    restarts = tuple(
+        Restart(**{**r, "missing": tuple(r["missing"]), "extra": tuple(r["extra"])})
+        for r in entry["restarts"]
+    )
+    balances = tuple(Balance(**b) for b in entry["balances"])
+    return Verification(restarts, balances, tuple(IndexSum(**s) for s in entry["sums"]))

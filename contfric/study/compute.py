@@ -66,7 +66,8 @@ def explore_from(study: Study, orbit: Orbit, task: ExploreTask, say: Say) -> Dia
     options = task.options()
     if task.seeds is not None:
         options["seeds"] = Seeds(**task.seeds.model_dump())
-    return explore(
+    del options["verify"]
+    diagram = explore(
         orbit,
         task.parameter,
         (task.range[0], task.range[1]),
@@ -74,6 +75,10 @@ def explore_from(study: Study, orbit: Orbit, task: ExploreTask, say: Say) -> Dia
         progress=lambda text: say(f"explore: {text}"),
         **options,
     )
+    if task.verify and diagram.complete:
+        say("verify: explored again from its own branches")
+        diagram.verify()
+    return diagram
 
 
 def continue_from(study: Study, orbit: Orbit, task: ContinueTask, say: Say) -> Branch:

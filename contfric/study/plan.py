@@ -145,6 +145,8 @@ def _task_text(study: Study, task: ExploreTask | ContinueTask) -> str:
         text = f"every branch that can be reached, {where}"
         if task.max_periods is not None:
             text += f", of up to {task.max_periods} period(s)"
+        if task.verify:
+            text += ", explored again from its own branches"
     return text + (", with multipliers" if study.wants(Want.STABILITY) else "")
 
 

@@ -102,6 +102,10 @@ def _diagram_entries(diagram: Diagram) -> dict[str, Any]:
         ],
         "loose_ends": [str(end) for end in diagram.loose_ends],
         "notes": list(diagram.notes),
+        "verified": diagram.verified,
+        "verification": []
+        if diagram.verification is None
+        else str(diagram.verification).split("\n"),
     }
 
 

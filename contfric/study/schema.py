@@ -142,10 +142,19 @@ class ExploreTask(_Task):
         None,
         ge=1,
         le=16,
-        description="a whole number from 1 to 16: longest period followed through doublings",
+        description="a whole number from 1 to 16: longest orbits, in periods",
+    )
+    copies: int | None = Field(
+        None,
+        ge=1,
+        le=16,
+        description="a whole number from 1 to 16: most copies of a motion at a sliding event",
     )
     max_branches: int | None = Field(
         None, ge=1, description="a whole number >= 1: most branches to compute"
+    )
+    verify: _Truth = Field(
+        False, description="true or false: whether the diagram is restarted from its own branches"
     )
 
 
@@ -256,7 +265,7 @@ class StudyFile(_Part):
     explore: ExploreTask | None = Field(
         None,
         description="a mapping with parameter and range; also bridges, seeds, max_step, "
-        "max_points, max_periods, max_branches",
+        "max_points, max_periods, copies, max_branches, verify",
     )
     continue_: ContinueTask | None = Field(
         None,

@@ -165,3 +165,32 @@ def test_local_conditions_agree_with_what_is_solved() -> None:
         assert told <= leaving
         checked += len(told)
     assert checked >= 4
+
+
+# ---------------------------------------------------------------------------- kept and in studies
+
+
+def test_a_study_verifies_and_keeps_it(tmp_path: Path) -> None:
+    text = (
+        "title: verified\nmodel: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\nstart: simulate\n"
+        "explore: {parameter: Omega, range: [0.48, 0.55], copies: 1, verify: true}\n"
+    )
+    path = tmp_path / "study.yaml"
+    path.write_text(text, encoding="utf-8")
+    result = cf.run_study(path, out=tmp_path / "out")
+    loaded = cf.load(tmp_path / "out" / "diagram.npz")
+    assert isinstance(loaded, cf.Diagram)
+    assert loaded.verified is True
+    assert loaded.settings == cf.load(tmp_path / "out" / "diagram.npz").settings
+    assert loaded.settings.copies == 1
+    assert loaded.verification is not None
+    assert str(loaded.verification) in "\n".join(result.info["diagram"]["verification"])
+
+
+def test_a_start_of_a_longer_period_raises_it() -> None:
+    params = {"Omega": 0.31, "S": 0.06, "S0": 0.18, "zeta": 0.06, "h": -0.093}
+    orbit = cf.find_orbit("coulomb", params)
+    assert orbit.periods == 3
+    diagram = cf.explore(orbit, "h", (-0.0935, -0.0925), max_periods=1)
+    assert diagram.settings.max_periods == diagram.settings.copies == 3
+    assert any("max_periods raised to 3" in note for note in diagram.notes)
