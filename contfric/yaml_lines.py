@@ -23,6 +23,8 @@ _TRUTH = {"yes": True, "on": True, "no": False, "off": False}
 _COLON = "; a text with ': ' in it needs quotes"
 #: Levels of nesting whose lines are kept.
 _DEEPEST = 4
+#: Brackets within brackets: a study nests four. Where a thousand are open PyYAML takes ten seconds.
+_MOST_OPEN = 50
 
 
 @dataclass(frozen=True)
@@ -102,9 +104,17 @@ def _entries(node: yaml.Node, known: dict[int, int]) -> int:
 def _loader() -> type[yaml.SafeLoader]:
     """Return PyYAML's safe loader, with the truth values of YAML 1.2: on, off, yes and no are names."""
     import yaml
+    from yaml.scanner import ScannerError
 
     class Loader(yaml.SafeLoader):
         """Reads plain data."""
+
+        def fetch_flow_collection_start(self, token: type[yaml.Token]) -> None:
+            """Open a bracket, if not too many are open."""
+            if self.flow_level >= _MOST_OPEN:
+                problem = f"more than {_MOST_OPEN} brackets are open at once"
+                raise ScannerError(None, None, problem, self.get_mark())
+            super().fetch_flow_collection_start(token)
 
     truth = "tag:yaml.org,2002:bool"
     Loader.yaml_implicit_resolvers = {

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from contfric.errors import ParameterError, shown, whole_number
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.simulation import displaced
+from contfric.orbit.starts import displaced
 
 #: A state, shape (n,), several, shape (k, n), or a function of the parameters that returns either.
 StateLike: TypeAlias = ArrayLike | Callable[[Mapping[str, float]], ArrayLike]

@@ -41,7 +41,7 @@ from contfric.continuation.standstill import first_standstill, leaving_rate, tou
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.simulation import signs_at
+from contfric.orbit.starts import signs_at
 from contfric.orbit.system import Margin, Test
 from contfric.signature.edits import Edit, drop, insert, split, swap_edit
 from contfric.signature.holds import TOUCH, hold_at, is_hold, release_mode

@@ -22,10 +22,16 @@ from contfric.continuation.points import (
 )
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.sliding import nearly_reached
-from contfric.continuation.smooth import SAME_PLACE, leapt_vertex, vertex_at
-from contfric.continuation.stalls import stalled_at
+from contfric.continuation.smooth import SAME_PLACE
 from contfric.continuation.trial import locate_value
-from contfric.continuation.vertices import at_vertex, left_at, passed_vertex
+from contfric.continuation.vertex_ends import (
+    CROSSED,
+    NEAREST,
+    SHORTER,
+    end_stalled,
+    leaps_over_vertex,
+)
+from contfric.continuation.vertices import at_vertex
 from contfric.errors import ConvergenceError, function_of
 from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
@@ -48,13 +54,8 @@ _LONGER, _STANDS = 1.5, 1e-6
 #: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
 _NO_SIZE = 1e-5
 
-#: Beside an event at which Newton fails steps are shortened by this factor, down to this length.
-_SHORTER, _NEAREST = 8.0, 1e-8
 #: A step this short after hundreds of points (arclength) gets nowhere.
 _CRAWLS = 1e-6
-
-#: Why a branch ends at a branch point at which its parameter turns, and no declared symmetry is broken.
-CROSSED = "branch point: the parameter turns there, and another branch crosses"
 
 Progress = Callable[[str], None]
 
@@ -183,7 +184,7 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         return True, step
     count = side.count
     why, step = side.march(orbit, settings, step)
-    if _leaps_over_vertex(orbit, side, settings, side.count - count):
+    if leaps_over_vertex(orbit, side, settings, side.count - count):
         return True, step
     reasons = {
         kernels.STEP: EndReason.STEP,
@@ -199,70 +200,13 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
             upper = side.tip.value > 0.5 * (settings.low + settings.high)
             side.end = _limit_end(upper, settings)
         elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
-            _end_stalled(orbit, side, settings)
+            end_stalled(orbit, side, settings)
         if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and _slows_down(side, settings):
             side.end = End(EndReason.PERIOD)
         return True, step
     if why == kernels.FULL:
         return _end_of_holds(orbit, side, settings, step < _CRAWLS), step
     return _resolve(orbit, side, settings), step
-
-
-def _leaps_over_vertex(orbit: Orbit, side: Side, settings: Settings, written: int) -> bool:
-    """End a side where its last points have passed a vertex that no fold has shown."""
-    first = side.last - written
-    passed = passed_vertex(orbit.system, side.rows.joints[first : side.last + 1])
-    if passed is None:
-        return False
-    before = side.rows.point(first + passed[0])
-    after = side.rows.point(first + passed[0] + 1)
-    if not np.isfinite(passed[1]):
-        active = orbit.model.index_of(settings.parameter)
-        near = left_at(before, after.orbit(orbit.system, orbit.vector, active), active)
-        vertex = None if near is None else vertex_at(orbit, near, settings)
-        if near is not None and vertex is not None:
-            side.rewind(first + passed[0] + 1)
-            _end_at_vertex(orbit, side, settings, vertex, near)
-            return True
-        if passed[1] < 0.0:
-            return False
-        side.rewind(first + passed[0])
-        side.largest = (after.arc - before.arc) / _SHORTER
-        return side.largest < _NEAREST and _stuck_at_vertex(orbit, side, settings)
-    found = leapt_vertex(orbit, before, after, passed[1], settings)
-    if found is None:
-        return False
-    bifurcation, point = found
-    side.rewind(first + passed[0] + 1)
-    _end_at_vertex(orbit, side, settings, bifurcation, point)
-    return True
-
-
-def _stuck_at_vertex(orbit: Orbit, side: Side, settings: Settings) -> bool:
-    """End a side that gets no farther because a vertex is before it; True if that is so."""
-    found = vertex_at(orbit, side.tip, settings)
-    if found is not None:
-        _end_at_vertex(orbit, side, settings, found, side.tip)
-    return found is not None
-
-
-def _end_stalled(orbit: Orbit, side: Side, settings: Settings) -> None:
-    """End a side that gets no farther; its message says whether a multiplier is at +1 there."""
-    if _stuck_at_vertex(orbit, side, settings):
-        return
-    message, found = stalled_at(orbit, side.tip, settings)
-    side.end = End(EndReason.STEP, message)
-    if found is not None:
-        active = orbit.model.index_of(settings.parameter)
-        side.put_tip(at_vertex(side.tip, found.orbit, active))
-        side.end = End(EndReason.BP, CROSSED, found)
-
-
-def _end_at_vertex(
-    orbit: Orbit, side: Side, settings: Settings, bifurcation: Bifurcation, point: Point
-) -> None:
-    side.put_tip(at_vertex(point, bifurcation.orbit, orbit.model.index_of(settings.parameter)))
-    side.end = End(EndReason[bifurcation.kind.name], bifurcation=bifurcation)
 
 
 def _slows_down(side: Side, settings: Settings) -> bool:
@@ -378,10 +322,10 @@ def _comes_closer(side: Side, located: list[tuple[Bifurcation, Point]], step: fl
     across may end on the other curve, and what is between its ends belongs to neither.
     """
     fails = any(point.lost or point.rough for _, point in located)
-    if not fails or step < _NEAREST:
+    if not fails or step < NEAREST:
         return False
     side.drop_tip()
-    side.largest = step / _SHORTER
+    side.largest = step / SHORTER
     return True
 
 

@@ -14,13 +14,13 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.candidates import candidates
-from contfric.continuation.events import TERMINAL, Bifurcation, kind_of_margin
+from contfric.continuation.events import TERMINAL, Bifurcation, Kind, kind_of_margin
 from contfric.continuation.points import EXTRA
 from contfric.curves.naming import MARGINAL
 from contfric.curves.points import CurvePoint, CurveRows, first_curve_point, march_rows
-from contfric.curves.problem import Box, Problem, problem_of
+from contfric.curves.problem import Box, Problem, problem_of, tangency
 from contfric.curves.special import SpecialPoint
-from contfric.errors import ContfricError
+from contfric.errors import ContfricError, ParameterError
 from contfric.journal import remembered
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
@@ -49,6 +49,22 @@ def place_of(orbit: Orbit, test: Test) -> tuple[float, str]:
     if test.margin is not Margin.INTERIOR:
         return float(orbit.ends[test.segment, 0]), test.surface
     return _touch_time(orbit, test), test.surface
+
+
+def _tangent_at(orbit: Orbit, test: Test) -> Test:
+    """Return the margin at the place of a tangency, whose test names the observable only.
+
+    Raises
+    ------
+    ParameterError
+        If there is no tangency in the segment.
+    """
+    from contfric.curves.conditions import JOINT, START
+
+    place, segment, surface = tangency(orbit, test)
+    if place == START:  # the joint is the end of the segment before it
+        return Test(Margin.JOINT, (segment - 1) % len(orbit.word), surface)
+    return Test(Margin.JOINT if place == JOINT else Margin.INTERIOR, segment, surface)
 
 
 def _touch_time(orbit: Orbit, test: Test) -> float:
@@ -108,12 +124,32 @@ def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation 
             return None
         gap = float(np.min(np.abs(orbit.turn_multipliers - problem.condition.sign)))
         return Bifurcation(problem.kind, orbit.params, orbit) if gap < _SAME_MULTIPLIER else None
+    if problem.kind is Kind.T:
+        return _tangency_again(problem.test, special.orbit, orbit)
     for test in orbit.system.tests:
         if test.margin is not problem.test.margin:
             continue
         if same_place(special.orbit, problem.test, orbit, test):
             kind = kind_of_margin(orbit.system, test, orbit)
             return Bifurcation(kind, orbit.params, orbit, (test,))
+    return None
+
+
+def _tangency_again(test: Test, one: Orbit, other: Orbit) -> Bifurcation | None:
+    """Return the tangency of a motion in another word for it; None where the segment is none of it."""
+    try:
+        place = _tangent_at(one, test)
+    except ParameterError:
+        return None
+    observables = [o.name for o in other.model.observables]
+    for segment, observable, *_ in other.system.layout.labels:
+        touch = Test(Margin.INTERIOR, int(segment), observables[int(observable)])
+        try:
+            there = _tangent_at(other, touch)
+        except ParameterError:
+            continue
+        if same_place(one, place, other, there):
+            return Bifurcation(Kind.T, other.params, other, (touch,))
     return None
 
 

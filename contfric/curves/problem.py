@@ -222,7 +222,7 @@ def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Proble
     surfaces = [s.name for s in model.surfaces]
     test = _chosen(bifurcation)
     if kind is Kind.T:
-        place, segment, surface = _tangency(orbit, test)
+        place, segment, surface = tangency(orbit, test)
     else:
         if test not in system.tests:
             raise ParameterError(f"{bifurcation!r}: its orbit has no margin {test}")
@@ -305,7 +305,7 @@ def _quiet(system: System, kind: Kind, segment: int, pinned: list[Test]) -> IntA
     return np.array(rows, dtype=np.int64)
 
 
-def _tangency(orbit: Orbit, test: Test) -> tuple[int, int, str]:
+def tangency(orbit: Orbit, test: Test) -> tuple[int, int, str]:
     """Return (place, segment, surface) of a tangency: where an observable is nearest to a surface."""
     from contfric.curves.conditions import INTERIOR, JOINT, START
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS
-from contfric.continuation.vertices import passed_vertex
 from contfric.curves.assembly import join_sides
+from contfric.curves.births import birth_among, birth_between
 from contfric.curves.curve import Curve
 from contfric.curves.going_on import Start, goes_on, is_continuum, prove
-from contfric.curves.locating import by_place, locate, locate_zero
+from contfric.curves.locating import by_place, locate
 from contfric.curves.naming import crossings
 from contfric.curves.points import (
     CHUNK,
@@ -25,7 +25,7 @@ from contfric.curves.points import (
     march_rows,
 )
 from contfric.curves.problem import Problem, box_of, problem_of
-from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
+from contfric.curves.special import CurveEnd, CurveEndReason, SpecialPoint
 from contfric.errors import ConvergenceError, ParameterError, finite_number, whole_number
 from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
@@ -283,9 +283,9 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
         side.end = CurveEnd(CurveEndReason.LOST)
         return True, step
     limit = _first(problem.within_limits(rows.values[last : k + 1]) < 0.0)
-    vertex = _vertex(side, fresh)
-    if vertex is not None and (limit is None or vertex <= limit):
-        return _end_at_birth(side, fresh, vertex), step
+    birth = birth_among(problem, [*side.points[-1:], *fresh]) if fresh else None
+    if birth is not None and (limit is None or birth <= limit):
+        return _end_at_birth(side, fresh, birth), step
     if limit is not None:
         side.points += fresh[:limit]
         return _end_at_limit(side, fresh[limit]), step
@@ -318,6 +318,16 @@ def _beyond(problem: Problem, point: CurvePoint) -> float:
     return float(problem.within_limits(point.w[None, :])[0])
 
 
+def _end_at_birth(side: CurveSide, fresh: list[CurvePoint], at: int) -> bool:
+    """End a fold curve of asymmetric (doubled) orbits where they become symmetric (undoubled)."""
+    side.points += fresh[:at]
+    point, special = birth_between(side.problem, side.tip, fresh[at], side.border)
+    side.points.append(point)
+    side.special.append(special)
+    side.end = CurveEnd(CurveEndReason.BIRTH, special=special)
+    return True
+
+
 def _end_at_limit(side: CurveSide, after: CurvePoint) -> bool:
     """End a side where the model's parameters end."""
     problem = side.problem
@@ -331,46 +341,6 @@ def _end_at_limit(side: CurveSide, after: CurvePoint) -> bool:
 def _near_limit(problem: Problem, point: CurvePoint) -> CurveEnd | None:
     near = _beyond(problem, point) < _NEAR_LIMIT * float(np.min(problem.box.widths))
     return CurveEnd(CurveEndReason.LIMIT) if near else None
-
-
-def _vertex(side: CurveSide, fresh: list[CurvePoint]) -> int | None:
-    """Return the first new point behind which orbits have become their own images: a curve is born there."""
-    if side.problem.kind is not Kind.SN or side.problem.system.half or not fresh:
-        return None
-    chain = [*side.points[-1:], *fresh]
-    passed = passed_vertex(side.problem.system, np.array([p.joints for p in chain]))
-    return None if passed is None or not np.isfinite(passed[1]) else passed[0]
-
-
-def _end_at_birth(side: CurveSide, fresh: list[CurvePoint], at: int) -> bool:
-    """End a fold curve of asymmetric (doubled) orbits where they become symmetric (undoubled)."""
-    side.points += fresh[:at]
-    before, after = side.tip, fresh[at]
-    problem = side.problem
-    reference = _odd_part(problem, before)
-
-    def value(p: CurvePoint) -> float:
-        return float(np.sum(_odd_part(problem, p) * reference))
-
-    point, fine = locate_zero(problem, before, after, side.border, value)
-    orbit = problem.orbit(point.joints, point.w)
-    symmetric = problem.system.periods % 2 == 1 or orbit.mirror_distance < 1e-5
-    kind = CodimTwo.DBP if symmetric else CodimTwo.GPD
-    special = SpecialPoint(kind, kind.name, orbit.params, orbit, None, (), point.arc, fine)
-    side.points.append(point)
-    side.special.append(special)
-    side.end = CurveEnd(CurveEndReason.BIRTH, special=special)
-    return True
-
-
-def _odd_part(problem: Problem, point: CurvePoint) -> FloatArray:
-    """Return the states of the second half less the image of the first."""
-    n = len(problem.system.word) // 2
-    symmetry = problem.model.symmetry
-    image = np.eye(len(problem.model.states))
-    if symmetry is not None and problem.system.word[:n] != problem.system.word[n:]:
-        image = symmetry.array()
-    return np.asarray(point.joints[n:, 1:] @ image - point.joints[:n, 1:])
 
 
 def _resolve(side: CurveSide, after: CurvePoint, border: FloatArray) -> bool:

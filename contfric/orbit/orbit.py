@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.errors import ParameterError, whole_number
+from contfric.errors import ParameterError
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import pencil_of_turn
-from contfric.orbit.reading import read_signature, segment_domains
-from contfric.orbit.simulation import signs_at
+from contfric.orbit.reading import read_signature
+from contfric.orbit.samples import samples, state_within
 from contfric.orbit.stops import displacements, reach_of, stopping_segments, turning_points
 from contfric.orbit.system import Margin, System, Word, build_system
 from contfric.orbit.words import half_of, mirror_pairs, whole_of
@@ -34,9 +34,6 @@ SYMMETRY_TOLERANCE = 1e-9
 #: A multiplier this near to 1 makes the orbit one of a continuum to working precision.
 DEGENERATE = 1e-9
 
-
-#: Samples of one orbit: more are seen by nobody, and take minutes.
-_MOST_SAMPLES = 10_000_000
 #: A stick of length zero (at an event) has a duration of rounding over the rate of its release.
 _NO_TIME = 1e-10
 #: A margin that vanishes is rounding of the motion (relative to the size of the orbit's times and states)
@@ -342,55 +339,11 @@ class Orbit:
         start = float(self.cycle[0, 0])
         time = start + (time - start) % self.period
         i = int(np.searchsorted(self.cycle[:, 0], time, side="right")) - 1
-        return self._within(i, time - float(self.cycle[i, 0]))
-
-    def _within(self, i: int, duration: float) -> FloatArray:
-        modes = [m.name for m in self.model.modes]
-        out = np.empty(len(self.model.states))
-        self.model.flow.flow(
-            modes.index(self.word[i][0]),
-            float(self.cycle[i, 0]),
-            self.begins[i, 1:].copy(),
-            duration,
-            self.vector,
-            np.empty(0, dtype=np.int64),
-            out,
-            np.empty((0, 0)),
-        )
-        return out
+        return state_within(self, i, time - float(self.cycle[i, 0]))
 
     def trajectory(self, points: int = 400) -> tuple[FloatArray, FloatArray, list[str]]:
         """Return times (k,), states (k, n) and domains (k) along one period, joints included."""
-        points = whole_number("points", points, least=1, most=_MOST_SAMPLES)
-        times: list[float] = []
-        states: list[FloatArray] = []
-        names: list[str] = []
-        paths = segment_domains(self, self._watched[1])
-        for i, (start, end) in enumerate(zip(self.cycle[:, 0], self.ends[:, 0], strict=True)):
-            count = max(3, int(np.ceil(points * (end - start) / self.period)))
-            path = paths[i]
-            for k, duration in enumerate(np.linspace(0.0, end - start, count)):
-                times.append(float(start + duration))
-                states.append(self._within(i, float(duration)))
-                if k == count - 1:  # a segment begins and ends where its word says
-                    path = path[-1:]
-                elif k > 0:
-                    path = self._rest_of(path, times[-1], states[-1])
-                names.append(path[0])
-        return np.array(times), np.array(states), names
-
-    def _rest_of(self, path: list[str], time: float, state: FloatArray) -> list[str]:
-        """Return the domains of a segment from that of one of its samples on.
-
-        It is the first that the sample fits, on a surface either side of it: none is left for an earlier one.
-        """
-        signs = signs_at(self.model, time, state, self.vector)
-        clear = [s.name for s in self.model.surfaces if not s.switching]
-        for k, name in enumerate(path):
-            own = self.model.domain_by_name[name].signs
-            if all(own[s] * signs[s] >= 0 for s in clear):
-                return path[k:]
-        return path
+        return samples(self, self._watched[1], points)
 
     def to_dataframe(self, points: int = 400) -> pd.DataFrame:
         """Return one period as a table: t, the states, the domain (needs pandas)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from contfric.orbit.simulation import signs_at
+from contfric.orbit.starts import signs_at
 from contfric.orbit.words import decode, end_domain, passed_domains
 from contfric.signature import Signature
 from contfric.signature.holds import TOUCH, domain_after, is_hold

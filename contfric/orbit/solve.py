@@ -14,7 +14,8 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.simulation import Trajectory, run, start_of
+from contfric.orbit.simulation import Trajectory, run
+from contfric.orbit.starts import start_of
 from contfric.orbit.system import System, build_system
 from contfric.orbit.words import half_of
 from contfric.signature import Signature, reduced_word

@@ -164,6 +164,10 @@ BOMBS = {
     + "".join(f"a{k}: &a{k} {{<<: [*a{k - 1}, *a{k - 1}]}}\n" for k in range(1, 40)),
     "itself": "a: &a {b: *a}",
     "deep": "a: " + "[" * 5_000,
+    "deep mappings": "a: " + "{a: " * 5_000,
+    "deep in lines": "a: " + "[\n" * 5_000,
+    "deep lists": "a: \n " + "- " * 5_000,
+    "deep keys": "? " * 5_000,
     "digits": "params: {Omega: 1" + "0" * 5_000 + "}",
     "hexadecimal": "model: coulomb\nparams: {Omega: 0x1" + "0" * 5_000 + "}",
 }

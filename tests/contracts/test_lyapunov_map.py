@@ -261,7 +261,7 @@ def test_errors() -> None:
     refused("tolerance is a number", tolerance=-0.1)
     refused("tolerance is a number", tolerance=True)
     refused("tile is a whole number", tile=0)
-    refused("time must be finite", time=np.inf)
+    refused("time is a finite number", time=np.inf)
     refused("client.get_executor", executor=object())
     with pytest.raises(cf.ParameterError, match="one state is followed"):
         cf.lyapunov_exponent("coulomb", state=[[1.0, 0.0], [1.1, 0.0]])

@@ -16,6 +16,7 @@ from contfric.continuation.vertices import passed_vertex
 from contfric.errors import NotationError
 from contfric.models import load_model
 from contfric.orbit.linear import assembled, jacobian_blocks, tangent_of
+from contfric.orbit.samples import state_within
 from contfric.signature import (
     canonical_word,
     double,
@@ -273,7 +274,7 @@ def test_the_mean_rate_row_is_the_exit_row_divided_by_the_duration() -> None:
             tried += 1
             joints = orbit.joints.copy()
             joints[i + 1, 0] += 0.25 * duration  # no orbit any more: the slide is too long
-            velocity = orbit._within(i, 1.25 * duration)[1]
+            velocity = state_within(orbit, i, 1.25 * duration)[1]
             row = residuals(orbit, joints, orbit.vector).reshape(-1, m)[i, m - 1]
             assert abs(row) > 1e-8
             assert row == pytest.approx(velocity / (1.25 * duration), abs=1e-12)

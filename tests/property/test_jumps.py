@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.orbit.simulation import signs_at
 from contfric.orbit.solve import polish
+from contfric.orbit.starts import signs_at
 
 #: For each kind a scene in which a stable regular branch ends at it.
 SCENES = {

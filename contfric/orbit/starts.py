@@ -1,0 +1,128 @@
+"""Initial states: the domain that a state is in or goes on into, and a start where none is given."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from contfric.errors import ParameterError, did_you_mean, shown
+from contfric.models.definition import Domain, FloatArray, Model, Surface
+from contfric.orbit.system import mode_bounds
+
+#: Displacements that a start is looked for at, in half-widths of the model: where the first is in no
+#: domain (behind a wall, or on a surface that motion does not leave), the next.
+_PLACES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
+#: States that are drawn where none of these is: enough to hit a region of a hundredth of the spread.
+_DRAWS = 1000
+
+
+def signs_at(
+    model: Model, t: float, y: FloatArray, vector: FloatArray, within: float = 0.0
+) -> dict[str, int]:
+    """Return the sign of (observable - level) for every surface at a state; 0 within a distance."""
+    flow, none, empty = model.flow, np.empty(0, dtype=np.int64), np.empty(0)
+    names = [o.name for o in model.observables]
+    signs = {}
+    for k, surface in enumerate(model.surfaces):
+        value = flow.observe(names.index(surface.observable), t, y, vector, none, empty)
+        apart = value - flow.level(k, vector, none, empty)
+        signs[surface.name] = 0 if abs(apart) <= within else int(np.sign(apart))
+    return signs
+
+
+def start_of(
+    model: Model, t: float, y: FloatArray, vector: FloatArray, domain: str | None
+) -> tuple[int, int]:
+    """Return (mode, surfaces that the start lies on and leaves, as bits) of an initial state."""
+    signs = signs_at(model, t, y, vector)
+    given: object = domain  # whatever the user gave
+    if given is not None and not (isinstance(given, str) and given in model.domain_by_name):
+        raise ParameterError(
+            f"unknown domain {shown(given)}{did_you_mean(given, model.domain_by_name)}"
+        )
+    name = domain or model.domain_at(signs) or _side_of_rates(model, t, y, vector, signs)
+    if name is None:
+        raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
+    mode = model.domain_by_name[name].mode
+    surfaces = [s.name for s in model.surfaces]
+    on = sum(1 << surfaces.index(k) for k in mode_bounds(model)[mode] if signs[k] == 0)
+    return [m.name for m in model.modes].index(mode), on
+
+
+def _side_of_rates(
+    model: Model, t: float, y: FloatArray, vector: FloatArray, signs: dict[str, int]
+) -> str | None:
+    """Return the domain that a state on some surfaces goes on into: those that its rates lead to.
+
+    Any side of a transparent surface will do.
+    """
+    flow, none, empty = model.flow, np.empty(0, dtype=np.int64), np.empty(0)
+    observables, modes = [o.name for o in model.observables], [m.name for m in model.modes]
+
+    def enters(domain: Domain, surface: Surface) -> bool:
+        if signs[surface.name] != 0 or not model.cuts(surface.name):
+            return True
+        c, mode = observables.index(surface.observable), modes.index(domain.mode)
+        rate = float(flow.rate(mode, c, t, y, vector, none, empty))
+        return domain.signs[surface.name] * rate > 0.0
+
+    beside = [
+        d for d in model.domains if all(sign in (0, d.signs[name]) for name, sign in signs.items())
+    ]
+    return next((d.name for d in beside if all(enters(d, s) for s in model.surfaces)), None)
+
+
+def displaced(model: Model, vector: FloatArray) -> FloatArray:
+    """Return the initial state by default: displaced from rest, else drawn; in a domain.
+
+    Raises
+    ------
+    ParameterError
+        If no state that was tried is in a domain.
+    """
+    half_width: FloatArray = model.spread(model.mapping(vector))
+    rest = np.zeros(len(model.states))
+    for place in _PLACES:
+        y = rest.copy()
+        y[0] = place * half_width[0]
+        if _is_start(model, y, vector):
+            return y
+    rng = np.random.default_rng(1)  # always the same start
+    for _ in range(_DRAWS):
+        y = rng.uniform(-1.0, 1.0, half_width.shape) * half_width
+        if _is_start(model, y, vector):
+            return y
+    within = ", ".join(f"|{s}| <= {w:g}" for s, w in zip(model.states, half_width, strict=True))
+    raise ParameterError(
+        f"no start was found: of {_DRAWS} states of '{model.name}' at t = 0 with {within}, its 'spread', "
+        "none is in a domain. Give one (state=...), or correct 'spread' or the sides of the modes"
+    )
+
+
+def _is_start(model: Model, y: FloatArray, vector: FloatArray) -> bool:
+    """Tell whether a state at time 0 is in a domain, or leads into one."""
+    signs = signs_at(model, 0.0, y, vector)
+    return bool(model.domain_at(signs) or _side_of_rates(model, 0.0, y, vector, signs))
+
+
+def checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> FloatArray:
+    """Return the initial state that a user gave, or the one by default.
+
+    Raises
+    ------
+    ParameterError
+        If it is no state of the model, or none is given and none is found.
+    """
+    if state is None:
+        # away from rest, so that symmetric and asymmetric attractors can both be reached
+        return displaced(model, vector)
+    try:
+        y = np.array(state, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        y = np.empty(0)
+    if y.shape != (len(model.states),) or not np.all(np.isfinite(y)):
+        raise ParameterError(
+            f"a state of '{model.name}' is {len(model.states)} finite numbers "
+            f"({', '.join(model.states)}), got {shown(state)}"
+        )
+    return y
