@@ -10,12 +10,13 @@ DEMO := demo
 STRESS := .stress
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint types contracts unit bench stress studies gallery clean
+.PHONY: help setup demo test lint types contracts unit test-all bench stress studies gallery clean
 MAKEFLAGS += --no-print-directory
 
 help:
 	@echo "make demo     the bifurcation diagram of Fig. 5, from one simulated orbit, in $(DEMO)/"
 	@echo "make test     lint, types, import contracts, tests"
+	@echo "make test-all the same with the tests that take long"
 	@echo "make bench    run times, cost at scale and of scenes, run time against error beside others"
 	@echo "make stress   random cases against 50 digits, to docs/stress.md (an hour or more)"
 	@echo "make studies  every bundled study from the shell, each with a time limit, to docs/studies.md"
@@ -66,6 +67,14 @@ contracts: $(STAMP)
 
 unit: $(STAMP)
 	@echo "== pytest"
+	@$(BIN)/python -m pytest -n $(WORKERS) -m "not slow"
+
+# With the tests that take long and tell little more.
+test-all: $(STAMP)
+	@$(MAKE) lint
+	@$(MAKE) types
+	@$(MAKE) contracts
+	@echo "== pytest, slow ones too"
 	@$(BIN)/python -m pytest -n $(WORKERS)
 
 # The peers are not needed by anything else: where one has no wheel, the page does without.
@@ -87,6 +96,7 @@ stress: $(STAMP)
 	@$(BIN)/python benchmarks/stress/orbits.py --count 400 --seed 3 --out $(STRESS)/orbits.json
 	@$(BIN)/python benchmarks/stress/events.py --count 400 --seed 2 --out $(STRESS)/events.json
 	@$(BIN)/python benchmarks/stress/continuation.py --count 300 --seed 2 --out $(STRESS)/continuation.json
+	@$(BIN)/python benchmarks/stress/restarts.py --count 3000 --seed 1 --out $(STRESS)/restarts.json
 	@$(BIN)/python benchmarks/stress/write_page.py $(STRESS)/*.json --out docs/stress.md
 
 # A study that does not end within the limit, or ends with an error, fails this.

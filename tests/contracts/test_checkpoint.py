@@ -44,7 +44,12 @@ needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
 
 @needs_fork
 @pytest.mark.parametrize(
-    ("text", "rounds"), [(EXPLORE, 6), (PLANE, 4), (MAP, 3)], ids=["explore", "plane", "map"]
+    ("text", "rounds"),
+    [
+        pytest.param(EXPLORE, 4, id="explore"),
+        pytest.param(PLANE, 4, id="plane", marks=pytest.mark.slow),
+        pytest.param(MAP, 3, id="map", marks=pytest.mark.slow),
+    ],
 )
 def test_a_killed_run_ends_with_the_files_of_an_undisturbed_one(tmp_path, text, rounds) -> None:
     study = tmp_path / "study.yaml"
@@ -67,6 +72,7 @@ def test_a_killed_run_ends_with_the_files_of_an_undisturbed_one(tmp_path, text, 
     assert records[0] == records[1]
 
 
+@pytest.mark.slow
 @needs_fork
 def test_a_killed_census_goes_on(tmp_path) -> None:
     command = ["census", "-p", "Omega=0.5", "-p", "S=0.32", "--stops", "4", "--json", "--quiet"]

@@ -89,7 +89,7 @@ RAISED = ("find_orbit", "simulate", "lyapunov_exponent", "period_adding")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals as a terminal sends them")
-@pytest.mark.parametrize("model", ["coulomb", "popp"])
+@pytest.mark.parametrize("model", ["coulomb", pytest.param("popp", marks=pytest.mark.slow)])
 def test_ctrl_c_acts_at_once(model: str) -> None:
     draw = random.Random(f"{model} {os.environ.get('CONTFRIC_SIGINT_SEED', '')}")
     # a census is offered for the first model only, and there are no bridges in the second

@@ -43,11 +43,11 @@ def random_params(seed: int) -> dict[str, float]:
     "model, params",
     [
         *(("coulomb", random_params(seed)) for seed in range(4)),
-        ("crossing.yaml", {"mu": 0.4, "q": -1.0}),
         ("bilinear.yaml", {"omega": 0.8}),
-        ("switched.yaml", SWITCHED),
-        ("belt", {}),
-        ("impact", {}),
+        pytest.param("crossing.yaml", {"mu": 0.4, "q": -1.0}, marks=pytest.mark.slow),
+        pytest.param("switched.yaml", SWITCHED, marks=pytest.mark.slow),
+        pytest.param("belt", {}, marks=pytest.mark.slow),
+        pytest.param("impact", {}, marks=pytest.mark.slow),
     ],
 )
 def test_extrema_are_those_of_dense_samples(model: str, params: dict[str, float]) -> None:
