@@ -17,7 +17,7 @@ from contfric.errors import (
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.simulation import signs_at
+from contfric.orbit.starts import signs_at
 
 #: Periods after which a seed that has not settled is given up: there are many seeds, and attractors that
 #: take longer are nearly marginal.

@@ -31,9 +31,6 @@ from contfric.orbit.system import System
 #: Smallest singular value of J against the largest, above which no branch point is near. Beside one it is
 #: about the distance; steps of a branch are 1e-2 at most.
 _REGULAR = 3e-2
-#: Share of the parameter's column that the left null vector sees, above which the same holds: 1e-8 beside
-#: branch points, 0.01 and more at folds.
-_SEEN = 5e-3
 #: Newton's method converges from there in 3 to 6 steps.
 _MOST_STEPS = 12
 #: Corrections that end it: far below what the derivatives, which are differences, leave in the next one.
@@ -111,8 +108,6 @@ def crossing_near(orbit: Orbit, settings: Settings, within: float) -> Crossing |
     active = orbit.model.index_of(settings.parameter)
     problem = _Problem(system, orbit.vector, active, settings.width)
     x = np.append(orbit.joints.ravel(), orbit.vector[active] / settings.width)
-    if _is_regular(problem, x):
-        return None
     located = _moore(problem, x)
     if located is None:
         return None
@@ -125,18 +120,6 @@ def crossing_near(orbit: Orbit, settings: Settings, within: float) -> Crossing |
     joints, vector = problem.split(x)
     found = Orbit(system, joints, vector, float(np.max(np.abs(problem.at(x)[0]))), Status.CONVERGED)
     return Crossing(found, directions)
-
-
-def _is_regular(problem: _Problem, x: FloatArray) -> bool:
-    """Tell whether the equations with the parameter are far from losing rank: no other curve is near.
-
-    At a branch point the left null vector of the Jacobian on the joints does not see the parameter. It is
-    cheap against the second derivatives that the search takes.
-    """
-    _, full = problem.at(x)
-    left = np.linalg.svd(full[:, :-1])[0]
-    seen = abs(float(left[:, -1] @ full[:, -1])) / float(np.linalg.norm(full[:, -1]))
-    return seen > _SEEN
 
 
 @dataclass(frozen=True, eq=False)

@@ -130,7 +130,13 @@ def _passes_vertex(
 def _crossing(
     orbit: Orbit, before: Point, after: Point, beyond: Point, share: float, settings: Settings
 ) -> tuple[Bifurcation, Point] | None:
-    """Return the branch point in a step, if there is one: another curve of orbits crosses there."""
+    """Return the branch point in a step, if there is one: another curve of orbits crosses there.
+
+    Along one parameter that takes a symmetry. One that is declared is dealt with by the orbits that have
+    it; the search is for models whose author did not declare it.
+    """
+    if orbit.model.symmetry is not None:
+        return None
     found = crossing_between(orbit, before, after, share, settings)
     if found is None:
         return None

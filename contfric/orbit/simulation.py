@@ -17,7 +17,6 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.counts import TALLY
 from contfric.orbit.pace import Pace
 from contfric.orbit.starts import checked_state, start_of
-from contfric.orbit.starts import signs_at as signs_at  # noqa: PLC0414 # found here too
 from contfric.orbit.system import IntArray, mode_bounds
 
 

@@ -71,8 +71,8 @@ def meeting(found: cf.Diagram, bridge: cf.Branch, side: int) -> tuple[cf.Branch,
         for k in (0, 1):
             gap = abs(branch.values[-k] - bridge.values[-side]) / width
             if gap < NEAR and (branch is not bridge or k != side) and not branch.mirrored:
-                met.append((apart(branch[-k], tip), gap, branch))
-    motion, gap, branch = min(met, key=lambda found: found[0])
+                met.append((branch.bridge, apart(branch[-k], tip), gap, branch))
+    _, motion, gap, branch = min(met, key=lambda found: found[:2])  # a regular one, if there is one
     return branch, gap, motion
 
 

@@ -70,7 +70,7 @@ def test_random_scenes() -> None:
         restarts.one_scene(tally, restarts.scene(7, index), most=1)
     faults = [f for f in tally.failed if f.kind != "all points admissible"]
     assert not faults, faults
-    assert tally.counts["restarts"] > len(SHARE)
+    assert tally.counts["restarts"] > 40
     assert tally.counts["balances"] > len(SHARE) // 2
 
 
