@@ -129,6 +129,8 @@ class Diagram:
     def verify(self, restarts: int = 6, step: float | None = None) -> Verification:
         """Explore again from the diagram's own branches, and check the sums of indices.
 
+        Without ``stability`` branch points may be seen from one side only, and restarts differ.
+
         Parameters
         ----------
         restarts : int

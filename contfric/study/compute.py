@@ -71,7 +71,7 @@ def explore_from(study: Study, orbit: Orbit, task: ExploreTask, say: Say) -> Dia
         orbit,
         task.parameter,
         (task.range[0], task.range[1]),
-        stability=study.wants(Want.STABILITY),
+        stability=study.wants(Want.STABILITY) or task.verify,  # without it branch points are missed
         progress=lambda text: say(f"explore: {text}"),
         **options,
     )

@@ -184,7 +184,7 @@ def test_a_study_verifies_and_keeps_it(tmp_path: Path) -> None:
     assert loaded.settings == cf.load(tmp_path / "out" / "diagram.npz").settings
     assert loaded.settings.copies == 1
     assert loaded.verification is not None
-    assert str(loaded.verification) in "\n".join(result.info["diagram"]["verification"])
+    assert str(loaded.verification) in "\n".join(result.info["verification"])
 
 
 def test_a_start_of_a_longer_period_raises_it() -> None:
