@@ -236,6 +236,12 @@ def test_both_ends_of_a_bridge_meet_a_branch(case: int | str) -> None:
         for side, end in enumerate(branch.ends):
             if not branch.bridge or end.bifurcation is None or end.reason is EndReason.REST:
                 continue
+            if end.reason in (
+                EndReason.BP,
+                EndReason.PD,
+            ):  # it meets the inside of a branch, no end
+                assert not any((e.branch, e.side) == (index, side) for e in found.loose_ends)
+                continue
             accuracy = end.bifurcation.accuracy
             rough = accuracy > ACCURACY
             values, motion = (accuracy, accuracy**0.5) if rough else (SAME_VALUE, SAME_MOTION)
