@@ -91,12 +91,15 @@ def _entries(node: yaml.Node, known: dict[int, int]) -> int:
     if isinstance(node, yaml.ScalarNode):
         return 1
     if id(node) not in known:
-        known[id(node)] = _MOST_ENTRIES + 1  # within itself a node has no end
+        known[id(node)] = -1  # until its parts are counted
         if isinstance(node, yaml.MappingNode):
             below = [part for pair in node.value for part in pair]
         else:
             below = list(node.value)
         known[id(node)] = 1 + sum(_entries(part, known) for part in below)
+    if known[id(node)] < 0:
+        problem = "an alias stands within what it names"
+        raise yaml.composer.ComposerError(None, None, problem, node.start_mark)
     return known[id(node)]
 
 

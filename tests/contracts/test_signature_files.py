@@ -165,7 +165,7 @@ def test_broken_entry_point_is_named(monkeypatch) -> None:
         (HEAD + WALK + "example: {1: 0.5}\n", 4, "'example' must be a mapping"),
         (HEAD + WALK + "example: {S: 0.5, S0: 0.4}\n", 4, "needs S0 >= S"),
         (HEAD + WALK + "example: {S: .nan}\n", 4, "must be finite"),
-        (HEAD + WALK + "example: &a {S: *a}\n", 4, "'example' must be a mapping"),
+        (HEAD + WALK + "example: &a {S: *a}\n", 4, "an alias stands within what it names"),
     ],
 )
 def test_error_names_file_and_line(write, text: str, line: int, message: str) -> None:

@@ -153,7 +153,7 @@ def test_newton_settles_at_the_rounding_of_an_integrated_flow(distance: float) -
 def test_what_is_run_through_twice_is_continued_once() -> None:
     orbit = symmetric()[0]
     settings = settings_of(orbit, "Omega", (0.45, 0.52), None, True, 1000)
-    state = Exploration(settings, 4, 10, True, None)
+    state = Exploration(settings, 4, 1, 10, True, None)
     twice = orbit.doubled()
     assert twice.periods == 2 * orbit.periods
     branch = _through(state, twice)

@@ -25,6 +25,13 @@ def orbits():
     return [cf.find_orbit(model, PARAMS) for model in (closed, integrated)]
 
 
+def facts(branch: cf.Branch) -> tuple[object, ...]:
+    """What is the same whatever the order of the branches and the direction they are run in."""
+    # in the middle: at an event itself rounding decides on which side of a surface a joint is
+    middle = branch[len(branch) // 2]
+    return len(middle.word), sorted(map(str, middle.word)), sorted(e.reason.name for e in branch.ends)
+
+
 def test_orbit(orbits):
     closed, integrated = orbits
     assert integrated.signature == closed.signature
@@ -42,7 +49,4 @@ def test_diagram_of_figure_5(orbits):
     )
     assert [kind for kind, _ in found] == [kind for kind, _ in expected]
     assert np.array([w for _, w in found]) == pytest.approx([w for _, w in expected], abs=1e-9)
-    for one, other in zip(integrated.branches, closed.branches, strict=True):
-        # in the middle: at an event itself rounding decides on which side of a surface a joint is
-        assert one[len(one) // 2].signature == other[len(other) // 2].signature
-        assert [end.reason for end in one.ends] == [end.reason for end in other.ends]
+    assert sorted(map(facts, integrated.branches)) == sorted(map(facts, closed.branches))
