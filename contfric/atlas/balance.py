@@ -15,6 +15,7 @@ import numpy as np
 
 from contfric.atlas.matching import same_event
 from contfric.continuation.branch import Branch
+from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.unit import unit_of
 from contfric.orbit.index import index_at_infinity, index_of
@@ -84,7 +85,10 @@ class IndexSum:
 
 
 def balances(diagram: Diagram) -> Iterator[Balance]:
-    """Yield the sums of indices beside every event that is no tangency."""
+    """Yield the sums of indices beside every event that is no tangency.
+
+    Events at the two ends of a continuum are one place: all that leaves them is summed together.
+    """
     width = diagram.range[1] - diagram.range[0]
     for number, node in enumerate(diagram.nodes):
         b = node.bifurcation
@@ -96,11 +100,29 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
         period = unit_of(b.orbit.as_whole()).periods if not b.orbit.model.autonomous else 0
         if period == 0:
             continue
-        families = list(_families(diagram, node, value, slack))
+        families = [
+            found
+            for joined in _joined(diagram, number)
+            for found in _families(diagram, diagram.nodes[joined], value, slack)
+        ]
         most = min(diagram.settings.copies, diagram.settings.max_periods // period)
         for times in range(1, most + 1):
             below, above = (_sum(families, side, period, times * period) for side in (-1, 1))
             yield Balance(number, b.label, value, times * period, below, above)
+
+
+def _joined(diagram: Diagram, number: int) -> list[int]:
+    """Return a node and those that continua of orbits join it to."""
+    continua = {i for i, branch in enumerate(diagram.branches) if is_continuum(branch)}
+    found = [number]
+    for known in found:  # grows
+        through = continua & set(diagram.nodes[known].branches)
+        found += [
+            k
+            for k, node in enumerate(diagram.nodes)
+            if k not in found and through & set(node.branches)
+        ]
+    return found
 
 
 def _families(

@@ -25,7 +25,7 @@ _FOLLOWED = frozenset(EndReason[name] for name in ("CS", "SS", "AS", "GS", "BP",
 FINAL = frozenset(
     {
         EndReason[name]
-        for name in ("RANGE", "LIMIT", "CLOSED", "UNBOUNDED", "REST", "PERIOD", "POINT")
+        for name in ("RANGE", "LIMIT", "CLOSED", "UNBOUNDED", "REST", "CONTINUUM", "PERIOD", "POINT")
     }
 )
 
@@ -40,7 +40,7 @@ class Event:
     branches : the branches that meet there
     members : the same event as located on the other branches
     proposals : what was proposed to follow it
-    rests : whether the mass stays at rest for ever behind it
+    final : why nothing is continued from it, if that is known: the mass stays at rest, or a continuum
     kinds : what the words of its motion call it
     """
 
@@ -48,7 +48,7 @@ class Event:
     branches: list[int] = field(default_factory=list)
     members: list[Bifurcation] = field(default_factory=list)
     proposals: list[Proposal] = field(default_factory=list)
-    rests: bool = False
+    final: EndReason | None = None
     kinds: set[Kind] = field(default_factory=set)
 
 
@@ -115,7 +115,7 @@ def _with_proposals(model: Model, computed: list[Branch], events: list[Event]) -
         place[i] = count
         count += 1 if branch.symmetric or model.symmetry is None else 2
     changed: dict[int, Bifurcation] = {}
-    rests = {id(member) for event in events if event.rests for member in event.members}
+    final = {id(b): event.final for event in events if event.final for b in event.members}
     for event in events:
         proposals = tuple(
             p if p.branch is None else replace(p, branch=place[p.branch]) for p in event.proposals
@@ -125,17 +125,19 @@ def _with_proposals(model: Model, computed: list[Branch], events: list[Event]) -
             changed[id(member)] = replace(member, kind=kind, proposals=proposals)
         event.bifurcation = changed[id(event.bifurcation)]
         event.members = [changed[id(member)] for member in event.members]
-    return [_renewed(branch, changed, rests) for branch in computed]
+    return [_renewed(branch, changed, final) for branch in computed]
 
 
-def _renewed(branch: Branch, changed: dict[int, Bifurcation], rests: set[int]) -> Branch:
+def _renewed(
+    branch: Branch, changed: dict[int, Bifurcation], final: dict[int, EndReason]
+) -> Branch:
     ends = []
     for end in branch.ends:
         b = end.bifurcation
         if b is None:
             ends.append(end)
-        elif id(b) in rests:
-            ends.append(End(EndReason.REST, bifurcation=changed[id(b)]))
+        elif id(b) in final:
+            ends.append(End(final[id(b)], bifurcation=changed[id(b)]))
         else:
             now = changed.get(id(b), b)
             reason = end.reason if now.kind is b.kind else EndReason[now.kind.name]

@@ -28,6 +28,7 @@ from contfric.atlas.matching import SAME_MOTION, part_distance, same_place
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, sequences_of
+from contfric.continuation.continuum import in_continuum
 from contfric.continuation.crossing import LOCATED, Direction, crossing_near
 from contfric.continuation.events import (
     ACCURACY,
@@ -144,7 +145,7 @@ def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:
     """Try one candidate; return whether a branch of it meets the event."""
     if candidate.orbit is None:
         state.judge(event, candidate.reason, Verdict.REFUSED, why=candidate.refusal)
-        event.rests = event.rests or candidate.rest
+        event.final = EndReason.REST if candidate.rest else event.final
         return candidate.rest
     known = state.ends_here(candidate.orbit, event)
     if known is not None:
@@ -175,11 +176,22 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         return False
     if branch is None:
         why = "no admissible orbit beyond the event"
+        if _begins_continuum(state, candidate.orbit, event):
+            why = EndReason.CONTINUUM.value
         state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
         return False
     state.judge(event, candidate.reason, Verdict.ACCEPTED, len(state.branches))
     state.add_from(branch, event)
     return True
+
+
+def _begins_continuum(state: Exploration, orbit: Orbit | None, event: Event) -> bool:
+    """Tell whether the orbits that follow an event are a continuum, and say so on the event."""
+    assert orbit is not None
+    active = orbit.model.index_of(state.settings.parameter)
+    found = in_continuum(orbit, active)
+    event.final = EndReason.CONTINUUM if found else event.final
+    return found
 
 
 def _has_no_width(branch: Branch, event: Event, settings: Settings) -> bool:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from itertools import pairwise
+
 import numpy as np
 
 from contfric.continuation.branch import Branch
+from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, Kind
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit, Status
@@ -94,6 +97,16 @@ def telling_kind(kinds: Iterable[Kind]) -> Kind:
     return min(kinds, key=lambda kind: _TELLING.get(kind, len(_TELLING)))
 
 
+def _in_family(orbit: Orbit, branch: Branch, mirror: bool) -> bool:
+    """Tell whether an orbit is one of a continuum: as near to one of its points as they are to each other."""
+    value = orbit.params[branch.parameter]
+    if abs(value - branch.values[0]) > _SAME_ORBIT * (1.0 + abs(value)):
+        return False
+    stops = [point.stops for point in branch]
+    apart = max(stops_distance(a, b, False) for a, b in pairwise(stops))
+    return min(stops_distance(orbit.stops, there, mirror) for there in stops) <= apart
+
+
 def on_branch(orbit: Orbit, branch: Branch) -> bool:
     """Tell whether an orbit (or its mirror image) lies on a branch.
 
@@ -105,6 +118,8 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
         return False
     value = orbit.params[branch.parameter]
     mirror = orbit.model.symmetry is not None
+    if is_continuum(branch):
+        return _in_family(orbit, branch, mirror)
     below = branch.values - value
     for i in np.flatnonzero(below[:-1] * below[1:] <= 0.0):
         step = branch.values[i + 1] - branch.values[i]

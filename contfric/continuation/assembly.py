@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.continuation.branch import Branch
+from contfric.continuation.continuum import continua_of
 from contfric.continuation.events import Bifurcation, End, Kind
 from contfric.continuation.openings import with_openings
 from contfric.continuation.points import Point, Settings
@@ -92,6 +93,7 @@ def _branch(
         notes=tuple(dict.fromkeys(notes)),
     )
     _renew_ends(branch)
+    branch = replace(branch, notes=(*branch.notes, *continua_of(branch)))
     return with_openings(branch, settings)
 
 

@@ -105,6 +105,7 @@ class EndReason(str, Enum):
     AS = "adding-sliding: the flow jumps"
     GS = "grazing-sliding: the flow jumps"
     REST = "the mass stays at rest for ever beyond this point"
+    CONTINUUM = "its orbits go on as a continuum, at this one value of the parameter"
     PERIOD = "the period grows without bound: the orbit comes to an equilibrium (homoclinic), or slows down"
     POINT = "the orbit shrinks to a point: an equilibrium that begins to oscillate (Hopf)"
     BP = "the orbit has become symmetric: its mirror branch goes on from here"

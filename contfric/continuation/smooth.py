@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from contfric.continuation.continuum import LEVEL
 from contfric.continuation.crossing import crossing_between
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.points import EXTRA, Point, Settings
@@ -56,6 +57,8 @@ def smooth_events(
         a, b = before.tests[base + column], after.tests[base + column]
         if not a * b < 0.0 or (column == CHI_ONE and folded):
             continue  # chi(1) of a fold vanishes with it
+        if max(abs(a), abs(b)) < LEVEL:
+            continue  # zero on both sides: a continuum of orbits, and the sign is rounding
         if column == CHI_ONE and not _passes_vertex(orbit, before, after, a / (a - b), settings):
             crossing = _crossing(orbit, before, after, beyond, a / (a - b), settings)
             if crossing is not None:
