@@ -16,10 +16,12 @@ import numpy as np
 from contfric.atlas.matching import same_event
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import is_continuum
-from contfric.continuation.events import ACCURACY, Bifurcation, Kind
+from contfric.continuation.events import ACCURACY, Bifurcation, EndReason, Kind
 from contfric.continuation.unit import unit_of
+from contfric.errors import ContfricError
 from contfric.orbit.index import index_at_infinity, index_of
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.simulation import simulate
 from contfric.orbit.solve import polish
 
 if TYPE_CHECKING:
@@ -31,6 +33,10 @@ _BESIDE = 10.0
 _SHARES = (0.381966, 0.618034)
 #: Events nearer than this share of the range have nothing between them that could be told from them.
 _APART = 1e-6
+#: Where rest is tried beside an event, relative to the range: beyond the accuracy of the event.
+_REST_BESIDE = 1e-4
+#: Events of a trial of rest: a motion has some in each period.
+_EVENTS = 20
 
 
 @dataclass(frozen=True)
@@ -108,7 +114,37 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
         most = min(diagram.settings.copies, diagram.settings.max_periods // period)
         for times in range(1, most + 1):
             below, above = (_sum(families, side, period, times * period) for side in (-1, 1))
+            rest = _rest_of(diagram, node)
+            if rest is not None and below is not None and above is not None:
+                beside = _REST_BESIDE * width
+                below += _rests(rest, diagram.parameter, value - beside)
+                above += _rests(rest, diagram.parameter, value + beside)
             yield Balance(number, b.label, value, times * period, below, above)
+
+
+def _rest_of(diagram: Diagram, node: Node) -> Orbit | None:
+    """Return the orbit at an event behind which the mass stays at rest for ever; None at others."""
+    for i in node.branches:
+        for end in diagram.branches[i].ends:
+            if end.reason is EndReason.REST and end.bifurcation is not None:
+                here, b = end.bifurcation.params[diagram.parameter], node.bifurcation
+                if here == b.params[diagram.parameter]:
+                    return end.bifurcation.orbit
+    return None
+
+
+def _rests(orbit: Orbit, parameter: str, value: float) -> bool:
+    """Tell whether the mass can stay at rest for ever, where it comes to rest at an event nearby.
+
+    All places in which it can are one set that attracts what is beside it: its index is 1.
+    """
+    params = {**orbit.params, parameter: value}
+    model, (time, *state) = orbit.model, orbit.cycle[0]
+    try:
+        run = simulate(model, params, state=state, time=float(time), periods=2.0, events=_EVENTS)
+    except ContfricError:  # no such state there, or a value outside of the limits
+        return False
+    return all(model.mode_by_name[mode].sliding for mode, _ in run.word)
 
 
 def _joined(diagram: Diagram, number: int) -> list[int]:
@@ -226,7 +262,8 @@ def _wanted(diagram: Diagram, value: float) -> int | None:
 
 
 def _sum_at(diagram: Diagram, value: float) -> int | None:
-    total = 0
+    resting = (orbit for node in diagram.nodes if (orbit := _rest_of(diagram, node)) is not None)
+    total = int(any(_rests(orbit, diagram.parameter, value) for orbit in resting))
     for branch in diagram.branches:
         if branch.system.periods != 1:
             continue

@@ -25,7 +25,16 @@ _FOLLOWED = frozenset(EndReason[name] for name in ("CS", "SS", "AS", "GS", "BP",
 FINAL = frozenset(
     {
         EndReason[name]
-        for name in ("RANGE", "LIMIT", "CLOSED", "UNBOUNDED", "REST", "CONTINUUM", "PERIOD", "POINT")
+        for name in (
+            "RANGE",
+            "LIMIT",
+            "CLOSED",
+            "UNBOUNDED",
+            "REST",
+            "CONTINUUM",
+            "PERIOD",
+            "POINT",
+        )
     }
 )
 

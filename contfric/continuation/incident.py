@@ -36,7 +36,7 @@ from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.slides import SAME_MOTION
+from contfric.orbit.slides import SHORT
 from contfric.orbit.system import Margin, Test, Word, build_system
 from contfric.signature.edits import apply_edit, edited_pieces
 
@@ -112,11 +112,11 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
 
 
 def _moves(orbit: Orbit) -> bool:
-    """Tell whether a motion has a slide of some length."""
+    """Tell whether a motion has a slide of some length: in less the mass moves by the cube of it."""
     sliding = {mode.name for mode in orbit.model.modes if mode.sliding}
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
     return any(
-        mode not in sliding and last > SAME_MOTION
+        mode not in sliding and last > SHORT
         for (mode, _), last in zip(orbit.word, lasts, strict=True)
     )
 

@@ -17,7 +17,7 @@ from contfric.orbit.orbit import Orbit
 SAME_MOTION = 1e-5
 #: Segments shorter than this have no length: a slide that vanishes is located to the third root of rounding
 #: (times its conditioning), a hold at a touch of rest to the second.
-_SHORT = 1e-3
+SHORT = 1e-3
 
 
 def slides_of(orbit: Orbit) -> list[int]:
@@ -28,7 +28,7 @@ def slides_of(orbit: Orbit) -> list[int]:
     """
     sliding = {mode.name for mode in orbit.model.modes if mode.sliding}
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
-    some = [i for i in range(len(orbit.word)) if lasts[i] > _SHORT]
+    some = [i for i in range(len(orbit.word)) if lasts[i] > SHORT]
     found = []
     for k, i in enumerate(some):
         before, mode = some[k - 1], orbit.word[i][0]
