@@ -61,6 +61,8 @@ _SHARES = (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6)
 _NOWHERE_ROUGHLY = 1e-3
 #: A branch shorter than this (arclength) that comes back to its event has been nowhere.
 _NO_WIDTH = 1e-3
+#: A hold shorter than this share of the arclength is rounding: on a bridge joints move as its length does.
+_NO_TIME = 1e-2
 
 
 def follow(state: Exploration, event: Event) -> None:
@@ -170,6 +172,10 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         assert candidate.orbit is not None
         own = settings_for(candidate.orbit, state.settings)
         branch = leave_singular(state, candidate.orbit, event, own) or branch
+    if branch is not None and _never_held(branch):
+        why = "its hold has no length anywhere: the motion of another word, that only touches rest"
+        state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
+        return False
     if branch is not None and _has_no_width(branch, event, state.settings):
         why = "it begins and ends at the event, without any width"
         state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
@@ -192,6 +198,19 @@ def _begins_continuum(state: Exploration, orbit: Orbit | None, event: Event) -> 
     found = in_continuum(orbit, active)
     event.final = EndReason.CONTINUUM if found else event.final
     return found
+
+
+def _never_held(branch: Branch) -> bool:
+    """Tell whether a hold has no length at any point of a branch: the equations hold, and nothing is held.
+
+    Where orbits are a continuum, those of them that touch rest solve the equations of a hold for every value
+    of the parameter. On a bridge a hold grows at least with the distance from its event.
+    """
+    holds = [hold.segment for hold in branch.system.holds]
+    if not holds:
+        return False
+    lasts = np.array([(o.ends[:, 0] - o.cycle[:, 0])[holds] for o in branch])
+    return bool(np.any(np.max(lasts, axis=0) < _NO_TIME * min(1.0, branch.arc[-1])))
 
 
 def _has_no_width(branch: Branch, event: Event, settings: Settings) -> bool:
