@@ -156,6 +156,7 @@ def test_more_stationary_points_than_there_is_room_for():
     assert integrated.turning(STICK, LOAD, 0.1, y, 30.0, p, times, values) == -1
 
 
+@pytest.mark.slow
 def test_van_der_pol_against_many_digits():
     """State, and its derivatives by state and mu, from Taylor series with 30 digits."""
     with mp.workdps(30):

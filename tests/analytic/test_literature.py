@@ -313,6 +313,7 @@ def _half_turns(A: float, y: Any, count: int) -> np.ndarray:
     return there
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind, near, halves",
     [

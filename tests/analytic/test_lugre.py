@@ -126,6 +126,7 @@ def test_multipliers_are_those_of_the_stroboscopic_map(model, orbit):
         assert np.sum(mine**e) == pytest.approx(np.sum(theirs**e), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_events_do_not_depend_on_where_orbits_are_cut(model, orbit):
     other = cf.find_orbit(model, {**WHERE, "S": 0.38, "phi0": 2.1})
     for start, max_step in ((orbit, 0.002), (other, 0.001)):
@@ -172,6 +173,7 @@ def test_the_models_own_step_finds_the_folds(model, symmetric):
     assert found[cf.Kind.BP] == pytest.approx([BREAKING], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_step_that_leaps_over_folds_is_taken_back(orbit):
     """Two sheets are 8e-5 apart where steps are 2e-2: between the ends of a leap no branch is found."""
     branch = cf.continue_orbit(orbit, "S", (0.36, 0.385), max_step=0.01)
@@ -208,6 +210,7 @@ def test_curve_of_the_symmetry_breaking_beside_a_touch(symmetric):
         assert np.min(below.real) < -1.0 < np.min(above.real)
 
 
+@pytest.mark.slow
 def test_fold_curve_is_where_runs_in_one_parameter_turn(model, symmetric):
     """Orbits are simulated above the fold, away from the curve, and continued down to it."""
     event = min(
@@ -271,6 +274,7 @@ def printed(page, low, high, orbits):
     return sorted((float(value), kind) for kind, value in rows if low < float(value) < high)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("page", "params", "parameter", "bounds", "orbits"),
     [

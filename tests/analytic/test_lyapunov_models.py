@@ -142,6 +142,7 @@ def test_areas_shrink_by_damping_and_by_restitution() -> None:
 # ------------------------------------------------------------------------- chaos
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHAOTIC)
 def test_chaotic_exponent_agrees_with_two_orbits(name: str) -> None:
     """Within four of the errors that both give for themselves."""

@@ -64,7 +64,7 @@ def test_accuracy_is_a_bound_of_the_error(parameter: str, monkeypatch: pytest.Mo
 
 
 def test_random_events() -> None:
-    report = events.run(count=22, seed=12)
+    report = events.run(count=8, seed=12)
     assert not report.failed, report.failed
     kinds = [kind for kind in cf.Kind if report.passed.get(f"{kind.value}: its parameter")]
     assert len(kinds) >= 7

@@ -33,7 +33,7 @@ PARAMS = {
 
 
 def test_random_orbits() -> None:
-    report = orbits.run(count=20, seed=11)
+    report = orbits.run(count=8, seed=11)
     assert not report.failed, report.failed
     assert report.passed["orbit: joints and multipliers"] >= 14
     assert report.passed["state at a late time"] >= 14

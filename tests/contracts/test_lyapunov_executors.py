@@ -103,6 +103,7 @@ def test_a_worker_killed_midway_loses_nothing(expected_long: bytes) -> None:
     assert "BrokenProcessPool" in lost[0]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("default")  # those of other packages
 def test_dask_cluster_with_a_worker_killed_midway(expected_long: bytes) -> None:
     """A real cluster of worker processes on this machine; dask gives the lost tiles to the others."""

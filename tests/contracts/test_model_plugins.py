@@ -373,6 +373,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_workers_find_the_model_of_another_package(
     site: Path, damped: cf.Model, tmp_path: Path
 ) -> None:

@@ -14,6 +14,7 @@ GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 SCRIPT = runpy.run_path(str(GALLERY / "literature.py"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCRIPT["STUDIES"])
 def test_table_is_what_is_computed(name: str, tmp_path: Path) -> None:
     import dataclasses

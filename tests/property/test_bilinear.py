@@ -18,6 +18,7 @@ def diagram():
     return cf.explore(cf.find_orbit(MODEL, {"omega": 0.8}), "omega", (0.75, 0.95))
 
 
+@pytest.mark.slow
 def test_there_are_no_loose_ends(diagram):
     assert [str(end) for end in diagram.loose_ends] == []
     grazing = [b for b in diagram.bifurcations if b.kind in (cf.Kind.CS, cf.Kind.GS)]

@@ -110,6 +110,7 @@ def test_every_orbit_of_every_branch_is_listed(seed: int) -> None:
                     assert has(found, orbit), (orbit, orbit.word, start)
 
 
+@pytest.mark.slow
 def test_branches_of_fig_5_with_unstable_ones() -> None:
     """One exploration, sixteen values of its parameter, each crossing stable or not."""
     params = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
@@ -237,6 +238,7 @@ def arcs(draw: st.DrawFn) -> dict[tuple[str, str], Arcs]:
     return found
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(arcs(), st.lists(st.sampled_from(["F+", "F-"]), min_size=1, max_size=4))
 def test_turns_against_all_phases(found: dict[tuple[str, str], Arcs], exits: list[str]) -> None:

@@ -60,7 +60,7 @@ def first_root(a, nodes, values):
 coefficient = st.floats(-1, 1).map(lambda x: 0.0 if abs(x) < 1e-3 else x)
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     rest=st.lists(coefficient, min_size=8, max_size=8),
     offset=st.floats(-3, 3),

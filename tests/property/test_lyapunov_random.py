@@ -71,6 +71,7 @@ def test_mirror_image_has_the_same_exponents(seed: int) -> None:
         np.testing.assert_allclose(one.exponents, other.exponents, rtol=0.0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_errors_are_what_they_say() -> None:
     """Averages over 600 periods of many chaotic motions, beside those over 15000.
 

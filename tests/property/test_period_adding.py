@@ -42,6 +42,7 @@ def test_the_windows_in_order() -> None:
     assert lows[1] > 0.49174881 and highs[-1] < 0.49181666
 
 
+@pytest.mark.slow
 def test_every_simulation_in_the_gap_settles_on_a_word_of_the_list_or_a_longer_one() -> None:
     known = {identity(w.branch[0]) for w in windows()}
     for value in np.linspace(0.4917489, 0.4918166, 40):
