@@ -15,6 +15,7 @@ from contfric.continuation.events import (
 )
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import bifurcation_at
+from contfric.continuation.side import first_point
 from contfric.continuation.trial import locate_change
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test
@@ -30,6 +31,10 @@ _REACHED = 1e-8
 ROUGHLY_REACHED = 1e-4
 #: The same where several holds end at once; what their lengths do to the orbit is the square of it.
 _NEARLY_REACHED = 1e-5
+#: How far a located point is moved back (arclength): where a slide vanishes joints are known to no more.
+_BACK = (1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8)
+#: A margin this negative is no rounding of a sum of a few terms of order 1.
+_NEGATIVE = 1e-14
 #: Share of the period below which a stick at a tangential release has vanished: the square root of
 #: the rounding of its quadratic margin.
 _VANISHED = 1e-5
@@ -54,6 +59,7 @@ def sliding_events(
     first, point = min(located, key=lambda pair: pair[1].arc)
     while hidden := _located_before(orbit, before, point, settings):
         first, point = min(hidden, key=lambda pair: pair[1].arc)
+    point = _pulled_in(orbit, before, point, settings)
     here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     first = _stop_behind(here, point, first)
     kind = kind_of_margin(orbit.system, orbit.system.tests[first], here)
@@ -83,6 +89,30 @@ def sliding_events(
     return [
         (replace(found, accuracy=max(found.accuracy, ROUGHLY_REACHED)) if rough else found, point)
     ]
+
+
+def _pulled_in(orbit: Orbit, before: Point, point: Point, settings: Settings) -> Point:
+    """Return a located point that is admissible: the same, or one before it, by less than it is located to.
+
+    Where a slide has no length any more the equations are nearly singular, and the last correction takes a
+    margin that was zero to either side of it.
+    """
+    active = orbit.model.index_of(settings.parameter)
+    if point.lost or _is_inside(point.orbit(orbit.system, orbit.vector, active)):
+        return point
+    for back in _BACK:
+        moved = point.orbit(orbit.system, orbit.vector, active)
+        moved = replace(moved, joints=moved.joints - back * point.tangent)
+        nearer = first_point(moved, settings, point.tangent, point.slope)
+        if nearer is not None and _is_inside(nearer.orbit(orbit.system, orbit.vector, active)):
+            return replace(nearer, arc=point.arc - back)
+    return point
+
+
+def _is_inside(here: Orbit) -> bool:
+    """Tell whether no margin is negative, and no segment lasts less than nothing."""
+    lasts = here.ends[:, 0] - here.cycle[:, 0]
+    return bool(np.min(lasts) >= 0.0 and np.min(here.margins, initial=0.0) > -_NEGATIVE)
 
 
 def _stop_behind(here: Orbit, point: Point, first: int) -> int:

@@ -273,7 +273,8 @@ class Orbit:
         """What a margin may miss zero by: at an event it vanishes, and its sign is rounding.
 
         A joint that touches a surface, and a hold at its limits, are located to the root of that where two
-        conditions meet.
+        conditions meet. An exit with the rate -r has been passed by r^2 / 2 before it: r is known to the root of
+        rounding where the exit is tangential.
         """
         held = {hold.segment for hold in self.system.holds}
         may = [
@@ -281,7 +282,8 @@ class Orbit:
             for t in self.system.tests
         ]
         rounding = _ROUNDING * self.model.rounding * (1.0 + float(np.max(np.abs(self.joints))))
-        return np.where(np.array(may), -1e-9, -rounding)
+        root = np.array([t.margin is Margin.EXIT for t in self.system.tests])
+        return np.where(root, -np.sqrt(rounding), np.where(np.array(may), -1e-9, -rounding))
 
     def violations(self) -> list[str]:
         """Return what makes the orbit not admissible, one line each."""
