@@ -22,7 +22,7 @@ import contfric as cf
 from contfric.atlas.verification import Verification
 
 WHAT = "Diagrams of random scenes in all five parameters, explored again from up to six of their branches."
-#: Longest that one scene may take with its restarts (s); longer ones are counted as cut.
+#: Longest that one scene may take with its restarts (s of processor time); longer ones are counted as cut.
 LIMIT = 60.0
 #: Most branches of a diagram; those with more are counted as cut.
 MOST_BRANCHES = 60
@@ -91,7 +91,7 @@ def run(count: int, seed: int, *, first: int = 0, progress: Progress = None) -> 
     began, tally = time.perf_counter(), Tally()
     for index in range(first, first + count):
         tally.index = index
-        start = time.perf_counter()
+        start = time.process_time()
         try:
             with time_limit(LIMIT):
                 one_scene(tally, scene(seed, index))
@@ -101,7 +101,7 @@ def run(count: int, seed: int, *, first: int = 0, progress: Progress = None) -> 
             Exception
         ) as error:  # whatever it is, it is a failure of this scene and not of the run
             tally.check("no exception", False, f"{scene(seed, index)}: {error!r}")
-        tally.largest("seconds of one scene", time.perf_counter() - start)
+        tally.largest("seconds of one scene", time.process_time() - start)
         if progress is not None and index % 10 == 9:
             progress(f"restarts: {index + 1 - first} of {count}, {len(tally.failed)} failures")
     return tally.report("restarts", WHAT, count, seed, time.perf_counter() - began)

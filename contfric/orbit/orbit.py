@@ -273,8 +273,8 @@ class Orbit:
         """What a margin may miss zero by: at an event it vanishes, and its sign is rounding.
 
         A joint that touches a surface, and a hold at its limits, are located to the root of that where two
-        conditions meet. An exit with the rate -r has been passed by r^2 / 2 before it: r is known to the root of
-        rounding where the exit is tangential.
+        conditions meet. Before an exit with the rate -r its surface is passed by r^2 / 2: r is known to the
+        root of rounding where the exit is tangential.
         """
         held = {hold.segment for hold in self.system.holds}
         may = [
