@@ -25,11 +25,11 @@ PAGE = """# The bundled studies
 
 Written by `make studies` (`benchmarks/studies.py`, which took {took}); {machine}, {processors} processors,
 Python {python}. Each study is run from the shell (`contfric run NAME`), with a limit of {limit:.0f} s; one
-that does not end by itself, or ends with an error, fails the command. The time is that of a whole process
-with its kernels compiled, figures and tables written. {once}
+that does not end by itself, or ends with an error, fails the command. The times are those of a whole process
+with its kernels compiled, figures and tables written: of the clock, and of the processors. {once}
 
-| study | what it computes | found | s |
-|---|---|---|---|
+| study | what it computes | found | s | processor s |
+|---|---|---|---|---|
 {rows}
 """
 
@@ -41,11 +41,13 @@ class Run:
     Attributes
     ----------
     seconds : wall time
+    work : processor time, that of its own processes included
     failed : what went wrong; empty if nothing did
     record : what the run says of itself
     """
 
     seconds: float
+    work: float
     failed: str
     record: dict[str, Any]
 
@@ -55,18 +57,25 @@ def run(name: str, limit: float) -> Run:
     with tempfile.TemporaryDirectory() as folder:
         out = str(Path(folder) / name)
         command = [sys.executable, "-m", "contfric", "run", name, "--out", out, "--json", "--quiet"]
-        began = time.perf_counter()
+        began, before = time.perf_counter(), os.times()
+
+        def spent() -> tuple[float, float]:
+            """Return wall and processor time since the start."""
+            now = os.times()
+            work = now.children_user + now.children_system
+            work -= before.children_user + before.children_system
+            return time.perf_counter() - began, work
+
         try:
             done = subprocess.run(
                 command, capture_output=True, text=True, timeout=limit, check=False
             )
         except subprocess.TimeoutExpired:
-            return Run(time.perf_counter() - began, f"did not end within {limit:.0f} s", {})
-        seconds = time.perf_counter() - began
+            return Run(*spent(), f"did not end within {limit:.0f} s", {})
         if done.returncode != 0:
             last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-            return Run(seconds, f"ended with {done.returncode}: {last}", {})
-        return Run(seconds, "", json.loads(done.stdout))
+            return Run(*spent(), f"ended with {done.returncode}: {last}", {})
+        return Run(*spent(), "", json.loads(done.stdout))
 
 
 def timed(name: str, limit: float) -> Run:
@@ -97,8 +106,8 @@ def found(record: dict[str, Any]) -> str:
 def row(name: str, run: Run) -> str:
     """Return the line of a study in the table."""
     if run.failed:
-        return f"| {name} | | **{run.failed}** | {run.seconds:.1f} |"
-    return f"| {name} | {run.record['title']} | {found(run.record)} | {run.seconds:.1f} |"
+        return f"| {name} | | **{run.failed}** | {run.seconds:.1f} | {run.work:.1f} |"
+    return f"| {name} | {run.record['title']} | {found(run.record)} | {run.seconds:.1f} | {run.work:.1f} |"
 
 
 def main() -> int:
