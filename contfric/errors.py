@@ -99,32 +99,6 @@ def whole_number(name: str, value: object, least: int, most: int | None = None) 
     return number
 
 
-def finite_number(name: str, value: object, what: str = "must be a finite number") -> float:
-    """Return a finite number that a user gave: a float, a whole number that fits, or one of numpy's.
-
-    ``what`` says in the message what it has to be.
-
-    Raises
-    ------
-    ParameterError
-        If it is none.
-
-    Examples
-    --------
-    >>> finite_number("time", 3)
-    3.0
-    """
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise ParameterError(f"{name} {what}, got {shown(value)}")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise ParameterError(f"{name} {what}, got {shown(value)}")
-    return number
-
-
 def checked_range(name: str, bounds: object) -> tuple[float, float]:
     """Return the range of a parameter: two finite numbers, lower first, that a float can tell apart.
 
@@ -177,8 +151,15 @@ def shown(value: object) -> str:
     return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
 
 
-def real_number(name: str, value: object, least: float | None = None) -> float:
-    """Return a finite number that a user gave, not below a limit.
+def real_number(
+    name: str, value: object, least: float | None = None, wanted: str = "is a finite number"
+) -> float:
+    """Return a finite number that a user gave: a float, a whole number that fits, or one of numpy's.
+
+    Parameters
+    ----------
+    least : what it is not below
+    wanted : what it has to be, for the message
 
     Raises
     ------
@@ -190,9 +171,14 @@ def real_number(name: str, value: object, least: float | None = None) -> float:
     >>> real_number("time", 1)
     1.0
     """
-    wanted = "is a finite number" if least is None else f"is a finite number >= {least:g}"
-    number = finite_number(name, value, wanted)
-    if least is not None and number < least:
+    if least is not None:
+        wanted = f"{wanted} >= {least:g}"
+    try:
+        real = isinstance(value, Real) and not isinstance(value, bool)
+        number = float(value) if real else math.nan  # type: ignore[arg-type] # Real has __float__
+    except OverflowError:  # a whole number of 400 digits
+        number = math.inf
+    if not math.isfinite(number) or (least is not None and number < least):
         raise ParameterError(f"{name} {wanted}, got {shown(value)}")
     return number
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from contfric.chaos.rows import Limits, follow
 from contfric.chaos.starts import StateLike, default_states, given_states
 from contfric.chaos.status import Motion
-from contfric.errors import ParameterError, finite_number, real_number, whole_number
+from contfric.errors import ParameterError, real_number, whole_number
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
 
@@ -130,7 +130,7 @@ def limits_of(transient: int, periods: int, tolerance: float, confirm: int) -> L
     periods = whole_number("periods", periods, least=1)
     confirm = whole_number("confirm", confirm, least=0)
     wanted = "is a number >= 0"
-    tolerance = finite_number("tolerance", tolerance, wanted)
+    tolerance = real_number("tolerance", tolerance, wanted=wanted)
     if tolerance < 0.0:
         raise ParameterError(f"tolerance {wanted}, got {tolerance!r}")
     return Limits(transient, periods, tolerance, confirm)

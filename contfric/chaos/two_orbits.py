@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.chaos.rows import check_excited
-from contfric.errors import ContfricError, ParameterError, finite_number, whole_number
+from contfric.errors import ContfricError, ParameterError, real_number, whole_number
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.simulation import SimulationEnd, run, simulate
@@ -95,7 +95,7 @@ def two_orbit_estimate(
     """
     model = load_model(model)
     whole_number("periods", periods, least=_BATCHES)
-    distance = finite_number("distance", distance)
+    distance = real_number("distance", distance)
     if not 0.0 < distance < 1.0:
         raise ParameterError(f"distance is a number between 0 and 1, got {distance!r}")
     check_excited(model, model.vector(params or {}))

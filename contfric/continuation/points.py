@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.errors import ParameterError, checked_range, finite_number, truth, whole_number
+from contfric.errors import ParameterError, checked_range, real_number, truth, whole_number
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System
@@ -132,7 +132,7 @@ def settings_of(
     max_points = whole_number("max_points", max_points, least=2)
     stability = truth("stability", stability)
     if max_step is not None:
-        max_step = finite_number("max_step", max_step, "is a share of the range, in (0, 1]")
+        max_step = real_number("max_step", max_step, wanted="is a share of the range, in (0, 1]")
         if not _LEAST_STEP <= max_step <= 1.0:
             raise ParameterError(
                 f"max_step is a share of the range, from {_LEAST_STEP:g} to 1, got {max_step!r}"

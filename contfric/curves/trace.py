@@ -26,7 +26,7 @@ from contfric.curves.points import (
 )
 from contfric.curves.problem import Problem, box_of, problem_of
 from contfric.curves.special import CurveEnd, CurveEndReason, SpecialPoint
-from contfric.errors import ConvergenceError, ParameterError, finite_number, whole_number
+from contfric.errors import ConvergenceError, ParameterError, real_number, whole_number
 from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
 
@@ -149,7 +149,7 @@ def largest_step(max_step: Any, model: Model) -> float:
     """Return the largest step as a share of the ranges: what is asked for, or the model's."""
     if max_step is None:
         return model.max_step or LARGEST_STEP
-    given = finite_number("max_step", max_step, "is a share of the ranges, in (0, 1]")
+    given = real_number("max_step", max_step, wanted="is a share of the ranges, in (0, 1]")
     if not 1e-8 <= given <= 1.0:
         raise ParameterError(f"max_step is a share of the ranges, from 1e-8 to 1, got {max_step!r}")
     return given

@@ -19,7 +19,7 @@ from contfric.errors import (
     ParameterError,
     ResultFileError,
     checked_range,
-    finite_number,
+    real_number,
     shown,
     whole_number,
 )
@@ -129,7 +129,7 @@ def test_ranges_of_a_plane_that_are_none(bounds: Any, orbit: cf.Orbit) -> None:
 
 
 def test_numbers_of_numpy_are_numbers(orbit: cf.Orbit) -> None:
-    assert finite_number("a", np.float32(0.5)) == 0.5 and finite_number("a", Fraction(1, 4)) == 0.25
+    assert real_number("a", np.float32(0.5)) == 0.5 and real_number("a", Fraction(1, 4)) == 0.25
     assert whole_number("n", np.int64(7), least=0) == 7
     assert checked_range("a", np.array([0.25, 3])) == (0.25, 3.0)
     settings = {"max_points": np.int32(50), "max_step": np.float64(0.01)}
