@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from contfric.continuation.accuracy import not_critical
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
+from contfric.continuation.continuum import LEVEL
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.locate import belongs_to, locate_events
 from contfric.continuation.outcomes import end_message
@@ -35,6 +37,7 @@ from contfric.continuation.vertices import at_vertex
 from contfric.errors import ConvergenceError, function_of
 from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.solve import polish
 
 #: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).
 _AT_LIMIT = 1e-6
@@ -53,6 +56,11 @@ _CROWD = 5e-4
 _LONGER, _STANDS = 1.5, 1e-6
 #: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
 _NO_SIZE = 1e-5
+
+#: Tests of the events that have a multiplier 1 or -1, the first ones.
+_LINEAR = 3
+#: Where a start is looked for that is at no event, relative to the range: in the first steps from it.
+_BESIDE_START = (1.3e-3, -1.3e-3)
 
 #: A step this short after hundreds of points (arclength) gets nowhere.
 _CRAWLS = 1e-6
@@ -129,11 +137,43 @@ def follow_orbit(
             "an orbit of a continuum). Move the parameter a little and solve again",
             orbit,
         )
+    orbit, start = _off_events(orbit, start, settings)
     ahead = trace_side(orbit, start, settings, progress=progress, keep=keep)
     if ahead.end.reason in (EndReason.CLOSED, EndReason.INTERRUPTED):
         return assemble(orbit, settings, ahead, End(ahead.end.reason))
     behind = trace_side(orbit, start.reversed(), settings, progress=progress, keep=keep)
     return join(orbit, settings, behind, ahead)
+
+
+def _off_events(orbit: Orbit, start: Point, settings: Settings) -> tuple[Orbit, Point]:
+    """Return a start at which no smooth event happens: the same, or one beside it.
+
+    An event is seen where a test changes sign, and at the event itself its sign is rounding. Where it is that
+    beside the start, too, orbits are continua, and the start is as good as any.
+    """
+    if not _is_at_event(start, settings):
+        return orbit, start
+    active = orbit.model.index_of(settings.parameter)
+    for share in _BESIDE_START:
+        value = start.value + share * settings.width
+        if not settings.low <= value <= settings.high:
+            continue
+        vector = orbit.vector.copy()
+        vector[active] = value
+        beside = polish(replace(orbit, vector=vector))
+        point = first_point(beside, settings) if beside.converged and beside.admissible else None
+        if point is not None and not _is_at_event(point, settings):
+            return beside, point
+    return orbit, start
+
+
+def _is_at_event(point: Point, settings: Settings) -> bool:
+    """Tell whether the slope, chi(1) or chi(-1) is zero to rounding.
+
+    (The product of a pair of multipliers is 1 wherever nothing is dissipated between events.)
+    """
+    tests = point.tests[len(point.tests) - EXTRA :][: _LINEAR if settings.stability else 1]
+    return bool(np.any(np.abs(tests[np.isfinite(tests)]) < LEVEL))
 
 
 def _went_to_its_end(side: Side) -> bool:
