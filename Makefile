@@ -1,4 +1,4 @@
-# make setup | demo | test | bench | stress | studies | gallery | clean
+# make setup | demo | test | test-all | gate | bench | stress | studies | gallery | clean
 PYTHON ?= python3
 WORKERS ?= 2
 
@@ -10,13 +10,14 @@ DEMO := demo
 STRESS := .stress
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint types contracts unit test-all bench stress studies gallery clean
+.PHONY: help setup demo test lint types contracts unit test-all gate bench stress studies gallery clean
 MAKEFLAGS += --no-print-directory
 
 help:
 	@echo "make demo     the bifurcation diagram of Fig. 5, from one simulated orbit, in $(DEMO)/"
 	@echo "make test     lint, types, import contracts, tests"
 	@echo "make test-all the same with the tests that take long"
+	@echo "make gate     whether anything got slower: a minute, against a yardstick of the machine"
 	@echo "make bench    run times, cost at scale and of scenes, run time against error beside others"
 	@echo "make stress   random cases against 50 digits, to docs/stress.md (an hour or more)"
 	@echo "make studies  every bundled study from the shell, each with a time limit, to docs/studies.md"
@@ -76,6 +77,11 @@ test-all: $(STAMP)
 	@$(MAKE) contracts
 	@echo "== pytest, slow ones too"
 	@$(BIN)/python -m pytest -n $(WORKERS)
+
+# A minute; not in CI, where machines are noisy.
+gate: $(STAMP)
+	@echo "== gate"
+	@$(BIN)/python benchmarks/gate.py
 
 # The peers are not needed by anything else: where one has no wheel, the page does without.
 bench: $(BENCH_STAMP)
