@@ -8,17 +8,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from contfric.atlas.collect import collect
 from contfric.atlas.diagram import Asked, Diagram
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.follow import follow
 from contfric.atlas.seeds import Seeds, attractors
+from contfric.continuation.branch import Branch
 from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import continue_orbit, follow_orbit
+from contfric.continuation.vertices import symmetrised
 from contfric.errors import ConvergenceError, function_of, truth, whole_number
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
+from contfric.orbit.solve import polish
 
 #: Longest orbits, in periods, that doublings are followed to by default: two doublings.
 MOST_PERIODS = 4
@@ -110,14 +115,7 @@ def explore(
             f"max_periods raised to {orbit.periods}: the start has that many periods"
         )
     try:
-        state.add(
-            follow_orbit(
-                orbit,
-                replace(settings, stability=stability and not orbit.system.holds),
-                progress,
-                keep=True,
-            )
-        )
+        state.add(_first_branch(state, orbit))
         _follow_all(state)
         if seeds is not None:
             _follow_seeds(state, orbit, seeds)
@@ -142,6 +140,21 @@ def explore(
             max_points,
         ),
     )
+
+
+def _first_branch(state: Exploration, orbit: Orbit) -> Branch:
+    """Return the branch through the start; of a continuum the one through its symmetric orbit."""
+    settings = state.settings
+    settings = replace(settings, stability=settings.stability and not orbit.system.holds)
+    try:
+        return follow_orbit(orbit, settings, state.progress, keep=True)
+    except ConvergenceError:
+        middle = symmetrised(orbit.as_whole(), np.inf)
+        solved = None if middle is None else polish(middle)
+        if solved is None or not (solved.converged and solved.admissible):
+            raise
+    state.notes.append("the start is one of a continuum of orbits: the symmetric one is continued")
+    return follow_orbit(solved, settings, state.progress, keep=True)
 
 
 def _follow_seeds(state: Exploration, orbit: Orbit, seeds: Seeds) -> None:

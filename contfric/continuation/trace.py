@@ -10,7 +10,7 @@ import numpy as np
 from contfric.continuation.accuracy import not_critical
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
-from contfric.continuation.continuum import LEVEL
+from contfric.continuation.continuum import LEVEL, in_continuum
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.locate import belongs_to, locate_events
 from contfric.continuation.outcomes import end_message
@@ -131,11 +131,12 @@ def follow_orbit(
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
     orbit = orbit.as_half()
     start = first_point(orbit, settings)
-    if start is None:
+    at_event = start is not None and _is_at_event(start, settings)
+    if start is None or (
+        at_event and in_continuum(orbit, orbit.model.index_of(settings.parameter))
+    ):
         raise ConvergenceError(
-            "the orbit has no unique continuation: the system is singular there (a bifurcation, or "
-            "an orbit of a continuum). Move the parameter a little and solve again",
-            orbit,
+            f"the orbit has no unique continuation: {_why(orbit, settings)}", orbit
         )
     orbit, start = _off_events(orbit, start, settings)
     ahead = trace_side(orbit, start, settings, progress=progress, keep=keep)
@@ -143,6 +144,16 @@ def follow_orbit(
         return assemble(orbit, settings, ahead, End(ahead.end.reason))
     behind = trace_side(orbit, start.reversed(), settings, progress=progress, keep=keep)
     return join(orbit, settings, behind, ahead)
+
+
+def _why(orbit: Orbit, settings: Settings) -> str:
+    """Return why an orbit has no unique continuation, and what to do."""
+    if in_continuum(orbit, orbit.model.index_of(settings.parameter)):
+        return (
+            f"it is one of a continuum of orbits, at each {settings.parameter} beside it, too. Continue the "
+            "symmetric one of them, or vary what makes them a continuum (the damping, the frequency)"
+        )
+    return "the equations are singular there (a bifurcation). Move the parameter a little and solve again"
 
 
 def _off_events(orbit: Orbit, start: Point, settings: Settings) -> tuple[Orbit, Point]:

@@ -51,7 +51,7 @@ def symmetric_part(orbit: Orbit, active: int) -> Orbit | None:
     return None if part is None else _vertex(part, active)
 
 
-def symmetrised(orbit: Orbit) -> Orbit | None:
+def symmetrised(orbit: Orbit, farthest: float = _NEARLY) -> Orbit | None:
     """Return the symmetric part of an orbit, not solved; None if it is far from its mirror image."""
     system = orbit.system
     half = None if system.half else half_of(orbit.model, system.word, system.periods)
@@ -61,7 +61,7 @@ def symmetrised(orbit: Orbit) -> Orbit | None:
     image = orbit.joints[n:].copy()
     image[:, 0] -= 0.5 * orbit.period
     image[:, 1:] = image[:, 1:] @ orbit.model.symmetry.array()
-    if np.max(np.abs(image - orbit.joints[:n])) > _NEARLY:
+    if np.max(np.abs(image - orbit.joints[:n])) > farthest:
         return None
     middle = 0.5 * (image + orbit.joints[:n])
     middle = clocked(orbit.model, middle, float(middle[0, 0]) + 0.5 * orbit.period)

@@ -87,6 +87,20 @@ def test_an_orbit_of_a_continuum_is_told_from_a_branch_point() -> None:
     assert not in_continuum(orbit, orbit.model.index_of("Omega"))
 
 
+def test_a_start_in_a_continuum_gives_the_diagram_of_its_symmetric_orbit() -> None:
+    params = free(1)
+    whole = cf.explore(symmetric_orbit(params), "zeta", (-0.004, 0.004), max_branches=12)
+    (branch,) = (b for b in whole.branches if is_continuum(b) and not b.mirrored)
+    inside, bounds = branch[len(branch) // 2], (params["S"] * 0.9, params["S"] * 1.1)
+    with pytest.raises(cf.ConvergenceError, match="one of a continuum of orbits, at each S"):
+        cf.continue_orbit(inside, "S", bounds)
+    again = cf.explore(inside, "S", bounds, max_branches=5)
+    expected = cf.explore(symmetric_orbit(params), "S", bounds, max_branches=5)
+    assert any("one of a continuum" in note for note in again.notes)
+    assert [b.name for b in again.branches] == [b.name for b in expected.branches]
+    assert again.branches[0].symmetric
+
+
 @pytest.mark.parametrize("vary", ["h", "zeta"])
 def test_restarts_and_balance_beside_continua(vary: str) -> None:
     """Scenes that had 14 branch points, and lost what is joined by a continuum."""
