@@ -15,7 +15,7 @@ from contfric.continuation.events import Bifurcation, End
 from contfric.errors import ParameterError
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.orbit import Orbit
+from contfric.orbit.orbit import Orbit, of_two_halves
 from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
 from contfric.orbit.system import IntArray, System, build_system
 from contfric.orbit.words import decode, encode, mirror_pairs
@@ -136,7 +136,7 @@ class Branch:
         if self.turn_multipliers is None:
             return None
         mu = self.turn_multipliers
-        return mu**2 if self.system.half else mu
+        return of_two_halves(mu) if self.system.half else mu
 
     @cached_property
     def stable(self) -> BoolArray | None:

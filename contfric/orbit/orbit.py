@@ -50,6 +50,19 @@ class Status(str, Enum):
     NOT_FINITE = "an iterate left the region where the flow is finite: start nearer"
 
 
+def of_two_halves(mu: ComplexArray) -> ComplexArray:
+    """Return multipliers of a symmetric orbit from those of its half: their squares, infinite ones too.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> of_two_halves(np.array([-0.5, np.inf]) + 0j).real.tolist()
+    [0.25, inf]
+    """
+    finite = np.isfinite(mu)
+    return np.where(finite, np.where(finite, mu, 0.0) ** 2, complex(np.inf))
+
+
 @dataclass(frozen=True, eq=False)
 class Orbit:
     """A periodic orbit of a piecewise-smooth model.
@@ -244,7 +257,7 @@ class Orbit:
     def multipliers(self) -> ComplexArray:
         """Floquet multipliers of the whole orbit, as those of one turn."""
         mu = self.turn_multipliers
-        return mu**2 if self.system.half and not self.system.holds else mu
+        return of_two_halves(mu) if self.system.half and not self.system.holds else mu
 
     @property
     def stable(self) -> bool:
