@@ -18,7 +18,7 @@ from contfric.continuation.side import first_point
 from contfric.continuation.smooth import _is_idle
 from contfric.continuation.switching import LEAVE, leaps, leave_branch_point
 from contfric.continuation.trace import trace_side
-from contfric.continuation.vertices import left_at
+from contfric.continuation.vertex_between import left_at
 from contfric.orbit.simulation import tables
 from contfric.orbit.system import Margin
 
@@ -85,7 +85,6 @@ def test_a_parameter_that_turns_is_a_fold(
 def test_a_vertex_left_behind_is_found_between_the_two_orbits() -> None:
     branch, orbit = asymmetric(), symmetric()[0]
     settings = settings_of(orbit, "Omega", (0.45, 0.52), None, True, 100)
-    active = orbit.model.index_of("Omega")
     near = int(np.argmin(np.abs(branch.values - BRANCH_POINT)))
     k = near + 5 if near + 5 < len(branch) else near - 5
     side = np.sign(branch.values[k] - BRANCH_POINT)
@@ -94,11 +93,11 @@ def test_a_vertex_left_behind_is_found_between_the_two_orbits() -> None:
     values = symmetric().values
     beyond = values[side * (values - BRANCH_POINT) < -1e-4]
     there = cf.solve_orbit("coulomb", "2s", FIG05 | {"Omega": float(beyond[len(beyond) // 2])})
-    found = left_at(before, there.as_whole(), active)
+    found = left_at(before, there.as_whole(), settings)
     assert found is not None and found.value == pytest.approx(BRANCH_POINT, abs=1e-10)
     # on the same side of the branch point there is none
     same = cf.solve_orbit("coulomb", "2s", FIG05 | {"Omega": BRANCH_POINT + side * 1e-3})
-    assert left_at(before, same.as_whole(), active) is None
+    assert left_at(before, same.as_whole(), settings) is None
 
 
 @pytest.mark.parametrize("step", [0.01, 0.1, 0.5, 1.0])
