@@ -28,8 +28,8 @@ LEAVE = 1e-3
 NEARER = (LEAVE, 1e-4, 1e-5, 1e-6, 1e-7)
 #: Share of that distance at which nothing else has happened yet.
 _AT_ONCE = 0.01
-#: On a parabola the parameter has changed by the square of that share there. One that has changed by more than
-#: this share of its whole change has a corner between; below the second number changes are rounding.
+#: On a parabola the parameter has changed by the square of that share there. One that has changed by more
+#: than this share of its whole change has a corner between; below the second number changes are rounding.
 _CORNER, _NO_CHANGE = 1e-3, 1e-11
 
 
