@@ -283,7 +283,8 @@ def _multiplier_error(kind: Kind, here: Orbit, active: int, width: float) -> flo
     own = _UNITS * float(np.finfo(float).eps) * (1.0 + abs(value))
     least: float | None = None
     for share in _CLOSER:
-        error = _miss(kind, here, active, share * distance)
+        clear = 1.0 if share == 1.0 else _MISSED
+        error = _miss(kind, here, active, share * distance, clear)
         if error is not None and (least is None or error < least):
             least = error
         if least is not None and least < ACCURACY * width:
@@ -291,8 +292,11 @@ def _multiplier_error(kind: Kind, here: Orbit, active: int, width: float) -> flo
     return None if least is None else least + own
 
 
-def _miss(kind: Kind, here: Orbit, active: int, distance: float) -> float | None:
-    """Return by how much a multiplier misses the unit circle, as a distance in the parameter."""
+def _miss(kind: Kind, here: Orbit, active: int, distance: float, clear: float) -> float | None:
+    """Return by how much a multiplier misses the unit circle, as a distance in the parameter.
+
+    None if it does not change by more than ``clear`` times what a parabola through its neighbours misses.
+    """
     shifts, found = [], []
     for k in _NEIGHBOURS:
         vector = here.vector.copy()
@@ -309,7 +313,7 @@ def _miss(kind: Kind, here: Orbit, active: int, distance: float) -> float | None
     x = np.array(shifts) / distance
     fit = np.polynomial.polynomial.polyfit(x, found, 2)
     missed = float(np.max(np.abs(np.polynomial.polynomial.polyval(x, fit) - found)))
-    if abs(fit[1]) <= missed:
+    if abs(fit[1]) <= clear * missed:
         return None
     return float(distance * (abs(fit[0]) + _MISSED * missed) / abs(fit[1]))
 
