@@ -108,10 +108,12 @@ def leaps(
     along = direction or Direction(null_vector(orbit), 0.0)
     nearer = leave_along(orbit, settings, along, departure.reason, _AT_ONCE * distance)
     if nearer is None:
-        return bool(orbit.model.kinks)
+        return bool(orbit.model.kinks)  # elsewhere there is nothing to fail at
     watched = [float(p.tests[CHI_MINUS - EXTRA]) for p in (departure.point, nearer.point)]
     if watched[0] * watched[1] < 0.0:
         return True
+    if not orbit.model.kinks:  # a corner would be the error of the event's own place
+        return False
     at = settings_value(orbit, settings)
     far, near = departure.point.value - at, nearer.point.value - at
     straight = distance * along.slope  # two curves that cross leave with a slope of their own
