@@ -39,7 +39,7 @@ from contfric.continuation.events import (
     Verdict,
 )
 from contfric.continuation.incident import incident_forms
-from contfric.continuation.points import Settings
+from contfric.continuation.points import FIRST_STEP, Settings
 from contfric.continuation.switching import (
     NEARER,
     leaps,
@@ -278,7 +278,13 @@ def _follow_departure(
             return
         if distance != NEARER[-1] and leaps(orbit, settings, departure, distance, along):
             continue
-        side = trace_side(orbit, departure.point, settings, progress=state.progress)
+        side = trace_side(
+            orbit,
+            departure.point,
+            settings,
+            first_step=min(FIRST_STEP, distance / settings.largest),  # no longer than what is known
+            progress=state.progress,
+        )
         if went_somewhere(side, event):
             first = first_end(reason, event, side, settings)
             state.judge(event, text, Verdict.ACCEPTED, len(state.branches))

@@ -41,6 +41,8 @@ _DIFFERENCE = 1e-7
 #: of the range. Far above rounding, and multipliers are parabolas there.
 _BESIDE, _BESIDE_RANGE = 1e-6, 1e-4
 _NEIGHBOURS = (-2.0, -1.0, 1.0, 2.0)
+#: Shares of that distance: the shorter ones where a fold or a touch of a kink lies between.
+_CLOSER = (1.0, 1e-2, 1e-4)
 #: Four points leave one of their errors in what a parabola misses: this many times that bounds them all.
 _MISSED = 10.0
 #: Unknowns of the largest system that is solved as a full matrix; a longer one is solved as a sparse one.
@@ -278,25 +280,42 @@ def _multiplier_error(kind: Kind, here: Orbit, active: int, width: float) -> flo
     """Return the error of the parameter at which a multiplier is on the unit circle."""
     value = float(here.vector[active])
     distance = min(_BESIDE * (1.0 + abs(value)), _BESIDE_RANGE * width)
+    own = _UNITS * float(np.finfo(float).eps) * (1.0 + abs(value))
+    least: float | None = None
+    for share in _CLOSER:
+        clear = 1.0 if share == 1.0 else _MISSED
+        error = _miss(kind, here, active, share * distance, clear)
+        if error is not None and (least is None or error < least):
+            least = error
+        if least is not None and least < ACCURACY * width:
+            break
+    return None if least is None else least + own
+
+
+def _miss(kind: Kind, here: Orbit, active: int, distance: float, clear: float) -> float | None:
+    """Return by how much a multiplier misses the unit circle, as a distance in the parameter.
+
+    None if it does not change by more than ``clear`` times what a parabola through its neighbours misses.
+    """
     shifts, found = [], []
     for k in _NEIGHBOURS:
         vector = here.vector.copy()
         vector[active] += k * distance
         orbit = polish(replace(here, vector=vector), damped=False)
-        if orbit.converged:
-            shifts.append(float(vector[active]) - value)
-            # where -1 is what it is, the pencil says it without multipliers, and on a bridge too
-            minus = kind is not Kind.NS and critical(kind, orbit) < 0.0
-            found.append(opening(orbit) if minus else off_circle(kind, orbit))
-    if len(found) < len(_NEIGHBOURS) or not np.all(np.isfinite(found)):
+        if not orbit.converged:
+            return None
+        shifts.append(float(vector[active] - here.vector[active]))
+        # where -1 is what it is, the pencil says it without multipliers, and on a bridge too
+        minus = kind is not Kind.NS and critical(kind, orbit) < 0.0
+        found.append(opening(orbit) if minus else off_circle(kind, orbit))
+    if not np.all(np.isfinite(found)):
         return None
     x = np.array(shifts) / distance
     fit = np.polynomial.polynomial.polyfit(x, found, 2)
     missed = float(np.max(np.abs(np.polynomial.polynomial.polyval(x, fit) - found)))
-    if abs(fit[1]) <= missed:
+    if abs(fit[1]) <= clear * missed:
         return None
-    own = _UNITS * np.finfo(float).eps * (1.0 + abs(value))
-    return float(distance * (abs(fit[0]) + _MISSED * missed) / abs(fit[1]) + own)
+    return float(distance * (abs(fit[0]) + _MISSED * missed) / abs(fit[1]))
 
 
 def not_critical(bifurcation: Bifurcation, before: Point, after: Point, settings: Settings) -> str:

@@ -3,8 +3,8 @@
 A trial is predicted by the cubic through both ends of the step and their tangents, and corrected
 normal to the tangent between them. Places are chosen by Chandrupatla's method (Adv. Eng. Software 28
 (1997) 145-149): inverse quadratic interpolation where the values are monotone enough for it, bisection
-elsewhere; the bracket shrinks to the resolution of the arithmetic. Only the value that is sought is
-evaluated on the way.
+elsewhere; the bracket shrinks to the resolution of the arithmetic, or of the flow where that is integrated.
+Only the value that is sought is evaluated on the way.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from numba import types
 
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
 from contfric.continuation.steps import (
-    ALONG,
     AT_EVENT,
     CHI_MINUS,
     CHI_ONE,
     FOLD,
     copy_to,
+    largest_state,
     observe_point,
     settle,
     step_room,
@@ -37,7 +37,7 @@ from contfric.orbit.monitor import (
     joint_margin,
     lasting_margin,
 )
-from contfric.orbit.newton import CHECKS, MULTIPLIERS
+from contfric.orbit.newton import ALONG, CHECKS, INTEGRATED, MULTIPLIERS
 from contfric.orbit.spectrum import multipliers
 from contfric.orbit.system import RETURNS
 
@@ -47,11 +47,29 @@ BY_TEST, BY_LABEL, BY_PARAMETER = range(3)
 #: A value of order 1 that is this small is rounding (ten units in the last place, of an orbit of several
 #: segments): a narrower bracket would follow noise.
 _NOISE = 2e-15
+#: Shortest bracket (share of a step): the resolution of the arithmetic.
+_SHORTEST = 4e-16
+#: Widest share of a step that the rounding of an integrated flow may be (in steps that are hardly longer).
+_COARSEST = 0.01
+#: Share of a step below which it is not narrowed down any further where Newton is lost: the multiplier that
+#: is sought is behind that.
+_LOST = 1e-6
 
 
 @helper
-def next_trial(low, high, f_low, f_high, x_old, f_old, x):  # type: ignore[no-untyped-def]
-    """Return Chandrupatla's next abscissa: inverse quadratic where it is monotone, else the middle."""
+def resolution(rounding, length, size):  # type: ignore[no-untyped-def]
+    """Return the share of a step of this length below which orbits of this size differ by rounding."""
+    if rounding <= INTEGRATED or not length > 0.0:
+        return _SHORTEST
+    return max(_SHORTEST, min(_COARSEST, rounding * (1.0 + size) / length))
+
+
+@helper
+def next_trial(low, high, f_low, f_high, x_old, f_old, x, closest):  # type: ignore[no-untyped-def]
+    """Return Chandrupatla's next abscissa: inverse quadratic where it is monotone, else the middle.
+
+    It is not closer to either end of the bracket than ``closest``.
+    """
     a, fa = x, (f_low if x == low else f_high)
     b, fb = (high, f_high) if x == low else (low, f_low)
     c, fc = x_old, f_old
@@ -64,7 +82,7 @@ def next_trial(low, high, f_low, f_high, x_old, f_old, x):  # type: ignore[no-un
                 fc - fb
             )
     width = abs(b - a)
-    least = min(0.5, 1e-16 / width if width > 0.0 else 0.5)
+    least = min(0.5, closest / width if width > 0.0 else 0.5)
     share = min(1.0 - least, max(least, share))
     return a + share * (b - a)
 
@@ -237,7 +255,7 @@ def locate(  # type: ignore[no-untyped-def]
     f_low, f_high = limited(sign * f_low), limited(sign * f_high)
     low, high, x = 0.0, 1.0, 0.5
     x_old, f_old = low, f_low
-    lost = False
+    lost, narrowest = False, resolution(layout.rounding, abs(length), largest_state(za))
     if f_low > 0.0 and f_high < 0.0:
         x = min(0.99, max(0.01, f_low / (f_low - f_high)))
     for _ in range(120):
@@ -268,9 +286,11 @@ def locate(  # type: ignore[no-untyped-def]
             x_old, f_old = high, f_high
             high, f_high = x, f
             lost = not fine
-        if f == 0.0 or high - low <= 4e-16 or (f_low <= noise and f_high >= -noise):
+        if f == 0.0 or high - low <= narrowest or (f_low <= noise and f_high >= -noise):
             break
-        x = next_trial(low, high, f_low, f_high, x_old, f_old, x)
+        if lost and two_sided and layout.rounding > INTEGRATED and high - low < _LOST:
+            break
+        x = next_trial(low, high, f_low, f_high, x_old, f_old, x, 0.25 * narrowest)
     if best_x == 1.0:
         copy_to(best_z, zb)
         copy_to(best_t, tb)

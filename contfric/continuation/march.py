@@ -22,7 +22,6 @@ from numba import types
 
 from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, table, vector
 from contfric.continuation.steps import (
-    ALONG,
     apart,
     changed,
     copy_to,
@@ -35,6 +34,7 @@ from contfric.continuation.steps import (
     step_room,
 )
 from contfric.orbit.equations import FunctionsType, LayoutType
+from contfric.orbit.newton import ALONG, INTEGRATED, ON_THE_WAY
 
 #: Why a march stopped.
 FULL, EVENT, OUTSIDE, STEP, CLOSED, BROKEN, UNBOUNDED, ENDLESS, MORE = range(9)
@@ -184,6 +184,8 @@ def march(  # type: ignore[no-untyped-def]
     guess, angle = np.empty((zs.shape[1], zs.shape[2])), 0.0
     room = step_room(zs.shape[1], zs.shape[2], p.shape[0])
     solving_first, finite, solved = k < 0, lost == 0.0, 0.0
+    integrated = layout.rounding > INTEGRATED
+    accuracy = ON_THE_WAY if integrated and not solving_first else ALONG
     while k + 1 < ws.shape[0]:
         row = k + 1
         if solved >= budget:
@@ -199,7 +201,7 @@ def march(  # type: ignore[no-untyped-def]
             copy_to(guess, zs[row])
         guess_w = trial[active]
         fine, slope, finite = settle(
-            functions, layout, zs[row], trial, which, tzs[row], slope, scale, ALONG, counts, room
+            functions, layout, zs[row], trial, which, tzs[row], slope, scale, accuracy, counts, room
         )
         if fine and not solving_first:
             miss = apart(zs[row], trial[active], guess, guess_w, scale)

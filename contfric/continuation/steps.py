@@ -24,10 +24,8 @@ from contfric.orbit.spectrum import SpectralRoom, multipliers, spectral_room
 #: 1 + mu, and 1 - |mu_1 mu_2| of the two largest multipliers.
 FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR = range(4)
 EXTRA = 4
-#: Correction from which the next one is far below rounding: along a branch the last Jacobian, which
-#: gives tangent and multipliers, is this near to the orbit.
-ALONG = 3e-13
-#: The same where an event is located, and its test function counts to its last digits.
+#: Correction that ends the iteration where an event is located: its test function counts to its last
+#: digits.
 AT_EVENT = 3e-15
 #: Share of the smaller end value above which a parabola's minimum is believed to stay positive.
 _SURE = 0.2

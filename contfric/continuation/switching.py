@@ -25,9 +25,12 @@ from contfric.orbit.orbit import Orbit
 #: still a parabola there.
 LEAVE = 1e-3
 #: Where the branch ends sooner than that, the start is taken nearer.
-NEARER = (LEAVE, 1e-4, 1e-5, 1e-6)
+NEARER = (LEAVE, 1e-4, 1e-5, 1e-6, 1e-7)
 #: Share of that distance at which nothing else has happened yet.
 _AT_ONCE = 0.01
+#: On a parabola the parameter has changed by the square of that share there. One that has changed by more
+#: than this share of its whole change has a corner between; below the second number changes are rounding.
+_CORNER, _NO_CHANGE = 1e-3, 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,19 +98,27 @@ def leaps(
     distance: float,
     direction: Direction | None = None,
 ) -> bool:
-    """Tell whether a start lies behind a period doubling that belongs to the branch, too.
+    """Tell whether a start lies behind something that belongs to the branch, too.
 
-    What watches a multiplier -1 has another sign there than beside the branch point. Multipliers may
-    change so fast beside a touch of a kink.
+    What watches a multiplier -1 has another sign there than beside the branch point, or the branch is no
+    parabola in between. Multipliers, and the parameter, may change so fast beside a touch of a kink.
     """
     from contfric.continuation.steps import CHI_MINUS
 
     along = direction or Direction(null_vector(orbit), 0.0)
     nearer = leave_along(orbit, settings, along, departure.reason, _AT_ONCE * distance)
     if nearer is None:
-        return False
+        return bool(orbit.model.kinks)  # elsewhere there is nothing to fail at
     watched = [float(p.tests[CHI_MINUS - EXTRA]) for p in (departure.point, nearer.point)]
-    return watched[0] * watched[1] < 0.0
+    if watched[0] * watched[1] < 0.0:
+        return True
+    if not orbit.model.kinks:  # a corner would be the error of the event's own place
+        return False
+    at = settings_value(orbit, settings)
+    far, near = departure.point.value - at, nearer.point.value - at
+    straight = distance * along.slope  # two curves that cross leave with a slope of their own
+    bent = abs(near - _AT_ONCE * straight) > _CORNER * abs(far - straight)
+    return bool(bent and abs(near - _AT_ONCE * straight) > _NO_CHANGE * (1.0 + abs(at)))
 
 
 def settings_value(orbit: Orbit, settings: Settings) -> float:

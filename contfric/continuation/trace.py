@@ -30,6 +30,7 @@ from contfric.continuation.vertex_ends import (
     CROSSED,
     NEAREST,
     SHORTER,
+    Leap,
     end_stalled,
     leaps_over_vertex,
 )
@@ -235,8 +236,9 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         return True, step
     count = side.count
     why, step = side.march(orbit, settings, step)
-    if leaps_over_vertex(orbit, side, settings, side.count - count):
-        return True, step
+    leap = leaps_over_vertex(orbit, side, settings, side.count - count)
+    if leap is not Leap.NONE:
+        return leap is Leap.ENDED, step
     reasons = {
         kernels.STEP: EndReason.STEP,
         kernels.BROKEN: EndReason.BROKEN,

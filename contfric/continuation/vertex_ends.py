@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from enum import Enum, auto
+
 import numpy as np
 
 from contfric.continuation.events import Bifurcation, End, EndReason
@@ -9,7 +11,8 @@ from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
 from contfric.continuation.smooth import leapt_vertex, vertex_at
 from contfric.continuation.stalls import stalled_at
-from contfric.continuation.vertices import at_vertex, left_at, passed_vertex
+from contfric.continuation.vertex_between import left_at
+from contfric.continuation.vertices import at_vertex, passed_vertex
 from contfric.orbit.orbit import Orbit
 
 #: Beside an event at which Newton fails steps are shortened by this factor, down to this length.
@@ -19,34 +22,51 @@ SHORTER, NEAREST = 8.0, 1e-8
 CROSSED = "branch point: the parameter turns there, and another branch crosses"
 
 
-def leaps_over_vertex(orbit: Orbit, side: Side, settings: Settings, written: int) -> bool:
-    """End a side where its last points have passed a vertex that no fold has shown."""
+class Leap(Enum):
+    """What became of a side whose last points may have passed a vertex."""
+
+    NONE = auto()
+    BACK = auto()
+    ENDED = auto()
+
+
+def leaps_over_vertex(orbit: Orbit, side: Side, settings: Settings, written: int) -> Leap:
+    """End a side where its last points have passed a vertex that no fold has shown, or take them back.
+
+    Orbits that have become symmetric (undoubled) are those of another branch: no side goes on along them.
+    """
     first = side.last - written
-    passed = passed_vertex(orbit.system, side.rows.joints[first : side.last + 1])
+    rows = side.rows.joints[: side.last + 1]
+    passed = passed_vertex(orbit.system, rows, max(0, first))
     if passed is None:
-        return False
-    before = side.rows.point(first + passed[0])
-    after = side.rows.point(first + passed[0] + 1)
-    if not np.isfinite(passed[1]):
-        active = orbit.model.index_of(settings.parameter)
-        near = left_at(before, after.orbit(orbit.system, orbit.vector, active), active)
-        vertex = None if near is None else vertex_at(orbit, near, settings)
-        if near is not None and vertex is not None:
-            side.rewind(first + passed[0] + 1)
-            _end_at_vertex(orbit, side, settings, vertex, near)
-            return True
-        if passed[1] < 0.0:
-            return False
-        side.rewind(first + passed[0])
-        side.largest = (after.arc - before.arc) / SHORTER
-        return side.largest < NEAREST and _stuck_at_vertex(orbit, side, settings)
-    found = leapt_vertex(orbit, before, after, passed[1], settings)
-    if found is None:
-        return False
-    bifurcation, point = found
-    side.rewind(first + passed[0] + 1)
-    _end_at_vertex(orbit, side, settings, bifurcation, point)
-    return True
+        return Leap.NONE
+    before, after = side.rows.point(passed[0]), side.rows.point(passed[0] + 1)
+    if np.isfinite(passed[1]):
+        found = leapt_vertex(orbit, before, after, passed[1], settings)
+    else:
+        found = _gone_over(orbit, before, after, settings)
+    if found is not None:
+        side.rewind(passed[0] + 1)
+        _end_at_vertex(orbit, side, settings, *found)
+        return Leap.ENDED
+    if np.isfinite(passed[1]):
+        return Leap.NONE
+    side.rewind(passed[0])
+    side.largest = (after.arc - before.arc) / SHORTER
+    if side.largest > NEAREST:
+        return Leap.BACK
+    end_stalled(orbit, side, settings)
+    return Leap.ENDED
+
+
+def _gone_over(
+    orbit: Orbit, before: Point, after: Point, settings: Settings
+) -> tuple[Bifurcation, Point] | None:
+    """Return the vertex at which a step has gone over to the simpler orbits, if it is found."""
+    active = orbit.model.index_of(settings.parameter)
+    near = left_at(before, after.orbit(orbit.system, orbit.vector, active), settings)
+    vertex = None if near is None else vertex_at(orbit, near, settings)
+    return None if near is None or vertex is None else (vertex, near)
 
 
 def _stuck_at_vertex(orbit: Orbit, side: Side, settings: Settings) -> bool:

@@ -34,15 +34,14 @@ _LOCATED = 1e-7
 _FAR = 1e-2
 #: Most steps of the secant: two or three where a multiplier passes -1, many where it touches it.
 _SECANTS = 40
-#: Distance in the parameter at which a multiplier that passes -1 is told from one that touches it.
-_BESIDE = 1e-6
+#: Distance in the parameter at which a multiplier that passes -1 is told from one that touches it; and a
+#: shorter one, where a fold is so near that there is no orbit on one side.
+_BESIDE = (1e-6, 1e-8)
 #: Odd parts below this (nondimensional) are what a singular system leaves undetermined.
 _ODD = 1e-5
 #: Odd parts below this are rounding: away from a vertex the orbit is symmetric (undoubled). Orbits with
 #: a small odd part may be truly asymmetric, where a vertex lies beside a fold.
 _EVEN = 1e-9
-#: Halvings of a step to the resolution of the parameter.
-_HALVINGS = 40
 
 
 def symmetric_part(orbit: Orbit, active: int) -> Orbit | None:
@@ -69,33 +68,14 @@ def symmetrised(orbit: Orbit, farthest: float = _NEARLY) -> Orbit | None:
     return replace(orbit, system=part, joints=middle)
 
 
-def left_at(before: Point, after: Orbit, active: int) -> Point | None:
-    """Return the vertex at which a step went over from asymmetric orbits to symmetric ones, if it did.
-
-    The symmetric orbits between its ends are known from the far one; the vertex is where their multiplier
-    passes -1. For vertices with a sharp tip, where orbits become symmetric too fast to be met by shorter
-    steps: beside a touch of a kink multipliers change with the root of the parameter.
-    """
-    part = symmetrised(after)
-    if part is None:
-        return None
-    low, high = (_moved(part, active, w) for w in (before.value, float(after.vector[active])))
-    if not (low.converged and high.converged and opening(low) * opening(high) < 0.0):
-        return None
-    side = opening(low)
-    for _ in range(_HALVINGS):
-        middle = _moved(high, active, 0.5 * float(low.vector[active] + high.vector[active]))
-        if not middle.converged:
-            return None
-        if side * opening(middle) > 0.0:
-            low = middle
-        else:
-            high = middle
-    return replace(before, joints=high.as_whole().joints, value=float(high.vector[active]))
-
-
 def undoubled_part(orbit: Orbit, active: int) -> Orbit | None:
     """Return the orbit of half the period that an orbit has come to; None if far."""
+    part = undoubled(orbit)
+    return None if part is None else _vertex(part, active)
+
+
+def undoubled(orbit: Orbit) -> Orbit | None:
+    """Return the orbit of half the period that an orbit is near, not solved; None if far."""
     system = orbit.system
     n, odd = divmod(len(system.word), 2)
     if system.half or odd or system.periods % 2 or system.word[:n] != system.word[n:]:
@@ -107,19 +87,22 @@ def undoubled_part(orbit: Orbit, active: int) -> Orbit | None:
     part = build_system(orbit.model, system.word[:n], system.periods // 2)
     middle = 0.5 * (image + orbit.joints[:n])
     middle = clocked(orbit.model, middle, float(middle[0, 0]) + 0.5 * orbit.period)
-    return _vertex(replace(orbit, system=part, joints=middle), active)
+    return replace(orbit, system=part, joints=middle)
 
 
-def passed_vertex(system: System, joints: FloatArray) -> tuple[int, float] | None:
+def passed_vertex(system: System, joints: FloatArray, first: int = 0) -> tuple[int, float] | None:
     """Return the step over which orbits become their own mirror images, or their own second halves.
 
     What is odd about them (the states of one half less their image in the other) changes sign there. A
-    step that leaps over a vertex goes on along the mirror branch, and no fold is seen.
+    step that leaps over a vertex goes on along the mirror branch, and no fold is seen. Short steps may have
+    points between whose odd part is not known: its sign is held against the last one that is.
 
     Parameters
     ----------
     joints : ndarray, shape (k, N, 1 + n)
         Consecutive points of a branch.
+    first : int
+        Steps from this point on are asked for; those before it serve the comparison.
 
     Returns
     -------
@@ -133,17 +116,21 @@ def passed_vertex(system: System, joints: FloatArray) -> tuple[int, float] | Non
     n = len(system.word) // 2
     odd = (joints[:, n:, 1:] @ image - joints[:, :n, 1:]).reshape(len(joints), -1)
     size = np.sum(odd * odd, axis=1)
-    ahead = np.sum(odd[1:] * odd[:-1], axis=1)
-    turned = (ahead < 0.0) & (np.minimum(size[1:], size[:-1]) > _ODD**2)
+    known = np.maximum.accumulate(np.where(size > _ODD**2, np.arange(len(size)), -1))[:-1]
+    ahead = np.sum(odd[1:] * odd[known], axis=1)
+    turned = (known >= 0) & (size[1:] > _ODD**2) & (ahead < 0.0)
     fallen = (size[1:] < _ODD**2) & (size[:-1] > (10.0 * _ODD) ** 2)
-    gone = (size[1:] < _EVEN**2) & (size[:-1] > (100.0 * _EVEN) ** 2)
-    places = np.flatnonzero(turned | fallen | gone)
+    # in short steps the odd part is gone little by little
+    gone = (size[1:] < _EVEN**2) & (np.maximum.accumulate(size[:-1]) > (100.0 * _EVEN) ** 2)
+    places = first + np.flatnonzero((turned | fallen | gone)[first:])
     if not len(places):
         return None
     k = int(places[0])
-    if turned[k]:
+    if not turned[k]:
+        return k, float(np.inf if fallen[k] else -np.inf)
+    if known[k] == k:
         return k, float(size[k] / (size[k] - ahead[k]))
-    return k, float(np.inf if fallen[k] else -np.inf)
+    return int(known[k]), 1.0
 
 
 def _image_of_second_half(system: System) -> FloatArray | None:
@@ -207,9 +194,12 @@ def opens_through(orbit: Orbit, active: int) -> bool:
     At a continuum (Omega = 1/2) it touches: the place is good to the root of rounding.
     """
     value = float(orbit.vector[active])
-    offset = _BESIDE * (1.0 + abs(value))
-    sides = [opening(_moved(orbit, active, value + s * offset)) for s in (-1.0, 1.0)]
-    return sides[0] * sides[1] < 0.0
+    for beside in _BESIDE:
+        offset = beside * (1.0 + abs(value))
+        sides = [opening(moved(orbit, active, value + s * offset)) for s in (-1.0, 1.0)]
+        if np.all(np.isfinite(sides)):
+            return sides[0] * sides[1] < 0.0
+    return False
 
 
 def refined_opening(orbit: Orbit, active: int) -> Orbit | None:
@@ -221,31 +211,38 @@ def refined_opening(orbit: Orbit, active: int) -> Orbit | None:
 def _refined(orbit: Orbit, active: int) -> Orbit:
     """Return the orbit whose turn has the multiplier -1 exactly, by secants in the parameter.
 
-    The best one that was met: whether it has the multiplier is for the caller to ask.
+    The best one that was met: whether it has the multiplier is for the caller to ask. Once what vanishes has
+    had both signs no step leaves the bracket: the secant of two values that are rounding leads anywhere.
     """
     value = float(orbit.vector[active])
     offset = 1e-7 * (1.0 + abs(value))  # far above rounding, far below the branch's curvature
-    a, b = orbit, _moved(orbit, active, value + offset)
+    a, b = orbit, moved(orbit, active, value + offset)
     open_a, open_b = opening(a), opening(b)
     best, least = orbit, abs(open_a)
+    ends = [np.nan, np.nan]  # the last places at which it was negative, and positive
+    ends[int(open_a > 0.0)], ends[int(open_b > 0.0)] = value, float(b.vector[active])
     for _ in range(_SECANTS):
         if not np.isfinite(open_b) or open_a == open_b:
             break
-        step = -open_b * float(b.vector[active] - a.vector[active]) / (open_b - open_a)
-        there = float(b.vector[active]) + step
+        here = float(b.vector[active])
+        there = here - open_b * (here - float(a.vector[active])) / (open_b - open_a)
+        if np.all(np.isfinite(ends)) and not min(ends) < there < max(ends):
+            there = 0.5 * (ends[0] + ends[1])
         if not abs(there - value) < _FAR * (1.0 + abs(value)):
             break
         a, open_a = b, open_b
-        b = _moved(b, active, there)
+        b = moved(b, active, there)
         open_b = opening(b)
+        ends[int(open_b > 0.0)] = there
         if abs(open_b) <= least:
             best, least = b, abs(open_b)
-        if abs(step) < 1e-15 * (1.0 + abs(value)):
+        if abs(there - here) < 1e-15 * (1.0 + abs(value)):
             break
     return best
 
 
-def _moved(orbit: Orbit, active: int, value: float) -> Orbit:
+def moved(orbit: Orbit, active: int, value: float) -> Orbit:
+    """Return an orbit solved at another value of a parameter; its status says whether it is."""
     vector = orbit.vector.copy()
     vector[active] = value
     return polish(replace(orbit, vector=vector), damped=False)

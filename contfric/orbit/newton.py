@@ -49,6 +49,18 @@ GOES_ON = 4
 _MOST_STEPS = 25
 #: Relative size of corrections at which rounding dominates (a few hundred units in the last place).
 FLOOR = 5e-14
+#: Rounding of a flow above which it is integrated: a closed form has that of its arithmetic.
+INTEGRATED = 1e-14
+#: Correction from which the next one is far below rounding: along a branch the last Jacobian, which
+#: gives tangent and multipliers, is this near to the orbit.
+ALONG = 3e-13
+#: The same along a branch of an integrated flow, whose next Jacobian costs what all else does together: the
+#: orbit is as good (what the correction leaves is below a unit in the last place), and multipliers differ by
+#: this times their rate, where rounding of the flow is a hundredth of it.
+ON_THE_WAY = 1e-10
+#: Corrections that are not even halved after which a step along such a branch is given up: from the cubic
+#: predictor Newton converges at once, or goes in circles about a touch of a kink for ever.
+_CIRCLES = 2
 #: Relative residual that is rounding: where the system is ill-conditioned (beside a fold) corrections
 #: stop falling earlier, and no iterate can be better.
 _ROUNDING = 1e-14
@@ -144,7 +156,9 @@ def move(z, p, which, dz, dw, share):  # type: ignore[no-untyped-def]
 def has_settled(size, before, worst, floor):  # type: ignore[no-untyped-def]
     """Tell whether the last correction ends the iteration."""
     left = size if not math.isfinite(before) else size * (size / before) ** 2
-    if size <= floor or (floor <= FLOOR and size < 1e-3 and left <= _TARGET):
+    if size <= min(floor, ALONG) or (floor <= FLOOR and size < 1e-3 and left <= _TARGET):
+        return True
+    if size <= floor and left <= _TARGET:
         return True
     if size < 0.5 * before:
         return False
@@ -201,7 +215,7 @@ def correct(  # type: ignore[no-untyped-def]
     """
     before, first, worst = np.inf, 0.0, 0.0
     share, worst_before, residual_before = 1.0, np.inf, np.inf
-    damped = math.isfinite(trust)
+    damped, circles = math.isfinite(trust), 0
     for step in range(_MOST_STEPS):
         if damped:
             worst = mismatch(functions, layout, z, p, room)
@@ -227,6 +241,10 @@ def correct(  # type: ignore[no-untyped-def]
         found = verdict(step, size, before, worst, residual_before, floor, layout.rounding)
         if found == CONVERGED or (found == NOT_CONVERGED and not damped):
             return found, step + 1, first, worst
+        if size > 0.5 * before:
+            circles += 1
+        if floor > ALONG and circles >= _CIRCLES and not is_noise(size, worst, layout.rounding):
+            return NOT_CONVERGED, step + 1, first, worst
         residual_before = worst
         before = (
             size if share == 1.0 else np.inf

@@ -12,6 +12,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import contfric as cf
+from contfric.continuation.points import settings_of
+from contfric.continuation.side import first_point
+from contfric.continuation.trace import trace_side
 from contfric.orbit.solve import polish
 
 WHERE = {"Omega": 0.5, "S0": 0.4}
@@ -153,6 +156,42 @@ def test_simulation_settles_on_what_the_symmetry_breaking_says(model, orbit, off
     assert settled.stable
     assert settled.symmetric == symmetric
     assert (settled.asymmetry < 1e-9) == symmetric
+
+
+#: An asymmetric orbit of Fig. 18 next to where it becomes symmetric: a start for Newton's method.
+NEAR_TIP = 0.490259010970
+TIP_JOINTS = (
+    (7.835843029157, -1.320997426700, 0.066705858841, 3.41548991398e-4),
+    (14.243869364818, 1.320998633584, -0.066718099958, -3.41543633732e-4),
+)
+#: The branch point there, 8e-8 beside a fold of the symmetric branch, and the doubling 4e-7 before it.
+TIP, DOUBLING = 0.490256250422, 0.490256687616
+
+
+@pytest.fixture(scope="module")
+def tip(model):
+    other = cf.find_orbit(model, {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    vector = model.vector({"Omega": NEAR_TIP, "S": 0.32, "S0": 0.4})
+    found = polish(replace(other, joints=np.array(TIP_JOINTS), vector=vector), damped=False)
+    assert found.converged and not other.symmetric
+    assert 1e-6 < found.mirror_distance < 1e-4
+    return found
+
+
+@pytest.mark.parametrize("max_step", [0.01, 0.001, 3e-4, 1e-4])
+def test_an_asymmetric_branch_ends_at_a_tip_beside_a_fold(tip, max_step):
+    """It does not go on along the symmetric branch, whatever the steps are."""
+    settings = settings_of(tip, "Omega", (0.46, 0.56), max_step, True, 400)
+    start = first_point(tip, settings)
+    side = trace_side(tip, start if start.slope < 0.0 else start.reversed(), settings)
+    assert side.end.reason is cf.EndReason.BP
+    event = side.end.bifurcation
+    assert event.params["Omega"] == pytest.approx(TIP, abs=2e-12)
+    assert event.accuracy < 1e-7 and event.orbit.symmetric
+    (doubling,) = side.bifurcations
+    assert doubling.kind is cf.Kind.PD
+    assert doubling.params["Omega"] == pytest.approx(DOUBLING, abs=1e-11)
+    assert doubling.accuracy < 1e-7
 
 
 PLANE = ("Omega", "S")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,13 +13,15 @@ import contfric as cf
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.follow import _through
 from contfric.atlas.matching import same_kind, telling_kind
-from contfric.continuation import events
+from contfric.continuation import events, smooth
 from contfric.continuation.points import Point, settings_of
 from contfric.continuation.side import first_point
 from contfric.continuation.smooth import _is_idle
 from contfric.continuation.switching import LEAVE, leaps, leave_branch_point
 from contfric.continuation.trace import trace_side
-from contfric.continuation.vertices import left_at
+from contfric.continuation.vertex_between import left_at
+from contfric.continuation.vertices import moved, opening, passed_vertex, refined_opening
+from contfric.orbit.counts import TALLY
 from contfric.orbit.simulation import tables
 from contfric.orbit.system import Margin
 
@@ -85,7 +88,6 @@ def test_a_parameter_that_turns_is_a_fold(
 def test_a_vertex_left_behind_is_found_between_the_two_orbits() -> None:
     branch, orbit = asymmetric(), symmetric()[0]
     settings = settings_of(orbit, "Omega", (0.45, 0.52), None, True, 100)
-    active = orbit.model.index_of("Omega")
     near = int(np.argmin(np.abs(branch.values - BRANCH_POINT)))
     k = near + 5 if near + 5 < len(branch) else near - 5
     side = np.sign(branch.values[k] - BRANCH_POINT)
@@ -94,11 +96,51 @@ def test_a_vertex_left_behind_is_found_between_the_two_orbits() -> None:
     values = symmetric().values
     beyond = values[side * (values - BRANCH_POINT) < -1e-4]
     there = cf.solve_orbit("coulomb", "2s", FIG05 | {"Omega": float(beyond[len(beyond) // 2])})
-    found = left_at(before, there.as_whole(), active)
+    found = left_at(before, there.as_whole(), settings)
     assert found is not None and found.value == pytest.approx(BRANCH_POINT, abs=1e-10)
     # on the same side of the branch point there is none
     same = cf.solve_orbit("coulomb", "2s", FIG05 | {"Omega": BRANCH_POINT + side * 1e-3})
-    assert left_at(before, same.as_whole(), active) is None
+    assert left_at(before, same.as_whole(), settings) is None
+
+
+@pytest.mark.parametrize(
+    "sizes, wanted",
+    [
+        ((1e-2, 5e-5, 3e-6, 1e-7, 3e-8, 5e-10), (4, -np.inf)),  # gone little by little
+        ((5e-5, 5e-6, -5e-6, -5e-5), (0, 1.0)),  # its sign is not known at the points between
+        ((5e-5, 5e-6, 5e-6, 5e-5), None),
+        ((3e-8, 5e-10, 1e-13), None),  # symmetric from the first point on
+    ],
+)
+def test_short_steps_do_not_hide_that_orbits_become_symmetric(
+    sizes: tuple[float, ...], wanted: tuple[int, float] | None
+) -> None:
+    orbit = cf.solve_orbit("coulomb", "2a", FIG05 | {"Omega": 0.4895})
+    n = len(orbit.joints) // 2
+    rng = np.random.default_rng(len(sizes))
+    middle = np.tile(rng.standard_normal((n, 3)), (2, 1))
+    middle[n:, 1:] *= -1.0
+    odd = np.tile(rng.standard_normal((n, 3)), (2, 1))  # of the same sign in both halves
+    odd /= 2.0 * np.linalg.norm(odd[:n, 1:])
+    points = np.array([middle + size * odd for size in sizes])
+    assert passed_vertex(orbit.system, points) == wanted
+    # what is asked for may be the last steps only: those before serve the comparison
+    assert passed_vertex(orbit.system, points, len(points) - 2) == wanted
+    assert passed_vertex(orbit.system, points[::-1][:2]) is None
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_vertex_that_is_met_already_is_not_left_by_rounding(seed: int) -> None:
+    """Two values that are rounding have a secant that leads anywhere."""
+    branch = symmetric()
+    (event,) = [b for b in branch.bifurcations if b.kind is cf.Kind.BP]
+    active = event.orbit.model.index_of("Omega")
+    shift = 10.0 ** -(8.0 + seed) * (-1.0) ** seed
+    beside = moved(event.orbit, active, event.params["Omega"] + shift)
+    found = refined_opening(beside, active)
+    assert found is not None
+    assert float(found.vector[active]) == pytest.approx(BRANCH_POINT, abs=1e-12)
+    assert abs(opening(found)) < 1e-12
 
 
 @pytest.mark.parametrize("step", [0.01, 0.1, 0.5, 1.0])
@@ -133,6 +175,29 @@ def test_a_start_behind_a_doubling_leaps() -> None:
         behind = point.value > doubling.params["A"]
         assert leaps(orbit, settings, replace(start, point=point), LEAVE) is behind
     assert behind
+
+
+def test_an_event_of_an_integrated_flow_is_bracketed_to_its_rounding_and_no_further(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    solves: list[int] = []
+    locate = smooth.locate_change
+
+    def counted(*given: Any) -> Point | None:
+        before = int(TALLY[0])
+        found = locate(*given)
+        solves.append(int(TALLY[0]) - before)
+        return found
+
+    monkeypatch.setattr(smooth, "locate_change", counted)
+    branch = cf.continue_orbit(cf.find_orbit("bang-bang", {"A": 20.0}), "A", (19.0, 24.0))
+    (event,) = [b for b in branch.bifurcations if b.kind is cf.Kind.BP]
+    assert solves and max(solves) <= 14  # 17 to 36 down to the resolution of the arithmetic
+    best = refined_opening(event.orbit, event.orbit.model.index_of("A"))
+    assert best is not None
+    assert best.params["A"] == pytest.approx(
+        event.params["A"], abs=5.0 * max(event.accuracy, 1e-12)
+    )
 
 
 @pytest.mark.parametrize("distance", [1e-3, 1e-4, 1e-5])
