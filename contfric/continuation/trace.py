@@ -35,6 +35,7 @@ from contfric.continuation.vertices import at_vertex
 from contfric.errors import ConvergenceError, function_of
 from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.sections import canonical
 
 #: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).
 _AT_LIMIT = 1e-6
@@ -121,7 +122,7 @@ def follow_orbit(
     """Continue an orbit both ways, as :func:`continue_orbit` does; ``keep`` is that of :func:`trace_side`."""
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
-    orbit = orbit.as_half()
+    orbit = canonical(orbit).as_half()
     start = first_point(orbit, settings)
     if start is None:
         raise ConvergenceError(

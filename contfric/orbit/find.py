@@ -14,6 +14,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
+from contfric.orbit.sections import is_smooth, without_sections
 from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
 from contfric.orbit.solve import settle
 from contfric.orbit.system import build_system
@@ -253,10 +254,15 @@ def _orbit_of_lag(trajectory: Trajectory, lag: int, turns: int) -> Orbit | None:
     joints = np.column_stack(
         [trajectory.times[first:-1] + cycles * period, trajectory.states[first:-1]]
     )
-    word = trajectory.word[first + 1 :]
+    word, end = trajectory.word[first + 1 :], float(trajectory.times[-1])
+    if not model.autonomous:
+        end = float(joints[0, 0]) + turns * period
+    if not is_smooth(model, word):
+        word, joints, end = without_sections(model, word, joints, end, vector, turns)
     if model.autonomous:
         turns = len(word) // primitive_length(word)
-        joints = clocked(model, joints, float(trajectory.times[-1]))
+    word, joints, end = without_sections(model, word, joints, end, vector, turns)
+    joints = clocked(model, joints, end)
     try:
         system = build_system(model, word, turns)
     except ValueError:

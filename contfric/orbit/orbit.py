@@ -311,7 +311,7 @@ class Orbit:
         """Displacements at the stops and impacts in the order of the orbit, shape (stops,)."""
         if not self.model.stop_surface:
             return turning_points(self)
-        if not self.model.cuts(self.model.stop_surface):
+        if not self.model.stops_at_joints:
             return displacements(self, self.model.stop_surface)
         return self.ends[stopping_segments(self.model, self.word), 1]
 
