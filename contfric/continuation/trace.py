@@ -35,7 +35,8 @@ from contfric.continuation.vertices import at_vertex
 from contfric.errors import ConvergenceError, function_of
 from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import canonical
+from contfric.orbit.sections import canonical, moved
+from contfric.orbit.system import Margin, Test
 
 #: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).
 _AT_LIMIT = 1e-6
@@ -55,6 +56,11 @@ _LONGER, _STANDS = 1.5, 1e-6
 #: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
 _NO_SIZE = 1e-5
 
+#: Why a branch ends where its orbits have no joint left that could take the place of one that vanishes.
+LAST_CROSSING = (
+    "the orbit crosses its section once less beyond this point, and no other crossing can take that place: "
+    "continue an orbit from there"
+)
 #: A step this short after hundreds of points (arclength) gets nowhere.
 _CRAWLS = 1e-6
 
@@ -249,6 +255,8 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     located = locate_events(orbit, before, after, settings)
     if _comes_closer(side, located, after.arc - before.arc):
         return False
+    if located and (sections := _on_sections(located[0][0])):
+        return _move_joints(orbit, side, settings, sections)
     side.largest = np.inf  # what asked for shorter steps is behind
     for bifurcation, point in located:
         if limit is not None and (
@@ -305,6 +313,36 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     side.put_tip(limit[0])
     side.end = _limit_end(after.value > settings.high, settings)
     return True
+
+
+def _on_sections(bifurcation: Bifurcation) -> tuple[Test, ...]:
+    """Return the joints on sections that an event would take away: there the orbit only touches one."""
+    word = bifurcation.orbit.system.word
+    if bifurcation.kind is not Kind.T:
+        return ()
+    return tuple(
+        test
+        for test in bifurcation.tests
+        if test.margin is Margin.EXIT and word[test.segment] in bifurcation.orbit.model.sections
+    )
+
+
+def _move_joints(orbit: Orbit, side: Side, settings: Settings, gone: tuple[Test, ...]) -> bool:
+    """Go on from the last point with joints on other crossings of the section; True if there are none."""
+    side.drop_tip()
+    tip = side.tip
+    here = tip.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    other = moved(here)
+    point = None if other is None else first_point(other, settings)
+    rates = None if point is None else [point.tests[orbit.system.tests.index(test)] for test in gone]
+    before = [tip.tests[orbit.system.tests.index(test)] for test in gone]
+    if point is None or rates is None or not min(rates) > min(before):
+        side.end = End(EndReason.STEP, LAST_CROSSING)
+        return True
+    point.arc = tip.arc
+    side.restart(point if point.slope * tip.slope >= 0.0 else point.reversed())
+    side.rows.arc[0] = tip.arc
+    return False
 
 
 def _end_message(bifurcation: Bifurcation) -> str:

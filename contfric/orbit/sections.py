@@ -19,6 +19,10 @@ from contfric.orbit.system import Word, build_system
 
 #: Crossings that belong to consecutive periods are apart by one period to this share of it.
 _SHARE = 0.25
+#: A crossing this slow beside the fastest one is that of a small loop.
+_SMALL = 0.2
+#: Most crossings of one segment that are looked for, and how near to its end one is the end itself.
+_MOST, _AT_JOINT = 1000, 1e-8
 #: A crossing that is the symmetry image of another one is so to this (nondimensional).
 _IMAGE = 1e-6
 
@@ -43,13 +47,13 @@ def without_sections(
     word, joints : all segments of a cycle and the time and state where each begins, behind no reset
     end : time at which the cycle ends
     vector : parameters, which tell how fast a section is crossed
-    periods : of the excitation
+    periods : of the excitation; without one, how many crossings each way are kept
     """
     if not model.joined:
         return word, joints, end
     kept = [i for i, pair in enumerate(word) if pair not in model.sections]
     if not kept:
-        kept = _crossings(model, word, joints, end, vector, periods)
+        kept = _fastest(model, word, joints, end, vector, periods)
     first = kept[-1] + 1 - len(word)  # the first segment may begin in the cycle before
     starts = [first, *(i + 1 for i in kept[:-1])]
     found = joints[[i % len(word) for i in starts]].copy()
@@ -57,35 +61,168 @@ def without_sections(
     if first < 0:
         found[0, 0] -= period
     pairs = tuple(
-        model.section_pair(*word[i]) if word[i] in model.sections else (model.whole_mode(word[i][0]), word[i][1])
+        model.section_pair(*word[i])
+        if word[i] in model.sections
+        else (model.whole_mode(word[i][0]), word[i][1])
         for i in kept
     )
     return pairs, found, float(found[0, 0]) + period
 
 
-def _crossings(
+def loops(model: Model, word: Word, joints: FloatArray, end: float, vector: FloatArray) -> int:
+    """Return how often a smooth cycle crosses its section each way, small loops beside large ones left out."""
+    crossings = _Crossings(model, word, joints, end, vector)
+    rates = [crossings.rates[i] for i in crossings.down]
+    return max(1, sum(rate > _SMALL * max(rates) for rate in rates))
+
+
+def canonical(orbit: Orbit) -> Orbit:
+    """Return the same orbit without joints on sections that it can do without; most often as it is."""
+    model, word = orbit.model, orbit.system.word
+    if not model.joined or orbit.system.domains or orbit.system.half or is_smooth(model, word):
+        return orbit
+    start = float(orbit.joints[0, 0])
+    found, joints, end = without_sections(
+        model, word, orbit.joints, start + orbit.period, orbit.vector, orbit.periods
+    )
+    if found == word:
+        return orbit
+    system = build_system(model, found, orbit.periods)
+    return replace(orbit, system=system, joints=clocked(model, joints, end))
+
+
+def moved(orbit: Orbit) -> Orbit | None:
+    """Return a smooth orbit with the joints where it crosses its section fastest; None if it has too few.
+
+    For an orbit of which a joint is about to vanish, where the orbit only touches the section.
+    """
+    model, whole = orbit.model, orbit.as_whole()
+    if not is_smooth(model, whole.word):
+        return None
+    pairs = len(whole.word) // 2
+    word, joints = _every_crossing(whole)
+    period, first = whole.period, float(joints[0, 0])
+    crossings = _Crossings(model, word, joints, first + period, whole.vector)
+    if len(crossings.down) < pairs or len(whole.word) != 2 * pairs:
+        return None
+    kept = crossings.chosen(pairs)
+    if len(kept) != 2 * pairs:
+        return None
+    starts = [(i + 1) % len(word) for i in kept]
+    ends = [model.section_pair(*word[i]) for i in kept]
+    own = [ends[(k + 1) % len(ends)] for k in range(len(ends))]  # the segment that begins at a joint
+    turn = own.index(whole.word[0])
+    found = joints[starts][np.arange(turn, turn + len(own)) % len(own)].copy()
+    for k in range(1, len(found)):
+        while found[k, 0] <= found[k - 1, 0]:
+            found[k, 0] += period
+    found = clocked(model, found, float(found[0, 0]) + period)
+    other = replace(whole, joints=found)
+    if not orbit.system.half:
+        return other
+    n = len(orbit.system.word)
+    return replace(orbit, joints=clocked(model, found[:n], float(found[n, 0])))
+
+
+def _every_crossing(whole: Orbit) -> tuple[Word, FloatArray]:
+    """Return all crossings of its section as the word and the joints of a smooth orbit, in order."""
+    model, flow = whole.model, whole.model.flow
+    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
+    surface = whole.word[0][1]
+    k = [s.name for s in model.surfaces].index(surface)
+    c = [o.name for o in model.observables].index(model.surfaces[k].observable)
+    level = flow.level(k, whole.vector, none, empty)
+    mode = [m.name for m in model.modes].index(whole.word[0][0])
+    pairs = {side: pair for pair, side in model.section_sides.items() if pair[1] == surface}
+    found: list[FloatArray] = []
+    for joint, end in zip(whole.cycle, whole.ends, strict=True):
+        found.append(joint)
+        for _ in range(_MOST):
+            time, state, out = float(found[-1][0]), found[-1][1:].copy(), np.empty(len(joint) - 1)
+            left = float(end[0]) - time
+            tau = flow.hit(mode, c, level, True, time, state, left, whole.vector, out)
+            if tau < 0.0 or left - tau < _AT_JOINT:
+                break
+            found.append(np.array([time + tau, *out]))
+    joints = np.array(found)
+    rates = [
+        float(flow.rate(mode, c, float(z[0]), z[1:].copy(), whole.vector, none, empty)) for z in joints
+    ]
+    # the segment that begins at a joint ends at the next one, on the side that this one leads to
+    word = tuple(pairs[1 if rate > 0.0 else -1] for rate in rates)
+    return word, joints
+
+
+class _Crossings:
+    """The crossings of the first section that a smooth cycle has, each as the segment that ends there."""
+
+    def __init__(
+        self, model: Model, word: Word, joints: FloatArray, end: float, vector: FloatArray
+    ) -> None:
+        self.model = model
+        surface = next(s for s in model.surface_by_name if any(pair[1] == s for pair in word))
+        self.at = [i for i, pair in enumerate(word) if pair[1] == surface]
+        self.ends = np.roll(joints, -1, axis=0)
+        self.ends[-1, 0] = end
+        self.period = end - float(joints[0, 0])
+        self.rates = {i: _rate(model, word[i], self.ends[i], vector) for i in self.at}
+        self.down = [i for i in self.at if model.section_sides[word[i]] > 0]
+
+    def chosen(self, pairs: int) -> list[int]:
+        """Return crossings in both directions by turns, as many each way as there are to be."""
+        chosen = sorted(self.later(pairs) or sorted(self.down, key=self.rates.__getitem__)[-pairs:])
+        found = []
+        for i, following in zip(chosen, [*chosen[1:], chosen[0]], strict=True):
+            ups = [j for j in self._behind(i, following) if j not in self.down]
+            if not ups:
+                return sorted(chosen)  # of a surface that is crossed one way only
+            image = self._image_of(i, ups)
+            found += [i, max(ups, key=self.rates.__getitem__) if image is None else image]
+        return sorted(found)
+
+    def _behind(self, i: int, following: int) -> list[int]:
+        """Return the crossings between two of them; all others if they are one."""
+        own = [j for j in self.at if j not in (i, following)]
+        if i < following:
+            return [j for j in own if i < j < following]
+        return [j for j in own if j > i or j < following]
+
+    def _image_of(self, i: int, others: list[int]) -> int | None:
+        """Return the crossing that is the symmetry image of another one, if there is one."""
+        if self.model.symmetry is None:
+            return None
+        image = self.model.symmetry.array() @ self.ends[i, 1:]
+        for j in others:
+            late = self._apart(self.ends[j, 0] - self.ends[i, 0] - 0.5 * self.period)
+            if max(late, float(np.max(np.abs(self.ends[j, 1:] - image)))) < _IMAGE:
+                return j
+        return None
+
+    def later(self, periods: int) -> list[int]:
+        """Return a crossing in every period of the excitation; none if one has none."""
+        first, found = max(self.down, key=self.rates.__getitem__), []
+        step = self.period / periods
+        for k in range(periods):
+            wanted = self.ends[first, 0] + k * step
+            best = min(self.down, key=lambda i: self._apart(self.ends[i, 0] - wanted))
+            if self._apart(self.ends[best, 0] - wanted) > _SHARE * step:
+                return []
+            found.append(best)
+        return found if len(set(found)) == periods else []
+
+    def _apart(self, time: float) -> float:
+        return float(abs((time + 0.5 * self.period) % self.period - 0.5 * self.period))
+
+
+def _fastest(
     model: Model, word: Word, joints: FloatArray, end: float, vector: FloatArray, periods: int
 ) -> list[int]:
     """Return the segments at whose ends a smooth cycle keeps a joint."""
-    surface = next(s for s in model.surface_by_name if any(pair[1] == s for pair in word))
-    at = [i for i, pair in enumerate(word) if pair[1] == surface]
-    if model.autonomous:
-        return at
-    ends = np.roll(joints, -1, axis=0)
-    ends[-1, 0] = end
-    sides = [[i for i in at if model.section_sides[word[i]] == side] for side in (1, -1)]
-    rates = {i: _rate(model, word[i], ends[i], vector) for i in at}
-    period = end - joints[0, 0]
-    chosen: list[int] = []
-    for side in sides:
-        if not side:
-            continue
-        best = _image_of(model, chosen, side, ends, period) if chosen else None
-        chosen.append(max(side, key=rates.__getitem__) if best is None else best)
-    more = [_later(i, side, ends, period, periods) for i, side in zip(chosen, filter(None, sides), strict=True)]
-    if all(more):
-        chosen = [i for run in more for i in run]
-    return sorted(chosen)
+    crossings = _Crossings(model, word, joints, end, vector)
+    if not crossings.down:
+        return crossings.at[:1]
+    fits = len(crossings.down) >= periods if model.autonomous else crossings.later(periods)
+    return crossings.chosen(periods if fits else 1)
 
 
 def _rate(model: Model, pair: tuple[str, str], at: FloatArray, vector: FloatArray) -> float:
@@ -93,44 +230,3 @@ def _rate(model: Model, pair: tuple[str, str], at: FloatArray, vector: FloatArra
     mode = [m.name for m in model.modes].index(pair[0])
     none, empty = np.empty(0, dtype=np.int64), np.empty(0)
     return abs(float(model.flow.rate(mode, c, float(at[0]), at[1:].copy(), vector, none, empty)))
-
-
-def _image_of(
-    model: Model, chosen: list[int], side: list[int], ends: FloatArray, period: float
-) -> int | None:
-    """Return the crossing that is the symmetry image of the one chosen, if there is one."""
-    if model.symmetry is None:
-        return None
-    image = model.symmetry.array() @ ends[chosen[0], 1:]
-    time = ends[chosen[0], 0] + 0.5 * period
-    for i in side:
-        late = abs((ends[i, 0] - time + 0.5 * period) % period - 0.5 * period)
-        if max(late, float(np.max(np.abs(ends[i, 1:] - image)))) < _IMAGE:
-            return i
-    return None
-
-
-def _later(first: int, side: list[int], ends: FloatArray, period: float, periods: int) -> list[int]:
-    """Return a crossing in every period of the excitation; none if one has none."""
-    step, found = period / periods, []
-    for k in range(periods):
-        late = (ends[side, 0] - ends[first, 0] - k * step + 0.5 * period) % period - 0.5 * period
-        best = int(np.argmin(np.abs(late)))
-        if abs(late[best]) > _SHARE * step:
-            return []
-        found.append(side[best])
-    return found if len(set(found)) == periods else []
-
-
-def canonical(orbit: Orbit) -> Orbit:
-    """Return the same orbit without joints on sections that it can do without; most often as it is."""
-    model, word = orbit.model, orbit.system.word
-    if not model.joined or orbit.system.domains or orbit.system.half:
-        return orbit
-    found, joints, end = without_sections(
-        model, word, orbit.joints, float(orbit.joints[0, 0]) + orbit.period, orbit.vector, orbit.periods
-    )
-    if found == word:
-        return orbit
-    system = build_system(model, found, orbit.periods)
-    return replace(orbit, system=system, joints=clocked(model, joints, end))
