@@ -22,7 +22,7 @@ from contfric.continuation.points import (
 )
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.sliding import nearly_reached
-from contfric.continuation.smooth import SAME_PLACE
+from contfric.continuation.smooth import SAME_PLACE, SAME_TANGENCY
 from contfric.continuation.trial import locate_value
 from contfric.continuation.vertex_ends import (
     CROSSED,
@@ -279,6 +279,8 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
                 after.labels
             )  # where a stop lies on a surface its label is arbitrary
             continue
+        if bifurcation.kind is Kind.T and _is_known_touch(side, point):
+            continue
         if bifurcation.kind in TERMINAL and _is_point(bifurcation.orbit):
             side.put_tip(point)
             side.end = End(EndReason.POINT)
@@ -315,6 +317,14 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     return True
 
 
+def _is_known_touch(side: Side, point: Point) -> bool:
+    """Tell whether a touch of a section was met a rounding before: which joints it has makes one of two."""
+    if not side.bifurcations or not side.bifurcations[-1].orbit.model.joined:
+        return False
+    last = side.bifurcations[-1]
+    return last.kind is Kind.T and abs(point.arc - last.position) < SAME_TANGENCY
+
+
 def _on_sections(bifurcation: Bifurcation) -> tuple[Test, ...]:
     """Return the joints on sections that an event would take away: there the orbit only touches one."""
     word = bifurcation.orbit.system.word
@@ -334,7 +344,9 @@ def _move_joints(orbit: Orbit, side: Side, settings: Settings, gone: tuple[Test,
     here = tip.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     other = moved(here)
     point = None if other is None else first_point(other, settings)
-    rates = None if point is None else [point.tests[orbit.system.tests.index(test)] for test in gone]
+    rates = (
+        None if point is None else [point.tests[orbit.system.tests.index(test)] for test in gone]
+    )
     before = [tip.tests[orbit.system.tests.index(test)] for test in gone]
     if point is None or rates is None or not min(rates) > min(before):
         side.end = End(EndReason.STEP, LAST_CROSSING)

@@ -17,8 +17,8 @@ several domains can follow (:attr:`Model.targets`).
 
 Motion is cut at switching surfaces and at resets, and only there: each has a mode of its own on each
 side. An orbit needs one such joint at least. A model whose cycles may be smooth therefore declares the
-surface of its stops (``v = 0``) with two modes of the same field. They are one mode (:attr:`Model.joined`), and the
-surface is a section: transparent, but for cycles that meet nothing else.
+surface of its stops (``v = 0``) with two modes of the same field. They are one mode
+(:attr:`Model.joined`), and the surface is a section: transparent, but for cycles that meet nothing else.
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ class Model:
 
     @cached_property
     def sections(self) -> frozenset[tuple[str, str]]:
-        """Pairs (declared mode, surface): crossings from one part of a mode to another, where nothing changes."""
+        """Pairs (declared mode, surface) that lead from one part of a mode to another: nothing changes."""
         return frozenset(
             (here.declared, surface)
             for (name, surface), target in self.transitions.items()

@@ -64,7 +64,9 @@ def _ends(
     description: Description, mode: ModeText, surfaces: list[Surface], first: Mapping[str, str]
 ) -> set[str]:
     """Return the surfaces that have all modes that are one with a mode on the same side."""
-    parts = [known_sides(m, surfaces) for m in description.modes if first[m.name] == first[mode.name]]
+    parts = [
+        known_sides(m, surfaces) for m in description.modes if first[m.name] == first[mode.name]
+    ]
     return {name for name, side in parts[0].items() if all(p.get(name) == side for p in parts)}
 
 

@@ -74,7 +74,8 @@ class Mode:
 class Domain:
     """A region of one mode: the sign of (observable - level) for every surface, 0 = on it.
 
-    ``declared`` is the mode as it was declared, where that is one with others (:mod:`contfric.models.sections`).
+    ``declared`` is the mode as it was declared, where that is one with others
+    (:mod:`contfric.models.sections`).
     """
 
     name: str

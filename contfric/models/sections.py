@@ -1,9 +1,9 @@
 """Sections: surfaces that divide modes whose field is one and the same.
 
-A model whose cycles may be smooth declares the surface of its stops (``v = 0``) with a mode on each side. The
-field is the same on both: nothing happens there, and an orbit that comes to touch it does not change. Such modes
-are one mode to the engine, and the surface is transparent. It only serves to find and to fix cycles that meet no
-other surface (:mod:`contfric.orbit.sections`).
+A model whose cycles may be smooth declares the surface of its stops (``v = 0``) with a mode on each side.
+The field is the same on both: nothing happens there, and an orbit that comes to touch it does not change.
+Such modes are one mode to the engine, and the surface is transparent. It only serves to find and to fix
+cycles that meet no other surface (:mod:`contfric.orbit.sections`).
 """
 
 from __future__ import annotations
@@ -148,7 +148,10 @@ def _jumps(sampler: Sampler, mode: ModeText, surface: str) -> bool:
         slope = sampler.gradient(surface, *place)
         size = max(map(abs, slope)) or 1.0
         sides = [
-            [c + side * _BESIDE * g / size for c, g in zip((place[0], *place[1]), slope, strict=True)]
+            [
+                c + side * _BESIDE * g / size
+                for c, g in zip((place[0], *place[1]), slope, strict=True)
+            ]
             for side in (1.0, -1.0)
         ]
         up, down = (evaluator.field(mode.name, params, at[0], at[1:]) for at in sides)
@@ -192,7 +195,9 @@ def clear_surfaces(surfaces: list[Surface], domains: tuple[Domain, ...]) -> list
     found = []
     for surface in surfaces:
         pairs = [(d, place.get(_beyond(d, surface.name))) for d in domains]
-        crossed = any(e is not None and d.declared != e.declared and d.mode == e.mode for d, e in pairs)
+        crossed = any(
+            e is not None and d.declared != e.declared and d.mode == e.mode for d, e in pairs
+        )
         divides = any(e is not None and d.mode != e.mode for d, e in pairs)
         rested = any(d.signs[surface.name] == 0 for d in domains)
         clear = crossed and not divides and not rested

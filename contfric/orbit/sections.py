@@ -1,9 +1,9 @@
 """Orbits without joints where nothing happens.
 
-A simulation stops at every section (a surface between two parts of one mode). An orbit that meets other surfaces has
-its joints there, and passes sections inside of its segments. An orbit that meets none is found and fixed by
-sections: by one crossing each way for every period of the excitation, that at which the surface is crossed
-fastest. Whether it crosses them more often is a label.
+A simulation stops at every section (a surface between two parts of one mode). An orbit that meets other
+surfaces has its joints there, and passes sections inside of its segments. An orbit that meets none is found
+and fixed by sections: by one crossing each way for every period of the excitation, that at which the surface
+is crossed fastest. Whether it crosses them more often is a label.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def without_sections(
 
 
 def loops(model: Model, word: Word, joints: FloatArray, end: float, vector: FloatArray) -> int:
-    """Return how often a smooth cycle crosses its section each way, small loops beside large ones left out."""
+    """Return how often a smooth cycle crosses its section each way; small loops are left out."""
     crossings = _Crossings(model, word, joints, end, vector)
     rates = [crossings.rates[i] for i in crossings.down]
     return max(1, sum(rate > _SMALL * max(rates) for rate in rates))
@@ -110,7 +110,9 @@ def moved(orbit: Orbit) -> Orbit | None:
         return None
     starts = [(i + 1) % len(word) for i in kept]
     ends = [model.section_pair(*word[i]) for i in kept]
-    own = [ends[(k + 1) % len(ends)] for k in range(len(ends))]  # the segment that begins at a joint
+    own = [
+        ends[(k + 1) % len(ends)] for k in range(len(ends))
+    ]  # the segment that begins at a joint
     turn = own.index(whole.word[0])
     found = joints[starts][np.arange(turn, turn + len(own)) % len(own)].copy()
     for k in range(1, len(found)):
@@ -146,7 +148,8 @@ def _every_crossing(whole: Orbit) -> tuple[Word, FloatArray]:
             found.append(np.array([time + tau, *out]))
     joints = np.array(found)
     rates = [
-        float(flow.rate(mode, c, float(z[0]), z[1:].copy(), whole.vector, none, empty)) for z in joints
+        float(flow.rate(mode, c, float(z[0]), z[1:].copy(), whole.vector, none, empty))
+        for z in joints
     ]
     # the segment that begins at a joint ends at the next one, on the side that this one leads to
     word = tuple(pairs[1 if rate > 0.0 else -1] for rate in rates)

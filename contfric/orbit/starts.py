@@ -60,7 +60,9 @@ def _side_of_rates(
     observables, modes = [o.name for o in model.observables], [m.name for m in model.modes]
 
     def enters(domain: Domain, surface: Surface) -> bool:
-        if signs[surface.name] != 0 or not (model.cuts(surface.name) or surface.name in model.section_surfaces):
+        if signs[surface.name] != 0 or not (
+            model.cuts(surface.name) or surface.name in model.section_surfaces
+        ):
             return True
         c, mode = observables.index(surface.observable), modes.index(domain.mode)
         rate = float(flow.rate(mode, c, t, y, vector, none, empty))

@@ -104,7 +104,9 @@ def mirror_pair(pair: ReducedPair, model: Model) -> ReducedPair:
         if known and own == (mode if section else model.whole_mode(mode)):
             image = model.domain_by_name[model.mirror_domain[domain.name]]
             mirrored = mirror_exit(surface, surfaces)
-            return model.section_pair(image.own_mode, mirrored) if section else (image.mode, mirrored)
+            return (
+                model.section_pair(image.own_mode, mirrored) if section else (image.mode, mirrored)
+            )
     raise NotationError(f"model '{model.name}' has no mode '{mode}' with surface '{surface}'")
 
 
@@ -167,7 +169,10 @@ def _fused(signature: Signature) -> tuple[ReducedSegment, ...]:
     if not ends:
         modes = [model.domain_by_name[name].own_mode for name in names]
         ends = section_ends(model, list(zip(modes, surfaces, strict=True)))
-        modes = [model.section_pair(m, s)[0] if k in ends else m for k, (m, s) in enumerate(zip(modes, surfaces, strict=True))]
+        modes = [
+            model.section_pair(m, s)[0] if k in ends else m
+            for k, (m, s) in enumerate(zip(modes, surfaces, strict=True))
+        ]
     if not ends:
         return (ReducedSegment(modes[0], NEVER, names),)
     starts = [ends[-1] - count, *ends]
