@@ -262,6 +262,11 @@ class Orbit:
         return self._watched[0]
 
     @property
+    def labels(self) -> NDArray[np.int64]:
+        """The transparent surfaces that the segments of one turn cross, as the engine codes them."""
+        return self._watched[1]
+
+    @property
     def admissible(self) -> bool:
         """Whether the orbit obeys every inequality inside every segment."""
         margins, _, fine = self._watched

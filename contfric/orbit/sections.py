@@ -77,10 +77,15 @@ def loops(model: Model, word: Word, joints: FloatArray, end: float, vector: Floa
 
 
 def canonical(orbit: Orbit) -> Orbit:
-    """Return the same orbit without joints on sections that it can do without; most often as it is."""
+    """Return the same orbit without joints on sections that it can do without; most often as it is.
+
+    Orbits of earlier versions have them.
+    """
     model, word = orbit.model, orbit.system.word
-    if not model.joined or orbit.system.domains or orbit.system.half or is_smooth(model, word):
+    if not has_sections(model, word) or orbit.system.domains or is_smooth(model, word):
         return orbit
+    if orbit.system.half:
+        return canonical(orbit.as_whole())
     start = float(orbit.joints[0, 0])
     found, joints, end = without_sections(
         model, word, orbit.joints, start + orbit.period, orbit.vector, orbit.periods
