@@ -59,10 +59,12 @@ def _side_of_rates(
     flow, none, empty = model.flow, np.empty(0, dtype=np.int64), np.empty(0)
     observables, modes = [o.name for o in model.observables], [m.name for m in model.modes]
 
+    def ends(domain: Domain, surface: Surface) -> bool:
+        own = {d.signs[surface.name] for d in model.domains if d.own_mode == domain.own_mode}
+        return model.cuts(surface.name) or (bool(domain.declared) and len(own) == 1)
+
     def enters(domain: Domain, surface: Surface) -> bool:
-        if signs[surface.name] != 0 or not (
-            model.cuts(surface.name) or surface.name in model.section_surfaces
-        ):
+        if signs[surface.name] != 0 or not ends(domain, surface):
             return True
         c, mode = observables.index(surface.observable), modes.index(domain.mode)
         rate = float(flow.rate(mode, c, t, y, vector, none, empty))

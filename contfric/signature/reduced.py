@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -85,6 +86,7 @@ def canonical_word(word: ReducedWord, model: Model) -> ReducedWord:
     return rotated(word, least_rotation([_key(pair, model) for pair in word]))
 
 
+@cache
 def mirror_pair(pair: ReducedPair, model: Model) -> ReducedPair:
     """Return the image of one (mode, exit) pair under the symmetry of the model.
 
