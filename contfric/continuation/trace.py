@@ -20,9 +20,15 @@ from contfric.continuation.points import (
     Settings,
     settings_of,
 )
+from contfric.continuation.section_joints import (
+    LAST_CROSSING,
+    is_known_touch,
+    is_on_section,
+    move_joints,
+)
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.sliding import nearly_reached
-from contfric.continuation.smooth import SAME_PLACE, SAME_TANGENCY
+from contfric.continuation.smooth import SAME_PLACE
 from contfric.continuation.trial import locate_value
 from contfric.continuation.vertex_ends import (
     CROSSED,
@@ -35,8 +41,7 @@ from contfric.continuation.vertices import at_vertex
 from contfric.errors import ConvergenceError, function_of
 from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import canonical, moved
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.sections import canonical
 
 #: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).
 _AT_LIMIT = 1e-6
@@ -56,11 +61,6 @@ _LONGER, _STANDS = 1.5, 1e-6
 #: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
 _NO_SIZE = 1e-5
 
-#: Why a branch ends where its orbits have no joint left that could take the place of one that vanishes.
-LAST_CROSSING = (
-    "the orbit crosses its section once less beyond this point, and no other crossing can take that place: "
-    "continue an orbit from there"
-)
 #: A step this short after hundreds of points (arclength) gets nowhere.
 _CRAWLS = 1e-6
 
@@ -191,6 +191,8 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         return True, step
     count = side.count
     why, step = side.march(orbit, settings, step)
+    if why in (kernels.STEP, kernels.BROKEN) and move_joints(orbit, side, settings):
+        return False, FIRST_STEP * settings.largest
     if leaps_over_vertex(orbit, side, settings, side.count - count):
         return True, step
     reasons = {
@@ -255,8 +257,12 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     located = locate_events(orbit, before, after, settings)
     if _comes_closer(side, located, after.arc - before.arc):
         return False
-    if located and (sections := _on_sections(located[0][0])):
-        return _move_joints(orbit, side, settings, sections)
+    if located and is_on_section(located[0][0]):
+        side.drop_tip()
+        if move_joints(orbit, side, settings):
+            return False
+        side.end = End(EndReason.STEP, LAST_CROSSING)
+        return True
     side.largest = np.inf  # what asked for shorter steps is behind
     for bifurcation, point in located:
         if limit is not None and (
@@ -279,7 +285,7 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
                 after.labels
             )  # where a stop lies on a surface its label is arbitrary
             continue
-        if bifurcation.kind is Kind.T and _is_known_touch(side, point):
+        if bifurcation.kind is Kind.T and is_known_touch(side, point):
             continue
         if bifurcation.kind in TERMINAL and _is_point(bifurcation.orbit):
             side.put_tip(point)
@@ -315,46 +321,6 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     side.put_tip(limit[0])
     side.end = _limit_end(after.value > settings.high, settings)
     return True
-
-
-def _is_known_touch(side: Side, point: Point) -> bool:
-    """Tell whether a touch of a section was met a rounding before: which joints it has makes one of two."""
-    if not side.bifurcations or not side.bifurcations[-1].orbit.model.joined:
-        return False
-    last = side.bifurcations[-1]
-    return last.kind is Kind.T and abs(point.arc - last.position) < SAME_TANGENCY
-
-
-def _on_sections(bifurcation: Bifurcation) -> tuple[Test, ...]:
-    """Return the joints on sections that an event would take away: there the orbit only touches one."""
-    word = bifurcation.orbit.system.word
-    if bifurcation.kind is not Kind.T:
-        return ()
-    return tuple(
-        test
-        for test in bifurcation.tests
-        if test.margin is Margin.EXIT and word[test.segment] in bifurcation.orbit.model.sections
-    )
-
-
-def _move_joints(orbit: Orbit, side: Side, settings: Settings, gone: tuple[Test, ...]) -> bool:
-    """Go on from the last point with joints on other crossings of the section; True if there are none."""
-    side.drop_tip()
-    tip = side.tip
-    here = tip.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
-    other = moved(here)
-    point = None if other is None else first_point(other, settings)
-    rates = (
-        None if point is None else [point.tests[orbit.system.tests.index(test)] for test in gone]
-    )
-    before = [tip.tests[orbit.system.tests.index(test)] for test in gone]
-    if point is None or rates is None or not min(rates) > min(before):
-        side.end = End(EndReason.STEP, LAST_CROSSING)
-        return True
-    point.arc = tip.arc
-    side.restart(point if point.slope * tip.slope >= 0.0 else point.reversed())
-    side.rows.arc[0] = tip.arc
-    return False
 
 
 def _end_message(bifurcation: Bifurcation) -> str:

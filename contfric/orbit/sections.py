@@ -23,8 +23,6 @@ _SHARE = 0.25
 _SMALL = 0.2
 #: Most crossings of one segment that are looked for, and how near to its end one is the end itself.
 _MOST, _AT_JOINT = 1000, 1e-8
-#: A crossing that is the symmetry image of another one is so to this (nondimensional).
-_IMAGE = 1e-6
 
 
 def has_sections(model: Model, word: Word) -> bool:
@@ -196,15 +194,16 @@ class _Crossings:
         return [j for j in own if j > i or j < following]
 
     def _image_of(self, i: int, others: list[int]) -> int | None:
-        """Return the crossing that is the symmetry image of another one, if there is one."""
+        """Return the crossing that is nearest to the symmetry image of another one."""
         if self.model.symmetry is None:
             return None
         image = self.model.symmetry.array() @ self.ends[i, 1:]
-        for j in others:
+
+        def apart(j: int) -> float:
             late = self._apart(self.ends[j, 0] - self.ends[i, 0] - 0.5 * self.period)
-            if max(late, float(np.max(np.abs(self.ends[j, 1:] - image)))) < _IMAGE:
-                return j
-        return None
+            return max(late, float(np.max(np.abs(self.ends[j, 1:] - image))))
+
+        return min(others, key=apart)
 
     def later(self, periods: int) -> list[int]:
         """Return a crossing in every period of the excitation; none if one has none."""
