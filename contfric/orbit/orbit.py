@@ -172,6 +172,9 @@ class Orbit:
         whole = self.as_whole()
         second = whole.joints.copy()
         second[:, 0] += whole.period
+        if not self.model.autonomous and all(pair in self.model.sections for pair in whole.word):
+            # a smooth cycle is found by one crossing each way, however long it is
+            return replace(whole, system=build_system(self.model, whole.word, self.periods * 2))
         system = build_system(self.model, whole.word * 2, self.periods * 2)
         joints = clocked(self.model, np.vstack([whole.joints, second]), whole.period)
         return replace(whole, system=system, joints=joints)

@@ -2,8 +2,8 @@
 
 A simulation stops at every section (a surface between two parts of one mode). An orbit that meets other
 surfaces has its joints there, and passes sections inside of its segments. An orbit that meets none is found
-and fixed by sections: by one crossing each way for every period of the excitation, that at which the surface
-is crossed fastest. Whether it crosses them more often is a label.
+and fixed by sections: by one crossing each way, that at which the surface is crossed fastest. Whether it
+crosses them more often is a label. (Without excitation it keeps as many as it has large loops.)
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Word, build_system
 
-#: Crossings that belong to consecutive periods are apart by one period to this share of it.
-_SHARE = 0.25
 #: A crossing this slow beside the fastest one is that of a small loop.
 _SMALL = 0.2
+#: States that repeat themselves to this (relative to 1 + their size) are the same.
+_SAME = 1e-8
 #: Most crossings of one segment that are looked for, and how near to its end one is the end itself.
 _MOST, _AT_JOINT = 1000, 1e-8
 
@@ -103,30 +103,60 @@ def moved(orbit: Orbit) -> Orbit | None:
     if not is_smooth(model, whole.word):
         return None
     pairs = len(whole.word) // 2
+    other = _with_pairs(whole, pairs) if len(whole.word) == 2 * pairs else None
+    if other is None or not orbit.system.half:
+        return other
+    n, found = len(orbit.system.word), other.joints
+    return replace(orbit, joints=clocked(model, found[:n], float(found[n, 0])))
+
+
+def in_halves(orbit: Orbit) -> Orbit:
+    """Return a smooth orbit of an even number of periods with joints in both halves, if it has them."""
+    pairs, odd = divmod(len(orbit.system.word), 2)
+    smooth = is_smooth(orbit.model, orbit.system.word) and not orbit.system.half
+    if not smooth or orbit.model.autonomous or odd or pairs % 2 == 0 or orbit.periods % 2:
+        return orbit
+    return _with_pairs(orbit, 2 * pairs) or orbit
+
+
+def _with_pairs(whole: Orbit, pairs: int) -> Orbit | None:
+    """Return a smooth orbit with some number of joints each way, in the rotation that it has."""
+    model, period = whole.model, whole.period
     word, joints = _every_crossing(whole)
-    period, first = whole.period, float(joints[0, 0])
-    crossings = _Crossings(model, word, joints, first + period, whole.vector)
-    if len(crossings.down) < pairs or len(whole.word) != 2 * pairs:
-        return None
-    kept = crossings.chosen(pairs)
+    crossings = _Crossings(model, word, joints, float(joints[0, 0]) + period, whole.vector)
+    kept = crossings.chosen(pairs) if len(crossings.down) >= pairs else []
     if len(kept) != 2 * pairs:
         return None
     starts = [(i + 1) % len(word) for i in kept]
     ends = [model.section_pair(*word[i]) for i in kept]
-    own = [
-        ends[(k + 1) % len(ends)] for k in range(len(ends))
-    ]  # the segment that begins at a joint
+    own = (*ends[1:], ends[0])  # the segment that begins at a joint ends at the next
     turn = own.index(whole.word[0])
     found = joints[starts][np.arange(turn, turn + len(own)) % len(own)].copy()
     for k in range(1, len(found)):
         while found[k, 0] <= found[k - 1, 0]:
             found[k, 0] += period
     found = clocked(model, found, float(found[0, 0]) + period)
-    other = replace(whole, joints=found)
-    if not orbit.system.half:
-        return other
-    n = len(orbit.system.word)
-    return replace(orbit, joints=clocked(model, found[:n], float(found[n, 0])))
+    system = build_system(model, own[turn:] + own[:turn], whole.periods)
+    return replace(whole, system=system, joints=found)
+
+
+def shortened(whole: Orbit, turns: int) -> Orbit | None:
+    """Return the part that a smooth orbit repeats, as an orbit; None if it does not run through one."""
+    model = whole.model
+    if model.autonomous or not is_smooth(model, whole.word):
+        return None
+    step = whole.period / turns
+    for joint in whole.cycle:
+        gap = np.abs(whole.state(float(joint[0]) + step) - joint[1:])
+        if np.max(gap) > _SAME * (1.0 + np.max(np.abs(whole.joints))):
+            return None
+    word, joints = _every_crossing(whole)
+    n, rest = divmod(len(word), turns)
+    if rest:
+        return None
+    periods, end = whole.periods // turns, float(joints[n, 0])
+    found, starts, _ = without_sections(model, word[:n], joints[:n], end, whole.vector, periods)
+    return replace(whole, system=build_system(model, found, periods), joints=starts)
 
 
 def _every_crossing(whole: Orbit) -> tuple[Word, FloatArray]:
@@ -206,15 +236,16 @@ class _Crossings:
         return min(others, key=apart)
 
     def later(self, periods: int) -> list[int]:
-        """Return a crossing in every period of the excitation; none if one has none."""
+        """Return crossings that are nearest to one another, a period of the excitation apart; or none."""
         first, found = max(self.down, key=self.rates.__getitem__), []
         step = self.period / periods
         for k in range(periods):
-            wanted = self.ends[first, 0] + k * step
-            best = min(self.down, key=lambda i: self._apart(self.ends[i, 0] - wanted))
-            if self._apart(self.ends[best, 0] - wanted) > _SHARE * step:
-                return []
-            found.append(best)
+
+            def apart(i: int, time: float = self.ends[first, 0] + k * step) -> float:
+                gap = float(np.max(np.abs(self.ends[i, 1:] - self.ends[first, 1:])))
+                return max(self._apart(self.ends[i, 0] - time), gap)
+
+            found.append(min(self.down, key=apart))
         return found if len(set(found)) == periods else []
 
     def _apart(self, time: float) -> float:
@@ -228,8 +259,7 @@ def _fastest(
     crossings = _Crossings(model, word, joints, end, vector)
     if not crossings.down:
         return crossings.at[:1]
-    fits = len(crossings.down) >= periods if model.autonomous else crossings.later(periods)
-    return crossings.chosen(periods if fits else 1)
+    return crossings.chosen(min(periods, len(crossings.down)) if model.autonomous else 1)
 
 
 def _rate(model: Model, pair: tuple[str, str], at: FloatArray, vector: FloatArray) -> float:
