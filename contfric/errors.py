@@ -250,3 +250,18 @@ def path_of(what: str, value: object) -> Path:
     if not isinstance(value, (str, os.PathLike)) or not str(value).strip() or "\0" in str(value):
         raise ResultFileError(f"{what} is a path, such as 'results.npz', got {shown(value)}")
     return Path(value)
+
+
+def either(one: str, other: str) -> str:
+    """Return what a kind of event is in words, where places of one diagram differ in it.
+
+    Examples
+    --------
+    >>> either("grazing impact", "grazing-sliding")
+    'grazing impact or grazing-sliding'
+    >>> either("", "grazing")
+    'grazing'
+    """
+    if not one or other in one.split(" or "):
+        return one or other
+    return f"{one} or {other}"

@@ -12,7 +12,8 @@ import numpy as np
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.simulation import tables
-from contfric.orbit.system import IntArray, mode_bounds
+from contfric.orbit.structure import cut_bounds
+from contfric.orbit.system import IntArray
 
 
 class Starting(NamedTuple):
@@ -75,7 +76,7 @@ def starting(model: Model) -> Starting:
     """Return the table of starts of a model."""
     surfaces = [s.name for s in model.surfaces]
     modes = [m.name for m in model.modes]
-    bounds = mode_bounds(model)
+    bounds = cut_bounds(model)
     mode = np.full(3 ** len(surfaces), -1, dtype=np.int64)
     on = np.zeros(3 ** len(surfaces), dtype=np.int64)
     for signs in product((-1, 0, 1), repeat=len(surfaces)):
@@ -84,7 +85,7 @@ def starting(model: Model) -> Starting:
         domain = model.domain_at(named)
         if domain is None:
             continue
-        name = model.domain_by_name[domain].mode
+        name = model.domain_by_name[domain].own_mode
         mode[code] = modes.index(name)
         on[code] = sum(1 << surfaces.index(k) for k in bounds[name] if named[k] == 0)
     # a shift in time is no disturbance of an autonomous motion

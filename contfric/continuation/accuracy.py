@@ -28,7 +28,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.linear import linearised
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
-from contfric.orbit.system import Test
+from contfric.orbit.system import Margin, Test
 
 #: Least accuracy that is claimed, relative to the range: two ways to one event differ by a little more than
 #: the rounding of one, and no diagram resolves it.
@@ -86,9 +86,8 @@ def accuracy_of(
     """
     active = here.model.index_of(settings.parameter)
     if tests:
-        condition = (
-            _touch(here, tests[0], active) if kind is Kind.T else _margin(here, tests[0], active)
-        )
+        labels = kind is Kind.T and tests[0].margin is Margin.INTERIOR  # else a joint on a section
+        condition = (_touch if labels else _margin)(here, tests[0], active)
         error = None if condition is None else _error_of(here, active, condition)
         otherwise = _SINGULAR
     elif kind is Kind.SN:

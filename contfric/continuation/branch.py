@@ -158,8 +158,7 @@ class Branch:
     @cached_property
     def stops(self) -> FloatArray:
         """Displacements at the stops and impacts, shape (k, stops); filled up with nan where fewer."""
-        surface = self.model.stop_surface
-        if not self.model.cuts(surface):
+        if not self.model.stops_at_joints:
             return _padded([orbit.stops for orbit in self])
         x = self.joints[:, :, 1]
         closed = self.joints[:, 0, 1:] @ self.system.layout.closure.T

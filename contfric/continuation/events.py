@@ -283,6 +283,10 @@ def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
         return Kind.CS
     if test.surface in model.reset_by_surface:
         return Kind.GS
+    if test.margin is Margin.JOINT and test.surface in model.section_surfaces:
+        resting = resting_domain(system, test)
+        if resting is None and inside_sign(model, mode, test.surface) == 0:
+            return Kind.T
     if test.margin is not Margin.JOINT:
         if model.mode_by_name[mode].sliding:
             return Kind.AS

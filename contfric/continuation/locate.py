@@ -5,12 +5,9 @@ from __future__ import annotations
 from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.sliding import sliding_events
-from contfric.continuation.smooth import SAME_PLACE, smooth_events
+from contfric.continuation.smooth import SAME_PLACE, SAME_TANGENCY, smooth_events
 from contfric.orbit.orbit import Orbit
 
-#: The same for a tangency: beside a tangential release (AS) the load overshoots its limit by the square
-#: of the release's rate, which is rounding up to this distance.
-_SAME_TANGENCY = 2e-6
 #: The same for a place known by its parameter (relative to the range), which is stationary at a fold.
 _SAME_VALUE, _SAME_FOLD = 1e-9, 1e-4
 
@@ -44,7 +41,7 @@ def belongs_to(kind: Kind, point: Point, end: Point, settings: Settings) -> bool
     if kind in TERMINAL:
         return False
     apart = abs(point.arc - end.arc)
-    if apart < (_SAME_TANGENCY if kind is Kind.T else SAME_PLACE):
+    if apart < (SAME_TANGENCY if kind is Kind.T else SAME_PLACE):
         return True
     same_value = abs(point.value - end.value) < _SAME_VALUE * settings.width
     return kind is not Kind.T and same_value and apart < _SAME_FOLD

@@ -337,7 +337,8 @@ def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
         reason = f"impact at the touch of {place.surface} in segment {i + 1}"
         return Outcome(edit, {(i, 0): touch_of(orbit, i, place.surface)}, reason)
     behind = (i + 1) % len(word)
-    if word[behind][0] != mode or len(word) < 2:
+    whole = orbit.model.whole_mode
+    if whole(word[behind][0]) != whole(mode) or len(word) < 2:
         raise NotationError(
             f"the impact behind segment {i + 1} changes the mode: it cannot be left out"
         )
@@ -366,7 +367,7 @@ def _rest_mode(orbit: Orbit, i: int, surface: str) -> str:
     model = orbit.model
     for domain in model.domains:
         target = model.transitions.get((domain.name, surface))
-        if domain.mode != orbit.word[i][0] or target is None:
+        if domain.mode != model.whole_mode(orbit.word[i][0]) or target is None:
             continue
         if model.mode_by_name[model.domain_by_name[target].mode].sliding:
             return model.domain_by_name[target].mode

@@ -212,6 +212,13 @@ class Side:
         self.last -= 1
         self.count -= 1
 
+    def restart(self, point: Point) -> None:
+        """Go on from a point that is the last one with other joints: nothing is predicted across."""
+        self._keep(self.last + 1)
+        self.rows.put(0, point)
+        self.last, self._fresh = 0, 0
+        self.count += 1
+
     def rewind(self, row: int) -> None:
         """Take away the points behind a row."""
         self.count -= self.last - row

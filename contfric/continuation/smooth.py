@@ -24,6 +24,9 @@ from contfric.orbit.system import Margin, Test
 #: Arclength within which a smooth event belongs to a sliding event: where a stop becomes tangential
 #: the branch folds and its multipliers are infinite, and where it meets a surface labels change.
 SAME_PLACE = 1e-7
+#: The same for a tangency: beside a tangential release (AS) the load overshoots its limit by the square
+#: of the release's rate, which is rounding up to this distance.
+SAME_TANGENCY = 2e-6
 #: A parameter that changes this slowly along a branch, in units of arclength, is constant: the orbits are
 #: a continuum at one value, and the sign of the slope is rounding.
 _VERTICAL = 1e-3
@@ -263,7 +266,16 @@ def _tangencies(
             test = Test(*_label_place(orbit, k))
             b = bifurcation_at(Kind.T, here, point, point, point, settings, (test,))
             found.append((b, point))
-    return found
+    return _once(found) if orbit.model.joined else found
+
+
+def _once(found: list[tuple[Bifurcation, Point]]) -> list[tuple[Bifurcation, Point]]:
+    """Return one tangency of those in one place: where a joint on a section is, is of no importance."""
+    kept: list[tuple[Bifurcation, Point]] = []
+    for event in sorted(found, key=lambda pair: pair[1].arc):
+        if not kept or event[1].arc - kept[-1][1].arc > SAME_TANGENCY:
+            kept.append(event)
+    return kept
 
 
 def _label_place(orbit: Orbit, k: int) -> tuple[Margin, int, str]:

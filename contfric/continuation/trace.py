@@ -22,6 +22,12 @@ from contfric.continuation.points import (
     Settings,
     settings_of,
 )
+from contfric.continuation.section_joints import (
+    LAST_CROSSING,
+    is_known_touch,
+    is_on_section,
+    move_joints,
+)
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.sliding import nearly_reached
 from contfric.continuation.smooth import SAME_PLACE
@@ -38,6 +44,7 @@ from contfric.continuation.vertices import at_vertex
 from contfric.errors import ConvergenceError, function_of
 from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.sections import canonical
 from contfric.orbit.solve import polish
 
 #: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).
@@ -130,7 +137,7 @@ def follow_orbit(
     """Continue an orbit both ways, as :func:`continue_orbit` does; ``keep`` is that of :func:`trace_side`."""
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
-    orbit = orbit.as_half()
+    orbit = canonical(orbit).as_half()
     start = first_point(orbit, settings)
     at_event = start is not None and _is_at_event(start, settings)
     if start is None or (
@@ -239,6 +246,8 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     leap = leaps_over_vertex(orbit, side, settings, side.count - count)
     if leap is not Leap.NONE:
         return leap is Leap.ENDED, step
+    if why in (kernels.STEP, kernels.BROKEN) and move_joints(orbit, side, settings):
+        return False, FIRST_STEP * settings.largest
     reasons = {
         kernels.STEP: EndReason.STEP,
         kernels.BROKEN: EndReason.BROKEN,
@@ -301,6 +310,12 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     located = locate_events(orbit, before, after, settings)
     if _comes_closer(side, located, after.arc - before.arc):
         return False
+    if located and is_on_section(located[0][0]):
+        side.drop_tip()
+        if move_joints(orbit, side, settings):
+            return False
+        side.end = End(EndReason.STEP, LAST_CROSSING)
+        return True
     side.largest = np.inf  # what asked for shorter steps is behind
     for bifurcation, point in located:
         if limit is not None and (
@@ -322,6 +337,8 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             side.relabel_first(
                 after.labels
             )  # where a stop lies on a surface its label is arbitrary
+            continue
+        if bifurcation.kind is Kind.T and is_known_touch(side, point):
             continue
         if bifurcation.kind in TERMINAL and _is_point(bifurcation.orbit):
             side.put_tip(point)

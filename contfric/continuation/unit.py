@@ -148,7 +148,8 @@ def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
         if orbit.model.autonomous:
             gap[:, 0] = 0.0
         fits = (np.max(gap, axis=1) < SAME_MOTION) & (lasts > SAME_MOTION)
-        found = [i for i in np.flatnonzero(fits) if orbit.word[i][0] == mode]
+        whole = unit.model.whole_mode
+        found = [i for i in np.flatnonzero(fits) if whole(orbit.word[i][0]) == whole(mode)]
         if not found:
             return None
         cuts.append(int(found[0]))

@@ -16,6 +16,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.sections import in_halves
 from contfric.orbit.solve import polish
 from contfric.orbit.system import System, build_system
 from contfric.orbit.words import half_of
@@ -76,6 +77,7 @@ def undoubled_part(orbit: Orbit, active: int) -> Orbit | None:
 
 def undoubled(orbit: Orbit) -> Orbit | None:
     """Return the orbit of half the period that an orbit is near, not solved; None if far."""
+    orbit = in_halves(orbit)
     system = orbit.system
     n, odd = divmod(len(system.word), 2)
     if system.half or odd or system.periods % 2 or system.word[:n] != system.word[n:]:

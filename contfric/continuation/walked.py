@@ -15,7 +15,10 @@ import numpy as np
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.sections import without_sections
 from contfric.orbit.simulation import Trajectory, run
+from contfric.orbit.starts import signs_at
+from contfric.orbit.structure import mode_domains
 from contfric.orbit.system import Word, build_system
 from contfric.signature import canonical_word
 
@@ -75,7 +78,7 @@ def _one_turn(orbit: Orbit, vector: FloatArray, state: FloatArray) -> Orbit | No
     model = orbit.model
     i, time = _middle(orbit)
     modes = [m.name for m in model.modes]
-    mode = modes.index(orbit.word[i][0])
+    mode = modes.index(_declared(orbit, i, time, state))
     unit = 1.0 if model.autonomous else orbit.period / orbit.periods
     trajectory = run(model, vector, mode, 0, time, state, _LONGER * orbit.period / unit, 10_000)
     stop = _end_of_turn(orbit, trajectory, time, unit)
@@ -86,7 +89,8 @@ def _one_turn(orbit: Orbit, vector: FloatArray, state: FloatArray) -> Orbit | No
     joints = np.column_stack([clock, trajectory.states])[:stop]
     end = float(joints[-1, 0])
     joints = np.roll(joints, 1, axis=0)
-    joints[0, 0] -= orbit.period
+    joints[0, 0] = end - orbit.period
+    word, joints, end = without_sections(model, word, joints, end, vector, orbit.periods)
     try:
         system = build_system(model, word, orbit.periods)
     except ValueError:
@@ -101,4 +105,15 @@ def _end_of_turn(orbit: Orbit, trajectory: Trajectory, start: float, unit: float
     count = int(np.searchsorted(clock, start + orbit.period))
     i, _ = _middle(orbit)
     mode = word[count][0] if count < len(word) else trajectory.last[3]
-    return count if count > 0 and mode == orbit.word[i][0] else None
+    same = bool(mode) and model.whole_mode(mode) == model.whole_mode(orbit.word[i][0])
+    return count if count > 0 and same else None
+
+
+def _declared(orbit: Orbit, i: int, time: float, state: FloatArray) -> str:
+    """Return the mode, as it was declared, that a motion beside segment i is in."""
+    model, mode = orbit.model, orbit.word[i][0]
+    if mode not in model.joined:
+        return mode
+    signs = signs_at(model, time, state, orbit.vector)
+    own = [model.domain_by_name[name] for name in mode_domains(model, mode)]
+    return min(own, key=lambda d: sum(d.signs[s] * sign < 0 for s, sign in signs.items())).own_mode

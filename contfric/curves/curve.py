@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from contfric.continuation.events import Kind, meaning_of
 from contfric.curves.special import CurveEnd, SpecialPoint
+from contfric.errors import either
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
@@ -174,7 +175,10 @@ class Curve:
     @property
     def meanings(self) -> dict[str, str]:
         """What happens on the curve, in words, for each kind of its points."""
-        return {part.kind.value: part.meaning for part in self.parts}
+        found: dict[str, str] = {}
+        for part in self.parts:
+            found[part.kind.value] = either(found.get(part.kind.value, ""), part.meaning)
+        return found
 
     @property
     def stable(self) -> BoolArray:

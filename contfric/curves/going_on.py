@@ -24,6 +24,7 @@ from contfric.errors import ContfricError, ParameterError
 from contfric.journal import remembered
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.sections import canonical, moved
 from contfric.orbit.system import IntArray, Margin, Test
 
 #: Times of a joint in two words for one motion agree to this (nondimensional): located events are good to
@@ -109,6 +110,11 @@ def same_place(one: Orbit, a: Test, other: Orbit, b: Test) -> bool:
 
 def words_at(special: SpecialPoint) -> Iterator[Orbit]:
     """Yield the orbits of all words without holds that can follow the sliding event of a point."""
+    if special.meets is Kind.T:
+        free = canonical(special.orbit)
+        other = moved(free) if free is special.orbit else free
+        if other is not None:
+            yield other
     event = special.bifurcation()
     if event is None or event.kind not in TERMINAL:
         return

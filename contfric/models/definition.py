@@ -17,7 +17,8 @@ several domains can follow (:attr:`Model.targets`).
 
 Motion is cut at switching surfaces and at resets, and only there: each has a mode of its own on each
 side. An orbit needs one such joint at least. A model whose cycles may be smooth therefore declares the
-surface of its stops (``v = 0``) as switching, with two modes of the same field: it serves as the section.
+surface of its stops (``v = 0``) with two modes of the same field. They are one mode
+(:attr:`Model.joined`), and the surface is a section: transparent, but for cycles that meet nothing else.
 """
 
 from __future__ import annotations
@@ -184,6 +185,55 @@ class Model:
     def reset_by_surface(self) -> dict[str, Reset]:
         """Resets by the names of their surfaces."""
         return {r.surface: r for r in self.resets}
+
+    @cached_property
+    def joined(self) -> dict[str, str]:
+        """The mode that each mode is a part of, for modes that were declared and are one with others."""
+        return {d.declared: d.mode for d in self.domains if d.declared}
+
+    def whole_mode(self, mode: str) -> str:
+        """Return the mode that a mode is a part of: itself, but where modes have one field."""
+        return self.joined.get(mode, mode)
+
+    @cached_property
+    def sections(self) -> frozenset[tuple[str, str]]:
+        """Pairs (declared mode, surface) that lead from one part of a mode to another: nothing changes."""
+        return frozenset(
+            (here.declared, surface)
+            for (name, surface), target in self.transitions.items()
+            if (here := self.domain_by_name[name]).declared
+            and here.mode == self.domain_by_name[target].mode
+            and here.declared != self.domain_by_name[target].declared
+        )
+
+    @cached_property
+    def section_sides(self) -> dict[tuple[str, str], int]:
+        """The side from which each section is crossed."""
+        return {
+            (d.declared, surface): d.signs[surface]
+            for d in self.domains
+            for mode, surface in self.sections
+            if d.declared == mode
+        }
+
+    def section_pair(self, mode: str, surface: str) -> tuple[str, str]:
+        """Return (mode, surface) of a section, the same for all modes that cross it from that side."""
+        whole, side = self.joined[mode], self.section_sides[mode, surface]
+        return next(
+            pair
+            for pair, other in self.section_sides.items()
+            if pair[1] == surface and other == side and self.joined[pair[0]] == whole
+        )
+
+    @cached_property
+    def section_surfaces(self) -> frozenset[str]:
+        """Surfaces that are sections, of some mode at least."""
+        return frozenset(surface for _, surface in self.sections)
+
+    @property
+    def stops_at_joints(self) -> bool:
+        """Whether motion is cut wherever the displacement is stationary on the stop surface."""
+        return self.cuts(self.stop_surface) and self.stop_surface not in self.section_surfaces
 
     def cuts(self, surface: str) -> bool:
         """Return whether motion is cut at a surface: it is switching, or has a reset."""

@@ -30,6 +30,7 @@ from contfric.models.evaluate import Evaluator, Sampler, defaults, floats
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope, parse
 from contfric.models.measuring import displacement_of, extrema_at_joints
 from contfric.models.regions import combinations, domains_of, ordered_surfaces
+from contfric.models.sections import clear_surfaces, join_domains, joined_modes
 from contfric.yaml_lines import Address
 
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
@@ -71,7 +72,10 @@ def model_from(description: Description) -> Model:
     sampler = Sampler(evaluator, params)
     levels = {s.name: _level(evaluator, s, params) for s in description.surfaces}
     surfaces = ordered_surfaces(description, levels)
-    domains = domains_of(description, surfaces)
+    declared = domains_of(description, surfaces)
+    departures = description.departures or _departures(sampler, surfaces, declared)
+    domains = join_domains(declared, joined_modes(description))
+    surfaces = clear_surfaces(surfaces, domains)
     return Model(
         name=description.name,
         title=description.title or description.name,
@@ -85,7 +89,7 @@ def model_from(description: Description) -> Model:
         surfaces=tuple(surfaces),
         modes=tuple(_mode(description, m.name) for m in description.modes),
         domains=domains,
-        departures=description.departures or _departures(sampler, surfaces, domains),
+        departures=departures,
         symmetry=_symmetry(sampler, surfaces),
         stop_surface=description.stop_surface or _stop_surface(sampler),
         displacement="" if extrema_at_joints(sampler, surfaces) else displacement_of(description),
@@ -95,7 +99,7 @@ def model_from(description: Description) -> Model:
         resets=tuple(_reset(description, name, domains) for name in description.resets),
         autonomous=not description.period,
         kinks=description.kinks,
-        filippov=leaves_at_rest(sampler, description, domains),
+        filippov=leaves_at_rest(sampler, description, declared),
         max_step=description.max_step,
         definition=description.text,
     )

@@ -9,6 +9,7 @@ labels and no events.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from contfric.errors import ModelError
@@ -16,6 +17,7 @@ from contfric.models.definition import Observable, Surface
 from contfric.models.description import Description, ModeText
 from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.regions import engine_order, known_sides
+from contfric.models.sections import joined_modes
 
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
 _SAME = 1e-9
@@ -51,10 +53,21 @@ def extrema_at_joints(sampler: Sampler, surfaces: list[Surface]) -> bool:
     if any(texts.get(x, x) != x for texts in description.resets.values()):
         return False
     cuts = {s.name for s in surfaces if s.switching} | set(description.resets)
+    first = joined_modes(description)
     return all(
-        _keeps_its_sign(sampler, mode, cuts & set(known_sides(mode, surfaces)))
+        _keeps_its_sign(sampler, mode, cuts & _ends(description, mode, surfaces, first))
         for mode in description.modes
     )
+
+
+def _ends(
+    description: Description, mode: ModeText, surfaces: list[Surface], first: Mapping[str, str]
+) -> set[str]:
+    """Return the surfaces that have all modes that are one with a mode on the same side."""
+    parts = [
+        known_sides(m, surfaces) for m in description.modes if first[m.name] == first[mode.name]
+    ]
+    return {name for name, side in parts[0].items() if all(p.get(name) == side for p in parts)}
 
 
 def _keeps_its_sign(sampler: Sampler, mode: ModeText, bounds: set[str]) -> bool:

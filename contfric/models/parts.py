@@ -47,7 +47,8 @@ class Observable:
 class Surface:
     """A level set of an observable; ``switching`` if motion is cut there, as the field changes.
 
-    A switching surface has another mode on each side (their fields may agree: a section).
+    A switching surface has another mode on each side. Where their fields agree everywhere it is a section,
+    which is not switching.
     """
 
     name: str
@@ -71,12 +72,22 @@ class Mode:
 
 @dataclass(frozen=True)
 class Domain:
-    """A region of one mode: the sign of (observable - level) for every surface, 0 = on it."""
+    """A region of one mode: the sign of (observable - level) for every surface, 0 = on it.
+
+    ``declared`` is the mode as it was declared, where that is one with others
+    (:mod:`contfric.models.sections`).
+    """
 
     name: str
     mode: str
     signs: Mapping[str, int]
     label: str = ""
+    declared: str = ""
+
+    @property
+    def own_mode(self) -> str:
+        """The mode that the model declares for this region."""
+        return self.declared or self.mode
 
 
 @dataclass(frozen=True)

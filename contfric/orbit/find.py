@@ -14,6 +14,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
+from contfric.orbit.sections import is_smooth, loops, without_sections
 from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
 from contfric.orbit.solve import settle
 from contfric.orbit.system import build_system
@@ -253,10 +254,16 @@ def _orbit_of_lag(trajectory: Trajectory, lag: int, turns: int) -> Orbit | None:
     joints = np.column_stack(
         [trajectory.times[first:-1] + cycles * period, trajectory.states[first:-1]]
     )
-    word = trajectory.word[first + 1 :]
-    if model.autonomous:
+    word, end = trajectory.word[first + 1 :], float(trajectory.times[-1])
+    if not model.autonomous:
+        end = float(joints[0, 0]) + turns * period
+    smooth = is_smooth(model, word)
+    if model.autonomous and smooth:
+        turns = loops(model, word, joints, end, vector)
+    word, joints, end = without_sections(model, word, joints, end, vector, turns)
+    if model.autonomous and not smooth:
         turns = len(word) // primitive_length(word)
-        joints = clocked(model, joints, float(trajectory.times[-1]))
+    joints = clocked(model, joints, end)
     try:
         system = build_system(model, word, turns)
     except ValueError:

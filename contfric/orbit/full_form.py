@@ -14,6 +14,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import polish
+from contfric.orbit.structure import is_section
 from contfric.orbit.system import build_system
 from contfric.signature import crossing
 
@@ -65,8 +66,8 @@ def _last(orbit: Orbit, domains: tuple[str, ...], at: int, i: int) -> bool:
     following = domains[at % len(domains)]
     through = crossing(model, domains[at - 1], following)
     assert through is not None
-    same_mode = model.domain_by_name[following].mode == orbit.word[i][0]
-    return not same_mode or model.surface_by_name[through].switching
+    same_mode = model.domain_by_name[following].mode == model.whole_mode(orbit.word[i][0])
+    return not same_mode or is_section(model, *orbit.word[i])
 
 
 def _crossing_point(

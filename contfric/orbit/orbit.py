@@ -185,6 +185,9 @@ class Orbit:
         whole = self.as_whole()
         second = whole.joints.copy()
         second[:, 0] += whole.period
+        if not self.model.autonomous and all(pair in self.model.sections for pair in whole.word):
+            # a smooth cycle is found by one crossing each way, however long it is
+            return replace(whole, system=build_system(self.model, whole.word, self.periods * 2))
         system = build_system(self.model, whole.word * 2, self.periods * 2)
         joints = clocked(self.model, np.vstack([whole.joints, second]), whole.period)
         return replace(whole, system=system, joints=joints)
@@ -275,6 +278,11 @@ class Orbit:
         return self._watched[0]
 
     @property
+    def labels(self) -> NDArray[np.int64]:
+        """The transparent surfaces that the segments of one turn cross, as the engine codes them."""
+        return self._watched[1]
+
+    @property
     def admissible(self) -> bool:
         """Whether the orbit obeys every inequality inside every segment."""
         margins, _, fine = self._watched
@@ -326,7 +334,7 @@ class Orbit:
         """Displacements at the stops and impacts in the order of the orbit, shape (stops,)."""
         if not self.model.stop_surface:
             return turning_points(self)
-        if not self.model.cuts(self.model.stop_surface):
+        if not self.model.stops_at_joints:
             return displacements(self, self.model.stop_surface)
         return self.ends[stopping_segments(self.model, self.word), 1]
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from contfric.orbit.starts import signs_at
+from contfric.orbit.structure import mode_domains
 from contfric.orbit.words import decode, end_domain, passed_domains
 from contfric.signature import Signature
 from contfric.signature.holds import TOUCH, domain_after, is_hold
@@ -86,7 +87,7 @@ def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
     begin = orbit.begins[i]
     signs = signs_at(model, float(begin[0]), begin[1:].copy(), orbit.vector)
     del signs[entry]  # the joint lies on it to rounding, on the side of every domain
-    own = [d for d in model.domains if d.mode == word[i][0]]
+    own = [model.domain_by_name[d] for d in mode_domains(model, word[i][0])]
     led = model.targets.get(
         (ends[i - 1], entry), ()
     )  # a surface met at the impact is on either side

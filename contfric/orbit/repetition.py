@@ -8,6 +8,7 @@ import numpy as np
 
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.sections import shortened
 from contfric.orbit.system import build_system
 
 #: Joints that repeat themselves to this (relative to 1 + their size) are the same: rounding over a
@@ -28,6 +29,8 @@ def shortest(orbit: Orbit) -> Orbit:
     whole = orbit.as_whole()
     word, joints = whole.system.word, whole.joints
     for turns in range(whole.periods, 1, -1):
+        if whole.periods % turns == 0 and (found := shortened(whole, turns)) is not None:
+            return found
         part, rest = divmod(len(word), turns)
         if whole.periods % turns or rest or word != word[:part] * turns:
             continue

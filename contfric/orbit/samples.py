@@ -71,7 +71,8 @@ def _rest_of(orbit: Orbit, path: list[str], time: float, state: FloatArray) -> l
     It is the first that the sample fits, on a surface either side of it: none is left for an earlier one.
     """
     signs = signs_at(orbit.model, time, state, orbit.vector)
-    clear = [s.name for s in orbit.model.surfaces if not s.switching]
+    model = orbit.model
+    clear = [s.name for s in model.surfaces if not s.switching or s.name in model.section_surfaces]
     for k, name in enumerate(path):
         own = orbit.model.domain_by_name[name].signs
         if all(own[s] * signs[s] >= 0 for s in clear):

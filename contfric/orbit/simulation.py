@@ -17,7 +17,8 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.counts import TALLY
 from contfric.orbit.pace import Pace
 from contfric.orbit.starts import checked_state, start_of
-from contfric.orbit.system import IntArray, mode_bounds
+from contfric.orbit.structure import cut_bounds
+from contfric.orbit.system import IntArray
 
 
 class SimulationEnd(str, Enum):
@@ -124,12 +125,12 @@ class Trajectory:
 
 @cache
 def tables(model: Model) -> Tables:
-    """Return the transition tables of a model."""
+    """Return the transition tables of a model, in modes as they were declared: sections are events, too."""
     surfaces = [s.name for s in model.surfaces]
     modes = [m.name for m in model.modes]
     observables = [o.name for o in model.observables]
     bounds = np.zeros((len(modes), len(surfaces)), dtype=np.int64)
-    for mode, names in mode_bounds(model).items():
+    for mode, names in cut_bounds(model).items():
         for name in names:
             bounds[modes.index(mode), surfaces.index(name)] = 1 + (name in model.reset_by_surface)
     codes = 1 << len(surfaces)
@@ -140,18 +141,18 @@ def tables(model: Model) -> Tables:
         for code in range(codes):
             if code >> k & 1 or not _matches(domain.signs, surfaces, k, code):
                 continue
-            row = (modes.index(domain.mode) * len(surfaces) + k) * codes + code
-            following[row] = modes.index(model.domain_by_name[target].mode)
+            row = (modes.index(domain.own_mode) * len(surfaces) + k) * codes + code
+            following[row] = modes.index(model.domain_by_name[target].own_mode)
     for (name, surface), targets in model.targets.items():
         if surface not in model.reset_by_surface:
             continue
-        k, source = surfaces.index(surface), modes.index(model.domain_by_name[name].mode)
+        k, source = surfaces.index(surface), modes.index(model.domain_by_name[name].own_mode)
         for code in range(codes):
             for behind in map(model.domain_by_name.__getitem__, targets):
                 # behind a reset the signs of the mapped state tell the domain
                 if not code >> k & 1 and _matches(behind.signs, surfaces, k, code):
                     row = (source * len(surfaces) + k) * codes + code
-                    following[row] = modes.index(behind.mode)
+                    following[row] = modes.index(behind.own_mode)
     return Tables(
         np.array([observables.index(s.observable) for s in model.surfaces], dtype=np.int64),
         bounds,
@@ -169,7 +170,7 @@ def _surfaces_under(model: Model, mode: str) -> int:
     return sum(
         1 << k
         for k, surface in enumerate(model.surfaces)
-        if any(d.mode == mode and d.signs[surface.name] == 0 for d in model.domains)
+        if any(d.own_mode == mode and d.signs[surface.name] == 0 for d in model.domains)
     )
 
 

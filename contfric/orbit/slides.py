@@ -96,6 +96,8 @@ class Outline:
 def outline_of(orbit: Orbit) -> Outline:
     """Return the outline of an orbit."""
     whole, model = orbit.as_whole(), orbit.model
+    if model.joined and not model.autonomous:
+        return _at_one_phase(whole)
     slides = slides_of(whole)
     turns = repetitions(whole, slides)
     starts = np.array(whole.cycle[slides[: len(slides) // turns]])
@@ -108,6 +110,28 @@ def outline_of(orbit: Orbit) -> Outline:
         if not model.autonomous:
             images[:, 0] += model.symmetry.fraction * cycle
     return Outline(whole.periods // turns, cycle, starts, images)
+
+
+def _at_one_phase(whole: Orbit) -> Outline:
+    """Return the states of an orbit at one phase of the excitation, for models with sections.
+
+    There a slide begins anywhere: which crossings of a section are joints is of no importance.
+    """
+    model, cycle = whole.model, whole.period / whole.periods
+    states = np.array([whole.state(k * cycle) for k in range(whole.periods)])
+    periods = next(
+        k
+        for k in range(1, whole.periods + 1)
+        if whole.periods % k == 0
+        and np.max(np.abs(np.roll(states, -k, axis=0) - states)) < SAME_MOTION
+    )
+    starts = np.column_stack([np.zeros(periods), states[:periods]])
+    images = starts
+    if model.symmetry is not None:
+        back = model.symmetry.fraction * cycle
+        others = np.array([whole.state(k * cycle - back) for k in range(periods)])
+        images = np.column_stack([np.zeros(periods), others @ model.symmetry.array().T])
+    return Outline(periods, cycle, starts, images)
 
 
 def _apart(one: FloatArray, other: FloatArray, cycle: float) -> float:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from contfric.errors import ParameterError, did_you_mean, shown
 from contfric.models.definition import Domain, FloatArray, Model, Surface
-from contfric.orbit.system import mode_bounds
+from contfric.orbit.structure import cut_bounds
 
 #: Displacements that a start is looked for at, in half-widths of the model: where the first is in no
 #: domain (behind a wall, or on a surface that motion does not leave), the next.
@@ -43,9 +43,9 @@ def start_of(
     name = domain or model.domain_at(signs) or _side_of_rates(model, t, y, vector, signs)
     if name is None:
         raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
-    mode = model.domain_by_name[name].mode
+    mode = model.domain_by_name[name].own_mode
     surfaces = [s.name for s in model.surfaces]
-    on = sum(1 << surfaces.index(k) for k in mode_bounds(model)[mode] if signs[k] == 0)
+    on = sum(1 << surfaces.index(k) for k in cut_bounds(model)[mode] if signs[k] == 0)
     return [m.name for m in model.modes].index(mode), on
 
 
@@ -59,8 +59,12 @@ def _side_of_rates(
     flow, none, empty = model.flow, np.empty(0, dtype=np.int64), np.empty(0)
     observables, modes = [o.name for o in model.observables], [m.name for m in model.modes]
 
+    def ends(domain: Domain, surface: Surface) -> bool:
+        own = {d.signs[surface.name] for d in model.domains if d.own_mode == domain.own_mode}
+        return model.cuts(surface.name) or (bool(domain.declared) and len(own) == 1)
+
     def enters(domain: Domain, surface: Surface) -> bool:
-        if signs[surface.name] != 0 or not model.cuts(surface.name):
+        if signs[surface.name] != 0 or not ends(domain, surface):
             return True
         c, mode = observables.index(surface.observable), modes.index(domain.mode)
         rate = float(flow.rate(mode, c, t, y, vector, none, empty))

@@ -111,7 +111,7 @@ def reach_of(orbit: Orbit) -> tuple[float, float]:
         if not extent(system.functions(), system.layout, c, joints, orbit.vector, out):
             out[:] = np.nan
         x.append(out)
-    elif not model.cuts(model.stop_surface):  # a definition by hand that says no more
+    elif not model.stops_at_joints:  # a definition by hand that says no more
         x.append(orbit.stops)
     every = np.concatenate(x)
     return float(np.min(every)), float(np.max(every))
@@ -119,4 +119,4 @@ def reach_of(orbit: Orbit) -> tuple[float, float]:
 
 def reaches_at_joints(model: Model) -> bool:
     """Tell whether the extrema of the displacement are among the joints of orbits."""
-    return not model.displacement and model.cuts(model.stop_surface)
+    return not model.displacement and model.stops_at_joints

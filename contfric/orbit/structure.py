@@ -1,4 +1,8 @@
-"""What a model's definition says of its modes: their domains, the surfaces that bound them, their images."""
+"""What a model's definition says of its modes: their domains, the surfaces that bound them, their images.
+
+Modes of one field are one mode (:attr:`contfric.models.definition.Model.joined`). The name of a part of it
+stands in words only where a segment ends on the section between two parts: it says from which side.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +14,21 @@ from contfric.models.definition import Model
 @cache
 def mode_bounds(model: Model) -> dict[str, tuple[str, ...]]:
     """Surfaces that bound each mode: resets, and those through which a transition changes the mode."""
+    found = _bounds(model, {d.name: d.mode for d in model.domains})
+    return found | {part: found[whole] for part, whole in model.joined.items()}
+
+
+@cache
+def cut_bounds(model: Model) -> dict[str, tuple[str, ...]]:
+    """Surfaces that bound each mode as it was declared, sections among them: a simulation stops there."""
+    return _bounds(model, {d.name: d.own_mode for d in model.domains})
+
+
+def _bounds(model: Model, modes: dict[str, str]) -> dict[str, tuple[str, ...]]:
     bounds: dict[str, set[str]] = {mode.name: set() for mode in model.modes}
     for (name, surface), targets in model.targets.items():
-        mode = model.domain_by_name[name].mode
-        if surface in model.reset_by_surface or model.domain_by_name[targets[0]].mode != mode:
-            bounds[mode].add(surface)
+        if surface in model.reset_by_surface or modes[targets[0]] != modes[name]:
+            bounds[modes[name]].add(surface)
     return {
         mode: tuple(s.name for s in model.surfaces if s.name in found)
         for mode, found in bounds.items()
@@ -23,7 +37,8 @@ def mode_bounds(model: Model) -> dict[str, tuple[str, ...]]:
 
 def mode_domains(model: Model, mode: str) -> list[str]:
     """Return the domains of one mode."""
-    return [d.name for d in model.domains if d.mode == mode]
+    whole = model.whole_mode(mode)
+    return [d.name for d in model.domains if d.mode == whole]
 
 
 def inside_sign(model: Model, mode: str, surface: str) -> int:
@@ -32,13 +47,21 @@ def inside_sign(model: Model, mode: str, surface: str) -> int:
     return signs.pop() if len(signs) == 1 else 0
 
 
+def is_section(model: Model, mode: str, surface: str) -> bool:
+    """Tell whether a segment of a mode that ends on a surface ends on a section, where nothing changes."""
+    return (mode, surface) in model.sections
+
+
 def exit_domains(model: Model, mode: str, surface: str, following: str) -> list[str]:
     """Return the domains of a mode from which a surface leads into the following mode."""
+    side = model.section_sides.get((mode, surface), 0)
+    whole = model.whole_mode(mode if side else following)
     return [
         name
         for name in mode_domains(model, mode)
-        if any(
-            model.domain_by_name[target].mode == following
+        if side in (0, model.domain_by_name[name].signs[surface])
+        and any(
+            model.domain_by_name[target].mode == whole
             for target in model.targets.get((name, surface), ())
         )
     ]
@@ -46,5 +69,6 @@ def exit_domains(model: Model, mode: str, surface: str, following: str) -> list[
 
 @cache
 def mirror_mode(model: Model) -> dict[str, str]:
-    """Image of each mode under the symmetry."""
-    return {d.mode: model.domain_by_name[model.mirror_domain[d.name]].mode for d in model.domains}
+    """Image of each mode under the symmetry; that of a part of a mode is the whole image."""
+    found = {d.mode: model.domain_by_name[model.mirror_domain[d.name]].mode for d in model.domains}
+    return found | {part: found[whole] for part, whole in model.joined.items()}

@@ -350,7 +350,7 @@ def _label_rows(
     surfaces = [s.name for s in model.surfaces]
     first = first_entry(model, word, half)
     rows: list[tuple[int, ...]] = []
-    for i, (mode, _) in enumerate(word):
+    for i, (mode, exit_) in enumerate(word):
         entry = word[i - 1][1] if i else first
         for c, observable in enumerate(model.observables):
             clear = [
@@ -359,7 +359,7 @@ def _label_rows(
                 if s.observable == observable.name and inside_sign(model, mode, s.name) == 0
             ]
             if clear and not model.mode_by_name[mode].sliding:
-                pin = next((h.pin for h in holds if h.segment == i + 1), None)
+                pin = next((h.pin for h in holds if h.segment == i + 1), exit_)
                 rows.append((i, c, *(_place(model, s, c, surfaces) for s in (entry, pin))))
     return _rows(rows, 4)
 

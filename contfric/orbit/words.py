@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections import deque
 
 from contfric.models.definition import Model
-from contfric.orbit.system import Word, exit_domains, mirror_mode
-from contfric.signature.holds import mirror_exit
+from contfric.orbit.structure import exit_domains
+from contfric.orbit.system import Word
+from contfric.signature.reduced import mirror_pair
 
 
 def mirror_pairs(model: Model, word: Word) -> Word:
     """Return the mirror image of a word, segment by segment (not rotated)."""
     assert model.symmetry is not None
-    surfaces = model.symmetry.surfaces
-    return tuple((mirror_mode(model)[mode], mirror_exit(exit_, surfaces)) for mode, exit_ in word)
+    return tuple(mirror_pair(pair, model) for pair in word)
 
 
 def half_of(model: Model, word: Word, periods: int) -> Word | None:

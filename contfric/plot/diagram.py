@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from contfric.errors import either
 from contfric.plot.events import Mark, draw_marks, label_marks, marks_of
 from contfric.plot.labels import settle
 from contfric.plot.protocols import BifurcationLike, BranchLike, DiagramLike
@@ -276,7 +277,9 @@ def _handles(
         handles.append(_line("stability not computed", GREY, width=UNKNOWN_WIDTH))
     if len(regular) < len(branches):
         handles.append(_line(BRIDGE_NAME, BRIDGE_COLOUR, style=BRIDGE, width=BRIDGE_WIDTH))
-    kinds = {m.kind.value: m.meaning for m in marks}
+    kinds: dict[str, str] = {}
+    for m in marks:
+        kinds[m.kind.value] = either(kinds.get(m.kind.value, ""), m.meaning)
     order = [*MARKERS, *(k for k in kinds if k not in MARKERS)]
     return handles + [_marker(k, kinds[k]) for k in order if k in kinds]
 

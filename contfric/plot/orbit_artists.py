@@ -92,12 +92,13 @@ def draw_levels(ax: Axes, orbit: OrbitLike, observable: str, *, vertical: bool) 
         if surface.observable != observable:
             continue
         value = level(orbit, surface)
-        style = "-" if surface.switching else (0, (1.5, 1.5))
+        section = surface.name in orbit.model.section_surfaces
+        style = "-" if surface.switching or section else (0, (1.5, 1.5))
         draw = ax.axvline if vertical else ax.axhline
         line = draw(value, color=GREY, linewidth=0.8, linestyle=style, zorder=1)
         line.set_gid(surface.name)
         text = surface_label(surface.name)
-        if surface.switching:
+        if surface.switching or section:
             text = f"{parameter_label(surface.observable)} = {surface.level}"
         _name_level(ax, text, value, vertical)
 
@@ -138,7 +139,7 @@ def draw_moving_surfaces(
         if is_sliding(orbit.model, piece.domain):
             continue
         surface = orbit.model.surface_by_name[piece.exit]
-        if surface.switching:
+        if surface.switching or surface.name in orbit.model.section_surfaces:
             continue
         time, state = float(piece.times[-1]), piece.states[-1]
         slope = observe_gradient(orbit, surface.observable, time, state)[[i, j]] * spans

@@ -88,7 +88,7 @@ def _crossings(orbit: OrbitLike, times: FloatArray, states: FloatArray) -> list[
     """Return times at which transparent surfaces are crossed inside a segment, in order."""
     found: list[tuple[float, str]] = []
     for surface in orbit.model.surfaces:
-        if surface.switching:
+        if surface.switching and surface.name not in orbit.model.section_surfaces:
             continue
         limit = level(orbit, surface)
         gap = np.array(
@@ -118,11 +118,12 @@ def _crossing(orbit: OrbitLike, observable: str, limit: float, bracket: FloatArr
 def _domain(orbit: OrbitLike, mode: str, time: float) -> str:
     """Return the domain of a mode in which the orbit is at a time."""
     state = orbit.state(time)
-    own = [d for d in orbit.model.domains if d.mode == mode]
+    model = orbit.model
+    own = [d for d in model.domains if d.mode == model.whole_mode(mode)]
     side = {
         s.name: np.sign(observe(orbit, s.observable, time, state) - level(orbit, s))
-        for s in orbit.model.surfaces
-        if not s.switching
+        for s in model.surfaces
+        if not s.switching or s.name in model.section_surfaces
     }
     fitting = [d for d in own if all(d.signs[name] == sign for name, sign in side.items())]
     return (fitting or own)[0].name
@@ -142,7 +143,8 @@ def rest_limits(orbit: OrbitLike, piece: Piece) -> tuple[float, float] | None:
     model = orbit.model
     found: list[float] = []
     for surface in model.surfaces:
-        if surface.switching or model.domain_by_name[piece.domain].signs[surface.name] == 0:
+        rests = model.domain_by_name[piece.domain].signs[surface.name] == 0
+        if surface.switching or surface.name in model.section_surfaces or rests:
             continue
         state = piece.states[0].copy()
         time = float(piece.times[0])
@@ -159,7 +161,8 @@ def rest_limits(orbit: OrbitLike, piece: Piece) -> tuple[float, float] | None:
 def rest_bounds(orbit: OrbitLike, observable: str) -> Iterator[tuple[float, float]]:
     """Yield the intervals of an observable inside which the model can stay on a surface."""
     model = orbit.model
-    own = [s for s in model.surfaces if s.observable == observable and not s.switching]
+    drawn = [s for s in model.surfaces if not s.switching and s.name not in model.section_surfaces]
+    own = [s for s in drawn if s.observable == observable]
     for domain in model.domains:
         if not model.mode_by_name[domain.mode].sliding:
             continue

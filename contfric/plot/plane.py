@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from contfric.errors import either
 from contfric.models.definition import FloatArray
 from contfric.plot.labels import Anchor, place_labels, settle
 from contfric.plot.protocols import CurveLike, PlaneLike, SpecialLike
@@ -199,7 +200,10 @@ def _legend(
     ax: Axes, curves: Sequence[CurveLike], special: Sequence[SpecialLike], where: Mapping[str, Any]
 ) -> None:
     """Say what colours and dashes mean."""
-    kinds = {name: text for curve in curves for name, text in curve.meanings.items()}
+    kinds: dict[str, str] = {}
+    for curve in curves:
+        for name, text in curve.meanings.items():
+            kinds[name] = either(kinds.get(name, ""), text)
     handles = [
         Line2D([], [], color=colour, linewidth=width, label=f"{name}: {kinds[name]}")
         for name, (colour, width) in _LOOKS.items()

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 
+import numpy as np
+
 from contfric.atlas.balance import Balance, IndexSum
 from contfric.atlas.diagram import Asked, Diagram, LooseEnd, Node
 from contfric.atlas.verification import Restart, Verification
@@ -21,7 +23,7 @@ from contfric.continuation.events import (
 )
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.system import Margin, System, Test, build_system
+from contfric.orbit.system import IntArray, Margin, System, Test, build_system
 from contfric.results.pack import BRANCH_ARRAYS, Arrays, Header
 
 
@@ -39,12 +41,18 @@ class Unpacker:
         return [
             build_system(
                 self.model,
-                tuple((str(mode), str(exit_)) for mode, exit_ in entry["word"]),
+                tuple(self._pair(str(mode), str(exit_)) for mode, exit_ in entry["word"]),
                 entry["periods"],
                 entry["half"],
             )
             for entry in self.header["systems"]
         ]
+
+    def _pair(self, mode: str, exit_: str) -> tuple[str, str]:
+        """Return a segment as words have it now: results of earlier versions have joints on sections."""
+        if (mode, exit_) in self.model.sections:
+            return self.model.section_pair(mode, exit_)
+        return self.model.whole_mode(mode), exit_
 
     @cached_property
     def orbits(self) -> list[Orbit]:
@@ -116,6 +124,8 @@ class Unpacker:
         self._expect(found["joints"].shape == shape)
         self._expect(found["vector"].shape == (len(self.model.parameters),))
         self._expect(len(found["arc"]) == len(found["labels"]) == shape[0])
+        if found["labels"].shape[1:] != (len(system.layout.labels),):
+            found["labels"] = _labelled(system, entry["parameter"], found)
         stability = entry["stability"]
         first, last = (self.ends[i] for i in entry["ends"])
         return Branch(
@@ -155,6 +165,16 @@ class Unpacker:
     def _expect(holds: bool) -> None:
         if not holds:
             raise ValueError("arrays do not fit each other")
+
+
+def _labelled(system: System, parameter: str, arrays: Arrays) -> IntArray:
+    """Return what the segments of a branch cross, where an earlier version has watched other surfaces."""
+    active, rows = system.model.index_of(parameter), []
+    for joints, value in zip(arrays["joints"], arrays["values"], strict=True):
+        vector = arrays["vector"].copy()
+        vector[active] = value
+        rows.append(Orbit(system, joints.copy(), vector, 0.0, Status.CONVERGED).labels)
+    return np.array(rows, dtype=np.int64).reshape(len(rows), len(system.layout.labels))
 
 
 def _verification(entry: Header | None) -> Verification | None:

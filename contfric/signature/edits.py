@@ -232,7 +232,8 @@ def is_closed_walk(word: Sequence[ReducedPair], model: Model) -> bool:
         return False
     if not (model.surface_by_name.keys() >= surfaces):
         return False
-    for entry in (domain.name for domain in model.domains if domain.mode == modes[0]):
+    first = model.whole_mode(modes[0])
+    for entry in (domain.name for domain in model.domains if domain.mode == first):
         reached = {entry}
         for index, (mode, surface) in enumerate(word):
             reached = entered(reached, surface, model, mode, modes[(index + 1) % len(word)])
@@ -251,8 +252,10 @@ def entered(
 ) -> set[str]:
     """Return the domains of the next mode that a segment can lead to from its entries."""
     inside = _within(entries, model, mode)
+    side = model.section_sides.get((mode, surface), 0)
+    inside = {d for d in inside if side in (0, model.domain_by_name[d].signs[surface])}
     targets = {t for d in inside for t in model.targets.get((d, surface), ())}
-    return {t for t in targets if model.domain_by_name[t].mode == next_mode}
+    return {t for t in targets if model.domain_by_name[t].mode == model.whole_mode(next_mode)}
 
 
 def _within(entries: Iterable[str], model: Model, mode: str) -> set[str]:

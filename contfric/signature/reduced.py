@@ -7,7 +7,9 @@ and after an event T have the same reduced word.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -84,6 +86,7 @@ def canonical_word(word: ReducedWord, model: Model) -> ReducedWord:
     return rotated(word, least_rotation([_key(pair, model) for pair in word]))
 
 
+@cache
 def mirror_pair(pair: ReducedPair, model: Model) -> ReducedPair:
     """Return the image of one (mode, exit) pair under the symmetry of the model.
 
@@ -96,11 +99,16 @@ def mirror_pair(pair: ReducedPair, model: Model) -> ReducedPair:
         raise NotationError(f"model '{model.name}' has no symmetry: there is no mirror image")
     mode, surface = pair
     surfaces = {NEVER: NEVER, **model.symmetry.surfaces}
+    section = pair in model.sections
     known = surface in surfaces or (is_hold(surface) and known_hold(surface, model))
     for domain in model.domains:
-        if domain.mode == mode and known:
+        own = domain.own_mode if section else domain.mode
+        if known and own == (mode if section else model.whole_mode(mode)):
             image = model.domain_by_name[model.mirror_domain[domain.name]]
-            return image.mode, mirror_exit(surface, surfaces)
+            mirrored = mirror_exit(surface, surfaces)
+            return (
+                model.section_pair(image.own_mode, mirrored) if section else (image.mode, mirrored)
+            )
     raise NotationError(f"model '{model.name}' has no mode '{mode}' with surface '{surface}'")
 
 
@@ -118,7 +126,25 @@ def mirror_word(word: ReducedWord, model: Model) -> ReducedWord:
 
 def fuses(model: Model, mode: str, surface: str, next_mode: str) -> bool:
     """Return whether the field is the same on both sides of a joint."""
-    return mode == next_mode and not model.cuts(surface)
+    same = model.whole_mode(mode) == model.whole_mode(next_mode)
+    return same and surface not in model.reset_by_surface
+
+
+def section_ends(model: Model, pairs: Sequence[ReducedPair]) -> list[int]:
+    """Return the joints by which a cycle that meets nothing but sections is found: one each way.
+
+    Of several crossings the first will do: they are crossings of one cycle.
+
+    Parameters
+    ----------
+    pairs : (mode as it was declared, surface at its end) of each domain
+    """
+    for surface in model.surface_by_name:
+        at = [k for k, pair in enumerate(pairs) if pair in model.sections and pair[1] == surface]
+        sides = {model.section_sides[pairs[k]]: k for k in reversed(at)}
+        if at:
+            return sorted(sides.values())
+    return []
 
 
 def _key(pair: ReducedPair, model: Model) -> tuple[int, int]:
@@ -142,6 +168,13 @@ def _fused(signature: Signature) -> tuple[ReducedSegment, ...]:
     ends = [
         i for i in range(count) if beside[i] or not fuses(model, modes[i], surfaces[i], after[i])
     ]
+    if not ends:
+        modes = [model.domain_by_name[name].own_mode for name in names]
+        ends = section_ends(model, list(zip(modes, surfaces, strict=True)))
+        modes = [
+            model.section_pair(m, s)[0] if k in ends else m
+            for k, (m, s) in enumerate(zip(modes, surfaces, strict=True))
+        ]
     if not ends:
         return (ReducedSegment(modes[0], NEVER, names),)
     starts = [ends[-1] - count, *ends]

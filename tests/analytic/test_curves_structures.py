@@ -283,6 +283,32 @@ def test_popp_doubling_ends_on_grazing() -> None:
     assert on_grazing.params["F"] == pytest.approx(force, abs=1e-9)
 
 
+def test_popp_doublings_pass_touches_of_rest_and_end_at_the_belt() -> None:
+    """A block that comes to rest for an instant is not at the speed of the belt: nothing changes there."""
+    orbit = cf.find_orbit("popp", {"omega": 2.35, "F": 0.83})
+    doubling = next(
+        b
+        for b in cf.continue_orbit(orbit, "omega", (2.3, 2.4)).bifurcations
+        if b.kind is cf.Kind.PD
+    )
+    box = {"omega": (2.3, 2.7), "F": (0.8, 1.5)}
+    found = cf.continue_bifurcation(doubling, ("omega", "F"), box)
+    touch = min(found.special, key=lambda p: abs(p.params["F"] - 0.8438125))
+    assert touch.name == "PD-T" and touch.params["omega"] == pytest.approx(2.356266, abs=1e-6)
+    speeds = [touch.orbit.state(t)[1] for t in np.linspace(0.0, touch.orbit.period, 2001)]
+    assert max(speeds) < 0.9  # slower than the belt
+    (end,) = (p for p in found.special if p.name == "PD-GS")
+    speeds = [end.orbit.state(t)[1] for t in np.linspace(0.0, end.orbit.period, 20_001)]
+    assert max(speeds) == pytest.approx(1.0, abs=1e-6)
+    assert end.params["F"] == pytest.approx(1.32, abs=1e-2)
+    start = end.orbit.state(2 * 2 * pi / end.params["omega"])
+    force = end.params["F"]
+    solved = fsolve(
+        lambda u: doubled(u[:2], u[2], force), [*start, end.params["omega"]], xtol=1e-13
+    )
+    assert end.params["omega"] == pytest.approx(solved[2], abs=1e-9)
+
+
 def test_popp_grazing_is_one_curve_in_two_words() -> None:
     """Of the orbit without a stick (a touch inside) and of that with one (a tangential stop)."""
     a, b = curve("popp", "GS", "0a, 4seg"), curve("popp", "GS", "1a, 5seg")

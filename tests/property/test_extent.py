@@ -90,7 +90,14 @@ def text_of(field: str, surfaces: str, modes: str) -> str:
             "",
             "x",
         ),
-        ("{x: v, v: -x}", "{s: {observable: v}}", "{a: {in: {s: +}}, b: {in: {s: -}}}", "s", ""),
+        ("{x: v, v: -x}", "{s: {observable: v}}", "{a: {in: {s: +}}, b: {in: {s: -}}}", "s", "x"),
+        (
+            "{x: v, v: -x - g*sign(v)}",
+            "{s: {observable: v}}",
+            "{a: {in: {s: +}}, b: {in: {s: -}}}",
+            "s",
+            "",
+        ),
         (
             "{x: v, v: -x}",
             "{s: {observable: v}, c: {observable: x, level: g}}",

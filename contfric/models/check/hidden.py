@@ -169,7 +169,7 @@ def _modes(model: Model, surfaces: dict[str, str]) -> dict[str, str] | None:
     for domain in model.domains:
         signs = {surfaces[s]: -side for s, side in domain.signs.items()}
         image = next((d for d in model.domains if d.signs == signs), None)
-        if image is None or found.setdefault(domain.mode, image.mode) != image.mode:
+        if image is None or found.setdefault(domain.own_mode, image.own_mode) != image.own_mode:
             return None
     return found
 

@@ -112,7 +112,7 @@ class Probe:
 
     def inside(self, mode: str, t: float, y: FloatArray) -> tuple[float, FloatArray] | None:
         """Return a state of a mode near a state: on the surfaces that it moves on; None if outside."""
-        domains = [d for d in self.model.domains if d.mode == mode]
+        domains = [d for d in self.model.domains if d.own_mode == mode]
         on = tuple(name for name, side in domains[0].signs.items() if side == 0)
         place = self.landed(on, t, y) if on else (t, y)
         if place is None:

@@ -81,7 +81,7 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
             if name is None:
                 continue
             domain = model.domain_by_name[name]
-            rate = probe.rate(domain.mode, surface.name, t, y)
+            rate = probe.rate(domain.own_mode, surface.name, t, y)
             if not side * rate < -_STILL:
                 continue
             report.count(Topic.TRANSITIONS)
@@ -112,7 +112,7 @@ def _goes_on(
     side = domain.signs[surface.name]
     if side == 0:
         return True
-    rate = probe.rate(domain.mode, surface.name, t, y)
+    rate = probe.rate(domain.own_mode, surface.name, t, y)
     if side * rate >= -_STILL:
         return True
     report.error(
@@ -134,7 +134,7 @@ def check_resets(report: ModelReport, probe: Probe) -> None:
             before = model.domain_at({**signs, name: min(inside)}) if len(inside) == 1 else None
             if before is None:
                 continue
-            side, mode = min(inside), model.domain_by_name[before].mode
+            side, mode = min(inside), model.domain_by_name[before].own_mode
             if not side * probe.rate(mode, name, t, y) < -_STILL:
                 continue
             report.count(Topic.RESETS)
@@ -148,7 +148,7 @@ def check_resets(report: ModelReport, probe: Probe) -> None:
                 return
             after = model.domain_at({**probe.signs(t, behind), name: side})
             if after is None or not (
-                side * probe.rate(model.domain_by_name[after].mode, name, t, behind) > 0.0
+                side * probe.rate(model.domain_by_name[after].own_mode, name, t, behind) > 0.0
             ):
                 report.error(
                     Topic.RESETS,
@@ -166,7 +166,7 @@ def check_sliding(report: ModelReport, probe: Probe) -> None:
         if not mode.sliding:
             continue
         _check_left(report, model, mode)
-        domain = next(d for d in model.domains if d.mode == mode.name)
+        domain = next(d for d in model.domains if d.own_mode == mode.name)
         surfaces = tuple(name for name, side in domain.signs.items() if side == 0)
         for t, y in probe.states(_ON_SURFACE):
             place = probe.inside(mode.name, t, y)
@@ -187,7 +187,7 @@ def check_sliding(report: ModelReport, probe: Probe) -> None:
 
 def _check_left(report: ModelReport, model: Model, mode: Mode) -> None:
     """Warn of a sliding mode that nothing ends: motion would stay in it for ever."""
-    own = {d.name for d in model.domains if d.mode == mode.name}
+    own = {d.name for d in model.domains if d.own_mode == mode.name}
     left = any(
         source in own and not own.issuperset(targets)
         for (source, _), targets in model.targets.items()
@@ -213,18 +213,18 @@ def check_symmetry(report: ModelReport, probe: Probe) -> None:
         return
     for domain in model.domains:
         for t, y in probe.states(_EVERYWHERE):
-            place = probe.inside(domain.mode, t, y)
+            place = probe.inside(domain.own_mode, t, y)
             if place is None:
                 continue
             moved, mirrored = place[0] + shift, matrix @ place[1]
             report.count(Topic.SYMMETRY)
-            mode = model.domain_by_name[images[domain.name]].mode
-            here = matrix @ probe.field(domain.mode, *place)
+            mode = model.domain_by_name[images[domain.name]].own_mode
+            here = matrix @ probe.field(domain.own_mode, *place)
             there = probe.field(mode, moved, mirrored)
             if not np.allclose(here, there, rtol=_SAME, atol=_SAME):
                 report.error(
                     Topic.SYMMETRY,
-                    f"the field of mode '{mode}' is no image of that of '{domain.mode}': at "
+                    f"the field of mode '{mode}' is no image of that of '{domain.own_mode}': at "
                     f"{_place(probe, *place)} the image of the rates is {here.tolist()}, the rates at "
                     f"the image are {there.tolist()}. Leave 'symmetry' out, or correct a field",
                 )

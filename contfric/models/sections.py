@@ -1,0 +1,209 @@
+"""Sections: surfaces that divide modes whose field is one and the same.
+
+A model whose cycles may be smooth declares the surface of its stops (``v = 0``) with a mode on each side.
+The field is the same on both: nothing happens there, and an orbit that comes to touch it does not change.
+Such modes are one mode to the engine, and the surface is transparent. It only serves to find and to fix
+cycles that meet no other surface (:mod:`contfric.orbit.sections`).
+"""
+
+from __future__ import annotations
+
+import ast
+import itertools
+import random
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from functools import lru_cache
+
+from contfric.errors import ModelError
+from contfric.models.definition import Domain, Surface
+from contfric.models.description import Description, ModeText
+from contfric.models.evaluate import Sampler, defaults, floats
+from contfric.models.grammar import parse
+from contfric.models.regions import domains_of, engine_order
+
+#: Functions with kinks: what they are on either side of a surface only formulas tell.
+_KINKED = frozenset({"abs", "sign", "where", "min", "max"})
+#: States at which two expressions must agree to be the same, and places on a surface at which a field that
+#: jumps there is seen to.
+_POINTS, _PLACES = 8, 40
+#: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
+_SAME = 1e-9
+#: Beside a surface: a smooth field changes by about as much over it, one that jumps by far more.
+_BESIDE, _JUMP = 1e-9, 1e-5
+
+
+def joined_modes(description: Description) -> Mapping[str, str]:
+    """Return, for each mode, the first mode that is one with it: itself, most often.
+
+    Two modes are one where their fields are the same formulas, no reset and no motion on a surface lies
+    between them, and the surfaces that end them are the same.
+    """
+    return _joined(_Key(description))
+
+
+class _Key:
+    """A description that is equal to others with the same text."""
+
+    def __init__(self, description: Description) -> None:
+        self.description = description
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Key) and self.description.text == other.description.text
+
+    def __hash__(self) -> int:
+        return hash(self.description.text)
+
+
+@lru_cache(maxsize=64)
+def _joined(key: _Key) -> dict[str, str]:
+    description = key.description
+    first = {mode.name: mode.name for mode in description.modes}
+    if len(first) < 2:
+        return first
+    domains = domains_of(description, engine_order(description))
+    moving = [mode for mode in description.modes if 0 not in mode.sides.values()]
+    going_on = True
+    while going_on:
+        going_on = False
+        for a, b in itertools.combinations(moving, 2):
+            if first[a.name] == first[b.name]:
+                continue
+            both = {name for name, lead in first.items() if lead in (first[a.name], first[b.name])}
+            between = _between(description, domains, both, a.name, b.name)
+            if between and _same_field(description, a, b, between):
+                lead = next(name for name in first if name in both)
+                first.update(dict.fromkeys(both, lead))
+                going_on = True
+    return first
+
+
+def _between(
+    description: Description, domains: tuple[Domain, ...], both: set[str], a: str, b: str
+) -> set[str]:
+    """Return the surfaces that divide two modes where all that is around them is one region; else none.
+
+    Every surface that ends the region has to have it on one side: that is what a mode is.
+    """
+    own = [d for d in domains if d.mode in both]
+    place = {tuple(d.signs.items()): d.mode for d in domains}
+    found: set[str] = set()
+    for domain, surface in itertools.product(own, domains[0].signs):
+        beyond = place.get(tuple({**domain.signs, surface: -domain.signs[surface]}.items()))
+        on = place.get(tuple({**domain.signs, surface: 0}.items()))
+        ends = surface in description.resets or on is not None
+        if (ends or beyond not in (None, *both)) and len({d.signs[surface] for d in own}) > 1:
+            return set()
+        if {domain.mode, beyond} == {a, b}:
+            found.add(surface)
+    return found
+
+
+def _same_field(description: Description, a: ModeText, b: ModeText, between: set[str]) -> bool:
+    """Tell whether two modes have one field, as it is on either side of what divides them."""
+    evaluator = floats(description)
+    for params in _parameters(description):
+        sampler = Sampler(evaluator, params)
+        for t, y in sampler.states(_POINTS):
+            for one, other in zip(a.field, b.field, strict=True):
+                here, there = (evaluator.value(text, params, t, y) for text in (one, other))
+                if abs(here - there) > _SAME * (1.0 + abs(here) + abs(there)):
+                    return False
+    texts = (*a.field, *b.field)
+    if a.field == b.field and not _has_kinks(description, texts):
+        return True
+    if any(_jumps(Sampler(evaluator, p), a, s) for p in _parameters(description) for s in between):
+        return False
+    return _same_formulas(description, a.name, b.name)
+
+
+def _parameters(description: Description) -> list[dict[str, float]]:
+    """Return the default parameters, and others: an equality at the defaults may be an accident."""
+    draw, params = random.Random(1), defaults(description)
+    moved = {name: value * (1.1 + 0.2 * draw.random()) for name, value in params.items()}
+    return [params, {name: value or 0.1 + 0.1 * draw.random() for name, value in moved.items()}]
+
+
+def _has_kinks(description: Description, texts: Iterable[str]) -> bool:
+    """Tell whether expressions use functions with kinks, in their named parts too."""
+    parts, waiting, seen = description.names.parts, list(texts), set()
+    while waiting:
+        for node in ast.walk(parse(waiting.pop())):
+            name = node.id if isinstance(node, ast.Name) else ""
+            if name in _KINKED:
+                return True
+            if name in parts and name not in seen:
+                seen.add(name)
+                waiting.append(parts[name])
+    return False
+
+
+def _jumps(sampler: Sampler, mode: ModeText, surface: str) -> bool:
+    """Tell whether the field of a mode is seen to jump where its formulas cross a surface."""
+    evaluator, params = sampler.evaluator, sampler.params
+    for t, y in sampler.states(_PLACES):
+        place = sampler.landed(surface, t, y)
+        if place is None:
+            continue
+        slope = sampler.gradient(surface, *place)
+        size = max(map(abs, slope)) or 1.0
+        sides = [
+            [
+                c + side * _BESIDE * g / size
+                for c, g in zip((place[0], *place[1]), slope, strict=True)
+            ]
+            for side in (1.0, -1.0)
+        ]
+        up, down = (evaluator.field(mode.name, params, at[0], at[1:]) for at in sides)
+        if any(abs(u - d) > _JUMP * (1.0 + abs(u)) for u, d in zip(up, down, strict=True)):
+            return True
+    return False
+
+
+def _same_formulas(description: Description, a: str, b: str) -> bool:
+    """Tell whether the fields of two modes are the same formulas, resolved on their sides."""
+    import sympy
+
+    from contfric.models.generate import Formulas
+
+    try:
+        formulas = Formulas(description)
+        fields, pieces = formulas.fields(), len(formulas.pieces)
+    except ModelError:
+        return False  # whoever builds the model says what is wrong, and where
+    names = [mode.name for mode in description.modes]
+    one, other = (fields[names.index(name) * pieces :][:pieces] for name in (a, b))
+    return all(
+        x == y or sympy.expand(x - y) == 0
+        for here, there in zip(one, other, strict=True)
+        for x, y in zip(here, there, strict=True)
+    )
+
+
+def join_domains(domains: tuple[Domain, ...], first: Mapping[str, str]) -> tuple[Domain, ...]:
+    """Return the domains with the modes that are one; what was declared stays known."""
+    joined = {lead for name, lead in first.items() if name != lead}
+    return tuple(
+        replace(d, mode=first[d.mode], declared=d.mode) if first[d.mode] in joined else d
+        for d in domains
+    )
+
+
+def clear_surfaces(surfaces: list[Surface], domains: tuple[Domain, ...]) -> list[Surface]:
+    """Return the surfaces; where all that meets one goes on in its own mode, it is not switching any more."""
+    place = {tuple(d.signs.items()): d for d in domains}
+    found = []
+    for surface in surfaces:
+        pairs = [(d, place.get(_beyond(d, surface.name))) for d in domains]
+        crossed = any(
+            e is not None and d.declared != e.declared and d.mode == e.mode for d, e in pairs
+        )
+        divides = any(e is not None and d.mode != e.mode for d, e in pairs)
+        rested = any(d.signs[surface.name] == 0 for d in domains)
+        clear = crossed and not divides and not rested
+        found.append(replace(surface, switching=False) if clear else surface)
+    return found
+
+
+def _beyond(domain: Domain, surface: str) -> tuple[tuple[str, int], ...]:
+    return tuple({**domain.signs, surface: -domain.signs[surface]}.items())

@@ -1,0 +1,269 @@
+"""Orbits without joints where nothing happens.
+
+A simulation stops at every section (a surface between two parts of one mode). An orbit that meets other
+surfaces has its joints there, and passes sections inside of its segments. An orbit that meets none is found
+and fixed by sections: by one crossing each way, that at which the surface is crossed fastest. Whether it
+crosses them more often is a label. (Without excitation it keeps as many as it has large loops.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.clock import clocked
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Word, build_system
+
+#: A crossing this slow beside the fastest one is that of a small loop.
+_SMALL = 0.2
+#: States that repeat themselves to this (relative to 1 + their size) are the same.
+_SAME = 1e-8
+#: Most crossings of one segment that are looked for, and how near to its end one is the end itself.
+_MOST, _AT_JOINT = 1000, 1e-8
+
+
+def has_sections(model: Model, word: Word) -> bool:
+    """Tell whether a word has joints on sections beside others."""
+    return bool(model.sections) and any(pair in model.sections for pair in word)
+
+
+def is_smooth(model: Model, word: Word) -> bool:
+    """Tell whether a cycle meets nothing but sections."""
+    return bool(model.sections) and all(pair in model.sections for pair in word)
+
+
+def without_sections(
+    model: Model, word: Word, joints: FloatArray, end: float, vector: FloatArray, periods: int
+) -> tuple[Word, FloatArray, float]:
+    """Return a whole cycle without its joints on sections: word, joints and the time at which it ends.
+
+    Parameters
+    ----------
+    word, joints : all segments of a cycle and the time and state where each begins, behind no reset
+    end : time at which the cycle ends
+    vector : parameters, which tell how fast a section is crossed
+    periods : of the excitation; without one, how many crossings each way are kept
+    """
+    if not model.joined:
+        return word, joints, end
+    kept = [i for i, pair in enumerate(word) if pair not in model.sections]
+    if not kept:
+        kept = _fastest(model, word, joints, end, vector, periods)
+    first = kept[-1] + 1 - len(word)  # the first segment may begin in the cycle before
+    starts = [first, *(i + 1 for i in kept[:-1])]
+    found = joints[[i % len(word) for i in starts]].copy()
+    period = end - joints[0, 0]
+    if first < 0:
+        found[0, 0] -= period
+    pairs = tuple(
+        model.section_pair(*word[i])
+        if word[i] in model.sections
+        else (model.whole_mode(word[i][0]), word[i][1])
+        for i in kept
+    )
+    return pairs, found, float(found[0, 0]) + period
+
+
+def loops(model: Model, word: Word, joints: FloatArray, end: float, vector: FloatArray) -> int:
+    """Return how often a smooth cycle crosses its section each way; small loops are left out."""
+    crossings = _Crossings(model, word, joints, end, vector)
+    rates = [crossings.rates[i] for i in crossings.down]
+    return max(1, sum(rate > _SMALL * max(rates) for rate in rates))
+
+
+def canonical(orbit: Orbit) -> Orbit:
+    """Return the same orbit without joints on sections that it can do without; most often as it is.
+
+    Orbits of earlier versions have them.
+    """
+    model, word = orbit.model, orbit.system.word
+    if not has_sections(model, word) or orbit.system.domains or is_smooth(model, word):
+        return orbit
+    if orbit.system.half:
+        return canonical(orbit.as_whole())
+    start = float(orbit.joints[0, 0])
+    found, joints, end = without_sections(
+        model, word, orbit.joints, start + orbit.period, orbit.vector, orbit.periods
+    )
+    if found == word:
+        return orbit
+    system = build_system(model, found, orbit.periods)
+    return replace(orbit, system=system, joints=clocked(model, joints, end))
+
+
+def moved(orbit: Orbit) -> Orbit | None:
+    """Return a smooth orbit with the joints where it crosses its section fastest; None if it has too few.
+
+    For an orbit of which a joint is about to vanish, where the orbit only touches the section.
+    """
+    model, whole = orbit.model, orbit.as_whole()
+    if not is_smooth(model, whole.word):
+        return None
+    pairs = len(whole.word) // 2
+    other = _with_pairs(whole, pairs) if len(whole.word) == 2 * pairs else None
+    if other is None or not orbit.system.half:
+        return other
+    n, found = len(orbit.system.word), other.joints
+    return replace(orbit, joints=clocked(model, found[:n], float(found[n, 0])))
+
+
+def in_halves(orbit: Orbit) -> Orbit:
+    """Return a smooth orbit of an even number of periods with joints in both halves, if it has them."""
+    pairs, odd = divmod(len(orbit.system.word), 2)
+    smooth = is_smooth(orbit.model, orbit.system.word) and not orbit.system.half
+    if not smooth or orbit.model.autonomous or odd or pairs % 2 == 0 or orbit.periods % 2:
+        return orbit
+    return _with_pairs(orbit, 2 * pairs) or orbit
+
+
+def _with_pairs(whole: Orbit, pairs: int) -> Orbit | None:
+    """Return a smooth orbit with some number of joints each way, in the rotation that it has."""
+    model, period = whole.model, whole.period
+    word, joints = _every_crossing(whole)
+    crossings = _Crossings(model, word, joints, float(joints[0, 0]) + period, whole.vector)
+    kept = crossings.chosen(pairs) if len(crossings.down) >= pairs else []
+    if len(kept) != 2 * pairs:
+        return None
+    starts = [(i + 1) % len(word) for i in kept]
+    ends = [model.section_pair(*word[i]) for i in kept]
+    own = (*ends[1:], ends[0])  # the segment that begins at a joint ends at the next
+    turn = own.index(whole.word[0])
+    found = joints[starts][np.arange(turn, turn + len(own)) % len(own)].copy()
+    for k in range(1, len(found)):
+        while found[k, 0] <= found[k - 1, 0]:
+            found[k, 0] += period
+    found = clocked(model, found, float(found[0, 0]) + period)
+    system = build_system(model, own[turn:] + own[:turn], whole.periods)
+    return replace(whole, system=system, joints=found)
+
+
+def shortened(whole: Orbit, turns: int) -> Orbit | None:
+    """Return the part that a smooth orbit repeats, as an orbit; None if it does not run through one."""
+    model = whole.model
+    if model.autonomous or not is_smooth(model, whole.word):
+        return None
+    step = whole.period / turns
+    for joint in whole.cycle:
+        gap = np.abs(whole.state(float(joint[0]) + step) - joint[1:])
+        if np.max(gap) > _SAME * (1.0 + np.max(np.abs(whole.joints))):
+            return None
+    word, joints = _every_crossing(whole)
+    n, rest = divmod(len(word), turns)
+    if rest:
+        return None
+    periods, end = whole.periods // turns, float(joints[n, 0])
+    found, starts, _ = without_sections(model, word[:n], joints[:n], end, whole.vector, periods)
+    return replace(whole, system=build_system(model, found, periods), joints=starts)
+
+
+def _every_crossing(whole: Orbit) -> tuple[Word, FloatArray]:
+    """Return all crossings of its section as the word and the joints of a smooth orbit, in order."""
+    model, flow = whole.model, whole.model.flow
+    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
+    surface = whole.word[0][1]
+    k = [s.name for s in model.surfaces].index(surface)
+    c = [o.name for o in model.observables].index(model.surfaces[k].observable)
+    level = flow.level(k, whole.vector, none, empty)
+    mode = [m.name for m in model.modes].index(whole.word[0][0])
+    pairs = {side: pair for pair, side in model.section_sides.items() if pair[1] == surface}
+    found: list[FloatArray] = []
+    for joint, end in zip(whole.cycle, whole.ends, strict=True):
+        found.append(joint)
+        for _ in range(_MOST):
+            time, state, out = float(found[-1][0]), found[-1][1:].copy(), np.empty(len(joint) - 1)
+            left = float(end[0]) - time
+            tau = flow.hit(mode, c, level, True, time, state, left, whole.vector, out)
+            if tau < 0.0 or left - tau < _AT_JOINT:
+                break
+            found.append(np.array([time + tau, *out]))
+    joints = np.array(found)
+    rates = [
+        float(flow.rate(mode, c, float(z[0]), z[1:].copy(), whole.vector, none, empty))
+        for z in joints
+    ]
+    # the segment that begins at a joint ends at the next one, on the side that this one leads to
+    word = tuple(pairs[1 if rate > 0.0 else -1] for rate in rates)
+    return word, joints
+
+
+class _Crossings:
+    """The crossings of the first section that a smooth cycle has, each as the segment that ends there."""
+
+    def __init__(
+        self, model: Model, word: Word, joints: FloatArray, end: float, vector: FloatArray
+    ) -> None:
+        self.model = model
+        surface = next(s for s in model.surface_by_name if any(pair[1] == s for pair in word))
+        self.at = [i for i, pair in enumerate(word) if pair[1] == surface]
+        self.ends = np.roll(joints, -1, axis=0)
+        self.ends[-1, 0] = end
+        self.period = end - float(joints[0, 0])
+        self.rates = {i: _rate(model, word[i], self.ends[i], vector) for i in self.at}
+        self.down = [i for i in self.at if model.section_sides[word[i]] > 0]
+
+    def chosen(self, pairs: int) -> list[int]:
+        """Return crossings in both directions by turns, as many each way as there are to be."""
+        chosen = sorted(self.later(pairs) or sorted(self.down, key=self.rates.__getitem__)[-pairs:])
+        found = []
+        for i, following in zip(chosen, [*chosen[1:], chosen[0]], strict=True):
+            ups = [j for j in self._behind(i, following) if j not in self.down]
+            if not ups:
+                return sorted(chosen)  # of a surface that is crossed one way only
+            image = self._image_of(i, ups)
+            found += [i, max(ups, key=self.rates.__getitem__) if image is None else image]
+        return sorted(found)
+
+    def _behind(self, i: int, following: int) -> list[int]:
+        """Return the crossings between two of them; all others if they are one."""
+        own = [j for j in self.at if j not in (i, following)]
+        if i < following:
+            return [j for j in own if i < j < following]
+        return [j for j in own if j > i or j < following]
+
+    def _image_of(self, i: int, others: list[int]) -> int | None:
+        """Return the crossing that is nearest to the symmetry image of another one."""
+        if self.model.symmetry is None:
+            return None
+        image = self.model.symmetry.array() @ self.ends[i, 1:]
+
+        def apart(j: int) -> float:
+            late = self._apart(self.ends[j, 0] - self.ends[i, 0] - 0.5 * self.period)
+            return max(late, float(np.max(np.abs(self.ends[j, 1:] - image))))
+
+        return min(others, key=apart)
+
+    def later(self, periods: int) -> list[int]:
+        """Return crossings that are nearest to one another, a period of the excitation apart; or none."""
+        first, found = max(self.down, key=self.rates.__getitem__), []
+        step = self.period / periods
+        for k in range(periods):
+
+            def apart(i: int, time: float = self.ends[first, 0] + k * step) -> float:
+                gap = float(np.max(np.abs(self.ends[i, 1:] - self.ends[first, 1:])))
+                return max(self._apart(self.ends[i, 0] - time), gap)
+
+            found.append(min(self.down, key=apart))
+        return found if len(set(found)) == periods else []
+
+    def _apart(self, time: float) -> float:
+        return float(abs((time + 0.5 * self.period) % self.period - 0.5 * self.period))
+
+
+def _fastest(
+    model: Model, word: Word, joints: FloatArray, end: float, vector: FloatArray, periods: int
+) -> list[int]:
+    """Return the segments at whose ends a smooth cycle keeps a joint."""
+    crossings = _Crossings(model, word, joints, end, vector)
+    if not crossings.down:
+        return crossings.at[:1]
+    return crossings.chosen(min(periods, len(crossings.down)) if model.autonomous else 1)
+
+
+def _rate(model: Model, pair: tuple[str, str], at: FloatArray, vector: FloatArray) -> float:
+    c = [o.name for o in model.observables].index(model.surface_by_name[pair[1]].observable)
+    mode = [m.name for m in model.modes].index(pair[0])
+    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
+    return abs(float(model.flow.rate(mode, c, float(at[0]), at[1:].copy(), vector, none, empty)))
