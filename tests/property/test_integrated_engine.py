@@ -29,7 +29,11 @@ def facts(branch: cf.Branch) -> tuple[object, ...]:
     """What is the same whatever the order of the branches and the direction they are run in."""
     # in the middle: at an event itself rounding decides on which side of a surface a joint is
     middle = branch[len(branch) // 2]
-    return len(middle.word), sorted(map(str, middle.word)), sorted(e.reason.name for e in branch.ends)
+    return (
+        len(middle.word),
+        sorted(map(str, middle.word)),
+        sorted(e.reason.name for e in branch.ends),
+    )
 
 
 def test_orbit(orbits):
