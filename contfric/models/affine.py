@@ -114,12 +114,12 @@ def _merged(waves: list[Wave]) -> list[Wave]:
 def _collected(waves: list[Wave], t: Any) -> tuple[Wave, ...]:
     """Return the harmonics by their frequencies: phases go to the factors."""
     sums: dict[Any, tuple[Any, Any]] = {}
-    for argument, a, b in waves:
-        w, phase = argument.diff(t), argument.xreplace({t: sympy.Integer(0)})
+    for argument, a, sine in waves:
+        w, phase, b = argument.diff(t), argument.xreplace({t: sympy.Integer(0)}), sine
         if w.could_extract_minus_sign():  # cos(-x) = cos(x), sin(-x) = -sin(x)
-            w, phase, b = -w, -phase, -b
+            w, phase, b = -w, -phase, -sine
         c, s = sympy.cos(phase), sympy.sin(phase)
         before = sums.get(w, (sympy.Integer(0), sympy.Integer(0)))
-        sine = sympy.Integer(0) if w == 0 else b * c - a * s
-        sums[w] = before[0] + a * c + b * s, before[1] + sine
+        other = sympy.Integer(0) if w == 0 else b * c - a * s
+        sums[w] = before[0] + a * c + b * s, before[1] + other
     return tuple((w, a, b) for w, (a, b) in sums.items() if (a, b) != (0, 0))

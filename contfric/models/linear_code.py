@@ -16,6 +16,10 @@ import sympy
 from contfric.models.affine import AffineForm
 from contfric.models.code import VALUES, Lines, Output, write_block
 
+#: Coefficients that are taken out of their array before a loop: more would not stay in registers.
+_FEW = 24
+#: One over each whole number: a division in each term would cost as much as the rest of it.
+_TABLE = ("from contfric.flow.linear.system import INVERSE", "")
 #: From a harmonic's frequency to its place among those of the model; place 0 is the constant.
 Places = dict[Any, int]
 
@@ -93,10 +97,15 @@ class LinearWriter:
             values = [layout.values if layout else () for layout in layouts]
             self._values(f"entries{ending}({index}, p, which, out, jac)", index, values)
             self._blocks(f"audible{ending}({index}, co, on)", index, layouts, _audible)
-        self._blocks("product(piece, co, y, out)", "piece", pieces, _product(self.states))
-        self._blocks("load(piece, co, c, s, out)", "piece", pieces, _load)
+        self.code.add("", *_TABLE)
+        n = self.states
+        self._blocks("rates(piece, co, y, c, s, out)", "piece", pieces, _rates(n))
+        self._blocks("expand(piece, co, y, c, s, w, h, terms, series)", "piece", pieces, _expand(n))
+        self._blocks(
+            "vary(piece, co, by, z, waves, w, dw, h, terms, series, out)", "piece", pieces, _vary(n)
+        )
         self._blocks("sums(piece, co, d, row, column, own)", "piece", pieces, _sums)
-        self._blocks("seen(c, co, y, cs, sn)", "c", sights, _seen)
+        self._blocks("look(c, co, cs, sn, w, h, terms, series, poly)", "c", sights, _look)
         counts = [len(layout.values) for layout in (*pieces, *sights) if layout]
         self.code.add("", f"ENTRIES, WAVES = {max(counts, default=0)}, {len(waves)}")
 
@@ -126,8 +135,7 @@ class LinearWriter:
         def write(key: Any) -> None:
             found = lines(*key)
             self.code.add(*found)
-            if not found or not found[-1].startswith("return"):
-                self.code.add("return")
+            self.code.add("return")
 
         self._branches(index, keys, write)
 
@@ -145,19 +153,102 @@ class LinearWriter:
         self.code.close()
 
 
-def _product(count: int) -> Callable[..., list[str]]:
+def _sum(terms: Sequence[str]) -> str:
+    return " + ".join(terms) or "0.0"
+
+
+def _row(i: int, slopes: Any, waves: Any, co: str, y: str, c: str, s: str) -> list[str]:
+    """Return the terms of one row of ``A y + b``; the names have places for a number each."""
+    found = [f"{co.format(k)} * {y.format(j)}" for row, j, k in slopes if row == i]
+    for row, j, k in waves:
+        if row == i:
+            found.append(f"{co.format(k)} * {c.format(j)}")
+            if j > 0:
+                found.append(f"{co.format(k + 1)} * {s.format(j)}")
+    return found
+
+
+def _rates(count: int) -> Callable[..., list[str]]:
     def lines(slopes: Any, waves: Any) -> list[str]:
-        found = []
-        for i in range(count):
-            terms = [f"co[{k}] * y[{j}]" for row, j, k in slopes if row == i]
-            found.append(f"out[{i}] = {' + '.join(terms) or '0.0'}")
-        return found
+        names = ("co[{}]", "y[{}]", "c[{}]", "s[{}]")
+        return [f"out[{i}] = {_sum(_row(i, slopes, waves, *names))}" for i in range(count)]
 
     return lines
 
 
-def _load(slopes: Any, waves: Any) -> list[str]:
-    return [f"out[{i}] += co[{k}] * c[{j}] + co[{k + 1}] * s[{j}]" for i, j, k in waves]
+def _coefficients(slopes: Any, waves: Any, array: str, name: str) -> tuple[list[str], str]:
+    """Return lines that take few coefficients out of their array, and how they are called then."""
+    places = [k for *_, k in slopes] + [at for _, j, k in waves for at in (k, k + 1)[: 1 + (j > 0)]]
+    if len(places) > _FEW:
+        return [], array + "[{}]"
+    return [f"{name}{k} = {array}[{k}]" for k in places], name + "{}"
+
+
+def _turn(used: Sequence[int]) -> list[str]:
+    """Return lines that replace the terms of cosines and sines by the next ones."""
+    found = []
+    for j in used:
+        if j == 0:  # a constant has no other terms
+            found.append("c0 = 0.0")
+        else:
+            found += [f"g = f * w{j}", f"c{j}, s{j} = -g * s{j}, g * c{j}"]
+    return found
+
+
+def _waves_of(waves: Any, c: str, s: str) -> tuple[list[int], list[str]]:
+    """Return the harmonics in use, and lines that take them out of their arrays."""
+    used = sorted({j for _, j, _ in waves})
+    found = [f"c{j} = {c}[{j}]" for j in used]
+    for j in used[used[:1] == [0] :]:
+        found += [f"s{j} = {s}[{j}]", f"w{j} = w[{j}]"]
+    return used, found
+
+
+def _expand(count: int) -> Callable[..., list[str]]:
+    def lines(slopes: Any, waves: Any) -> list[str]:
+        used, found = _waves_of(waves, "c", "s")
+        few, co = _coefficients(slopes, waves, "co", "a")
+        names = (co, "y{}", "c{}", "s{}")
+        found += few + [f"y{i} = y[{i}]" for i in range(count)]
+        found += [f"series[0, {i}] = y{i}" for i in range(count)]
+        found += ["for k in range(terms):", "    f = h * INVERSE[k + 1]"]
+        body = [f"z{i} = f * ({_sum(_row(i, slopes, waves, *names))})" for i in range(count)]
+        body += [f"y{i} = z{i}" for i in range(count)]
+        body += [f"series[k + 1, {i}] = y{i}" for i in range(count)]
+        return found + [f"    {line}" for line in body + _turn(used)]
+
+    return lines
+
+
+def _vary(count: int) -> Callable[..., list[str]]:
+    def lines(slopes: Any, waves: Any) -> list[str]:
+        used, found = _waves_of(waves, "waves[0]", "waves[1]")
+        harmonics = used[used[:1] == [0] :]
+        for j in harmonics:  # derivatives by the parameter: those by the frequency times its own
+            found += [f"u{j} = waves[2, {j}]", f"v{j} = waves[3, {j}]", f"d{j} = dw[{j}]"]
+        few, co = _coefficients(slopes, waves, "co", "a")
+        own, by = _coefficients(slopes, waves, "by", "b")
+        found += few + own + [f"z{i} = z[{i}]" for i in range(count)]
+        found += [f"out[0, {i}] = z{i}" for i in range(count)]
+        found += ["for k in range(terms):", "    f = h * INVERSE[k + 1]"]
+        moved = [(i, j, k) for i, j, k in waves if j > 0]
+        body = []
+        for i in range(count):
+            terms = _row(i, slopes, (), co, "z{}", "", "")
+            terms += _row(i, slopes, waves, by, "series[k, {}]", "c{}", "s{}")
+            terms += [
+                f"d{j} * ({co.format(k)} * u{j} + {co.format(k + 1)} * v{j})"
+                for row, j, k in moved
+                if row == i
+            ]
+            body.append(f"x{i} = f * ({_sum(terms)})")
+        body += [f"z{i} = x{i}" for i in range(count)]
+        body += [f"out[k + 1, {i}] = z{i}" for i in range(count)]
+        for j in harmonics:
+            body.append(f"u{j}, v{j} = -f * (s{j} + w{j} * v{j}), f * (c{j} + w{j} * u{j})")
+        return found + [f"    {line}" for line in body + _turn(used)]
+
+    return lines
 
 
 def _audible(slopes: Any, waves: Any) -> list[str]:
@@ -180,7 +271,12 @@ def _sums(slopes: Any, waves: Any) -> list[str]:
     return found
 
 
-def _seen(slopes: Any, waves: Any) -> list[str]:
-    terms = [f"co[{k}] * y[{j}]" for _, j, k in slopes]
-    terms += [f"co[{k}] * cs[{j}] + co[{k + 1}] * sn[{j}]" for _, j, k in waves]
-    return [f"return {' + '.join(terms) or '0.0'}"]
+def _look(slopes: Any, waves: Any) -> list[str]:
+    used, found = _waves_of(waves, "cs", "sn")
+    few, co = _coefficients(slopes, waves, "co", "a")
+    terms = _row(0, slopes, waves, co, "series[k, {}]", "c{}", "s{}")
+    found += [*few, "for k in range(terms + 1):", f"    poly[k] = {_sum(terms)}"]
+    turn = _turn(used)
+    if turn:
+        found.append("    f = h * INVERSE[k + 1]")
+    return found + [f"    {line}" for line in turn]

@@ -6,9 +6,9 @@ The series of ``y' = A y + b(t)`` needs products with A only, whose entries that
 
 and the terms of cosines and sines follow in the same way. Nothing happens at a resonance, at a defective
 or a singular matrix. Within two units of ``rate * h`` 25 terms leave less than rounding, and rounding is not
-amplified; a long duration is cut into such steps. The derivatives are columns of the same kind::
+amplified; a long duration is cut into steps of that kind, all of the same length. The derivatives are::
 
-    by t0:  z' = A z + b'(t),      by y0:  z' = A z,      by p:  z' = A z + A_p y + b_p(t).
+    by y0: E = exp(A d),  by p: z' = A z + A_p y + b_p(t),  by t0: y'(t0 + d) - E y'(t0),  by d: y'(t0 + d).
 """
 
 from __future__ import annotations
@@ -20,84 +20,112 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.folding import folded
 from contfric.flow.linear.system import (
-    make_system,
-    next_waves,
+    REACH,
     set_up,
     silenced,
+    size_of_system,
     start_waves,
+    sum_of,
+    system_in,
     terms_for,
 )
 
-#: Longest step, in units of 1 / rate: a longer one amplifies rounding, a shorter one costs more.
-REACH = 2.0
 #: Most steps of a segment, a second of computation: it takes one to a hundred. Iterates of Newton's method
 #: on their way to nowhere ask for any number.
 MOST_STEPS = 2_000_000
 
 
 @helper
-def next_terms(motion, piece, which, factor, columns, system):  # type: ignore[no-untyped-def]
-    """Replace the Taylor terms of all columns by the next ones, and add them up."""
-    term, now, waves, out = system.term, system.now, system.waves, system.work[4]
-    n, free = out.shape[0], which.shape[0]
-    cosine, sine = waves[0], waves[1]
-    for column in range(columns - 1, -1, -1):
-        motion.product(piece, system.co, term[column], out)
-        if column == 0:
-            motion.load(piece, system.co, cosine, sine, out)
-        elif column == 1:
-            a, b = waves[4], waves[5]
-            for j in range(a.shape[0]):
-                a[j], b[j] = -system.w[j] * sine[j], system.w[j] * cosine[j]
-            motion.load(piece, system.co, a, b, out)
-        elif column >= 2 + n:
-            k, extra, a, b = column - 2 - n, system.work[3], waves[4], waves[5]
-            motion.product(piece, system.slopes[k], term[0], extra)
-            motion.load(piece, system.slopes[k], cosine, sine, extra)
-            for j in range(a.shape[0]):
-                a[j], b[j] = system.dw[k, j] * waves[2, j], system.dw[k, j] * waves[3, j]
-            motion.load(piece, system.co, a, b, extra)
-            for i in range(n):
-                out[i] += extra[i]
+def write_exponential(motion, piece, h, terms, system, out):  # type: ignore[no-untyped-def]
+    """Write exp(A h), one column after the other, as rows of ``out``."""
+    silence, unit = system.waves[4], system.work[0]
+    for j in range(unit.shape[0]):
+        for i in range(unit.shape[0]):
+            unit[i] = 1.0 if i == j else 0.0
+        motion.expand(piece, system.co, unit, silence, silence, silence, h, terms, system.other)
+        sum_of(system.other, terms, out[j])
+
+
+@helper
+def carried(step, columns, work):  # type: ignore[no-untyped-def]
+    """Multiply the columns (rows of an array) by a matrix whose columns are rows of ``step``."""
+    n = work.shape[0]
+    for row in range(columns.shape[0]):
         for i in range(n):
-            term[column, i] = factor * out[i]
-            now[column, i] += term[column, i]
-    next_waves(system, factor, columns > 1 and free > 0)
+            total = 0.0
+            for j in range(n):
+                total += step[j, i] * columns[row, j]
+            work[i] = total
+        for i in range(n):
+            columns[row, i] = work[i]
 
 
 @helper
-def step(motion, piece, t, h, terms, which, columns, system):  # type: ignore[no-untyped-def]
-    """Advance all columns by h from time t."""
-    start_waves(system, t)
-    for column in range(columns):
-        for i in range(system.now.shape[1]):
-            system.term[column, i] = system.now[column, i]
-    for k in range(1, terms + 1):
-        next_terms(motion, piece, which, h / k, columns, system)
+def advance(motion, piece, t0, dt, rate, spread, y, varied, maps, system):  # type: ignore[no-untyped-def]
+    """Advance a state and its derivatives by the parameters by a duration of either sign.
 
-
-@helper
-def rates_at(motion, piece, t, y, system, out):  # type: ignore[no-untyped-def]
-    """Write the field at a state."""
-    start_waves(system, t)
-    motion.product(piece, system.co, y, out)
-    motion.load(piece, system.co, system.waves[0], system.waves[1], out)
-
-
-@helper
-def advance(motion, piece, t0, dt, p, which, columns, system):  # type: ignore[no-untyped-def]
-    """Advance the columns by a duration of either sign; tell whether that is possible."""
-    rate, spread = set_up(motion, piece, p, which, columns, system)
-    rate = silenced(rate, system)
-    reach = rate * abs(dt)
-    if not reach < REACH * MOST_STEPS:
-        return False
-    steps = max(1, math.ceil(reach / REACH))
+    Parameters
+    ----------
+    y, varied : the state, (n,), and the derivatives, (parameters, n)
+    maps : exp(A dt) and room for that of a step, transposed, (2, n, n); (0, n, n) where it is not wanted
+    """
+    steps = max(1, math.ceil(rate * abs(dt) / REACH))
     h = dt / steps
     terms = terms_for(rate * abs(h), spread)
+    if maps.shape[0] > 0:
+        write_exponential(motion, piece, h, terms, system, maps[1])
     for k in range(steps):
-        step(motion, piece, t0 + k * h, h, terms, which, columns, system)
-    return True
+        start_waves(system, t0 + k * h)
+        waves = system.waves
+        motion.expand(piece, system.co, y, waves[0], waves[1], system.w, h, terms, system.series)
+        for j in range(varied.shape[0]):
+            motion.vary(
+                piece, system.co, system.slopes[j], varied[j], waves, system.w, system.dw[j], h,
+                terms, system.series, system.other,
+            )  # fmt: skip
+            sum_of(system.other, terms, varied[j])
+        sum_of(system.series, terms, y)
+        if maps.shape[0] > 0:
+            if k == 0:
+                for i in range(y.shape[0]):
+                    for j in range(y.shape[0]):
+                        maps[0, i, j] = maps[1, i, j]
+            else:
+                carried(maps[1], maps[0], system.work[0])
+
+
+@helper
+def flow_in(motion, piece, t, y0, dt, p, which, y1, jac, flat):  # type: ignore[no-untyped-def]
+    """Advance a state from a folded time, in room that is given."""
+    n, full = y0.shape[0], jac.shape[0] > 0
+    free = which.shape[0]
+    system = system_in(flat, n, motion, free)
+    rest = flat[flat.shape[0] - n * (free + (2 * n if full else 0)) :]
+    varied, maps = rest[: free * n].reshape((free, n)), rest[free * n :].reshape((-1, n, n))
+    rate, spread = set_up(motion, piece, p, which, system)
+    rate = silenced(rate, system)
+    fine = rate * abs(dt) < REACH * MOST_STEPS  # not so where it is no number
+    for i in range(n):
+        y1[i] = y0[i] if fine else math.nan
+        for k in range(free):
+            varied[k, i] = 0.0
+    if fine:
+        advance(motion, piece, t, dt, rate, spread, y1, varied, maps, system)
+    if not full:
+        return
+    before, after = system.work[0], system.work[1]
+    start_waves(system, t)
+    motion.rates(piece, system.co, y0, system.waves[0], system.waves[1], before)
+    start_waves(system, t + dt)
+    motion.rates(piece, system.co, y1, system.waves[0], system.waves[1], after)
+    for i in range(n):
+        by_start = after[i]
+        for j in range(n):
+            jac[i, 1 + j] = maps[0, j, i]
+            by_start -= maps[0, j, i] * before[j]
+        jac[i, 0], jac[i, 1 + n] = by_start, after[i]
+        for k in range(free):
+            jac[i, 2 + n + k] = varied[k, i]
 
 
 @allocating_helper
@@ -108,29 +136,14 @@ def linear_flow(motion, piece, t0, y0, dt, p, which, y1, jac):  # type: ignore[n
     """
     n, full = y0.shape[0], jac.shape[0] > 0
     free = which.shape[0] if full else 0
-    columns = 2 + n + free if full else 1
-    system = make_system(n, motion.entries_count, motion.waves_count, columns, free, 0)
-    grad = np.empty(free)
     wanted = which[:free]
+    size = size_of_system(n, motion, free) + free
+    flat = np.empty(size + n * (free + (2 * n if full else 0)))
+    grad = flat[size - free : size]
     period = motion.period(p, wanted, grad)
     cycles = folded(t0, period)
-    t = t0 - cycles * period
-    now = system.now
-    for i in range(n):
-        now[0, i] = y0[i]
-        if full:
-            now[2 + i, i] = 1.0
-    fine = advance(motion, piece, t, dt, p, wanted, columns, system)
-    for i in range(n):
-        y1[i] = now[0, i] if fine else math.nan
-    if not full:
-        return
-    slope = system.work[0]
-    rates_at(motion, piece, t + dt, y1, system, slope)
-    for i in range(n):
-        jac[i, 0] = now[1, i] if fine else math.nan
-        jac[i, 1 + n] = slope[i]
-        for j in range(n):
-            jac[i, 1 + j] = now[2 + j, i]
-        for k in range(free):
-            jac[i, 2 + n + k] = now[2 + n + k, i] - cycles * grad[k] * now[1, i]
+    flow_in(motion, piece, t0 - cycles * period, y0, dt, p, wanted, y1, jac, flat)
+    if cycles != 0.0:
+        for i in range(jac.shape[0]):
+            for k in range(free):
+                jac[i, 2 + n + k] -= cycles * grad[k] * jac[i, 0]

@@ -14,14 +14,15 @@ import numpy as np
 
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.folding import folded
-from contfric.flow.linear.flow import MOST_STEPS, REACH
+from contfric.flow.linear.flow import MOST_STEPS
 from contfric.flow.linear.system import (
+    REACH,
     TERMS,
-    make_system,
-    next_waves,
     set_up,
     silenced,
+    size_of_system,
     start_waves,
+    system_in,
     terms_for,
 )
 from contfric.flow.pieces import FREE, ISOLATED, coefficients, root_of, scan
@@ -44,21 +45,10 @@ _AT_JOINT = 4e-10
 @helper
 def write_series(motion, piece, sight, c, target, t, y, h, terms, system, poly):  # type: ignore[no-untyped-def]
     """Write the Taylor terms of the state along a step, and of an observable less a target."""
-    series, waves = system.series, system.waves
-    n = y.shape[0]
+    series, waves, w = system.series, system.waves, system.w
     start_waves(system, t)
-    for i in range(n):
-        series[0, i] = y[i]
-    for k in range(terms + 1):
-        poly[k] = motion.seen(c, sight, series[k], waves[0], waves[1])
-        if k == terms:
-            break
-        following, factor = series[k + 1], h / (k + 1)
-        motion.product(piece, system.co, series[k], following)
-        motion.load(piece, system.co, waves[0], waves[1], following)
-        for i in range(n):
-            following[i] *= factor
-        next_waves(system, factor, False)
+    motion.expand(piece, system.co, y, waves[0], waves[1], w, h, terms, series)
+    motion.look(c, sight, waves[0], waves[1], w, h, terms, series, poly)
     poly[0] -= target
 
 
@@ -181,14 +171,14 @@ def state_at(series, terms, s, out):  # type: ignore[no-untyped-def]
 @helper
 def begin_search(motion, piece, c, t0, y0, dt, p, none, system, sight):  # type: ignore[no-untyped-def]
     """Evaluate the system and the observable; return the rate (no number: no motion) and the spread."""
-    rate, spread = set_up(motion, piece, p, none, 1, system)
+    rate, spread = set_up(motion, piece, p, none, system)
     motion.entries_seen(c, p, none, sight, system.slopes)
-    motion.audible_seen(c, sight, system.waves[6])
+    motion.audible_seen(c, sight, system.waves[5])
     rate = silenced(rate, system)
     size = t0 + dt
     for i in range(y0.shape[0]):
         size += y0[i]
-        system.now[0, i] = y0[i]
+        system.work[4, i] = y0[i]
     if not (math.isfinite(size) and rate * dt < REACH * MOST_STEPS):
         return math.nan, spread
     return rate, spread
@@ -204,7 +194,7 @@ def next_length(rate, left):  # type: ignore[no-untyped-def]
 @helper
 def hit_in(motion, piece, c, target, on, t0, dt_max, p, rate, spread, system, sight, poly, y1):  # type: ignore[no-untyped-def]
     """Return the first time at which an observable takes a value, with the state there in ``y1``."""
-    y, series = system.now[0], system.series
+    y, series = system.work[4], system.series
     done, sign = 0.0, 0.0
     while done < dt_max:
         h = next_length(rate, dt_max - done)
@@ -221,7 +211,8 @@ def hit_in(motion, piece, c, target, on, t0, dt_max, p, rate, spread, system, si
             sign = math.copysign(1.0, poly[first])
             at, _ = first_root(poly, first, terms, 0.0, sign, sixth_of(poly, first, terms))
             if math.isnan(at):
-                y1[:] = at
+                for i in range(y1.shape[0]):
+                    y1[i] = at
                 return done
             if at >= 0.0:
                 state_at(series, terms, at, y1)
@@ -240,22 +231,30 @@ def linear_hit(motion, piece, c, target, on, t0, y0, dt_max, p, y1):  # type: ig
     """
     if not dt_max > 0.0:
         return -1.0
-    entries = motion.entries_count
-    system = make_system(y0.shape[0], entries, motion.waves_count, 1, 0, TERMS + 2)
-    room, none = np.zeros(entries + TERMS + 2), np.empty(0, dtype=np.int64)
-    sight, poly = room[:entries], room[entries:]
-    period = motion.period(p, none, room[:0])
+    size, none = size_of_system(y0.shape[0], motion, 0), np.empty(0, dtype=np.int64)
+    flat = np.empty(size + motion.entries_count + TERMS + 2)
+    period = motion.period(p, none, flat[:0])
     t = t0 - folded(t0, period) * period
+    return search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, flat, y1)
+
+
+@helper
+def search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, flat, y1):  # type: ignore[no-untyped-def]
+    """Search the first hit, from a folded time, in room that is given."""
+    system = system_in(flat, y0.shape[0], motion, 0)
+    poly = flat[flat.shape[0] - TERMS - 2 :]
+    sight = flat[flat.shape[0] - TERMS - 2 - motion.entries_count : flat.shape[0] - TERMS - 2]
     rate, spread = begin_search(motion, piece, c, t, y0, dt_max, p, none, system, sight)
     if math.isnan(rate):
-        y1[:] = rate
+        for i in range(y1.shape[0]):
+            y1[i] = rate
         return 0.0
     return hit_in(motion, piece, c, target, on, t, dt_max, p, rate, spread, system, sight, poly, y1)
 
 
 @helper
 def turnings_in_step(poly, slope, first, terms, sign, done, h, span, count, times, values):  # type: ignore[no-untyped-def]
-    """Append the zeros of a slope in a step; return their number (-1: no room, or no end) and the last sign."""
+    """Append the zeros of a slope in a step; return their number (-1: it failed) and the last sign."""
     bound, behind = sixth_of(slope, first, terms), 0.0
     while behind < 1.0:
         at, behind = first_root(slope, first, terms, behind, sign, bound)
@@ -277,7 +276,7 @@ def turnings_in(
     motion, piece, c, t0, dt, p, rate, spread, system, sight, poly, slope, times, values
 ):  # type: ignore[no-untyped-def]
     """Write the interior stationary points of an observable; return their number, or -1."""
-    y, near = system.now[0], _AT_JOINT * (1.0 + dt)
+    y, near = system.work[4], _AT_JOINT * (1.0 + dt)
     span = (min(near, 0.5 * dt), max(dt - near, 0.5 * dt))
     done, sign, count = 0.0, 0.0, 0
     while done < dt:
@@ -314,12 +313,20 @@ def linear_turning(motion, piece, c, t0, y0, dt, p, times, values):  # type: ign
     """Write the stationary points of an observable and return their number (``turning_signature``)."""
     if not dt > 0.0:
         return 0
-    entries = motion.entries_count
-    system = make_system(y0.shape[0], entries, motion.waves_count, 1, 0, TERMS + 2)
-    room, none = np.zeros(entries + 2 * (TERMS + 2)), np.empty(0, dtype=np.int64)
-    sight, poly, slope = room[:entries], room[entries : -TERMS - 2], room[-TERMS - 2 :]
-    period = motion.period(p, none, room[:0])
+    size, none = size_of_system(y0.shape[0], motion, 0), np.empty(0, dtype=np.int64)
+    flat = np.empty(size + motion.entries_count + 2 * (TERMS + 2))
+    period = motion.period(p, none, flat[:0])
     t = t0 - folded(t0, period) * period
+    return search_turnings(motion, piece, c, t, y0, dt, p, none, flat, times, values)
+
+
+@helper
+def search_turnings(motion, piece, c, t, y0, dt, p, none, flat, times, values):  # type: ignore[no-untyped-def]
+    """Search all stationary points, from a folded time, in room that is given."""
+    system = system_in(flat, y0.shape[0], motion, 0)
+    last = flat.shape[0] - 2 * (TERMS + 2)
+    sight = flat[last - motion.entries_count : last]
+    poly, slope = flat[last : last + TERMS + 2], flat[last + TERMS + 2 :]
     rate, spread = begin_search(motion, piece, c, t, y0, dt, p, none, system, sight)
     if math.isnan(rate):
         return -1

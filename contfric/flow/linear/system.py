@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.compiled import allocating_helper, helper
+from contfric.compiled import helper
 
 FloatArray = NDArray[np.float64]
 
@@ -24,8 +24,28 @@ _SWEEPS = 3
 _FREE = 1e-2
 #: Most terms of a series: two units of time over the rate need 25, their derivatives a few more.
 TERMS = 40
-#: Places of the waves: cosine, sine, their derivatives by the frequency, work.
-_WAVES = 8
+#: One over each whole number.
+INVERSE = np.array([0.0] + [1.0 / k for k in range(1, TERMS + 3)])
+#: What a series may leave out, relative to its largest value.
+_LEFT_OUT = 1e-17
+#: Terms beyond these: one for the derivative by a frequency, one for the parity of oscillations.
+_MORE = 2
+#: Longest step, in units of 1 / rate: a longer one amplifies rounding, a shorter one costs more.
+REACH = 2.0
+#: Lengths that the numbers of terms are tabulated for.
+_PARTS = 16
+
+
+def _terms(reach: float) -> int:
+    size, k = 1.0, 1
+    while size > _LEFT_OUT:
+        size *= reach / k
+        k += 1
+    return k + _MORE
+
+
+#: Numbers of terms for the lengths 0, 1/16, 2/16 ...
+_TABLE = np.array([_terms(j / _PARTS) for j in range(int(REACH * _PARTS) + 2)])
 
 
 class System(NamedTuple):
@@ -35,10 +55,10 @@ class System(NamedTuple):
     ----------
     co, slopes : coefficients of the mode, (entries,), and their derivatives, (parameters, entries)
     w, dw : frequencies, (waves,), and their derivatives, (parameters, waves)
-    waves : Taylor terms of cosines and sines and of their derivatives by the frequencies, (8, waves)
-    now, term : columns (state, and derivatives where they are wanted) and their Taylor terms
-    work : room for n numbers, several times
-    series : Taylor terms of the state in a search, (TERMS + 1, n)
+    waves : cosines and sines at the start of a step, their derivatives by the frequencies, zeros, and
+        whether their factors differ from zero, (6, waves)
+    work : room for n numbers, (5, n)
+    series, other : Taylor terms of the state, and of another column, (TERMS + 1, n)
     """
 
     co: FloatArray
@@ -46,35 +66,45 @@ class System(NamedTuple):
     w: FloatArray
     dw: FloatArray
     waves: FloatArray
-    now: FloatArray
-    term: FloatArray
     work: FloatArray
     series: FloatArray
+    other: FloatArray
 
 
-@allocating_helper
-def make_system(n, entries, waves, columns, free, terms):  # type: ignore[no-untyped-def]
-    """Return the room for a system of n states, ``columns`` columns and ``free`` parameters."""
-    sizes = entries * (1 + free) + waves * (1 + free + _WAVES) + n * (2 * columns + 5 + terms)
-    flat = np.zeros(sizes)
-    a = entries
-    b = a + entries * free
+_WAVES, _WORK = 6, 5
+
+
+@helper
+def size_of_system(n, motion, free):  # type: ignore[no-untyped-def]
+    """Return how many numbers a system needs."""
+    entries, waves = motion.entries_count, motion.waves_count
+    return entries * (1 + free) + waves * (1 + free + _WAVES) + n * (_WORK + 2 * TERMS + 2)
+
+
+@helper
+def system_in(flat, n, motion, free):  # type: ignore[no-untyped-def]
+    """Return the room for a system of n states and ``free`` parameters, within an array."""
+    entries, waves = motion.entries_count, motion.waves_count
+    b = entries + entries * free
     c = b + waves
     d = c + waves * free
     e = d + waves * _WAVES
-    f = e + n * columns
-    g = f + n * columns
-    h = g + 5 * n
+    f = e + _WORK * n
+    g = f + (TERMS + 1) * n
+    h = g + (TERMS + 1) * n
+    for k in range(entries, b):
+        flat[k] = 0.0
+    for k in range(c, e):
+        flat[k] = 0.0
     return System(
-        flat[:a],
-        flat[a:b].reshape((free, entries)),
+        flat[:entries],
+        flat[entries:b].reshape((free, entries)),
         flat[b:c],
         flat[c:d].reshape((free, waves)),
         flat[d:e].reshape((_WAVES, waves)),
-        flat[e:f].reshape((columns, n)),
-        flat[f:g].reshape((columns, n)),
-        flat[g:h].reshape((5, n)),
-        flat[h:].reshape((terms, n)),
+        flat[e:f].reshape((_WORK, n)),
+        flat[f:g].reshape((TERMS + 1, n)),
+        flat[g:h].reshape((TERMS + 1, n)),
     )
 
 
@@ -89,6 +119,9 @@ def growth(motion, piece, system):  # type: ignore[no-untyped-def]
         for i in range(n):
             row[i] = column[i] = own[i] = 0.0
         motion.sums(piece, system.co, units, row, column, own)
+        if n == 2 and row[0] > 0.0 and row[1] > 0.0:
+            ratio = math.sqrt(row[0] / row[1])
+            return max(own[0], own[1]) + ratio * row[1], max(ratio, 1.0 / ratio)
         if sweep == _SWEEPS:
             break
         settled = True
@@ -111,15 +144,13 @@ def growth(motion, piece, system):  # type: ignore[no-untyped-def]
 
 
 @helper
-def set_up(motion, piece, p, which, columns, system):  # type: ignore[no-untyped-def]
-    """Evaluate the coefficients; return the rate of the system and the spread of its units."""
+def set_up(motion, piece, p, which, system):  # type: ignore[no-untyped-def]
+    """Evaluate the coefficients; return the rate of the matrix and the spread of its units."""
     motion.entries(piece, p, which, system.co, system.slopes)
     motion.frequencies(p, which, system.w, system.dw)
-    audible = system.waves[6]
-    for j in range(audible.shape[0]):
-        audible[j] = 0.0
+    audible = system.waves[5]
     motion.audible(piece, system.co, audible)
-    for k in range(which.shape[0] if columns > 1 else 0):
+    for k in range(system.slopes.shape[0]):
         motion.audible(piece, system.slopes[k], audible)
     return growth(motion, piece, system)
 
@@ -127,7 +158,7 @@ def set_up(motion, piece, p, which, columns, system):  # type: ignore[no-untyped
 @helper
 def silenced(rate, system):  # type: ignore[no-untyped-def]
     """Silence the harmonics whose factors are zero; return the rate with the others."""
-    audible = system.waves[6]
+    audible = system.waves[5]
     for j in range(audible.shape[0]):
         if audible[j] == 0.0:
             system.w[j] = 0.0
@@ -140,13 +171,11 @@ def silenced(rate, system):  # type: ignore[no-untyped-def]
 @helper
 def terms_for(reach, spread):  # type: ignore[no-untyped-def]
     """Return how many Taylor terms leave less than rounding, for rate times duration."""
-    size, k = spread, 1
-    while k < TERMS - 3 and size > 1e-17:
-        size *= reach / k
+    k = _TABLE[min(int(reach * _PARTS) + 1, _TABLE.shape[0] - 1)]
+    while spread > 1.0 and k < TERMS:  # a smaller unit than the largest asks for more
+        spread *= reach / k
         k += 1
-    return (
-        k + 2
-    )  # one for a derivative by a frequency (a term more), one for the parity of oscillations
+    return k
 
 
 @helper
@@ -162,12 +191,10 @@ def start_waves(system, t):  # type: ignore[no-untyped-def]
 
 
 @helper
-def next_waves(system, factor, varied):  # type: ignore[no-untyped-def]
-    """Replace the Taylor terms of the waves by the next ones."""
-    waves, w = system.waves, system.w
-    for j in range(w.shape[0]):
-        c, s = waves[0, j], waves[1, j]
-        if varied:
-            u, v = waves[2, j], waves[3, j]
-            waves[2, j], waves[3, j] = factor * (-s - w[j] * v), factor * (c + w[j] * u)
-        waves[0, j], waves[1, j] = -factor * w[j] * s, factor * w[j] * c
+def sum_of(series, terms, out):  # type: ignore[no-untyped-def]
+    """Write the sum of a series, its smallest terms first."""
+    for i in range(out.shape[0]):
+        total = 0.0
+        for k in range(terms, -1, -1):
+            total += series[k, i]
+        out[i] = total
