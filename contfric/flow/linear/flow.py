@@ -21,9 +21,10 @@ from contfric.compiled import allocating_helper, helper
 from contfric.flow.folding import folded
 from contfric.flow.linear.system import (
     REACH,
+    WAVES,
+    rows_of,
     set_up,
     silenced,
-    size_of_system,
     start_waves,
     sum_of,
     system_in,
@@ -47,8 +48,8 @@ def write_exponential(motion, piece, h, terms, system, out):  # type: ignore[no-
 
 
 @helper
-def carried(step, columns, work):  # type: ignore[no-untyped-def]
-    """Multiply the columns (rows of an array) by a matrix whose columns are rows of ``step``."""
+def carry(step, columns, work):  # type: ignore[no-untyped-def]
+    """Multiply columns (rows of an array) by a matrix whose columns are the rows of ``step``."""
     n = work.shape[0]
     for row in range(columns.shape[0]):
         for i in range(n):
@@ -61,22 +62,20 @@ def carried(step, columns, work):  # type: ignore[no-untyped-def]
 
 
 @helper
-def advance(motion, piece, t0, dt, rate, spread, y, varied, maps, system):  # type: ignore[no-untyped-def]
-    """Advance a state and its derivatives by the parameters by a duration of either sign.
-
-    Parameters
-    ----------
-    y, varied : the state, (n,), and the derivatives, (parameters, n)
-    maps : exp(A dt) and room for that of a step, transposed, (2, n, n); (0, n, n) where it is not wanted
-    """
+def advance(motion, piece, t0, dt, rate, spread, y, system):  # type: ignore[no-untyped-def]
+    """Advance a state, its derivatives by parameters, and the exponential, where there is room."""
+    waves, varied, n = system.waves, system.varied, y.shape[0]
     steps = max(1, math.ceil(rate * abs(dt) / REACH))
     h = dt / steps
     terms = terms_for(rate * abs(h), spread)
-    if maps.shape[0] > 0:
-        write_exponential(motion, piece, h, terms, system, maps[1])
+    maps = system.maps.shape[0] > 0
+    if maps:
+        write_exponential(motion, piece, h, terms, system, system.maps[:n])
+        for i in range(n if steps > 1 else 0):
+            for j in range(n):
+                system.maps[n + i, j] = system.maps[i, j]
     for k in range(steps):
         start_waves(system, t0 + k * h)
-        waves = system.waves
         motion.expand(piece, system.co, y, waves[0], waves[1], system.w, h, terms, system.series)
         for j in range(varied.shape[0]):
             motion.vary(
@@ -85,47 +84,44 @@ def advance(motion, piece, t0, dt, rate, spread, y, varied, maps, system):  # ty
             )  # fmt: skip
             sum_of(system.other, terms, varied[j])
         sum_of(system.series, terms, y)
-        if maps.shape[0] > 0:
-            if k == 0:
-                for i in range(y.shape[0]):
-                    for j in range(y.shape[0]):
-                        maps[0, i, j] = maps[1, i, j]
-            else:
-                carried(maps[1], maps[0], system.work[0])
+        if maps and k > 0:
+            carry(system.maps[n:], system.maps[:n], system.work[0])
 
 
 @helper
-def flow_in(motion, piece, t, y0, dt, p, which, y1, jac, flat):  # type: ignore[no-untyped-def]
+def write_rates(motion, piece, t, y, system, out):  # type: ignore[no-untyped-def]
+    """Write the field at a state."""
+    start_waves(system, t)
+    motion.rates(piece, system.co, y, system.waves[0], system.waves[1], out)
+
+
+@helper
+def flow_in(motion, piece, t, y0, dt, p, which, y1, jac, room):  # type: ignore[no-untyped-def]
     """Advance a state from a folded time, in room that is given."""
-    n, full = y0.shape[0], jac.shape[0] > 0
-    free = which.shape[0]
-    system = system_in(flat, n, motion, free)
-    rest = flat[flat.shape[0] - n * (free + (2 * n if full else 0)) :]
-    varied, maps = rest[: free * n].reshape((free, n)), rest[free * n :].reshape((-1, n, n))
+    n, free = y0.shape[0], which.shape[0]
+    system = system_in(room[0], room[1], room[2], free)
     rate, spread = set_up(motion, piece, p, which, system)
     rate = silenced(rate, system)
     fine = rate * abs(dt) < REACH * MOST_STEPS  # not so where it is no number
     for i in range(n):
         y1[i] = y0[i] if fine else math.nan
         for k in range(free):
-            varied[k, i] = 0.0
+            system.varied[k, i] = 0.0
     if fine:
-        advance(motion, piece, t, dt, rate, spread, y1, varied, maps, system)
-    if not full:
+        advance(motion, piece, t, dt, rate, spread, y1, system)
+    if jac.shape[0] == 0:
         return
-    before, after = system.work[0], system.work[1]
-    start_waves(system, t)
-    motion.rates(piece, system.co, y0, system.waves[0], system.waves[1], before)
-    start_waves(system, t + dt)
-    motion.rates(piece, system.co, y1, system.waves[0], system.waves[1], after)
+    before, after, maps = system.work[0], system.work[1], system.maps
+    write_rates(motion, piece, t, y0, system, before)
+    write_rates(motion, piece, t + dt, y1, system, after)
     for i in range(n):
         by_start = after[i]
         for j in range(n):
-            jac[i, 1 + j] = maps[0, j, i]
-            by_start -= maps[0, j, i] * before[j]
+            jac[i, 1 + j] = maps[j, i]
+            by_start -= maps[j, i] * before[j]
         jac[i, 0], jac[i, 1 + n] = by_start, after[i]
         for k in range(free):
-            jac[i, 2 + n + k] = varied[k, i]
+            jac[i, 2 + n + k] = system.varied[k, i]
 
 
 @allocating_helper
@@ -137,12 +133,14 @@ def linear_flow(motion, piece, t0, y0, dt, p, which, y1, jac):  # type: ignore[n
     n, full = y0.shape[0], jac.shape[0] > 0
     free = which.shape[0] if full else 0
     wanted = which[:free]
-    size = size_of_system(n, motion, free) + free
-    flat = np.empty(size + n * (free + (2 * n if full else 0)))
-    grad = flat[size - free : size]
+    coefficients = np.empty((1 + free, motion.entries_count))
+    waves = np.empty((1 + free + WAVES, motion.waves_count))
+    rows = np.empty((rows_of(free, 2 * n if full else 0), n))
+    grad = np.empty(free)
     period = motion.period(p, wanted, grad)
     cycles = folded(t0, period)
-    flow_in(motion, piece, t0 - cycles * period, y0, dt, p, wanted, y1, jac, flat)
+    room = (coefficients, waves, rows)
+    flow_in(motion, piece, t0 - cycles * period, y0, dt, p, wanted, y1, jac, room)
     if cycles != 0.0:
         for i in range(jac.shape[0]):
             for k in range(free):

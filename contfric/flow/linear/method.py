@@ -11,15 +11,8 @@ import numpy as np
 
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.dop853 import POWER
-from contfric.flow.linear.flow import MOST_STEPS, advance
-from contfric.flow.linear.system import (
-    REACH,
-    set_up,
-    silenced,
-    size_of_system,
-    start_waves,
-    system_in,
-)
+from contfric.flow.linear.flow import MOST_STEPS, advance, write_rates
+from contfric.flow.linear.system import REACH, WAVES, rows_of, set_up, silenced, system_in
 from contfric.flow.stepping import explicit, explicit_probe
 from contfric.flow.stiffness import automatic, automatic_probe
 
@@ -29,52 +22,45 @@ def linear_step(motion, mode, c, t, h, p, which, room, end, any_length):  # type
     """Write the vector after a step from ``room.start``; return its length against the longest one."""
     n, size = room.scales.shape[0], room.partial.shape[1]
     free = which.shape[0] if size > 0 else 0
-    flat = np.empty(size_of_system(n, motion, free) + n * (2 * n + free))
-    return linear_step_in(motion, mode, c, t, h, p, which[:free], room, end, any_length, flat)
+    coefficients = np.empty((1 + free, motion.entries_count))
+    waves = np.empty((1 + free + WAVES, motion.waves_count))
+    rows = np.empty((rows_of(free, 2 * n if size > 0 else 0), n))
+    own = (coefficients, waves, rows)
+    return step_in(motion, mode, c, t, h, p, which[:free], room, end, any_length, own)
 
 
 @helper
-def linear_step_in(motion, mode, c, t, h, p, which, room, end, any_length, flat):  # type: ignore[no-untyped-def]
+def step_in(motion, mode, c, t, h, p, which, room, end, any_length, own):  # type: ignore[no-untyped-def]
     """Step in room that is given."""
-    n, size, free = room.scales.shape[0], room.partial.shape[1], which.shape[0]
-    system, start = system_in(flat, n, motion, free), room.start
-    rest = flat[flat.shape[0] - n * (2 * n + free) :]
-    varied, maps = rest[: free * n].reshape((free, n)), rest[free * n :].reshape((2, n, n))
+    system = system_in(own[0], own[1], own[2], which.shape[0])
     rate, spread = set_up(motion, mode, p, which, system)
     rate = silenced(rate, system)
     length = rate * abs(h) / REACH
     if not (length <= 1.0 or (any_length and length < MOST_STEPS)):
         return length
-    y, first, after = system.work[4], start.shape[0] - n * size, system.work[1]
+    n, size, start, maps = room.scales.shape[0], room.partial.shape[1], room.start, system.maps
+    y, first = system.work[4], start.shape[0] - n * size
     for i in range(n):
         y[i] = start[i]
-    for k in range(free):
-        for i in range(n):
-            varied[k, i] = 0.0
-    wanted = maps[: 2 if size > 0 else 0]
-    advance(motion, mode, t, h, rate, spread, y, varied, wanted, system)
+        for k in range(system.varied.shape[0]):
+            system.varied[k, i] = 0.0
+    advance(motion, mode, t, h, rate, spread, y, system)
     for i in range(n):
         end[i] = y[i]
     if first > n:
         end[n] = motion.observe(c, t + h, end[:n], p, room.none, room.empty)
-    if size > 0:
-        before = system.work[0]
-        start_waves(system, t)
-        motion.rates(mode, system.co, start[:n], system.waves[0], system.waves[1], before)
-        start_waves(system, t + h)
-        motion.rates(mode, system.co, y, system.waves[0], system.waves[1], after)
-        for i in range(n):
-            for j in range(size):  # the derivatives so far, carried on, and what this step adds
-                total = 0.0
-                if j == 0:
-                    total = after[i]
-                    for k in range(n):
-                        total -= maps[0, k, i] * before[k]
-                elif j > n:
-                    total = varied[j - n - 1, i]
-                for k in range(n):
-                    total += maps[0, k, i] * start[first + k * size + j]
-                end[first + i * size + j] = total
+    if size == 0:
+        return length
+    before, after = system.work[0], system.work[1]
+    write_rates(motion, mode, t, start[:n], system, before)
+    write_rates(motion, mode, t + h, y, system, after)
+    for i in range(n):
+        for j in range(size):  # the derivatives so far, carried on, and what this step adds
+            total = after[i] if j == 0 else system.varied[j - n - 1, i] if j > n else 0.0
+            for k in range(n):
+                so_far = start[first + k * size + j]
+                total += maps[k, i] * (so_far - before[k] if j == 0 else so_far)
+            end[first + i * size + j] = total
     return length
 
 

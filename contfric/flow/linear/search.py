@@ -18,9 +18,10 @@ from contfric.flow.linear.flow import MOST_STEPS
 from contfric.flow.linear.system import (
     REACH,
     TERMS,
+    WAVES,
+    rows_of,
     set_up,
     silenced,
-    size_of_system,
     start_waves,
     system_in,
     terms_for,
@@ -231,25 +232,27 @@ def linear_hit(motion, piece, c, target, on, t0, y0, dt_max, p, y1):  # type: ig
     """
     if not dt_max > 0.0:
         return -1.0
-    size, none = size_of_system(y0.shape[0], motion, 0), np.empty(0, dtype=np.int64)
-    flat = np.empty(size + motion.entries_count + TERMS + 2)
-    period = motion.period(p, none, flat[:0])
+    entries, none = motion.entries_count, np.empty(0, dtype=np.int64)
+    coefficients, waves = np.empty((2, entries)), np.empty((1 + WAVES, motion.waves_count))
+    rows, poly = np.empty((rows_of(0, 0), y0.shape[0])), np.empty(TERMS + 2)
+    period = motion.period(p, none, poly[:0])
     t = t0 - folded(t0, period) * period
-    return search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, flat, y1)
+    room = (coefficients, waves, rows, poly)
+    return search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, room, y1)
 
 
 @helper
-def search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, flat, y1):  # type: ignore[no-untyped-def]
+def search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, room, y1):  # type: ignore[no-untyped-def]
     """Search the first hit, from a folded time, in room that is given."""
-    system = system_in(flat, y0.shape[0], motion, 0)
-    poly = flat[flat.shape[0] - TERMS - 2 :]
-    sight = flat[flat.shape[0] - TERMS - 2 - motion.entries_count : flat.shape[0] - TERMS - 2]
+    system, sight = system_in(room[0][:1], room[1], room[2], 0), room[0][1]
     rate, spread = begin_search(motion, piece, c, t, y0, dt_max, p, none, system, sight)
     if math.isnan(rate):
         for i in range(y1.shape[0]):
             y1[i] = rate
         return 0.0
-    return hit_in(motion, piece, c, target, on, t, dt_max, p, rate, spread, system, sight, poly, y1)
+    return hit_in(
+        motion, piece, c, target, on, t, dt_max, p, rate, spread, system, sight, room[3], y1
+    )
 
 
 @helper
@@ -313,20 +316,20 @@ def linear_turning(motion, piece, c, t0, y0, dt, p, times, values):  # type: ign
     """Write the stationary points of an observable and return their number (``turning_signature``)."""
     if not dt > 0.0:
         return 0
-    size, none = size_of_system(y0.shape[0], motion, 0), np.empty(0, dtype=np.int64)
-    flat = np.empty(size + motion.entries_count + 2 * (TERMS + 2))
-    period = motion.period(p, none, flat[:0])
+    entries, none = motion.entries_count, np.empty(0, dtype=np.int64)
+    coefficients, waves = np.empty((2, entries)), np.empty((1 + WAVES, motion.waves_count))
+    rows, poly = np.empty((rows_of(0, 0), y0.shape[0])), np.empty((2, TERMS + 2))
+    period = motion.period(p, none, poly[0, :0])
     t = t0 - folded(t0, period) * period
-    return search_turnings(motion, piece, c, t, y0, dt, p, none, flat, times, values)
+    room = (coefficients, waves, rows, poly)
+    return search_turnings(motion, piece, c, t, y0, dt, p, none, room, times, values)
 
 
 @helper
-def search_turnings(motion, piece, c, t, y0, dt, p, none, flat, times, values):  # type: ignore[no-untyped-def]
+def search_turnings(motion, piece, c, t, y0, dt, p, none, room, times, values):  # type: ignore[no-untyped-def]
     """Search all stationary points, from a folded time, in room that is given."""
-    system = system_in(flat, y0.shape[0], motion, 0)
-    last = flat.shape[0] - 2 * (TERMS + 2)
-    sight = flat[last - motion.entries_count : last]
-    poly, slope = flat[last : last + TERMS + 2], flat[last + TERMS + 2 :]
+    system, sight = system_in(room[0][:1], room[1], room[2], 0), room[0][1]
+    poly, slope = room[3][0], room[3][1]
     rate, spread = begin_search(motion, piece, c, t, y0, dt, p, none, system, sight)
     if math.isnan(rate):
         return -1

@@ -59,6 +59,8 @@ class System(NamedTuple):
         whether their factors differ from zero, (6, waves)
     work : room for n numbers, (5, n)
     series, other : Taylor terms of the state, and of another column, (TERMS + 1, n)
+    varied : derivatives by the parameters, (parameters, n)
+    maps : exp(A d) of the motion so far, and of a step, transposed, (2 n, n); (0, n) where not wanted
     """
 
     co: FloatArray
@@ -69,42 +71,46 @@ class System(NamedTuple):
     work: FloatArray
     series: FloatArray
     other: FloatArray
+    varied: FloatArray
+    maps: FloatArray
 
 
-_WAVES, _WORK = 6, 5
-
-
-@helper
-def size_of_system(n, motion, free):  # type: ignore[no-untyped-def]
-    """Return how many numbers a system needs."""
-    entries, waves = motion.entries_count, motion.waves_count
-    return entries * (1 + free) + waves * (1 + free + _WAVES) + n * (_WORK + 2 * TERMS + 2)
+#: Rows of waves, and of work.
+WAVES, _WORK = 6, 5
 
 
 @helper
-def system_in(flat, n, motion, free):  # type: ignore[no-untyped-def]
-    """Return the room for a system of n states and ``free`` parameters, within an array."""
-    entries, waves = motion.entries_count, motion.waves_count
-    b = entries + entries * free
-    c = b + waves
-    d = c + waves * free
-    e = d + waves * _WAVES
-    f = e + _WORK * n
-    g = f + (TERMS + 1) * n
-    h = g + (TERMS + 1) * n
-    for k in range(entries, b):
-        flat[k] = 0.0
-    for k in range(c, e):
-        flat[k] = 0.0
+def rows_of(free, maps):  # type: ignore[no-untyped-def]
+    """Return how many rows of n numbers a system needs, with columns of derivatives and further rows."""
+    return _WORK + 2 * (TERMS + 1) + free + maps
+
+
+@helper
+def system_in(coefficients, waves, rows, free):  # type: ignore[no-untyped-def]
+    """Return the room for a system with ``free`` parameters, within three arrays.
+
+    Parameters
+    ----------
+    coefficients, waves, rows : shapes (1 + free, entries), (1 + free + WAVES, waves) and (rows, n)
+    """
+    for k in range(1, 1 + free):
+        for j in range(coefficients.shape[1]):
+            coefficients[k, j] = 0.0
+    for k in range(waves.shape[0]):
+        for j in range(waves.shape[1]):
+            waves[k, j] = 0.0
+    a = _WORK + TERMS + 1
     return System(
-        flat[:entries],
-        flat[entries:b].reshape((free, entries)),
-        flat[b:c],
-        flat[c:d].reshape((free, waves)),
-        flat[d:e].reshape((_WAVES, waves)),
-        flat[e:f].reshape((_WORK, n)),
-        flat[f:g].reshape((TERMS + 1, n)),
-        flat[g:h].reshape((TERMS + 1, n)),
+        coefficients[0],
+        coefficients[1:],
+        waves[0],
+        waves[1 : 1 + free],
+        waves[1 + free :],
+        rows[:_WORK],
+        rows[_WORK:a],
+        rows[a : a + TERMS + 1],
+        rows[a + TERMS + 1 : a + TERMS + 1 + free],
+        rows[a + TERMS + 1 + free :],
     )
 
 
