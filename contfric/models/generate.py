@@ -41,6 +41,7 @@ from contfric.compiled import (
     flow_signature,
     helper,
     hit_signature,
+    inlined_helper,
     kernel,
     level_signature,
     observe_signature,
@@ -375,8 +376,8 @@ class _Writer:
         """Write the head of a function, and take what its formulas need out of the arrays."""
         self._head(head, [o.expression for outputs in blocks for o in outputs])
 
-    def _head(self, head: str, formulas: Sequence[Any]) -> None:
-        self.code.add("", "@helper")
+    def _head(self, head: str, formulas: Sequence[Any], decorator: str = "helper") -> None:
+        self.code.add("", f"@{decorator}")
         self.code.open(f"def {head}:")
         used = {s for e in formulas for s in e.free_symbols}
         self.code.add(*(f"{s} = y[{i}]" for i, s in enumerate(self.f.y) if s in used))

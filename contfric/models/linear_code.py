@@ -16,6 +16,8 @@ import sympy
 from contfric.models.affine import AffineForm
 from contfric.models.code import VALUES, Lines, Output, write_block
 
+#: States up to which the products are inlined: with more, a call is nothing beside them.
+_SMALL = 6
 #: Coefficients that are taken out of their array before a loop: more would not stay in registers.
 _FEW = 24
 #: One over each whole number: a division in each term would cost as much as the rest of it.
@@ -82,7 +84,7 @@ class LinearWriter:
     def __init__(
         self,
         code: Lines,
-        define: Callable[[str, Sequence[Any]], None],
+        define: Callable[[str, Sequence[Any], str], None],
         states: int,
         parameters: Sequence[Any],
     ) -> None:
@@ -111,7 +113,7 @@ class LinearWriter:
 
     def _values(self, head: str, index: str | None, vectors: Sequence[Sequence[Any]]) -> None:
         """Write vectors of formulas of the parameters, with their derivatives in the rows of ``jac``."""
-        self.define(head, [e for vector in vectors for e in vector])
+        self.define(head, [e for vector in vectors for e in vector], "inlined_helper")
         blocks = []
         for vector in vectors:
             block = [Output(VALUES, f"out[{i}]", e) for i, e in enumerate(vector)]
@@ -129,7 +131,7 @@ class LinearWriter:
         self, head: str, index: str, layouts: Sequence[Layout | None], lines: Callable[..., Any]
     ) -> None:
         """Write lines that depend on the structure of a layout only."""
-        self.define(head, [])
+        self.define(head, [], "inlined_helper" if self.states <= _SMALL else "helper")
         keys = [layout.structure if layout else ((), ()) for layout in layouts]
 
         def write(key: Any) -> None:
@@ -159,13 +161,13 @@ def _sum(terms: Sequence[str]) -> str:
 
 def _row(i: int, slopes: Any, waves: Any, co: str, y: str, c: str, s: str) -> list[str]:
     """Return the terms of one row of ``A y + b``; the names have places for a number each."""
-    found = [f"{co.format(k)} * {y.format(j)}" for row, j, k in slopes if row == i]
+    found = []  # the waves first: the next term of a state waits for the last one of the states only
     for row, j, k in waves:
         if row == i:
             found.append(f"{co.format(k)} * {c.format(j)}")
             if j > 0:
                 found.append(f"{co.format(k + 1)} * {s.format(j)}")
-    return found
+    return found + [f"{co.format(k)} * {y.format(j)}" for row, j, k in slopes if row == i]
 
 
 def _rates(count: int) -> Callable[..., list[str]]:
@@ -234,13 +236,13 @@ def _vary(count: int) -> Callable[..., list[str]]:
         moved = [(i, j, k) for i, j, k in waves if j > 0]
         body = []
         for i in range(count):
-            terms = _row(i, slopes, (), co, "z{}", "", "")
-            terms += _row(i, slopes, waves, by, "series[k, {}]", "c{}", "s{}")
+            terms = _row(i, slopes, waves, by, "series[k, {}]", "c{}", "s{}")
             terms += [
                 f"d{j} * ({co.format(k)} * u{j} + {co.format(k + 1)} * v{j})"
                 for row, j, k in moved
                 if row == i
             ]
+            terms += _row(i, slopes, (), co, "z{}", "", "")
             body.append(f"x{i} = f * ({_sum(terms)})")
         body += [f"z{i} = x{i}" for i in range(count)]
         body += [f"out[k + 1, {i}] = z{i}" for i in range(count)]

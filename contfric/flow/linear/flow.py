@@ -5,8 +5,8 @@ The series of ``y' = A y + b(t)`` needs products with A only, whose entries that
     y_{k+1} = h / (k + 1) (A y_k + b_k),
 
 and the terms of cosines and sines follow in the same way. Nothing happens at a resonance, at a defective
-or a singular matrix. Within two units of ``rate * h`` 25 terms leave less than rounding, and rounding is not
-amplified; a long duration is cut into steps of that kind, all of the same length. The derivatives are::
+or a singular matrix. Within three units of ``rate * h`` 30 terms leave less than rounding, and rounding is
+hardly amplified; a long duration is cut into steps of that kind, of the same length. The derivatives are::
 
     by y0: E = exp(A d),  by p: z' = A z + A_p y + b_p(t),  by t0: y'(t0 + d) - E y'(t0),  by d: y'(t0 + d).
 """
@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from contfric.compiled import allocating_helper, helper
+from contfric.compiled import allocating_helper, inlined_helper
 from contfric.flow.folding import folded
 from contfric.flow.linear.system import (
     REACH,
@@ -36,7 +36,7 @@ from contfric.flow.linear.system import (
 MOST_STEPS = 2_000_000
 
 
-@helper
+@inlined_helper
 def write_exponential(motion, piece, h, terms, system, out):  # type: ignore[no-untyped-def]
     """Write exp(A h), one column after the other, as rows of ``out``."""
     silence, unit = system.waves[4], system.work[0]
@@ -47,7 +47,7 @@ def write_exponential(motion, piece, h, terms, system, out):  # type: ignore[no-
         sum_of(system.other, terms, out[j])
 
 
-@helper
+@inlined_helper
 def carry(step, columns, work):  # type: ignore[no-untyped-def]
     """Multiply columns (rows of an array) by a matrix whose columns are the rows of ``step``."""
     n = work.shape[0]
@@ -61,7 +61,7 @@ def carry(step, columns, work):  # type: ignore[no-untyped-def]
             columns[row, i] = work[i]
 
 
-@helper
+@inlined_helper
 def advance(motion, piece, t0, dt, rate, spread, y, system):  # type: ignore[no-untyped-def]
     """Advance a state, its derivatives by parameters, and the exponential, where there is room."""
     waves, varied, n = system.waves, system.varied, y.shape[0]
@@ -88,14 +88,14 @@ def advance(motion, piece, t0, dt, rate, spread, y, system):  # type: ignore[no-
             carry(system.maps[n:], system.maps[:n], system.work[0])
 
 
-@helper
+@inlined_helper
 def write_rates(motion, piece, t, y, system, out):  # type: ignore[no-untyped-def]
     """Write the field at a state."""
     start_waves(system, t)
     motion.rates(piece, system.co, y, system.waves[0], system.waves[1], out)
 
 
-@helper
+@inlined_helper
 def flow_in(motion, piece, t, y0, dt, p, which, y1, jac, room):  # type: ignore[no-untyped-def]
     """Advance a state from a folded time, in room that is given."""
     n, free = y0.shape[0], which.shape[0]

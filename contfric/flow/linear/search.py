@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from contfric.compiled import allocating_helper, helper
+from contfric.compiled import allocating_helper, helper, inlined_helper
 from contfric.flow.folding import folded
 from contfric.flow.linear.flow import MOST_STEPS
 from contfric.flow.linear.system import (
@@ -43,7 +43,7 @@ MOST_PIECES = 3000
 _AT_JOINT = 4e-10
 
 
-@helper
+@inlined_helper
 def write_series(motion, piece, sight, c, target, t, y, h, terms, system, poly):  # type: ignore[no-untyped-def]
     """Write the Taylor terms of the state along a step, and of an observable less a target."""
     series, waves, w = system.series, system.waves, system.w
@@ -51,6 +51,18 @@ def write_series(motion, piece, sight, c, target, t, y, h, terms, system, poly):
     motion.expand(piece, system.co, y, waves[0], waves[1], w, h, terms, series)
     motion.look(c, sight, waves[0], waves[1], w, h, terms, series, poly)
     poly[0] -= target
+
+
+@inlined_helper
+def value_at_end(poly, first, terms):  # type: ignore[no-untyped-def]
+    """Return the same at s = 1."""
+    q, q1, q2 = 0.0, 0.0, 0.0
+    for k in range(terms, first - 1, -1):
+        m, here = k - first, poly[k]
+        q += here
+        q1 += m * here
+        q2 += m * (m - 1) * here
+    return q, q1, q2
 
 
 @helper
@@ -64,7 +76,7 @@ def value_at(poly, first, terms, s):  # type: ignore[no-untyped-def]
     return q, q1, 2.0 * q2
 
 
-@helper
+@inlined_helper
 def sixth_of(poly, first, terms):  # type: ignore[no-untyped-def]
     """Return a bound of the polynomial's sixth derivative over a step, and the sum of its terms."""
     bound, size = 0.0, 0.0
@@ -76,7 +88,7 @@ def sixth_of(poly, first, terms):  # type: ignore[no-untyped-def]
     return bound, size
 
 
-@helper
+@inlined_helper
 def leaving(poly, terms, h):  # type: ignore[no-untyped-def]
     """Return the power with which a motion leaves the level that it starts on; beyond the terms: never."""
     q1, q2, q3 = poly[1] / h, 2.0 * poly[2] / (h * h), 6.0 * poly[3] / (h * h * h)
@@ -95,7 +107,7 @@ def leaving(poly, terms, h):  # type: ignore[no-untyped-def]
     return terms
 
 
-@helper
+@inlined_helper
 def refine(poly, first, terms, sign, low, high, s):  # type: ignore[no-untyped-def]
     """Return the only root in a bracket, on the way from positive to negative."""
     for _ in range(100):  # bisection alone needs 60
@@ -128,13 +140,17 @@ def first_root(poly, first, terms, begin, sign, bound):  # type: ignore[no-untyp
     """
     sixth, rounding = bound[0], _ROUNDING * bound[1]
     a, width = begin, 1.0 - begin
-    q, q1, q2 = value_at(poly, first, terms, a)
+    q, q1, q2 = poly[first], poly[first + 1], 2.0 * poly[first + 2]
+    if a > 0.0:
+        q, q1, q2 = value_at(poly, first, terms, a)
     for _ in range(MOST_PIECES):
         b = min(1.0, a + width)
         if 1.0 - b < SHORTEST:
             b = 1.0
         length = b - a
-        r, r1, r2 = value_at(poly, first, terms, b)
+        r, r1, r2 = (
+            value_at_end(poly, first, terms) if b == 1.0 else value_at(poly, first, terms, b)
+        )
         ends = coefficients(sign * q, sign * q1, sign * q2, sign * r, sign * r1, sign * r2, length)
         cube = length * length * length
         outcome, low, high, here = scan(ends, sixth * cube * cube + rounding, False)
@@ -159,7 +175,7 @@ def first_root(poly, first, terms, begin, sign, bound):  # type: ignore[no-untyp
     return math.nan, 1.0
 
 
-@helper
+@inlined_helper
 def state_at(series, terms, s, out):  # type: ignore[no-untyped-def]
     """Write the state within a step."""
     for i in range(out.shape[0]):
@@ -169,7 +185,7 @@ def state_at(series, terms, s, out):  # type: ignore[no-untyped-def]
         out[i] = y
 
 
-@helper
+@inlined_helper
 def begin_search(motion, piece, c, t0, y0, dt, p, none, system, sight):  # type: ignore[no-untyped-def]
     """Evaluate the system and the observable; return the rate (no number: no motion) and the spread."""
     rate, spread = set_up(motion, piece, p, none, system)
@@ -185,14 +201,14 @@ def begin_search(motion, piece, c, t0, y0, dt, p, none, system, sight):  # type:
     return rate, spread
 
 
-@helper
+@inlined_helper
 def next_length(rate, left):  # type: ignore[no-untyped-def]
     """Return the length of the next step: no tiny last one."""
     h = REACH / rate if rate > 0.0 else left
     return left if left <= 1.05 * h else h
 
 
-@helper
+@inlined_helper
 def hit_in(motion, piece, c, target, on, t0, dt_max, p, rate, spread, system, sight, poly, y1):  # type: ignore[no-untyped-def]
     """Return the first time at which an observable takes a value, with the state there in ``y1``."""
     y, series = system.work[4], system.series
@@ -241,7 +257,7 @@ def linear_hit(motion, piece, c, target, on, t0, y0, dt_max, p, y1):  # type: ig
     return search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, room, y1)
 
 
-@helper
+@inlined_helper
 def search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, room, y1):  # type: ignore[no-untyped-def]
     """Search the first hit, from a folded time, in room that is given."""
     system, sight = system_in(room[0][:1], room[1], room[2], 0), room[0][1]
@@ -255,7 +271,7 @@ def search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, room, y1): 
     )
 
 
-@helper
+@inlined_helper
 def turnings_in_step(poly, slope, first, terms, sign, done, h, span, count, times, values):  # type: ignore[no-untyped-def]
     """Append the zeros of a slope in a step; return their number (-1: it failed) and the last sign."""
     bound, behind = sixth_of(slope, first, terms), 0.0
@@ -274,7 +290,7 @@ def turnings_in_step(poly, slope, first, terms, sign, done, h, span, count, time
     return count, sign
 
 
-@helper
+@inlined_helper
 def turnings_in(
     motion, piece, c, t0, dt, p, rate, spread, system, sight, poly, slope, times, values
 ):  # type: ignore[no-untyped-def]
@@ -325,7 +341,7 @@ def linear_turning(motion, piece, c, t0, y0, dt, p, times, values):  # type: ign
     return search_turnings(motion, piece, c, t, y0, dt, p, none, room, times, values)
 
 
-@helper
+@inlined_helper
 def search_turnings(motion, piece, c, t, y0, dt, p, none, room, times, values):  # type: ignore[no-untyped-def]
     """Search all stationary points, from a folded time, in room that is given."""
     system, sight = system_in(room[0][:1], room[1], room[2], 0), room[0][1]

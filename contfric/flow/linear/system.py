@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.compiled import helper
+from contfric.compiled import inlined_helper
 
 FloatArray = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 _SWEEPS = 3
 #: Largest change of a unit in a sweep where nothing holds it on one side (a rigid body).
 _FREE = 1e-2
-#: Most terms of a series: two units of time over the rate need 25, their derivatives a few more.
+#: Most terms of a series: three units of time over the rate need 30, derivatives by parameters more.
 TERMS = 40
 #: One over each whole number.
 INVERSE = np.array([0.0] + [1.0 / k for k in range(1, TERMS + 3)])
@@ -31,7 +31,7 @@ _LEFT_OUT = 1e-17
 #: Terms beyond these: one for the derivative by a frequency, one for the parity of oscillations.
 _MORE = 2
 #: Longest step, in units of 1 / rate: a longer one amplifies rounding, a shorter one costs more.
-REACH = 2.0
+REACH = 3.0
 #: Lengths that the numbers of terms are tabulated for.
 _PARTS = 16
 
@@ -45,7 +45,7 @@ def _terms(reach: float) -> int:
 
 
 #: Numbers of terms for the lengths 0, 1/16, 2/16 ...
-_TABLE = np.array([_terms(j / _PARTS) for j in range(int(REACH * _PARTS) + 2)])
+_TABLE = np.array([_terms(j / _PARTS) for j in range(int(1.1 * REACH * _PARTS) + 2)])
 
 
 class System(NamedTuple):
@@ -79,13 +79,13 @@ class System(NamedTuple):
 WAVES, _WORK = 6, 5
 
 
-@helper
+@inlined_helper
 def rows_of(free, maps):  # type: ignore[no-untyped-def]
     """Return how many rows of n numbers a system needs, with columns of derivatives and further rows."""
     return _WORK + 2 * (TERMS + 1) + free + maps
 
 
-@helper
+@inlined_helper
 def system_in(coefficients, waves, rows, free):  # type: ignore[no-untyped-def]
     """Return the room for a system with ``free`` parameters, within three arrays.
 
@@ -114,7 +114,7 @@ def system_in(coefficients, waves, rows, free):  # type: ignore[no-untyped-def]
     )
 
 
-@helper
+@inlined_helper
 def growth(motion, piece, system):  # type: ignore[no-untyped-def]
     """Return a norm of the matrix in balanced units, and the largest ratio of these units."""
     units, row, column, own = system.work[0], system.work[1], system.work[2], system.work[3]
@@ -149,7 +149,7 @@ def growth(motion, piece, system):  # type: ignore[no-untyped-def]
     return min(rows, columns), high / low
 
 
-@helper
+@inlined_helper
 def set_up(motion, piece, p, which, system):  # type: ignore[no-untyped-def]
     """Evaluate the coefficients; return the rate of the matrix and the spread of its units."""
     motion.entries(piece, p, which, system.co, system.slopes)
@@ -161,7 +161,7 @@ def set_up(motion, piece, p, which, system):  # type: ignore[no-untyped-def]
     return growth(motion, piece, system)
 
 
-@helper
+@inlined_helper
 def silenced(rate, system):  # type: ignore[no-untyped-def]
     """Silence the harmonics whose factors are zero; return the rate with the others."""
     audible = system.waves[5]
@@ -174,7 +174,7 @@ def silenced(rate, system):  # type: ignore[no-untyped-def]
     return rate
 
 
-@helper
+@inlined_helper
 def terms_for(reach, spread):  # type: ignore[no-untyped-def]
     """Return how many Taylor terms leave less than rounding, for rate times duration."""
     k = _TABLE[min(int(reach * _PARTS) + 1, _TABLE.shape[0] - 1)]
@@ -184,7 +184,7 @@ def terms_for(reach, spread):  # type: ignore[no-untyped-def]
     return k
 
 
-@helper
+@inlined_helper
 def start_waves(system, t):  # type: ignore[no-untyped-def]
     """Write the cosines and sines at a time, and their derivatives by the frequencies."""
     waves, w = system.waves, system.w
@@ -196,7 +196,7 @@ def start_waves(system, t):  # type: ignore[no-untyped-def]
         waves[2, j], waves[3, j] = -t * s, t * c
 
 
-@helper
+@inlined_helper
 def sum_of(series, terms, out):  # type: ignore[no-untyped-def]
     """Write the sum of a series, its smallest terms first."""
     for i in range(out.shape[0]):
