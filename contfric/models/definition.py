@@ -66,7 +66,7 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Model:
     """A piecewise-smooth oscillator: its definition, and a factory of its compiled flow.
 
@@ -140,6 +140,33 @@ class Model:
                     f"model '{self.name}': the reset at '{reset.surface}' needs a surface of that "
                     "name that is not switching (the state is mapped there, and stays on its side)"
                 )
+
+    @cached_property
+    def integrated(self) -> dict[str, str]:
+        """Modes whose motion is integrated numerically, each with the reason; others are in closed form.
+
+        Of a model that is declared by its equations the formulas decide; of a flow that is written by hand
+        nothing is said.
+        """
+        if not self.definition:
+            return {}
+        from contfric.models.describe import from_text
+        from contfric.models.generate import integrated_modes
+
+        return integrated_modes(from_text(self.definition))
+
+    def __repr__(self) -> str:
+        """Say what the model is, and how its modes move."""
+        reasons = self.integrated
+        closed = [mode.name for mode in self.modes if mode.name not in reasons]
+        lines = [f"Model {self.name}: {self.title}", f"  states: {', '.join(self.states)}"]
+        lines.append(
+            f"  parameters: {', '.join(f'{p.name} = {p.default:g}' for p in self.parameters)}"
+        )
+        if closed and self.definition:
+            lines.append(f"  modes in closed form: {', '.join(closed)}")
+        lines += [f"  mode integrated: {mode} ({reason})" for mode, reason in reasons.items()]
+        return "\n".join(lines)
 
     @cached_property
     def flow(self) -> CompiledFlow:

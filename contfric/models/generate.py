@@ -169,10 +169,14 @@ class Formulas:
 
     def affine(self, formulas: list[Any]) -> list[AffineForm] | str:
         """Return formulas as affine forms, or why one of them is none."""
-        try:
-            return [affine_form(f, self.t, self.y, self.description.states) for f in formulas]
-        except NotAffineError as error:
-            return str(error)
+        states, found = self.description.states, []
+        for i, f in enumerate(formulas):
+            try:
+                found.append(affine_form(f, self.t, self.y, states))
+            except NotAffineError as error:
+                what = f"the rate of {states[i]}: " if len(formulas) == len(states) else ""
+                return f"{what}{error}"
+        return found
 
     @property
     def pieces(self) -> list[tuple[int, ...]]:
@@ -234,6 +238,18 @@ class Formulas:
                 ]
             )
         return found
+
+
+def integrated_modes(description: Description) -> dict[str, str]:
+    """Return the modes that are not affine, each with the reason."""
+    formulas = Formulas(description)
+    pieces, found = 1 << len(description.kinks), {}
+    forms = [formulas.affine(field) for field in formulas.fields()]
+    for m, mode in enumerate(description.modes):
+        reasons = [f for f in forms[m * pieces : (m + 1) * pieces] if isinstance(f, str)]
+        if reasons:
+            found[mode.name] = reasons[0]
+    return found
 
 
 def module_source(description: Description, digest: str) -> str:

@@ -49,7 +49,9 @@ class Layout:
 
 def layout_of(rows: Sequence[AffineForm], places: Places) -> Layout:
     """Return the layout of some formulas."""
-    slopes, waves, values = [], [], []
+    slopes: list[tuple[int, int, int]] = []
+    waves: list[tuple[int, int, int]] = []
+    values: list[Any] = []
     for i, row in enumerate(rows):
         for j, e in enumerate(row.slopes):
             if e != 0:

@@ -8,7 +8,7 @@ and the terms of cosines and sines follow in the same way. Nothing happens at a 
 or a singular matrix. Within three units of ``rate * h`` 30 terms leave less than rounding, and rounding is
 hardly amplified; a long duration is cut into steps of that kind, of the same length. The derivatives are::
 
-    by y0: E = exp(A d),  by p: z' = A z + A_p y + b_p(t),  by t0: y'(t0 + d) - E y'(t0),  by d: y'(t0 + d).
+    by y0: E = exp(A d),  by t0: z' = A z + b'(t),  by p: z' = A z + A_p y + b_p(t),  by d: y'(t0 + d).
 """
 
 from __future__ import annotations
@@ -31,24 +31,27 @@ from contfric.flow.linear.system import (
     terms_for,
 )
 
+#: States up to which the exponential is carried on by its series, which errs less than products do: these
+#: repeat the rounding of one step.
+_SMALL = 6
 #: Most steps of a segment, a second of computation: it takes one to a hundred. Iterates of Newton's method
 #: on their way to nowhere ask for any number.
 MOST_STEPS = 2_000_000
 
 
 @inlined_helper
-def write_exponential(motion, piece, h, terms, system, out):  # type: ignore[no-untyped-def]
-    """Write exp(A h), one column after the other, as rows of ``out``."""
-    silence, unit = system.waves[4], system.work[0]
-    for j in range(unit.shape[0]):
-        for i in range(unit.shape[0]):
-            unit[i] = 1.0 if i == j else 0.0
-        motion.expand(piece, system.co, unit, silence, silence, silence, h, terms, system.other)
-        sum_of(system.other, terms, out[j])
+def carry_by_series(motion, piece, h, terms, system, columns):  # type: ignore[no-untyped-def]
+    """Multiply columns (rows of an array) by exp(A h)."""
+    silence = system.waves[4]
+    for j in range(columns.shape[0]):
+        motion.expand(
+            piece, system.co, columns[j], silence, silence, silence, h, terms, system.other
+        )
+        sum_of(system.other, terms, columns[j])
 
 
 @inlined_helper
-def carry(step, columns, work):  # type: ignore[no-untyped-def]
+def carry_by_product(step, columns, work):  # type: ignore[no-untyped-def]
     """Multiply columns (rows of an array) by a matrix whose columns are the rows of ``step``."""
     n = work.shape[0]
     for row in range(columns.shape[0]):
@@ -63,17 +66,23 @@ def carry(step, columns, work):  # type: ignore[no-untyped-def]
 
 @inlined_helper
 def advance(motion, piece, t0, dt, rate, spread, y, system):  # type: ignore[no-untyped-def]
-    """Advance a state, its derivatives by parameters, and the exponential, where there is room."""
-    waves, varied, n = system.waves, system.varied, y.shape[0]
+    """Advance a state, and its derivatives where there is room for the exponential."""
+    waves, varied, by_start, n = system.waves, system.varied, system.work[5], y.shape[0]
     steps = max(1, math.ceil(rate * abs(dt) / REACH))
     h = dt / steps
     terms = terms_for(rate * abs(h), spread)
     maps = system.maps.shape[0] > 0
+    products = n > _SMALL and steps > 1
     if maps:
-        write_exponential(motion, piece, h, terms, system, system.maps[:n])
-        for i in range(n if steps > 1 else 0):
+        for i in range(n):
+            by_start[i] = 0.0
             for j in range(n):
-                system.maps[n + i, j] = system.maps[i, j]
+                system.maps[i, j] = 1.0 if i == j else 0.0
+        if products:
+            for i in range(n):
+                for j in range(n):
+                    system.maps[n + i, j] = 1.0 if i == j else 0.0
+            carry_by_series(motion, piece, h, terms, system, system.maps[n:])
     for k in range(steps):
         start_waves(system, t0 + k * h)
         motion.expand(piece, system.co, y, waves[0], waves[1], system.w, h, terms, system.series)
@@ -84,15 +93,15 @@ def advance(motion, piece, t0, dt, rate, spread, y, system):  # type: ignore[no-
             )  # fmt: skip
             sum_of(system.other, terms, varied[j])
         sum_of(system.series, terms, y)
-        if maps and k > 0:
-            carry(system.maps[n:], system.maps[:n], system.work[0])
-
-
-@inlined_helper
-def write_rates(motion, piece, t, y, system, out):  # type: ignore[no-untyped-def]
-    """Write the field at a state."""
-    start_waves(system, t)
-    motion.rates(piece, system.co, y, system.waves[0], system.waves[1], out)
+        if maps:
+            motion.expand(
+                piece, system.co, by_start, waves[6], waves[7], system.w, h, terms, system.other
+            )
+            sum_of(system.other, terms, by_start)
+            if products:
+                carry_by_product(system.maps[n:], system.maps[:n], system.work[0])
+            else:
+                carry_by_series(motion, piece, h, terms, system, system.maps[:n])
 
 
 @inlined_helper
@@ -111,15 +120,13 @@ def flow_in(motion, piece, t, y0, dt, p, which, y1, jac, room):  # type: ignore[
         advance(motion, piece, t, dt, rate, spread, y1, system)
     if jac.shape[0] == 0:
         return
-    before, after, maps = system.work[0], system.work[1], system.maps
-    write_rates(motion, piece, t, y0, system, before)
-    write_rates(motion, piece, t + dt, y1, system, after)
+    slope = system.work[0]
+    start_waves(system, t + dt)
+    motion.rates(piece, system.co, y1, system.waves[0], system.waves[1], slope)
     for i in range(n):
-        by_start = after[i]
+        jac[i, 0], jac[i, 1 + n] = system.work[5, i], slope[i]
         for j in range(n):
-            jac[i, 1 + j] = maps[j, i]
-            by_start -= maps[j, i] * before[j]
-        jac[i, 0], jac[i, 1 + n] = by_start, after[i]
+            jac[i, 1 + j] = system.maps[j, i]
         for k in range(free):
             jac[i, 2 + n + k] = system.varied[k, i]
 

@@ -291,11 +291,10 @@ def turnings_in_step(poly, slope, first, terms, sign, done, h, span, count, time
 
 
 @inlined_helper
-def turnings_in(
-    motion, piece, c, t0, dt, p, rate, spread, system, sight, poly, slope, times, values
-):  # type: ignore[no-untyped-def]
+def turnings_in(motion, piece, c, t0, dt, p, reach, system, sight, polys, times, values):  # type: ignore[no-untyped-def]
     """Write the interior stationary points of an observable; return their number, or -1."""
-    y, near = system.work[4], _AT_JOINT * (1.0 + dt)
+    rate, spread = reach
+    y, near, poly, slope = system.work[4], _AT_JOINT * (1.0 + dt), polys[0], polys[1]
     span = (min(near, 0.5 * dt), max(dt - near, 0.5 * dt))
     done, sign, count = 0.0, 0.0, 0
     while done < dt:
@@ -345,10 +344,7 @@ def linear_turning(motion, piece, c, t0, y0, dt, p, times, values):  # type: ign
 def search_turnings(motion, piece, c, t, y0, dt, p, none, room, times, values):  # type: ignore[no-untyped-def]
     """Search all stationary points, from a folded time, in room that is given."""
     system, sight = system_in(room[0][:1], room[1], room[2], 0), room[0][1]
-    poly, slope = room[3][0], room[3][1]
-    rate, spread = begin_search(motion, piece, c, t, y0, dt, p, none, system, sight)
-    if math.isnan(rate):
+    reach = begin_search(motion, piece, c, t, y0, dt, p, none, system, sight)
+    if math.isnan(reach[0]):
         return -1
-    return turnings_in(
-        motion, piece, c, t, dt, p, rate, spread, system, sight, poly, slope, times, values
-    )
+    return turnings_in(motion, piece, c, t, dt, p, reach, system, sight, room[3], times, values)

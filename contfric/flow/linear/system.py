@@ -55,9 +55,9 @@ class System(NamedTuple):
     ----------
     co, slopes : coefficients of the mode, (entries,), and their derivatives, (parameters, entries)
     w, dw : frequencies, (waves,), and their derivatives, (parameters, waves)
-    waves : cosines and sines at the start of a step, their derivatives by the frequencies, zeros, and
-        whether their factors differ from zero, (6, waves)
-    work : room for n numbers, (5, n)
+    waves : cosines and sines at the start of a step, their derivatives by the frequencies, zeros, whether
+        their factors differ from zero, and the derivatives by time, (8, waves)
+    work : room for n numbers, and the derivative by the time of the start, (6, n)
     series, other : Taylor terms of the state, and of another column, (TERMS + 1, n)
     varied : derivatives by the parameters, (parameters, n)
     maps : exp(A d) of the motion so far, and of a step, transposed, (2 n, n); (0, n) where not wanted
@@ -76,7 +76,7 @@ class System(NamedTuple):
 
 
 #: Rows of waves, and of work.
-WAVES, _WORK = 6, 5
+WAVES, _WORK = 8, 6
 
 
 @inlined_helper
@@ -186,7 +186,7 @@ def terms_for(reach, spread):  # type: ignore[no-untyped-def]
 
 @inlined_helper
 def start_waves(system, t):  # type: ignore[no-untyped-def]
-    """Write the cosines and sines at a time, and their derivatives by the frequencies."""
+    """Write the cosines and sines at a time, and their derivatives by the frequencies and by time."""
     waves, w = system.waves, system.w
     for j in range(w.shape[0]):
         c, s = 1.0, 0.0
@@ -194,6 +194,7 @@ def start_waves(system, t):  # type: ignore[no-untyped-def]
             c, s = math.cos(w[j] * t), math.sin(w[j] * t)
         waves[0, j], waves[1, j] = c, s
         waves[2, j], waves[3, j] = -t * s, t * c
+        waves[6, j], waves[7, j] = -w[j] * s, w[j] * c
 
 
 @inlined_helper

@@ -45,6 +45,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     from contfric.models.check.derivatives import check_derivatives
     from contfric.models.check.hidden import check_hidden
     from contfric.models.check.kinks import check_kinks
+    from contfric.models.check.motion import check_motion
     from contfric.models.check.names import check_constraints, check_names
     from contfric.models.check.probe import Probe
     from contfric.models.check.structure import (
@@ -71,4 +72,5 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_symmetry(report, probe)
     check_hidden(report, probe)
     check_period(report, probe)
+    check_motion(report, loaded)
     return report

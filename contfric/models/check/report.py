@@ -21,6 +21,7 @@ class Topic(str, Enum):
     PERIOD = "the field repeats itself after the period"
     CONSTRAINTS = "the defaults obey the constraints"
     NAMES = "every parameter is used, and every state is driven"
+    MOTION = "modes in closed form"
 
 
 class Severity(str, Enum):
