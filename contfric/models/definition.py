@@ -155,17 +155,22 @@ class Model:
 
         return integrated_modes(from_text(self.definition))
 
+    @property
+    def closed_form(self) -> tuple[str, ...]:
+        """Modes whose motion is a closed form, of a model that is declared by its equations."""
+        if not self.definition:
+            return ()
+        return tuple(mode.name for mode in self.modes if mode.name not in self.integrated)
+
     def __repr__(self) -> str:
         """Say what the model is, and how its modes move."""
-        reasons = self.integrated
-        closed = [mode.name for mode in self.modes if mode.name not in reasons]
         lines = [f"Model {self.name}: {self.title}", f"  states: {', '.join(self.states)}"]
         lines.append(
             f"  parameters: {', '.join(f'{p.name} = {p.default:g}' for p in self.parameters)}"
         )
-        if closed and self.definition:
-            lines.append(f"  modes in closed form: {', '.join(closed)}")
-        lines += [f"  mode integrated: {mode} ({reason})" for mode, reason in reasons.items()]
+        if self.closed_form:
+            lines.append(f"  closed form: {', '.join(self.closed_form)}")
+        lines += [f"  integrated: {mode} ({reason})" for mode, reason in self.integrated.items()]
         return "\n".join(lines)
 
     @cached_property

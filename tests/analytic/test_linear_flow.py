@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import mpmath as mp
 import numpy as np
@@ -19,6 +20,8 @@ import contfric as cf
 EPS = 2.0**-52
 #: Units in the last place, times 1 + the fastest rate times the duration, that a motion may err.
 UNITS = 50
+#: Places on the way at which the size of a motion is looked at.
+PARTS = 8
 NONE, NOTHING = np.empty(0, dtype=np.int64), np.empty((0, 0))
 
 
@@ -89,67 +92,120 @@ RANDOM = {
 }
 
 
-def extended(a: np.ndarray, forces: np.ndarray, w: float) -> mp.matrix:
+#: Binary digits of the numbers with a fixed point that references are computed in.
+BITS = 320
+
+
+def fixed(x: Any) -> int:
+    """A number with a fixed point: whole multiples of 2**-BITS are exact, and fast."""
+    return int(mp.nint(mp.ldexp(mp.mpf(x), BITS)))
+
+
+def exact(values: Any) -> np.ndarray:
+    return np.vectorize(lambda x: fixed(float(x)), otypes=[object])(np.asarray(values))
+
+
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a.dot(b) >> BITS
+
+
+def exponential(m: np.ndarray, dt: float) -> np.ndarray:
+    """exp(m dt) by scaling and squaring; 100 digits are far more than what is lost."""
+    m = product(m, exact(np.eye(len(m)) * dt))
+    squarings = max(0, int(np.abs(m).sum(axis=1).max()).bit_length() - BITS + 4)
+    m, found = m >> squarings, exact(np.eye(len(m)))
+    term = found
+    for k in range(1, 60):  # (1/8)**60 / 60! is nothing
+        term = product(term, m) // k
+        found = found + term
+    for _ in range(squarings):
+        found = product(found, found)
+    return found
+
+
+def extended(a: np.ndarray, forces: np.ndarray, w: float) -> np.ndarray:
     """The matrix of (y, 1, cos, sin), shape (n + 3, n + 3)."""
     n = len(a)
-    m = mp.zeros(n + 3)
-    for i in range(n):
-        for j in range(n):
-            m[i, j] = mp.mpf(float(a[i, j]))
-        for j in range(3):
-            m[i, n + j] = mp.mpf(float(forces[i, j]))
-    m[n + 1, n + 2], m[n + 2, n + 1] = -mp.mpf(float(w)), mp.mpf(float(w))
-    return m
+    m = np.zeros((n + 3, n + 3))
+    m[:n, :n], m[:n, n:] = a, forces
+    m[n + 1, n + 2], m[n + 2, n + 1] = -w, w
+    return exact(m)
 
 
-def start(y0: np.ndarray, w: float, t0: float) -> mp.matrix:
-    phase = mp.mpf(float(w)) * mp.mpf(float(t0))
-    return mp.matrix([*(mp.mpf(float(y)) for y in y0), mp.mpf(1), mp.cos(phase), mp.sin(phase)])
+def start(y0: np.ndarray, w: float, t0: float) -> np.ndarray:
+    phase = mp.mpf(w) * mp.mpf(t0)
+    return np.array([*exact(y0), fixed(1), fixed(mp.cos(phase)), fixed(mp.sin(phase))], object)
 
 
-def tolerance(a: np.ndarray, w: float, dt: float) -> float:
-    fastest = max(np.abs(np.linalg.eigvals(a)).max(), w)
-    return UNITS * EPS * (1.0 + fastest * abs(dt))
+def natural(sizes: np.ndarray, fastest: float) -> np.ndarray:
+    """The largest values on the way, of displacements and speeds in each other's units.
+
+    Rounding in a force of a stiff spring moves the mass by what it moves it, however slow it is.
+    """
+    most = sizes.max(axis=0)
+    other = [most[i + 1] / fastest if i % 2 == 0 else most[i - 1] * fastest for i in range(SIZE)]
+    return np.maximum(most, other)
 
 
-def within(found: np.ndarray, want: mp.matrix, largest: np.ndarray, allowed: float) -> bool:
-    error = [abs(mp.mpf(float(f)) - x) for f, x in zip(found, want, strict=True)]
-    return all(e <= allowed * mp.mpf(float(size)) for e, size in zip(error, largest, strict=True))
+def plain(values: np.ndarray) -> np.ndarray:
+    return np.array([float(mp.ldexp(int(x), -BITS)) for x in values])
 
 
-def motions(model, name):
-    """The case's flow from the compiled module, and what defines it exactly."""
-    a, w, dt = {**CASES, **RANDOM}[name]
+def assert_close(found: np.ndarray, part: np.ndarray, begin: np.ndarray, case: Any) -> None:
+    """Compare numbers with the first ones of part**PARTS begin, against their largest values on the way."""
+    a, w, dt = case
+    fastest = max(float(np.abs(np.linalg.eigvals(a)).max()), w, 1.0)
+    at, sizes = begin, [np.abs(plain(begin[:SIZE]))]
+    for _ in range(PARTS):
+        at = product(part, at)
+        sizes.append(np.abs(plain(at[:SIZE])))
+    error = np.abs(plain(exact(found) - at[:SIZE]))
+    allowed = UNITS * EPS * (1.0 + fastest * abs(dt))
+    assert np.all(error <= allowed * natural(np.array(sizes), fastest))
+
+
+def doubled(m: np.ndarray, entries: dict[tuple[int, int], int]) -> np.ndarray:
+    """The matrix whose exponential has the derivative of that of m by some of its entries."""
+    n = len(m)
+    both = exact(np.zeros((2 * n, 2 * n)))
+    both[:n, :n], both[n:, n:] = m, m
+    for (i, j), value in entries.items():
+        both[i, n + j] = fixed(value)
+    return both
+
+
+@pytest.mark.parametrize("name", [*CASES, *RANDOM])
+def test_state_and_derivatives(model, name):
+    """By the start, its time, the duration, entries of the matrix, a force and the frequency."""
+    case = {**CASES, **RANDOM}[name]
+    a, w, dt = case
     rng = np.random.default_rng(len(name))
     forces, y0, t0 = rng.uniform(-1, 1, (SIZE, 3)), rng.uniform(-1, 1, SIZE), rng.uniform(0, 2)
     values = {f"a{i}{j}": a[i, j] for i in range(SIZE) for j in range(SIZE)}
     for i in range(SIZE):
         values |= dict(zip((f"b{i}", f"c{i}", f"s{i}"), forces[i], strict=True))
-    return a, forces, w, y0, t0, dt, model.vector({**values, "w": w})
-
-
-@pytest.mark.parametrize("name", [*CASES, *RANDOM])
-def test_state_and_derivatives_by_the_start(model, name):
-    a, forces, w, y0, t0, dt, p = motions(model, name)
-    y1, jac = np.empty(SIZE), np.empty((SIZE, 2 + SIZE))
-    model.flow.flow(0, t0, y0, dt, p, NONE, y1, jac)
-    with mp.workdps(50):
-        m = extended(a, forces, w)
-        steps = 8
-        part = mp.expm(m * (mp.mpf(dt) / steps))
-        at, map_, sizes = start(y0, w, t0), mp.eye(SIZE + 3), []
-        for _ in range(steps):
-            sizes.append([abs(x) for x in at[:SIZE]] + [abs(x) for x in map_[:SIZE, :SIZE]])
-            at, map_ = part * at, part * map_
-        # the largest value on the way: of the state, and of each entry of the exponential
-        largest = np.array([[float(x) for x in row] for row in sizes]).max(axis=0)
-        here = np.array([float(abs(x)) for x in at[:SIZE]])
-        state = np.maximum(largest[:SIZE], here)
-        allowed = tolerance(a, w, dt)
-        assert within(y1, at[:SIZE], state, allowed)
+    p = model.vector({**values, "w": w})
+    which = np.array([model.index_of(k) for k in ("a00", "a10", "c1", "w")])
+    y1, alone, jac = np.empty(SIZE), np.empty(SIZE), np.empty((SIZE, 2 + SIZE + len(which)))
+    model.flow.flow(0, t0, y0, dt, p, which, y1, jac)
+    model.flow.flow(0, t0, y0, dt, p, NONE, alone, NOTHING)
+    assert np.array_equal(y1, alone)
+    n = SIZE + 3
+    with mp.workprec(BITS):
+        m, at = extended(a, forces, w), start(y0, w, t0)
+        part, unit = exponential(m, dt / PARTS), exact(np.eye(n))
+        assert_close(y1, part, at, case)
         for j in range(SIZE):
-            column = map_[:SIZE, j]
-            size = np.array(
-                [max(largest[SIZE + i * SIZE + j], float(abs(column[i]))) for i in range(SIZE)]
-            )
-            assert within(jac[:, 1 + j], column, np.maximum(size, 1e-300), allowed)
+            assert_close(jac[:, 1 + j], part, unit[:, j], case)
+        turn = exact(np.zeros((n, n)))  # a later start turns the phase
+        turn[SIZE + 1, SIZE + 2], turn[SIZE + 2, SIZE + 1] = fixed(-w), fixed(w)
+        assert_close(jac[:, 0], part, product(turn, at), case)
+        assert_close(jac[:, 1 + SIZE], part, product(m, at), case)
+        turns = {(SIZE + 1, SIZE + 2): -1, (SIZE + 2, SIZE + 1): 1}
+        for k, entries in enumerate(({(0, 0): 1}, {(1, 0): 1}, {(1, SIZE + 1): 1}, turns)):
+            begin = np.array([fixed(0)] * n + [*at], object)
+            if k == 3:  # the phase at the start depends on the frequency, too
+                begin[SIZE + 1] = -fixed(t0) * at[SIZE + 2] >> BITS
+                begin[SIZE + 2] = fixed(t0) * at[SIZE + 1] >> BITS
+            both = exponential(doubled(m, entries), dt / PARTS)
+            assert_close(jac[:, 2 + SIZE + k], both, begin, case)
