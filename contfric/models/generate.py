@@ -178,6 +178,16 @@ class Formulas:
                 return f"{what}{error}"
         return found
 
+    def affine_fields(self) -> list[list[AffineForm] | str]:
+        """Return the field of each piece as affine forms, or why it is none.
+
+        A model that asks for an implicit method has fast decays, along which a series takes many steps.
+        """
+        method = self.description.method
+        if method != "explicit":
+            return [f"the model asks for the method '{method}'" for _ in self.fields()]
+        return [self.affine(field) for field in self.fields()]
+
     @property
     def pieces(self) -> list[tuple[int, ...]]:
         """Signs of the kinks in each piece of a mode, in the order of their bits."""
@@ -244,7 +254,7 @@ def integrated_modes(description: Description) -> dict[str, str]:
     """Return the modes that are not affine, each with the reason."""
     formulas = Formulas(description)
     pieces, found = 1 << len(description.kinks), {}
-    forms = [formulas.affine(field) for field in formulas.fields()]
+    forms = formulas.affine_fields()
     for m, mode in enumerate(description.modes):
         reasons = [f for f in forms[m * pieces : (m + 1) * pieces] if isinstance(f, str)]
         if reasons:
@@ -312,7 +322,7 @@ class _Writer:
 
     def linear(self) -> tuple[list[int], list[int]]:
         """Write the helpers of what is affine; return the pieces and the observables that are."""
-        forms = [self.f.affine(field) for field in self.f.fields()]
+        forms = self.f.affine_fields()
         sights = [self.f.affine([o]) for o in self.f.observables()]
         every = [
             form for found in (*forms, *sights) if not isinstance(found, str) for form in found
