@@ -264,6 +264,16 @@ def helper(function: F) -> F:
     return numba.njit(error_model="numpy", nogil=True, _nrt=False, **_INSIDE)(function)  # type: ignore[no-any-return]
 
 
+def inlined_helper(function: F) -> F:
+    """Compile a helper so that it is always inlined: for one that is called once, or has little to do.
+
+    A call hands each array over as seven to nine numbers, which may cost more than what is done with them.
+    """
+    return numba.njit(  # type: ignore[no-any-return]
+        error_model="numpy", nogil=True, _nrt=False, forceinline=True, **_INSIDE
+    )(function)
+
+
 def allocating_helper(function: F) -> F:
     """Compile a function that allocates into the kernels that call it."""
     return numba.njit(error_model="numpy", nogil=True, **_INSIDE)(function)  # type: ignore[no-any-return]

@@ -45,7 +45,7 @@ as states that are no numbers, and as -1 stationary points; the engine says so.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import Enum
 from typing import Any
 
@@ -54,7 +54,14 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.bundle import Bundle
 from contfric.flow.dop853 import POWER, STAGES
+from contfric.flow.folding import folded
 from contfric.flow.hits import first_hit
+from contfric.flow.linear.method import (
+    automatic_or_linear,
+    automatic_or_linear_probe,
+    explicit_or_linear,
+    explicit_or_linear_probe,
+)
 from contfric.flow.radau import IMPLICIT_STAGES
 from contfric.flow.stepping import explicit, explicit_probe, first_step, next_step, settle
 from contfric.flow.stiffness import automatic, automatic_probe, implicit, implicit_probe
@@ -74,6 +81,11 @@ _METHODS = {
     Method.EXPLICIT: (explicit, explicit_probe, 0),
     Method.IMPLICIT: (implicit, implicit_probe, IMPLICIT_STAGES),
     Method.AUTOMATIC: (automatic, automatic_probe, IMPLICIT_STAGES),
+}
+#: The same where some modes are affine; those need no implicit method.
+_OR_LINEAR = {
+    Method.EXPLICIT: (explicit_or_linear, explicit_or_linear_probe, 0),
+    Method.AUTOMATIC: (automatic_or_linear, automatic_or_linear_probe, IMPLICIT_STAGES),
 }
 #: Error that a step may make, relative to a state and relative to its scale: the error of a segment is
 #: about as large (docs/integration.md), and Newton's method on a chain of segments sees a smooth map.
@@ -99,6 +111,7 @@ def integrated_motion(
     absolute: float = TOLERANCE,
     kinks: int = 0,
     kink: Callable[..., Any] | None = None,
+    linear: Mapping[str, Any] | None = None,
 ) -> Bundle:
     """Bundle the helpers of a model, as the kernels of its flow take them.
 
@@ -110,14 +123,18 @@ def integrated_motion(
     relative, absolute : error that a step may make relative to a state, and to its scale
     kinks, kink : number of kinks of the field, and a helper from a kink to the observable that vanishes
         there (:mod:`contfric.flow.kinked`)
+    linear : helpers of the modes that are affine (:mod:`contfric.flow.linear`), with ``closed(mode)``, which
+        tells them from others
 
     Raises
     ------
     ValueError
         For an unknown method.
     """
-    attempt, probe, stages = _METHODS[Method(method)]
+    attempt, probe, stages = (_METHODS if linear is None else _OR_LINEAR)[Method(method)]
+    own = {} if linear is None else {k: v for k, v in linear.items() if k != "period"}
     return Bundle(
+        **own,
         field=field,
         observe=observe,
         rate=rate,
@@ -133,12 +150,6 @@ def integrated_motion(
         kinks=int(kinks),
         kink=kink or observe,
     )
-
-
-@helper
-def folded(t0, period):  # type: ignore[no-untyped-def]
-    """Return the number of whole periods before a time, 0 without excitation."""
-    return math.floor(t0 / period) if period > 0.0 else 0.0
 
 
 @helper

@@ -30,8 +30,9 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.dense import is_flat, node, probed, write
 from contfric.flow.dop853 import STAGES
+from contfric.flow.folding import folded
 from contfric.flow.hits import _FLAT, first_hit, first_in_step, leaving
-from contfric.flow.integrated import folded, hand_back
+from contfric.flow.integrated import hand_back
 from contfric.flow.stepping import (
     FRESH,
     MOST_STEPS,

@@ -67,7 +67,7 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Model:
     """A piecewise-smooth oscillator: its definition, and a factory of its compiled flow.
 
@@ -141,6 +141,38 @@ class Model:
                     f"model '{self.name}': the reset at '{reset.surface}' needs a surface of that "
                     "name that is not switching (the state is mapped there, and stays on its side)"
                 )
+
+    @cached_property
+    def integrated(self) -> dict[str, str]:
+        """Modes whose motion is integrated numerically, each with the reason; others are in closed form.
+
+        Of a model that is declared by its equations the formulas decide; of a flow that is written by hand
+        nothing is said.
+        """
+        if not self.definition:
+            return {}
+        from contfric.models.describe import from_text
+        from contfric.models.generate import integrated_modes
+
+        return integrated_modes(from_text(self.definition))
+
+    @property
+    def closed_form(self) -> tuple[str, ...]:
+        """Modes whose motion is a closed form, of a model that is declared by its equations."""
+        if not self.definition:
+            return ()
+        return tuple(mode.name for mode in self.modes if mode.name not in self.integrated)
+
+    def __repr__(self) -> str:
+        """Say what the model is, and how its modes move."""
+        lines = [f"Model {self.name}: {self.title}", f"  states: {', '.join(self.states)}"]
+        lines.append(
+            f"  parameters: {', '.join(f'{p.name} = {p.default:g}' for p in self.parameters)}"
+        )
+        if self.closed_form:
+            lines.append(f"  closed form: {', '.join(self.closed_form)}")
+        lines += [f"  integrated: {mode} ({reason})" for mode, reason in self.integrated.items()]
+        return "\n".join(lines)
 
     @cached_property
     def flow(self) -> CompiledFlow:

@@ -42,7 +42,7 @@ def leaves_at_rest(sampler: Sampler, description: Description, domains: tuple[Do
     That is so where the limit under which a mode slides is the very place at which the field beside it
     turns around (static and kinetic limits agree); it must be so for other parameters, too.
     """
-    verdicts: set[bool] = set()
+    found = False
     for domain in domains:
         on = [name for name, side in domain.signs.items() if side == 0]
         limits = {
@@ -53,8 +53,11 @@ def leaves_at_rest(sampler: Sampler, description: Description, domains: tuple[Do
             if side != 0
         }
         for limit in limits if len(on) == 1 else ():
-            verdicts.update(_left_at_rest(sampler, domain, on[0], limit, domains))
-    return verdicts == {True}
+            verdicts = _left_at_rest(sampler, domain, on[0], limit, domains)
+            if False in verdicts:  # one place decides: of many contacts there are many domains
+                return False
+            found = found or bool(verdicts)
+    return found
 
 
 def _left_at_rest(
@@ -78,6 +81,8 @@ def _left_at_rest(
             rates = [other.rate(d.mode, on, d.signs[on], *place) for d in beside]
             found.add(min(abs(rate) for rate in rates) <= _STILL)
             places += 1
+            if False in found:
+                return found
             if places == _PLACES:
                 break
     return found

@@ -10,16 +10,19 @@ This module imports sympy; it is loaded when a model is built for the first time
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import sympy
 
 from contfric.errors import ModelError
+from contfric.models.affine import AffineForm, NotAffineError, affine_form
 from contfric.models.code import SLOPES, VALUES, Lines, Output, write_block
 from contfric.models.description import Description
 from contfric.models.entries import EntryError
 from contfric.models.formulas import FORMULAS, formula, resolved
 from contfric.models.grammar import TIME, parse
+from contfric.models.linear_code import Layout, LinearWriter, layout_of, places_of
 from contfric.models.motion import motion_code, piece_code
 from contfric.models.regions import engine_order, known_sides
 from contfric.yaml_lines import Address
@@ -38,6 +41,7 @@ from contfric.compiled import (
     flow_signature,
     helper,
     hit_signature,
+    inlined_helper,
     kernel,
     level_signature,
     observe_signature,
@@ -163,6 +167,27 @@ class Formulas:
             )
         return found
 
+    def affine(self, formulas: list[Any]) -> list[AffineForm] | str:
+        """Return formulas as affine forms, or why one of them is none."""
+        states, found = self.description.states, []
+        for i, f in enumerate(formulas):
+            try:
+                found.append(affine_form(f, self.t, self.y, states))
+            except NotAffineError as error:
+                what = f"the rate of {states[i]}: " if len(formulas) == len(states) else ""
+                return f"{what}{error}"
+        return found
+
+    def affine_fields(self) -> list[list[AffineForm] | str]:
+        """Return the field of each piece as affine forms, or why it is none.
+
+        A model that asks for an implicit method has fast decays, along which a series takes many steps.
+        """
+        method = self.description.method
+        if method != "explicit":
+            return [f"the model asks for the method '{method}'" for _ in self.fields()]
+        return [self.affine(field) for field in self.fields()]
+
     @property
     def pieces(self) -> list[tuple[int, ...]]:
         """Signs of the kinks in each piece of a mode, in the order of their bits."""
@@ -225,6 +250,18 @@ class Formulas:
         return found
 
 
+def integrated_modes(description: Description) -> dict[str, str]:
+    """Return the modes that are not affine, each with the reason."""
+    formulas = Formulas(description)
+    pieces, found = 1 << len(description.kinks), {}
+    forms = formulas.affine_fields()
+    for m, mode in enumerate(description.modes):
+        reasons = [f for f in forms[m * pieces : (m + 1) * pieces] if isinstance(f, str)]
+        if reasons:
+            found[mode.name] = reasons[0]
+    return found
+
+
 def module_source(description: Description, digest: str) -> str:
     """Return the module of a model.
 
@@ -238,6 +275,7 @@ def module_source(description: Description, digest: str) -> str:
     code = Lines()
     code.add(_HEAD.format(digest=digest))
     writer = _Writer(code, formulas)
+    closed, seen = writer.linear()
     writer.vectors("field", "mode", "out", formulas.fields())
     writer.scalars("observe_at(c, t, y, p, which, grad)", "c", formulas.observables())
     writer.rates(formulas.rates())
@@ -255,7 +293,8 @@ def module_source(description: Description, digest: str) -> str:
     timed = [
         c for c, o in enumerate(formulas.observables()) if not o.free_symbols & set(formulas.y)
     ]
-    code.add(motion_code(description, _idle(description, formulas.rates()), timed))
+    idle = _idle(description, formulas.rates())
+    code.add(motion_code(description, idle, timed, closed, seen))
     return str(code)
 
 
@@ -280,6 +319,23 @@ class _Writer:
 
     def __init__(self, code: Lines, formulas: Formulas) -> None:
         self.code, self.f = code, formulas
+
+    def linear(self) -> tuple[list[int], list[int]]:
+        """Write the helpers of what is affine; return the pieces and the observables that are."""
+        forms = self.f.affine_fields()
+        sights = [self.f.affine([o]) for o in self.f.observables()]
+        every = [
+            form for found in (*forms, *sights) if not isinstance(found, str) for form in found
+        ]
+        places = places_of(every)
+
+        def layouts(found: list[list[AffineForm] | str]) -> list[Layout | None]:
+            return [None if isinstance(f, str) else layout_of(f, places) for f in found]
+
+        pieces, seen = layouts(forms), layouts(sights)
+        if any(pieces):
+            LinearWriter(self.code, self._head, len(self.f.y), self.f.p).write(pieces, seen, places)
+        return [i for i, x in enumerate(pieces) if x], [c for c, x in enumerate(seen) if x]
 
     def vectors(self, name: str, index: str, target: str, rows: list[list[Any]]) -> None:
         """Write a vector function of state, one block for each index."""
@@ -344,9 +400,12 @@ class _Writer:
 
     def _define(self, head: str, blocks: list[list[Output]]) -> None:
         """Write the head of a function, and take what its formulas need out of the arrays."""
-        self.code.add("", "@helper")
+        self._head(head, [o.expression for outputs in blocks for o in outputs])
+
+    def _head(self, head: str, formulas: Sequence[Any], decorator: str = "helper") -> None:
+        self.code.add("", f"@{decorator}")
         self.code.open(f"def {head}:")
-        used = {s for outputs in blocks for o in outputs for s in o.expression.free_symbols}
+        used = {s for e in formulas for s in e.free_symbols}
         self.code.add(*(f"{s} = y[{i}]" for i, s in enumerate(self.f.y) if s in used))
         self.code.add(*(f"{s} = p[{i}]" for i, s in enumerate(self.f.p) if s in used))
 

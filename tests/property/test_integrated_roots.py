@@ -1,22 +1,30 @@
 """First roots and stationary points of observables that are as wild as they can be, grazing ones above all.
 
 A trigonometric sum of four harmonics is watched from a state at rest. Its stationary points are
-eigenvalues (of the companion matrix); between two of them there is at most one root.
+eigenvalues (of the companion matrix); between two of them there is at most one root. Searched are a motion
+that is integrated and one in closed form.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "integrated"))
 
+import contfric as cf
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "models"))
+
 from catalogue import HARMONICS, REST, hit, turning
+from harmonic_sum import definition
 
 SUM = 2
 #: Values within this of the level are decided by rounding (sums here are of order 1 to 10).
@@ -57,6 +65,31 @@ def first_root(a, nodes, values):
     return None
 
 
+@pytest.fixture(scope="module", params=["integrated", "closed form"])
+def search(request, tmp_path_factory):
+    """Return hit and turning of the sum along a state at rest: of (a, t0, dt, where to write)."""
+    if request.param == "integrated":
+
+        def at(a):
+            return np.array([0.0, 1e-12, *a])
+
+        return (
+            lambda a, t0, dt, y1: hit(REST, SUM, 0.0, False, t0, np.zeros(2), dt, at(a), y1),
+            lambda a, t0, dt, *out: turning(REST, SUM, t0, np.zeros(2), dt, at(a), *out),
+        )
+    path = tmp_path_factory.mktemp("models") / "harmonic-sum.yaml"
+    path.write_text(json.dumps(definition(HARMONICS)))
+    model = cf.load_model(path)
+    flow = model.flow
+    assert not model.integrated
+    return (
+        lambda a, t0, dt, y1: flow.hit(
+            0, 0, 0.0, False, t0, np.zeros(2), dt, np.array([1.0, *a]), y1
+        ),
+        lambda a, t0, dt, *out: flow.turning(0, 0, t0, np.zeros(2), dt, np.array([1.0, *a]), *out),
+    )
+
+
 coefficient = st.floats(-1, 1).map(lambda x: 0.0 if abs(x) < 1e-3 else x)
 
 
@@ -70,7 +103,7 @@ coefficient = st.floats(-1, 1).map(lambda x: 0.0 if abs(x) < 1e-3 else x)
     t0=st.floats(0, 6),
     dt=st.floats(0.1, 12),
 )
-def test_first_root_and_stationary_points(rest, offset, grazes, which, miss, t0, dt):
+def test_first_root_and_stationary_points(search, rest, offset, grazes, which, miss, t0, dt):
     a = np.array([offset, *rest])
     assume(np.abs(rest).max() > 0.05)
     turn = stationary(a)
@@ -80,10 +113,10 @@ def test_first_root_and_stationary_points(rest, offset, grazes, which, miss, t0,
     every = (turn[None, :] + 2.0 * math.pi * np.arange(-1, 4)[:, None]).ravel()
     assume(min(np.abs(every - t0).min(), np.abs(every - t0 - dt).min()) > 1e-6)
     inside = np.sort(every[(every > t0) & (every < t0 + dt)])
-    p = np.array([0.0, 1e-12, *a])
+    hit_of, turning_of = search
 
     times, values = np.empty(64), np.empty(64)
-    n = turning(REST, SUM, t0, np.zeros(2), dt, p, times, values)
+    n = turning_of(a, t0, dt, times, values)
     assert n == len(inside)
     assert np.all(np.abs(t0 + times[:n] - inside) < 1e-8)
     assert np.all(np.abs(values[:n] - sums(a, inside)[0]) < UNSURE)
@@ -92,7 +125,7 @@ def test_first_root_and_stationary_points(rest, offset, grazes, which, miss, t0,
     at_nodes = sums(a, nodes)[0]
     assume(np.abs(at_nodes).min() > UNSURE)
     expected, y1 = first_root(a, nodes, at_nodes), np.empty(2)
-    tau = hit(REST, SUM, 0.0, False, t0, np.zeros(2), dt, p, y1)
+    tau = hit_of(a, t0, dt, y1)
     assert (tau >= 0.0) == (expected is not None)
     if expected is not None:
         rate = abs(sums(a, np.array([expected]))[1][0])

@@ -57,7 +57,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     )
 
     loaded = load_model(model)
-    report = ModelReport(loaded.name)
+    report = ModelReport(loaded.name, closed=loaded.closed_form, integrated=loaded.integrated)
     check_names(report, loaded)
     if params is None and not check_constraints(report, loaded):
         return report  # at such parameters nothing else means anything

@@ -52,11 +52,15 @@ class ModelReport:
     model : name of the model
     counts : how many single comparisons were made for each topic; 0 where a topic does not apply
     findings : what is wrong, errors and warnings, and what is of use to know, notes
+    closed : modes whose motion is a closed form, of a model that is declared by its equations
+    integrated : modes whose motion is integrated, each with the reason
     """
 
     model: str
     counts: dict[Topic, int] = field(default_factory=lambda: dict.fromkeys(Topic, 0))
     findings: list[Finding] = field(default_factory=list)
+    closed: tuple[str, ...] = ()
+    integrated: dict[str, str] = field(default_factory=dict)
 
     @property
     def ok(self) -> bool:
@@ -88,6 +92,8 @@ class ModelReport:
         return {
             "model": self.model,
             "ok": self.ok,
+            "closed_form": list(self.closed),
+            "integrated": self.integrated,
             "checks": {topic.name.lower(): count for topic, count in self.counts.items()},
             "findings": [
                 {
@@ -109,5 +115,8 @@ class ModelReport:
             note = f" ({count} comparisons)" if count else " (does not apply)"
             lines.append(f"  {mark:5}  {topic.value}{note}")
             lines.extend(f"           {f}" for f in own)
+        if self.closed:
+            lines.append(f"  closed form: {', '.join(self.closed)}")
+        lines.extend(f"  integrated: {mode} ({why})" for mode, why in self.integrated.items())
         lines.append("fine" if self.ok else "not fine: results of this model would be wrong")
         return "\n".join(lines)

@@ -1,0 +1,106 @@
+"""The closed form as a method of the integrator, for what its own search does not know.
+
+An observable that is not affine, and a motion through kinks, are searched step by step as along an integrated
+motion (:mod:`contfric.flow.stepping`); the steps of an affine mode are then its closed form. They have no
+error; their length is limited so that the certificates of the search hold.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.compiled import allocating_helper, helper
+from contfric.flow.dop853 import POWER
+from contfric.flow.linear.flow import MOST_STEPS, advance
+from contfric.flow.linear.system import REACH, WAVES, rows_of, set_up, silenced, system_in
+from contfric.flow.stepping import explicit, explicit_probe
+from contfric.flow.stiffness import automatic, automatic_probe
+
+
+@allocating_helper
+def linear_step(motion, mode, c, t, h, p, which, room, end, any_length):  # type: ignore[no-untyped-def]
+    """Write the vector after a step from ``room.start``; return its length against the longest one."""
+    n, size = room.scales.shape[0], room.partial.shape[1]
+    free = which.shape[0] if size > 0 else 0
+    coefficients = np.empty((1 + free, motion.entries_count))
+    waves = np.empty((1 + free + WAVES, motion.waves_count))
+    rows = np.empty((rows_of(free, 2 * n if size > 0 else 0), n))
+    own = (coefficients, waves, rows)
+    return step_in(motion, mode, c, t, h, p, which[:free], room, end, any_length, own)
+
+
+@helper
+def step_in(motion, mode, c, t, h, p, which, room, end, any_length, own):  # type: ignore[no-untyped-def]
+    """Step in room that is given."""
+    system = system_in(own[0], own[1], own[2], which.shape[0])
+    rate, spread = set_up(motion, mode, p, which, system)
+    rate = silenced(rate, system)
+    length = rate * abs(h) / REACH
+    if not (length <= 1.0 or (any_length and length < MOST_STEPS)):
+        return length
+    n, size, start, maps = room.scales.shape[0], room.partial.shape[1], room.start, system.maps
+    y, first = system.work[4], start.shape[0] - n * size
+    for i in range(n):
+        y[i] = start[i]
+        for k in range(system.varied.shape[0]):
+            system.varied[k, i] = 0.0
+    advance(motion, mode, t, h, rate, spread, y, system)
+    for i in range(n):
+        end[i] = y[i]
+    if first > n:
+        end[n] = motion.observe(c, t + h, end[:n], p, room.none, room.empty)
+    if size == 0:
+        return length
+    for i in range(n):
+        for j in range(size):  # the derivatives so far, carried on, and what this step adds
+            total = system.work[5, i] if j == 0 else system.varied[j - n - 1, i] if j > n else 0.0
+            for k in range(n):
+                total += maps[k, i] * start[first + k * size + j]
+            end[first + i * size + j] = total
+    return length
+
+
+@helper
+def linear_attempt(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
+    """Step from ``room.start`` to ``room.end``; return the error in units of what is allowed."""
+    length = linear_step(motion, mode, c, t, h, p, which, room, room.end, False)
+    return length**POWER
+
+
+@helper
+def linear_probe(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
+    """Write the vector at t + h, within the last step, to ``room.trial``."""
+    linear_step(motion, mode, c, t, h, p, which, room, room.trial, True)
+    return True
+
+
+@helper
+def explicit_or_linear(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
+    """Step by the closed form where there is one (a method)."""
+    if motion.closed(mode):
+        return linear_attempt(motion, mode, c, t, h, p, which, room)
+    return explicit(motion, mode, c, t, h, p, which, room)
+
+
+@helper
+def explicit_or_linear_probe(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
+    """Probe by the closed form where there is one."""
+    if motion.closed(mode):
+        return linear_probe(motion, mode, c, t, h, p, which, room)
+    return explicit_probe(motion, mode, c, t, h, p, which, room)
+
+
+@helper
+def automatic_or_linear(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
+    """Step by the closed form where there is one (a method)."""
+    if motion.closed(mode):
+        return linear_attempt(motion, mode, c, t, h, p, which, room)
+    return automatic(motion, mode, c, t, h, p, which, room)
+
+
+@helper
+def automatic_or_linear_probe(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
+    """Probe by the closed form where there is one."""
+    if motion.closed(mode):
+        return linear_probe(motion, mode, c, t, h, p, which, room)
+    return automatic_probe(motion, mode, c, t, h, p, which, room)

@@ -1,0 +1,350 @@
+"""First hits and stationary points along an affine mode, on the Taylor polynomial itself.
+
+Along a step the observable is its Taylor polynomial to rounding, and so are its derivatives. The step is
+looked at piece by piece with the certificates of :mod:`contfric.flow.pieces`, whose bound of the sixth
+derivative is the sum of the polynomial's own terms. A motion that starts on the level leaves it with the
+first power of time whose factor is not rounding; what is searched then is the quotient by that power.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from contfric.compiled import allocating_helper, helper, inlined_helper
+from contfric.flow.folding import folded
+from contfric.flow.linear.flow import MOST_STEPS
+from contfric.flow.linear.system import (
+    REACH,
+    TERMS,
+    WAVES,
+    rows_of,
+    set_up,
+    silenced,
+    start_waves,
+    system_in,
+    terms_for,
+)
+from contfric.flow.pieces import FREE, ISOLATED, coefficients, root_of, scan
+
+#: A rate at the start below this, relative to 1 + the next one, is rounding.
+AT_START = 1e-13
+#: A second rate at the start this small leaves less than the third does after the first moments.
+FLAT = 1e-7
+#: Shortest piece, as a share of a step: a double root differs from a near miss by its square, rounding.
+SHORTEST = 1e-8
+#: Rounding of a value, against the sum of the terms: a few units in the last place, in the unit of the
+#: certificates' bound of values.
+_ROUNDING = 1e-15 * 46080.0
+#: Most pieces of a step: a regular one has one to ten, each double root about 30 more.
+MOST_PIECES = 3000
+#: Error of a stationary time, relative to 1 + the time: one within it of a joint is at the joint.
+_AT_JOINT = 4e-10
+
+
+@inlined_helper
+def write_series(motion, piece, sight, c, target, t, y, h, terms, system, poly):  # type: ignore[no-untyped-def]
+    """Write the Taylor terms of the state along a step, and of an observable less a target."""
+    series, waves, w = system.series, system.waves, system.w
+    start_waves(system, t)
+    motion.expand(piece, system.co, y, waves[0], waves[1], w, h, terms, series)
+    motion.look(c, sight, waves[0], waves[1], w, h, terms, series, poly)
+    poly[0] -= target
+
+
+@inlined_helper
+def value_at_end(poly, first, terms):  # type: ignore[no-untyped-def]
+    """Return the same at s = 1."""
+    q, q1, q2 = 0.0, 0.0, 0.0
+    for k in range(terms, first - 1, -1):
+        m, here = k - first, poly[k]
+        q += here
+        q1 += m * here
+        q2 += m * (m - 1) * here
+    return q, q1, q2
+
+
+@helper
+def value_at(poly, first, terms, s):  # type: ignore[no-untyped-def]
+    """Return the polynomial from its term ``first`` on, with two derivatives."""
+    q, q1, q2 = 0.0, 0.0, 0.0
+    for k in range(terms, first - 1, -1):
+        q2 = q2 * s + q1
+        q1 = q1 * s + q
+        q = q * s + poly[k]
+    return q, q1, 2.0 * q2
+
+
+@inlined_helper
+def sixth_of(poly, first, terms):  # type: ignore[no-untyped-def]
+    """Return a bound of the polynomial's sixth derivative over a step, and the sum of its terms."""
+    bound, size = 0.0, 0.0
+    for k in range(first, terms + 1):
+        m, here = k - first, abs(poly[k])
+        size += here
+        if m >= 6:
+            bound += here * (m * (m - 1) * (m - 2)) * ((m - 3) * (m - 4) * (m - 5))
+    return bound, size
+
+
+@inlined_helper
+def leaving(poly, terms, h):  # type: ignore[no-untyped-def]
+    """Return the power with which a motion leaves the level that it starts on; beyond the terms: never."""
+    q1, q2, q3 = poly[1] / h, 2.0 * poly[2] / (h * h), 6.0 * poly[3] / (h * h * h)
+    if abs(q1) > AT_START * (1.0 + abs(q2)):
+        return 1
+    if abs(q2) > FLAT * (1.0 + abs(q3)):
+        return 2
+    largest = 0.0
+    for k in range(3, terms + 1):
+        largest = max(largest, abs(poly[k]))
+    if largest <= AT_START * AT_START:
+        return terms + 1
+    for k in range(3, terms):
+        if abs(poly[k]) > FLAT * largest:
+            return k
+    return terms
+
+
+@inlined_helper
+def refine(poly, first, terms, sign, low, high, s):  # type: ignore[no-untyped-def]
+    """Return the only root in a bracket, on the way from positive to negative."""
+    for _ in range(100):  # bisection alone needs 60
+        q, q1, _ = value_at(poly, first, terms, s)
+        if sign * q > 0.0:
+            low = s
+        else:
+            high = s
+        shift = -q / q1 if q1 != 0.0 else math.inf
+        following = s + shift
+        if not low <= following <= high:
+            if high - low <= 4e-16 * high:
+                return s
+            following = 0.5 * (low + high)
+        elif abs(shift) <= 1e-9 * s:  # the square of that is rounding
+            return following
+        s = following
+    return s
+
+
+@helper
+def first_root(poly, first, terms, begin, sign, bound):  # type: ignore[no-untyped-def]
+    """Return the first root in (begin, 1] of a polynomial that starts on the side ``sign``.
+
+    Returns
+    -------
+    tuple
+        (the root, -1 if there is none, no number if the search is too long; a place behind it up to which
+        there is no other one).
+    """
+    sixth, rounding = bound[0], _ROUNDING * bound[1]
+    a, width = begin, 1.0 - begin
+    q, q1, q2 = poly[first], poly[first + 1], 2.0 * poly[first + 2]
+    if a > 0.0:
+        q, q1, q2 = value_at(poly, first, terms, a)
+    for _ in range(MOST_PIECES):
+        b = min(1.0, a + width)
+        if 1.0 - b < SHORTEST:
+            b = 1.0
+        length = b - a
+        r, r1, r2 = (
+            value_at_end(poly, first, terms) if b == 1.0 else value_at(poly, first, terms, b)
+        )
+        ends = coefficients(sign * q, sign * q1, sign * q2, sign * r, sign * r1, sign * r2, length)
+        cube = length * length * length
+        outcome, low, high, here = scan(ends, sixth * cube * cube + rounding, False)
+        if outcome == ISOLATED:
+            low, high = a + low * length, a + high * length
+            return refine(
+                poly, first, terms, sign, low, high, low + (high - low) * root_of(here)
+            ), high
+        if outcome != FREE and length <= SHORTEST:
+            if sign * r <= 0.0:
+                return refine(poly, first, terms, sign, a, b, 0.5 * (a + b)), b
+            outcome = FREE
+        if outcome == FREE:
+            if b == 1.0:
+                return -1.0, 1.0
+            a, q, q1, q2, width = b, r, r1, r2, 2.0 * length
+            continue
+        width = 0.5 * length
+        if low > 0.0:
+            a += low * length
+            q, q1, q2 = value_at(poly, first, terms, a)
+    return math.nan, 1.0
+
+
+@inlined_helper
+def state_at(series, terms, s, out):  # type: ignore[no-untyped-def]
+    """Write the state within a step."""
+    for i in range(out.shape[0]):
+        y = 0.0
+        for k in range(terms, -1, -1):
+            y = y * s + series[k, i]
+        out[i] = y
+
+
+@inlined_helper
+def begin_search(motion, piece, c, t0, y0, dt, p, none, system, sight):  # type: ignore[no-untyped-def]
+    """Evaluate the system and the observable; return the rate (no number: no motion) and the spread."""
+    rate, spread = set_up(motion, piece, p, none, system)
+    motion.entries_seen(c, p, none, sight, system.slopes)
+    motion.audible_seen(c, sight, system.waves[5])
+    rate = silenced(rate, system)
+    size = t0 + dt
+    for i in range(y0.shape[0]):
+        size += y0[i]
+        system.work[4, i] = y0[i]
+    if not (math.isfinite(size) and rate * dt < REACH * MOST_STEPS):
+        return math.nan, spread
+    return rate, spread
+
+
+@inlined_helper
+def next_length(rate, left):  # type: ignore[no-untyped-def]
+    """Return the length of the next step: no tiny last one."""
+    h = REACH / rate if rate > 0.0 else left
+    return left if left <= 1.05 * h else h
+
+
+@inlined_helper
+def hit_in(motion, piece, c, target, on, t0, dt_max, p, rate, spread, system, sight, poly, y1):  # type: ignore[no-untyped-def]
+    """Return the first time at which an observable takes a value, with the state there in ``y1``."""
+    y, series = system.work[4], system.series
+    done, sign = 0.0, 0.0
+    while done < dt_max:
+        h = next_length(rate, dt_max - done)
+        terms, first = terms_for(rate * h, spread), 0
+        write_series(motion, piece, sight, c, target, t0 + done, y, h, terms, system, poly)
+        if on:
+            first = leaving(poly, terms, h)
+        elif done == 0.0:
+            sign = math.copysign(1.0, poly[0])
+        if not on and (poly[0] == 0.0 or sign * poly[0] < 0.0):
+            state_at(series, terms, 0.0, y1)
+            return done
+        if first <= terms:
+            sign = math.copysign(1.0, poly[first])
+            at, _ = first_root(poly, first, terms, 0.0, sign, sixth_of(poly, first, terms))
+            if math.isnan(at):
+                for i in range(y1.shape[0]):
+                    y1[i] = at
+                return done
+            if at >= 0.0:
+                state_at(series, terms, at, y1)
+                return min(done + at * h, dt_max)
+            on = False
+        state_at(series, terms, 1.0, y)
+        done = dt_max if h == dt_max - done else done + h
+    return -1.0
+
+
+@allocating_helper
+def linear_hit(motion, piece, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-untyped-def]
+    """Return the first time at which an observable takes a value (``hit_signature``).
+
+    No numbers as the state where nothing can be found: what is given is no motion, or the search too long.
+    """
+    if not dt_max > 0.0:
+        return -1.0
+    entries, none = motion.entries_count, np.empty(0, dtype=np.int64)
+    coefficients, waves = np.empty((2, entries)), np.empty((1 + WAVES, motion.waves_count))
+    rows, poly = np.empty((rows_of(0, 0), y0.shape[0])), np.empty(TERMS + 2)
+    period = motion.period(p, none, poly[:0])
+    t = t0 - folded(t0, period) * period
+    room = (coefficients, waves, rows, poly)
+    return search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, room, y1)
+
+
+@inlined_helper
+def search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, room, y1):  # type: ignore[no-untyped-def]
+    """Search the first hit, from a folded time, in room that is given."""
+    system, sight = system_in(room[0][:1], room[1], room[2], 0), room[0][1]
+    rate, spread = begin_search(motion, piece, c, t, y0, dt_max, p, none, system, sight)
+    if math.isnan(rate):
+        for i in range(y1.shape[0]):
+            y1[i] = rate
+        return 0.0
+    return hit_in(
+        motion, piece, c, target, on, t, dt_max, p, rate, spread, system, sight, room[3], y1
+    )
+
+
+@inlined_helper
+def turnings_in_step(poly, slope, first, terms, sign, done, h, span, count, times, values):  # type: ignore[no-untyped-def]
+    """Append the zeros of a slope in a step; return their number (-1: it failed) and the last sign."""
+    bound, behind = sixth_of(slope, first, terms), 0.0
+    while behind < 1.0:
+        at, behind = first_root(slope, first, terms, behind, sign, bound)
+        if math.isnan(at):
+            return -1, sign
+        if at < 0.0:
+            break
+        sign = -sign
+        if span[0] < done + at * h < span[1]:
+            if count == times.shape[0]:
+                return -1, sign
+            times[count], values[count] = done + at * h, value_at(poly, 0, terms + 1, at)[0]
+            count += 1
+    return count, sign
+
+
+@inlined_helper
+def turnings_in(motion, piece, c, t0, dt, p, reach, system, sight, polys, times, values):  # type: ignore[no-untyped-def]
+    """Write the interior stationary points of an observable; return their number, or -1."""
+    rate, spread = reach
+    y, near, poly, slope = system.work[4], _AT_JOINT * (1.0 + dt), polys[0], polys[1]
+    span = (min(near, 0.5 * dt), max(dt - near, 0.5 * dt))
+    done, sign, count = 0.0, 0.0, 0
+    while done < dt:
+        h = next_length(rate, dt - done)
+        terms, first, size = terms_for(rate * h, spread), 0, 0.0
+        write_series(motion, piece, sight, c, 0.0, t0 + done, y, h, terms, system, poly)
+        for k in range(1, terms + 1):
+            slope[k - 1] = k * poly[k]
+            size += abs(poly[k])
+        if size > FLAT * FLAT * (1.0 + abs(poly[0])):
+            if sign == 0.0 and abs(slope[0]) <= AT_START * (h + abs(slope[1])):
+                first = leaving(slope, terms - 1, h)
+            if first < terms:
+                sign = math.copysign(1.0, slope[first]) if sign == 0.0 else sign
+                if first == 0 and sign * slope[0] < 0.0:  # rounding between two steps
+                    sign = -sign
+                    if span[0] < done < span[1]:
+                        if count == times.shape[0]:
+                            return -1
+                        times[count], values[count] = done, poly[0]
+                        count += 1
+                count, sign = turnings_in_step(
+                    poly, slope, first, terms - 1, sign, done, h, span, count, times, values
+                )
+                if count < 0:
+                    return -1
+        state_at(system.series, terms, 1.0, y)
+        done = dt if h == dt - done else done + h
+    return count
+
+
+@allocating_helper
+def linear_turning(motion, piece, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
+    """Write the stationary points of an observable and return their number (``turning_signature``)."""
+    if not dt > 0.0:
+        return 0
+    entries, none = motion.entries_count, np.empty(0, dtype=np.int64)
+    coefficients, waves = np.empty((2, entries)), np.empty((1 + WAVES, motion.waves_count))
+    rows, poly = np.empty((rows_of(0, 0), y0.shape[0])), np.empty((2, TERMS + 2))
+    period = motion.period(p, none, poly[0, :0])
+    t = t0 - folded(t0, period) * period
+    room = (coefficients, waves, rows, poly)
+    return search_turnings(motion, piece, c, t, y0, dt, p, none, room, times, values)
+
+
+@inlined_helper
+def search_turnings(motion, piece, c, t, y0, dt, p, none, room, times, values):  # type: ignore[no-untyped-def]
+    """Search all stationary points, from a folded time, in room that is given."""
+    system, sight = system_in(room[0][:1], room[1], room[2], 0), room[0][1]
+    reach = begin_search(motion, piece, c, t, y0, dt, p, none, system, sight)
+    if math.isnan(reach[0]):
+        return -1
+    return turnings_in(motion, piece, c, t, dt, p, reach, system, sight, room[3], times, values)

@@ -1,0 +1,42 @@
+"""Flow, first hits and stationary points of the declared oscillator against the closed form by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.flow import forced_oscillator as by_hand
+
+NONE, EMPTY, ALL = np.empty(0, dtype=np.int64), np.empty(0), np.arange(5)
+LOAD, SPEED, STICK = 0, 1, 2
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_segments_agree(seed: int) -> None:
+    flow, rng = cf.load_model("coulomb-yaml").flow, np.random.default_rng(seed)
+    s, extra = rng.uniform(0, 1), rng.uniform(0, 0.5)
+    p = np.array([rng.uniform(0.1, 3), s, s + extra, rng.uniform(-1, 1), rng.uniform(0, 0.5)])
+    p[3:] *= rng.integers(0, 2, 2)
+    mode, y = int(rng.integers(3)), rng.uniform(-2, 2, 2)
+    y[1] *= mode != STICK
+    t0, dt = rng.uniform(-30, 30), rng.uniform(0, 20)
+    a, b, ja, jb = np.empty(2), np.empty(2), np.empty((2, 9)), np.empty((2, 9))
+    flow.flow(mode, t0, y, dt, p, ALL, a, ja)
+    by_hand.flow(mode, t0, y, dt, p, ALL, b, jb)
+    assert np.all(np.abs(a - b) < 2e-13 * (1 + np.abs(b)))
+    assert np.all(np.abs(ja - jb) < 2e-12 * (1 + np.abs(jb)))
+    for c in (LOAD, SPEED):
+        on = bool(rng.integers(2)) and c == LOAD
+        target = by_hand.observe(c, t0, y, p, NONE, EMPTY) if on else rng.uniform(-1, 1)
+        tau, want = (
+            f.hit(mode, c, target, on, t0, y, dt, p, y1) for f, y1 in ((flow, a), (by_hand, b))
+        )
+        assert (tau < 0) == (want < 0)
+        if tau >= 0:
+            rate = abs(by_hand.rate(mode, c, t0 + want, b, p, NONE, EMPTY))
+            assert max(abs(tau - want), *np.abs(a - b)) * min(rate, 1.0) < 1e-12
+        times, values = np.empty((2, 200)), np.empty((2, 200))
+        n = flow.turning(mode, c, t0, y, dt, p, times[0], values[0])
+        assert n == by_hand.turning(mode, c, t0, y, dt, p, times[1], values[1])
+        assert np.all(np.abs(np.diff(values[:, :n], axis=0)) < 1e-12)
