@@ -1,0 +1,249 @@
+"""What the page of a diagram shows, as plain data: lines, events, and orbits to click on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from html.entities import name2codepoint
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.models.definition import FloatArray
+from contfric.plot.events import Mark, marks_of
+from contfric.plot.live.packed import floats, kept, quantised
+from contfric.plot.runs import aligned, quantity, stability_runs
+from contfric.plot.style import BRIDGE_COLOUR, ROWS, branch_colours, domain_colours, lighter
+
+if TYPE_CHECKING:
+    from contfric.atlas.diagram import Diagram
+    from contfric.continuation.branch import Branch
+    from contfric.orbit.orbit import Orbit
+
+#: Samples of an orbit: a curve of this many pieces looks smooth at the size that it has on the page.
+_SAMPLES = 72
+#: Relative: an event is on a branch that has one of its kind this near.
+_SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Detail:
+    """How much of a diagram goes into the file.
+
+    Attributes
+    ----------
+    orbits : most orbits that can be clicked on, without those of the events
+    tolerance : what a line may be off, as a share of the diagram's height; 0 keeps every point
+    """
+
+    orbits: int
+    tolerance: float
+
+
+def symbol(name: str) -> str:
+    """Return the name of a parameter with Greek letters.
+
+    Examples
+    --------
+    >>> symbol("Omega"), symbol("S0")
+    ('Ω', 'S0')
+    """
+    return chr(name2codepoint[name]) if name in name2codepoint else name
+
+
+def collect(diagram: Diagram, detail: Detail) -> dict[str, Any]:
+    """Return everything that the page shows of a diagram."""
+    branches = diagram.branches
+    colours = branch_colours(b.name for b in branches if not b.bridge)
+    return {
+        "parameter": symbol(diagram.parameter),
+        "range": list(diagram.range),
+        "model": diagram.model.name,
+        "states": list(diagram.model.states),
+        "rows": [_row(diagram, name) for name in ROWS],
+        "domains": domain_colours(diagram.model),
+        "branches": [_branch(b, colours) for b in branches],
+        "runs": [run for i in range(len(branches)) for run in _runs(diagram, i, detail)],
+        "points": list(_points(diagram, detail)),
+    }
+
+
+def _row(diagram: Diagram, name: str) -> dict[str, Any]:
+    """Return one quantity with its marks; of an even one, mirror images lie on their originals."""
+    originals = {b.name for b in diagram.branches if not b.mirrored}
+    row = ROWS[name]
+    twins = [
+        row.even and branch.mirrored and branch.name in originals for branch in diagram.branches
+    ]
+    found = marks_of(diagram.bifurcations, diagram.branches, row.attribute, diagram.parameter)
+    return {
+        "name": name,
+        "label": {"stops": "x at stops", "psi": "ψ"}.get(name, name),
+        "left_out": [i for i, twin in enumerate(twins) if twin],
+        "marks": [_mark(mark, diagram) for mark in found],
+    }
+
+
+def _mark(mark: Mark, diagram: Diagram) -> dict[str, Any]:
+    there = {
+        branch.name
+        for branch in diagram.branches
+        for event in branch.bifurcations
+        if event.kind is mark.kind
+        and abs(event.params[diagram.parameter] - mark.x) <= _SAME * abs(mark.x)
+    }
+    return {
+        "kind": mark.kind.value,
+        "label": mark.label,
+        "meaning": mark.meaning,
+        "x": mark.x,
+        "y": mark.y.tolist(),
+        "on_bridges": mark.on_bridges,
+        "branches": sorted(there),
+    }
+
+
+def _branch(branch: Branch, colours: dict[str, str]) -> dict[str, Any]:
+    colour = BRIDGE_COLOUR if branch.bridge else colours[branch.name]
+    shown = lighter(colour) if branch.mirrored else colour
+    return {
+        "name": branch.name,
+        "bridge": branch.bridge,
+        "mirrored": branch.mirrored,
+        "colour": shown,
+    }
+
+
+def _runs(diagram: Diagram, i: int, detail: Detail) -> Iterator[dict[str, Any]]:
+    """Yield the pieces of one stability of a branch: x once, y of every row."""
+    branch = diagram.branches[i]
+    of_rows = [stability_runs(branch, row.attribute) for row in ROWS.values()]
+    width = diagram.range[1] - diagram.range[0]
+    for pieces in zip(*of_rows, strict=True):
+        x = pieces[0].x
+        columns = np.column_stack([x / width, *(p.y / _height(p.y) for p in pieces)])
+        at = kept(columns, detail.tolerance)
+        stable = pieces[0].stable
+        style = {True: "stable", False: "unstable", None: "unknown"}[stable]
+        yield {
+            "branch": i,
+            "style": "bridge" if branch.bridge else style,
+            "x": floats(x[at]),
+            "y": {
+                name: [floats(column) for column in piece.y[at].T]
+                for name, piece in zip(ROWS, pieces, strict=True)
+            },
+        }
+
+
+def _height(values: FloatArray) -> float:
+    """Return the size of a quantity, for lengths relative to it."""
+    finite = values[np.isfinite(values)]
+    return float(np.max(np.abs(finite))) if finite.size and np.any(finite) else 1.0
+
+
+# ------------------------------------------------------------------------------- orbits
+
+
+def _points(diagram: Diagram, detail: Detail) -> Iterator[dict[str, Any]]:
+    """Yield the orbits that can be clicked on: of the branches, and of every event."""
+    stride = _stride([len(b) for b in diagram.branches], detail.orbits)
+    for i, branch in enumerate(diagram.branches):
+        multipliers = None if branch.bridge else branch.multipliers
+        for k in _spread(len(branch), stride):
+            own = None if multipliers is None else multipliers[k]
+            stable = None if branch.stable is None else bool(branch.stable[k])
+            yield _point(diagram, i, branch[k], own, stable, "")
+        for event in branch.bifurcations:
+            own = None if branch.bridge or multipliers is None else event.orbit.multipliers
+            near = {n: _nearest(branch, event.params, n) for n in ROWS}
+            yield _point(diagram, i, event.orbit, own, None, event.label, near)
+
+
+def _stride(lengths: Sequence[int], most: int) -> int:
+    """Return which share of the points is shown, so that there are not more than asked for."""
+    stride = 1
+    while sum(len(_spread(n, stride)) for n in lengths) > max(most, 2 * len(lengths)):
+        stride += 1
+    return stride
+
+
+def _spread(count: int, stride: int) -> list[int]:
+    """Return every so many of a branch's points, the last one too."""
+    return sorted({*range(0, count, stride), count - 1}) if count else []
+
+
+def _nearest(branch: Branch, params: dict[str, float], row: str) -> FloatArray:
+    k = int(np.argmin(np.abs(branch.values - params[branch.parameter])))
+    return np.asarray(quantity(branch, ROWS[row].attribute)[k])
+
+
+def _point(
+    diagram: Diagram,
+    branch: int,
+    orbit: Orbit,
+    multipliers: NDArray[np.complex128] | None,
+    stable: bool | None,
+    event: str,
+    near: dict[str, FloatArray] | None = None,
+) -> dict[str, Any]:
+    """Return one orbit: where it is drawn in each row, what is said of it, and its motion."""
+    y = {name: quantity(orbit, row.attribute) for name, row in ROWS.items()}
+    if near is not None:
+        y = {name: aligned(values, near[name]) for name, values in y.items()}
+    return {
+        "branch": branch,
+        "event": event,
+        "x": float(orbit.params[diagram.parameter]),
+        "y": {name: [_short(value) for value in values] for name, values in y.items()},
+        "signature": str(orbit.signature),
+        "stable": stable,
+        "periods": orbit.periods,
+        "period": _short(orbit.period),
+        "multipliers": None if multipliers is None else [_complex(mu) for mu in multipliers],
+        "margin": _smallest_margin(orbit),
+        **_motion(orbit),
+    }
+
+
+def _short(value: float) -> float | None:
+    return float(f"{value:.6g}") if np.isfinite(value) else None  # JSON knows no nan
+
+
+def _complex(value: complex) -> str:
+    """Return a multiplier as text.
+
+    Examples
+    --------
+    >>> _complex(0.5 + 0j), _complex(0.5 - 0.25j)
+    ('0.5', '0.5 − 0.25i')
+    """
+    if value.imag == 0.0 or not np.isfinite(value):
+        return f"{value.real:.6g}"
+    return f"{value.real:.6g} {'−' if value.imag < 0.0 else '+'} {abs(value.imag):.6g}i"
+
+
+def _smallest_margin(orbit: Orbit) -> str:
+    """Return the margin nearest to zero, and where it is."""
+    tests = orbit.system.tests
+    if not tests:
+        return "none is watched"
+    k = int(np.argmin(orbit.margins))
+    test = tests[k]
+    mode = orbit.system.word[test.segment][0]
+    return (
+        f"{orbit.margins[k]:.4g} ({test.margin.value}, at {test.surface}, "
+        f"in segment {test.segment + 1}: {mode})"
+    )
+
+
+def _motion(orbit: Orbit) -> dict[str, Any]:
+    """Return time and states along one period, and where each segment begins."""
+    times, states, names = orbit.trajectory(_SAMPLES)
+    changes = [k for k in range(len(names)) if k == 0 or names[k] != names[k - 1]]
+    return {
+        "t": quantised(times - times[0]),
+        "s": [quantised(column) for column in states.T],
+        "parts": [[k, names[k]] for k in changes],
+    }
