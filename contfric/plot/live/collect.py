@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from contfric.models.definition import FloatArray
 from contfric.plot.events import Mark, marks_of
 from contfric.plot.live.packed import floats, kept, quantised
-from contfric.plot.runs import aligned, quantity, stability_runs
+from contfric.plot.runs import quantity, stability_runs
 from contfric.plot.style import BRIDGE_COLOUR, ROWS, branch_colours, domain_colours, lighter
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
     from contfric.continuation.branch import Branch
+    from contfric.continuation.events import Bifurcation
     from contfric.orbit.orbit import Orbit
 
 #: Samples of an orbit: a curve of this many pieces looks smooth at the size that it has on the page.
@@ -52,8 +53,13 @@ def symbol(name: str) -> str:
     return chr(name2codepoint[name]) if name in name2codepoint else name
 
 
-def collect(diagram: Diagram, detail: Detail) -> dict[str, Any]:
-    """Return everything that the page shows of a diagram."""
+def collect(
+    diagram: Diagram, detail: Detail, orbits: dict[tuple[int, int], dict[str, Any]]
+) -> dict[str, Any]:
+    """Return everything that the page shows of a diagram.
+
+    ``orbits`` keeps those that were sampled, by branch and point, for a call that asks for fewer.
+    """
     branches = diagram.branches
     colours = branch_colours(b.name for b in branches if not b.bridge)
     return {
@@ -65,7 +71,7 @@ def collect(diagram: Diagram, detail: Detail) -> dict[str, Any]:
         "domains": domain_colours(diagram.model),
         "branches": [_branch(b, colours) for b in branches],
         "runs": [run for i in range(len(branches)) for run in _runs(diagram, i, detail)],
-        "points": list(_points(diagram, detail)),
+        "points": list(_points(diagram, detail, orbits)),
     }
 
 
@@ -146,26 +152,30 @@ def _height(values: FloatArray) -> float:
 # ------------------------------------------------------------------------------- orbits
 
 
-def _points(diagram: Diagram, detail: Detail) -> Iterator[dict[str, Any]]:
+def _points(
+    diagram: Diagram, detail: Detail, known: dict[tuple[int, int], dict[str, Any]]
+) -> Iterator[dict[str, Any]]:
     """Yield the orbits that can be clicked on: of the branches, and of every event."""
     stride = _stride([len(b) for b in diagram.branches], detail.orbits)
     for i, branch in enumerate(diagram.branches):
-        multipliers = None if branch.bridge else branch.multipliers
         for k in _spread(len(branch), stride):
-            own = None if multipliers is None else multipliers[k]
-            stable = None if branch.stable is None else bool(branch.stable[k])
-            yield _point(diagram, i, branch[k], own, stable, "")
-        for event in branch.bifurcations:
-            own = None if branch.bridge or multipliers is None else event.orbit.multipliers
-            near = {n: _nearest(branch, event.params, n) for n in ROWS}
-            yield _point(diagram, i, event.orbit, own, None, event.label, near)
+            if (i, k) not in known:
+                known[i, k] = _on_branch(diagram, i, k)
+            yield known[i, k]
+        for k, event in enumerate(branch.bifurcations, start=1):
+            if (i, -k) not in known:
+                known[i, -k] = _at_event(diagram, i, event)
+            yield known[i, -k]
 
 
 def _stride(lengths: Sequence[int], most: int) -> int:
-    """Return which share of the points is shown, so that there are not more than asked for."""
+    """Return every how many points one is shown, so that there are not more than asked for.
+
+    It is a power of two: what a coarser page shows, a finer one shows, too.
+    """
     stride = 1
     while sum(len(_spread(n, stride)) for n in lengths) > max(most, 2 * len(lengths)):
-        stride += 1
+        stride *= 2
     return stride
 
 
@@ -174,9 +184,24 @@ def _spread(count: int, stride: int) -> list[int]:
     return sorted({*range(0, count, stride), count - 1}) if count else []
 
 
-def _nearest(branch: Branch, params: dict[str, float], row: str) -> FloatArray:
-    k = int(np.argmin(np.abs(branch.values - params[branch.parameter])))
-    return np.asarray(quantity(branch, ROWS[row].attribute)[k])
+def _on_branch(diagram: Diagram, i: int, k: int) -> dict[str, Any]:
+    """Return a point of a branch, with the multipliers that the branch has."""
+    branch = diagram.branches[i]
+    multipliers = None if branch.bridge or branch.multipliers is None else branch.multipliers[k]
+    stable = None if branch.stable is None else bool(branch.stable[k])
+    orbit = branch[k]
+    y = {name: quantity(orbit, row.attribute) for name, row in ROWS.items()}
+    return _point(diagram, i, orbit, multipliers, y) | {"stable": stable, "event": ""}
+
+
+def _at_event(diagram: Diagram, i: int, event: Bifurcation) -> dict[str, Any]:
+    """Return the orbit of an event of a branch; it has no stability, which changes there."""
+    branch = diagram.branches[i]
+    known = not branch.bridge and branch.multipliers is not None
+    multipliers = event.orbit.multipliers if known else None
+    y = {name: quantity(event.orbit, row.attribute) for name, row in ROWS.items()}
+    found = _point(diagram, i, event.orbit, multipliers, y)
+    return found | {"stable": None, "event": event.label}
 
 
 def _point(
@@ -184,21 +209,14 @@ def _point(
     branch: int,
     orbit: Orbit,
     multipliers: NDArray[np.complex128] | None,
-    stable: bool | None,
-    event: str,
-    near: dict[str, FloatArray] | None = None,
+    y: dict[str, FloatArray],
 ) -> dict[str, Any]:
     """Return one orbit: where it is drawn in each row, what is said of it, and its motion."""
-    y = {name: quantity(orbit, row.attribute) for name, row in ROWS.items()}
-    if near is not None:
-        y = {name: aligned(values, near[name]) for name, values in y.items()}
     return {
         "branch": branch,
-        "event": event,
         "x": float(orbit.params[diagram.parameter]),
         "y": {name: [_short(value) for value in values] for name, values in y.items()},
         "signature": str(orbit.signature),
-        "stable": stable,
         "periods": orbit.periods,
         "period": _short(orbit.period),
         "multipliers": None if multipliers is None else [_complex(mu) for mu in multipliers],

@@ -192,6 +192,6 @@ for (const id of ["abscissa", "ordinate"]) by_id(id).addEventListener("change", 
 window.contfric = {data, pick, show, thin};
 fit(draw());
 thin();
-const first = data.points.find((p) => p.stable) ?? data.points[0];
-if (first) show(first);
+const stable = data.points.filter((p) => p.stable);
+if (data.points.length > 0) show(stable[stable.length >> 1] ?? data.points[0]);
 document.body.dataset.contfric = "ready"; // tests wait for it

@@ -77,8 +77,9 @@ def write_page(diagram: Diagram, path: str | PathLike[str]) -> Path:
     need_bokeh()
     file = Path(path)
     text = ""
+    orbits: dict[tuple[int, int], dict[str, Any]] = {}
     for detail in _DETAILS:
-        text = _page(diagram, detail)
+        text = _page(diagram, collect(diagram, detail, orbits))
         if len(text.encode()) <= LARGEST:
             break
     with replacing(file) as temporary:
@@ -86,13 +87,13 @@ def write_page(diagram: Diagram, path: str | PathLike[str]) -> Path:
     return file
 
 
-def _page(diagram: Diagram, detail: Detail) -> str:
+def _page(diagram: Diagram, data: dict[str, Any]) -> str:
+    """Return the text of the page."""
     from bokeh.document import Document
     from bokeh.embed import file_html
     from bokeh.models import CustomJS
     from bokeh.resources import INLINE
 
-    data = collect(diagram, detail)
     data["looks"] = _looks()
     data["state_colours"] = [_STATE_COLOURS[k % 7] for k in range(len(data["states"]))]
     figures, sources = _figures(diagram, data)
