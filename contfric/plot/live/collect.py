@@ -66,6 +66,7 @@ def collect(
         "parameter": symbol(diagram.parameter),
         "range": list(diagram.range),
         "model": diagram.model.name,
+        "autonomous": diagram.model.autonomous,
         "states": list(diagram.model.states),
         "rows": [_row(diagram, name) for name in ROWS],
         "domains": domain_colours(diagram.model),

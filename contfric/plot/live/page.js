@@ -111,7 +111,8 @@ function show(point) {
     stability: branch.bridge ? "bridge: the least disturbance ends its hold" : stability,
     "Floquet multipliers": point.multipliers ? point.multipliers.join(", ") : branch.bridge ? "none" : "not computed",
     "smallest margin": point.margin,
-    period: `${point.period} (${point.periods} of the excitation or cycle)`,
+    period: String(point.period),
+    [data.autonomous ? "cycles" : "periods of the excitation"]: String(point.periods),
   };
   if (point.event) {
     facts.event = point.event;

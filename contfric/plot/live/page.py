@@ -234,4 +234,5 @@ def _orbit_glyphs(phase: Any, series: Any) -> dict[str, Any]:
     series.multi_line(
         "x", "y", source=curves, line_color="colour", line_width=2, legend_field="state"
     )
+    series.legend.background_fill_alpha = 0.6
     return {"parts": parts, "joints": joints, "curves": curves}
