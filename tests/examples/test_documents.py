@@ -60,7 +60,7 @@ def test_tutorial_runs(
 
 
 def test_every_page_of_the_tutorial_is_run() -> None:
-    named = {p[0] if isinstance(p, tuple) else p.values[0] for p in TUTORIAL}
+    named = {getattr(p, "values", p)[0] for p in TUTORIAL}
     assert named == {page.stem for page in (ROOT / "docs/tutorial").glob("*.md")}
 
 
