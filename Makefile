@@ -124,10 +124,11 @@ gallery: $(STAMP)
 	    test -f "$$script" || continue; found=yes; echo "$$script"; $(BIN)/python "$$script"; \
 	done; test $$found = yes || echo "no docs/gallery/*.py yet"
 
-# The variable silences the theme's advertisement of its successor; mkdocs' own warnings are errors.
+# Without --quiet, with which mkdocs does not count its warnings. The variable silences the theme's
+# advertisement of its successor.
 docs: $(DOCS_STAMP)
 	@echo "== docs"
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir $(SITE)
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir $(SITE)
 	@echo "$(SITE)/index.html"
 
 clean:
