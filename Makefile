@@ -129,7 +129,7 @@ gallery: $(STAMP)
 docs: $(DOCS_STAMP)
 	@echo "== docs"
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir $(SITE)
-	@echo "$(SITE)/index.html"
+	@echo "$(SITE)/index.html (its search needs a server: python3 -m http.server -d $(SITE))"
 
 clean:
 	@rm -rf build dist $(DEMO) $(SITE) .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache

@@ -61,6 +61,13 @@ def test_every_public_name_has_one_place_in_the_reference() -> None:
     assert sorted([*found, "__version__"]) == sorted(contfric.__all__)
 
 
+def test_a_warning_fails_the_build() -> None:
+    """With --quiet mkdocs does not count its warnings, and --strict lets them pass."""
+    (line,) = re.findall(r"^\t.*mkdocs build.*$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert "--strict" in line
+    assert "quiet" not in line
+
+
 def prose(page: Path) -> str:
     """Return the text of a page without what stands as code."""
     text = re.sub(r"^( *)```.*?^\1```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
