@@ -98,6 +98,12 @@ def wrong_links(page: Path) -> list[str]:
     return wrong
 
 
+@pytest.mark.parametrize("page", PAGES, ids=relative)
+def test_lists_go_on_where_they_do_on_github(page: Path) -> None:
+    """mkdocs ends a list at a paragraph that is indented by less than four spaces, GitHub does not."""
+    assert re.findall(r"(?<=\n\n) {1,3}[^ \n].*", prose(page)) == []
+
+
 @pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=relative)
 def test_links_resolve(page: Path) -> None:
     assert wrong_links(page) == []
