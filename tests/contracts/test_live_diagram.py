@@ -20,7 +20,7 @@ from contfric.cli import main
 from contfric.extras import MissingPackageError
 from contfric.plot.live import page
 from contfric.plot.live.collect import Detail
-from contfric.plot.live.packed import floats, kept, quantised
+from contfric.plot.live.packed import floats, kept, local_sizes, quantised
 from contfric.plot.style import ROWS
 
 LARGEST = 2_000_000
@@ -152,21 +152,42 @@ def test_a_large_diagram_is_shown_with_less(
     assert less["rows"] == data["rows"]  # nor any event
 
 
+def drawn(columns: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return points of the thinned line that stand for its vertices."""
+    found = np.empty_like(columns)
+    for first, last in pairwise(at):
+        share = (np.arange(last - first + 1) / (last - first))[:, None]
+        found[first : last + 1] = (1 - share) * columns[first] + share * columns[last]
+    return found
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_vertex_that_is_left_out_is_near_the_line(seed: int) -> None:
     generator = np.random.default_rng(seed)
     columns = np.cumsum(generator.normal(size=(200, 3)), axis=0)
+    sizes = generator.uniform(0.5, 2.0, size=columns.shape)
     tolerance = float(10.0 ** generator.uniform(-2, 1))
-    at = kept(columns, tolerance)
+    at = kept(columns, sizes, tolerance)
     assert at[0] == 0
     assert at[-1] == 199
-    index = np.arange(200)
-    drawn = np.empty_like(columns)
-    for first, last in pairwise(at):
-        share = ((index[first : last + 1] - first) / (last - first))[:, None]
-        drawn[first : last + 1] = (1 - share) * columns[first] + share * columns[last]
-    assert np.abs(drawn - columns).max() <= tolerance * (1 + 1e-9)
-    assert np.array_equal(kept(columns, 0.0), index)
+    assert np.max(np.abs(drawn(columns, at) - columns) / sizes) <= tolerance * (1 + 1e-9)
+    assert np.array_equal(kept(columns, sizes, 0.0), np.arange(200))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_resonance_does_not_flatten_the_rest(seed: int) -> None:
+    """A line that grows by six decades is drawn exactly where it is small."""
+    generator = np.random.default_rng(seed)
+    x = 1.0 - np.geomspace(1.0, 1e-6, 2000)
+    y = 1.0 / (1.0 - x) + 0.3 * np.sin(generator.uniform(5, 20) * x)
+    columns = np.column_stack([x, y])
+    sizes = np.column_stack([np.ones_like(x), local_sizes(y)])
+    at = kept(columns, sizes, 1e-3)
+    assert len(at) < len(x)
+    error = np.abs(drawn(columns, at) - columns)
+    small = y < 5.0
+    assert error[small, 1].max() <= 1e-3 * (y[small].max() + np.quantile(np.abs(y), 0.05))
+    assert error[:, 0].max() <= 1e-3
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -102,6 +102,7 @@ def wrong_links(page: Path) -> list[str]:
 def test_lists_go_on_where_they_do_on_github(page: Path) -> None:
     """mkdocs ends a list at a paragraph that is indented by less than four spaces, GitHub does not."""
     assert re.findall(r"(?<=\n\n) {1,3}[^ \n].*", prose(page)) == []
+    assert re.findall(r"^ {4}[^ *\n-].*\n(?:[*-]|\d+\.) .*", prose(page), re.MULTILINE) == []
 
 
 @pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=relative)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray
 from contfric.plot.events import Mark, marks_of
-from contfric.plot.live.packed import floats, kept, quantised
+from contfric.plot.live.packed import floats, kept, local_sizes, quantised
 from contfric.plot.runs import quantity, stability_runs
 from contfric.plot.style import BRIDGE_COLOUR, ROWS, branch_colours, domain_colours, lighter
 
@@ -35,7 +35,7 @@ class Detail:
     Attributes
     ----------
     orbits : most orbits that can be clicked on, without those of the events
-    tolerance : what a line may be off, as a share of the diagram's height; 0 keeps every point
+    tolerance : what a line may be off, as a share of its own size there; 0 keeps every point
     """
 
     orbits: int
@@ -129,8 +129,9 @@ def _runs(diagram: Diagram, i: int, detail: Detail) -> Iterator[dict[str, Any]]:
     width = diagram.range[1] - diagram.range[0]
     for pieces in zip(*of_rows, strict=True):
         x = pieces[0].x
-        columns = np.column_stack([x / width, *(p.y / _height(p.y) for p in pieces)])
-        at = kept(columns, detail.tolerance)
+        columns = np.column_stack([x, *(p.y for p in pieces)])
+        sizes = np.column_stack([np.full(len(x), width), *(local_sizes(p.y) for p in pieces)])
+        at = kept(columns, sizes, detail.tolerance)
         stable = pieces[0].stable
         style = {True: "stable", False: "unstable", None: "unknown"}[stable]
         yield {
@@ -142,12 +143,6 @@ def _runs(diagram: Diagram, i: int, detail: Detail) -> Iterator[dict[str, Any]]:
                 for name, piece in zip(ROWS, pieces, strict=True)
             },
         }
-
-
-def _height(values: FloatArray) -> float:
-    """Return the size of a quantity, for lengths relative to it."""
-    finite = values[np.isfinite(values)]
-    return float(np.max(np.abs(finite))) if finite.size and np.any(finite) else 1.0
 
 
 # ------------------------------------------------------------------------------- orbits

@@ -11,6 +11,9 @@ from contfric.models.definition import FloatArray
 
 #: Steps of a quantised number: the largest number of 16 bits.
 _STEPS = 65535
+#: What counts as small on a line: this quantile of its values, unless they span more decades than single
+#: precision has.
+_SMALL, _DECADES = 0.05, 1e-6
 
 
 def floats(values: FloatArray) -> str:
@@ -38,15 +41,30 @@ def quantised(values: FloatArray) -> tuple[float, float, str]:
     return low, step, base64.b64encode(counts.tobytes()).decode("ascii")
 
 
-def kept(columns: FloatArray, tolerance: float) -> NDArray[np.intp]:
+def local_sizes(values: FloatArray) -> FloatArray:
+    """Return the size of a quantity at each of its values: what an error there is compared with.
+
+    Near a resonance a branch grows by many decades, and one zooms in to where it is small.
+    """
+    sizes = np.abs(np.nan_to_num(values))
+    if not np.any(sizes):
+        return np.ones_like(sizes)
+    found = sizes[np.isfinite(values)]
+    small = max(float(np.quantile(found, _SMALL)), _DECADES * float(found.max()))
+    return np.asarray(sizes + small)
+
+
+def kept(columns: FloatArray, sizes: FloatArray, tolerance: float) -> NDArray[np.intp]:
     """Return the indices of the vertices that a polyline needs (Douglas and Peucker, 1973).
 
     Parameters
     ----------
     columns : ndarray, shape (k, quantities)
-        The vertices, each quantity as a share of what is drawn; nan where it is absent.
+        The vertices as they are drawn; nan where a quantity is absent.
+    sizes : ndarray, shape (k, quantities)
+        What distances at each vertex are compared with.
     tolerance : float
-        Largest distance of a vertex that is left out; 0 keeps all.
+        Largest distance of a vertex that is left out, relative to its sizes; 0 keeps all.
     """
     count = len(columns)
     needed = np.ones(count, dtype=bool)
@@ -60,7 +78,9 @@ def kept(columns: FloatArray, tolerance: float) -> NDArray[np.intp]:
                 continue
             share = np.linspace(0.0, 1.0, last - first + 1)[:, None]
             chord = (1.0 - share) * filled[first] + share * filled[last]
-            far = np.abs(filled[first : last + 1] - chord).max(axis=1)
+            here = slice(first, last + 1)
+            far = (np.abs(filled[here] - chord) / sizes[here]).max(axis=1)
+            far[[0, -1]] = 0.0  # the ends are kept already
             worst = int(np.argmax(far))
             if far[worst] > tolerance:
                 needed[first + worst] = True
