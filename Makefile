@@ -1,4 +1,4 @@
-# make setup | demo | test | test-all | gate | bench | stress | studies | gallery | clean
+# make setup | demo | test | test-all | gate | bench | stress | studies | gallery | docs | clean
 PYTHON ?= python3
 WORKERS ?= 2
 
@@ -6,11 +6,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 BENCH_STAMP := $(VENV)/.bench-installed
+DOCS_STAMP := $(VENV)/.docs-installed
+SITE := site
 DEMO := demo
 STRESS := .stress
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint types contracts unit test-all gate bench stress studies gallery clean
+.PHONY: help setup demo test lint types contracts unit test-all gate bench stress studies gallery docs clean
 MAKEFLAGS += --no-print-directory
 
 help:
@@ -22,6 +24,7 @@ help:
 	@echo "make stress   random cases against 50 digits, to docs/stress.md (an hour or more)"
 	@echo "make studies  every bundled study from the shell, each with a time limit, to docs/studies.md"
 	@echo "make gallery  the figures of docs/gallery"
+	@echo "make docs     the documentation as a site, in $(SITE)/; a warning or a broken link fails it"
 	@echo "make setup    a virtual environment in $(VENV)/ (the others do this by themselves)"
 	@echo "make clean    removes what make and the tests wrote, and keeps $(VENV)/"
 
@@ -37,6 +40,11 @@ $(BENCH_STAMP): $(STAMP)
 	@echo "== setup: peers for the benchmarks"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,bench]' \
 	    || echo "not all peers can be installed here: those that are missing are left out"
+	@touch $@
+
+$(DOCS_STAMP): $(STAMP)
+	@echo "== setup: mkdocs"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,docs]'
 	@touch $@
 
 demo: $(STAMP)
@@ -116,6 +124,13 @@ gallery: $(STAMP)
 	    test -f "$$script" || continue; found=yes; echo "$$script"; $(BIN)/python "$$script"; \
 	done; test $$found = yes || echo "no docs/gallery/*.py yet"
 
+# Without --quiet, with which mkdocs does not count its warnings. The variable silences the theme's
+# advertisement of its successor.
+docs: $(DOCS_STAMP)
+	@echo "== docs"
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir $(SITE)
+	@echo "$(SITE)/index.html (its search needs a server: python3 -m http.server -d $(SITE))"
+
 clean:
-	@rm -rf build dist $(DEMO) .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
+	@rm -rf build dist $(DEMO) $(SITE) .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
 	@find contfric tests benchmarks docs -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -23,3 +23,19 @@ def need_pandas() -> None:
         raise MissingPackageError(
             f"tables need pandas ({error}): pip install 'contfric[pandas]'"
         ) from None
+
+
+def need_bokeh() -> None:
+    """See that bokeh can be imported.
+
+    Raises
+    ------
+    MissingPackageError
+        If it is not installed.
+    """
+    try:
+        import bokeh  # noqa: F401
+    except ImportError as error:
+        raise MissingPackageError(
+            f"live diagrams need bokeh ({error}): pip install 'contfric[live]'"
+        ) from None

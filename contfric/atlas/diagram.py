@@ -13,6 +13,9 @@ from contfric.extras import need_pandas
 from contfric.models.definition import Model
 
 if TYPE_CHECKING:
+    from os import PathLike
+    from pathlib import Path
+
     import networkx as nx
     import pandas as pd
     from matplotlib.axes import Axes
@@ -222,6 +225,34 @@ class Diagram:
         from contfric.plot.diagram import plot_diagram_row
 
         return plot_diagram_row(self, row, ax=ax)
+
+    def to_html(self, path: str | PathLike[str]) -> Path:
+        """Write the diagram as one page for a browser (needs bokeh: the extra ``live``).
+
+        A click on a point shows its orbit, signature, multipliers and smallest margin. Rows are chosen, and
+        branches, events and bridges switched on and off. The file holds everything that it needs, in at
+        most 2 MB: of a large diagram not every orbit can be clicked on.
+
+        Parameters
+        ----------
+        path : path
+            The file; one that exists is replaced.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        MissingPackageError
+            If bokeh is not installed.
+        ResultFileError
+            If the file cannot be written.
+        """
+        from contfric.plot.live.page import write_page
+
+        return write_page(self, path)
 
     def __repr__(self) -> str:
         low, high = self.range

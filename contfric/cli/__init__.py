@@ -1,4 +1,4 @@
-"""The command line: ``contfric run | explain | info | signatures | graph | simulate | census``.
+"""The command line: ``contfric run | explain | info | view | ...``.
 
 Data go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 computing or writing
 failed, 2 the input is wrong, 130 interrupted (what was found is saved).

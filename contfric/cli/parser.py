@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from contfric.cli import commands
+from contfric.cli import commands, view
 from contfric.errors import ContfricError, did_you_mean
 from contfric.models import DEFAULT_MODEL
 
-_COMMANDS = ("run", "explain", "info", "signatures", "check", "graph", "simulate", "census")
+_COMMANDS = ("run", "explain", "info", "signatures", "check", "graph", "simulate", "census", "view")
 _DEBUG = "show the traceback of an error"
 
 
@@ -85,6 +85,7 @@ def _parser() -> _Parser:
     _fill_graph(add("graph", commands.graph, "print or draw the transitions of a model"))
     _fill_simulate(add("simulate", commands.simulate, "print the events of a trajectory as CSV"))
     _fill_census(add("census", commands.census, "list all periodic orbits, stable or not"))
+    _fill_view(add("view", view.view, "write the diagram of a run folder as a page to click on"))
     return parser
 
 
@@ -111,6 +112,11 @@ def _fill_explain(parser: argparse.ArgumentParser) -> None:
 
 def _fill_info(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", metavar="DIR", type=Path, help="folder of a run")
+
+
+def _fill_view(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", metavar="DIR", type=Path, help="folder of a run")
+    parser.add_argument("--open", action="store_true", help="open the page in a browser")
 
 
 def _fill_signatures(parser: argparse.ArgumentParser) -> None:

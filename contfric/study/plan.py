@@ -15,6 +15,8 @@ BIFURCATIONS = "bifurcations.csv"
 ORBIT = "orbit.npz"
 BRANCH = "branch.npz"
 DIAGRAM = "diagram.npz"
+#: Written by ``contfric view``; a new run removes it, as it shows the old one.
+VIEW = "diagram.html"
 LYAPUNOV = "lyapunov.npz"
 LYAPUNOV_TABLE = "lyapunov.csv"
 PLANE = "plane.npz"
@@ -23,7 +25,7 @@ SPECIAL = "special.csv"
 REGIONS = "regions.csv"
 _TABLES = (POINTS, BIFURCATIONS, CURVES, SPECIAL, REGIONS, LYAPUNOV_TABLE)
 #: Files that every run may write, figures apart.
-RESULT_FILES = (RECORD, *_TABLES, ORBIT, BRANCH, DIAGRAM, PLANE, LYAPUNOV)
+RESULT_FILES = (RECORD, *_TABLES, ORBIT, BRANCH, DIAGRAM, VIEW, PLANE, LYAPUNOV)
 
 
 class StepName(str, Enum):

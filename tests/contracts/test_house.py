@@ -18,7 +18,7 @@ MAX_LINES = 400
 
 #: Loaded by those functions that need them, never by `import contfric`.
 HEAVY = (
-    *("matplotlib", "mpmath", "networkx", "numba", "pandas", "pydantic", "scipy.optimize"),
+    *("bokeh", "matplotlib", "mpmath", "networkx", "numba", "pandas", "pydantic", "scipy.optimize"),
     *("sympy", "yaml"),
 )
 

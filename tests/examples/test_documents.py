@@ -31,6 +31,39 @@ def test_code_runs(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert "SN_1a" in capsys.readouterr().out
 
 
+#: Of each page of the tutorial: a word that it prints. The second one compiles its model first.
+TUTORIAL = [
+    ("first-diagram", "SS_a"),
+    pytest.param("own-model", "RANGE|range", marks=pytest.mark.slow),
+    ("two-parameters", "SN-CS"),
+    ("chaos", "CHAOTIC"),
+    ("from-other-programs", "accepted"),
+]
+
+
+@pytest.mark.parametrize(("name", "printed"), TUTORIAL)
+def test_tutorial_runs(
+    name: str,
+    printed: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    page = f"docs/tutorial/{name}.md"
+    for model in re.findall(r"```yaml\n(.*?)```", (ROOT / page).read_text(), re.DOTALL):
+        (tmp_path / "bilinear.yaml").write_text(model, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)  # pages save files
+    scope: dict[str, object] = {}
+    for block in blocks(page):
+        exec(compile(block, page, "exec"), scope)
+    assert re.search(printed, capsys.readouterr().out)
+
+
+def test_every_page_of_the_tutorial_is_run() -> None:
+    named = {getattr(p, "values", p)[0] for p in TUTORIAL}
+    assert named == {page.stem for page in (ROOT / "docs/tutorial").glob("*.md")}
+
+
 def test_the_model_in_the_readme_is_one(tmp_path: Path) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     (found,) = [b for b in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if "modes:" in b]

@@ -1,0 +1,32 @@
+"""``contfric view DIR``: the diagram of a run as a page for a browser."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from contfric.cli.exits import Exit
+from contfric.errors import ResultFileError
+
+
+def view(options: argparse.Namespace) -> int:
+    """Write the page beside the results; its path goes to stdout."""
+    from contfric.atlas.diagram import Diagram
+    from contfric.extras import need_bokeh
+    from contfric.results import load
+    from contfric.study.plan import DIAGRAM, VIEW
+
+    need_bokeh()  # before anything is read
+    source: Path = options.folder / DIAGRAM
+    if not source.is_file():
+        raise ResultFileError(f"{options.folder} holds no diagram: {source} is missing")
+    diagram = load(source)
+    if not isinstance(diagram, Diagram):
+        raise ResultFileError(f"{source} holds no diagram, but a {type(diagram).__name__.lower()}")
+    path = diagram.to_html(options.folder / VIEW)
+    print(path)
+    if options.open:
+        import webbrowser
+
+        webbrowser.open(path.resolve().as_uri())
+    return Exit.DONE

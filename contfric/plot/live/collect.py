@@ -1,0 +1,263 @@
+"""What the page of a diagram shows, as plain data: lines, events, and orbits to click on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from html.entities import name2codepoint
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.models.definition import FloatArray
+from contfric.plot.events import Mark, marks_of
+from contfric.plot.live.packed import floats, kept, local_sizes, quantised
+from contfric.plot.runs import quantity, stability_runs
+from contfric.plot.style import BRIDGE_COLOUR, ROWS, branch_colours, domain_colours, lighter
+
+if TYPE_CHECKING:
+    from contfric.atlas.diagram import Diagram
+    from contfric.continuation.branch import Branch
+    from contfric.continuation.events import Bifurcation
+    from contfric.orbit.orbit import Orbit
+
+#: Samples of an orbit: a curve of this many pieces looks smooth at the size that it has on the page.
+_SAMPLES = 72
+#: Relative: an event is on a branch that has one of its kind this near.
+_SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Detail:
+    """How much of a diagram goes into the file.
+
+    Attributes
+    ----------
+    orbits : most orbits that can be clicked on, without those of the events
+    tolerance : what a line may be off, as a share of its own size there; 0 keeps every point
+    """
+
+    orbits: int
+    tolerance: float
+
+
+def symbol(name: str) -> str:
+    """Return the name of a parameter with Greek letters.
+
+    Examples
+    --------
+    >>> symbol("Omega"), symbol("S0")
+    ('Ω', 'S0')
+    """
+    return chr(name2codepoint[name]) if name in name2codepoint else name
+
+
+def collect(
+    diagram: Diagram, detail: Detail, orbits: dict[tuple[int, int], dict[str, Any]]
+) -> dict[str, Any]:
+    """Return everything that the page shows of a diagram.
+
+    ``orbits`` keeps those that were sampled, by branch and point, for a call that asks for fewer.
+    """
+    branches = diagram.branches
+    colours = branch_colours(b.name for b in branches if not b.bridge)
+    return {
+        "parameter": symbol(diagram.parameter),
+        "range": list(diagram.range),
+        "model": diagram.model.name,
+        "autonomous": diagram.model.autonomous,
+        "states": list(diagram.model.states),
+        "rows": [_row(diagram, name) for name in ROWS],
+        "domains": domain_colours(diagram.model),
+        "branches": [_branch(b, colours) for b in branches],
+        "runs": [run for i in range(len(branches)) for run in _runs(diagram, i, detail)],
+        "points": list(_points(diagram, detail, orbits)),
+    }
+
+
+def _row(diagram: Diagram, name: str) -> dict[str, Any]:
+    """Return one quantity with its marks; of an even one, mirror images lie on their originals."""
+    originals = {b.name for b in diagram.branches if not b.mirrored}
+    row = ROWS[name]
+    twins = [
+        row.even and branch.mirrored and branch.name in originals for branch in diagram.branches
+    ]
+    found = marks_of(diagram.bifurcations, diagram.branches, row.attribute, diagram.parameter)
+    return {
+        "name": name,
+        "label": {"stops": "x at stops", "psi": "ψ"}.get(name, name),
+        "left_out": [i for i, twin in enumerate(twins) if twin],
+        "marks": [_mark(mark, diagram) for mark in found],
+    }
+
+
+def _mark(mark: Mark, diagram: Diagram) -> dict[str, Any]:
+    there = {
+        branch.name
+        for branch in diagram.branches
+        for event in branch.bifurcations
+        if event.kind is mark.kind
+        and abs(event.params[diagram.parameter] - mark.x) <= _SAME * abs(mark.x)
+    }
+    return {
+        "kind": mark.kind.value,
+        "label": mark.label,
+        "meaning": mark.meaning,
+        "x": mark.x,
+        "y": mark.y.tolist(),
+        "on_bridges": mark.on_bridges,
+        "branches": sorted(there),
+    }
+
+
+def _branch(branch: Branch, colours: dict[str, str]) -> dict[str, Any]:
+    colour = BRIDGE_COLOUR if branch.bridge else colours[branch.name]
+    shown = lighter(colour) if branch.mirrored else colour
+    return {
+        "name": branch.name,
+        "bridge": branch.bridge,
+        "mirrored": branch.mirrored,
+        "colour": shown,
+    }
+
+
+def _runs(diagram: Diagram, i: int, detail: Detail) -> Iterator[dict[str, Any]]:
+    """Yield the pieces of one stability of a branch: x once, y of every row."""
+    branch = diagram.branches[i]
+    of_rows = [stability_runs(branch, row.attribute) for row in ROWS.values()]
+    width = diagram.range[1] - diagram.range[0]
+    for pieces in zip(*of_rows, strict=True):
+        x = pieces[0].x
+        columns = np.column_stack([x, *(p.y for p in pieces)])
+        sizes = np.column_stack([np.full(len(x), width), *(local_sizes(p.y) for p in pieces)])
+        at = kept(columns, sizes, detail.tolerance)
+        stable = pieces[0].stable
+        style = {True: "stable", False: "unstable", None: "unknown"}[stable]
+        yield {
+            "branch": i,
+            "style": "bridge" if branch.bridge else style,
+            "x": floats(x[at]),
+            "y": {
+                name: [floats(column) for column in piece.y[at].T]
+                for name, piece in zip(ROWS, pieces, strict=True)
+            },
+        }
+
+
+# ------------------------------------------------------------------------------- orbits
+
+
+def _points(
+    diagram: Diagram, detail: Detail, known: dict[tuple[int, int], dict[str, Any]]
+) -> Iterator[dict[str, Any]]:
+    """Yield the orbits that can be clicked on: of the branches, and of every event."""
+    stride = _stride([len(b) for b in diagram.branches], detail.orbits)
+    for i, branch in enumerate(diagram.branches):
+        for k in _spread(len(branch), stride):
+            if (i, k) not in known:
+                known[i, k] = _on_branch(diagram, i, k)
+            yield known[i, k]
+        for k, event in enumerate(branch.bifurcations, start=1):
+            if (i, -k) not in known:
+                known[i, -k] = _at_event(diagram, i, event)
+            yield known[i, -k]
+
+
+def _stride(lengths: Sequence[int], most: int) -> int:
+    """Return every how many points one is shown, so that there are not more than asked for.
+
+    It is a power of two: what a coarser page shows, a finer one shows, too.
+    """
+    stride = 1
+    while sum(len(_spread(n, stride)) for n in lengths) > max(most, 2 * len(lengths)):
+        stride *= 2
+    return stride
+
+
+def _spread(count: int, stride: int) -> list[int]:
+    """Return every so many of a branch's points, the last one too."""
+    return sorted({*range(0, count, stride), count - 1}) if count else []
+
+
+def _on_branch(diagram: Diagram, i: int, k: int) -> dict[str, Any]:
+    """Return a point of a branch, with the multipliers that the branch has."""
+    branch = diagram.branches[i]
+    multipliers = None if branch.bridge or branch.multipliers is None else branch.multipliers[k]
+    stable = None if branch.stable is None else bool(branch.stable[k])
+    orbit = branch[k]
+    y = {name: quantity(orbit, row.attribute) for name, row in ROWS.items()}
+    return _point(diagram, i, orbit, multipliers, y) | {"stable": stable, "event": ""}
+
+
+def _at_event(diagram: Diagram, i: int, event: Bifurcation) -> dict[str, Any]:
+    """Return the orbit of an event of a branch; it has no stability, which changes there."""
+    branch = diagram.branches[i]
+    known = not branch.bridge and branch.multipliers is not None
+    multipliers = event.orbit.multipliers if known else None
+    y = {name: quantity(event.orbit, row.attribute) for name, row in ROWS.items()}
+    found = _point(diagram, i, event.orbit, multipliers, y)
+    return found | {"stable": None, "event": event.label}
+
+
+def _point(
+    diagram: Diagram,
+    branch: int,
+    orbit: Orbit,
+    multipliers: NDArray[np.complex128] | None,
+    y: dict[str, FloatArray],
+) -> dict[str, Any]:
+    """Return one orbit: where it is drawn in each row, what is said of it, and its motion."""
+    return {
+        "branch": branch,
+        "x": float(orbit.params[diagram.parameter]),
+        "y": {name: [_short(value) for value in values] for name, values in y.items()},
+        "signature": str(orbit.signature),
+        "periods": orbit.periods,
+        "period": _short(orbit.period),
+        "multipliers": None if multipliers is None else [_complex(mu) for mu in multipliers],
+        "margin": _smallest_margin(orbit),
+        **_motion(orbit),
+    }
+
+
+def _short(value: float) -> float | None:
+    return float(f"{value:.6g}") if np.isfinite(value) else None  # JSON knows no nan
+
+
+def _complex(value: complex) -> str:
+    """Return a multiplier as text.
+
+    Examples
+    --------
+    >>> _complex(0.5 + 0j), _complex(0.5 - 0.25j)
+    ('0.5', '0.5 − 0.25i')
+    """
+    if value.imag == 0.0 or not np.isfinite(value):
+        return f"{value.real:.6g}"
+    return f"{value.real:.6g} {'−' if value.imag < 0.0 else '+'} {abs(value.imag):.6g}i"
+
+
+def _smallest_margin(orbit: Orbit) -> str:
+    """Return the margin nearest to zero, and where it is."""
+    tests = orbit.system.tests
+    if not tests:
+        return "none is watched"
+    k = int(np.argmin(orbit.margins))
+    test = tests[k]
+    mode = orbit.system.word[test.segment][0]
+    return (
+        f"{orbit.margins[k]:.4g} ({test.margin.value}, at {test.surface}, "
+        f"in segment {test.segment + 1}: {mode})"
+    )
+
+
+def _motion(orbit: Orbit) -> dict[str, Any]:
+    """Return time and states along one period, and where each segment begins."""
+    times, states, names = orbit.trajectory(_SAMPLES)
+    changes = [k for k in range(len(names)) if k == 0 or names[k] != names[k - 1]]
+    return {
+        "t": quantised(times - times[0]),
+        "s": [quantised(column) for column in states.T],
+        "parts": [[k, names[k]] for k in changes],
+    }

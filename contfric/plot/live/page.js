@@ -1,0 +1,198 @@
+// Runs once bokeh has drawn the page. bokeh hands over the figures (top, phase, series) and the
+// sources of their glyphs by name; contfric/plot/live/page.py makes them.
+const data = JSON.parse(document.getElementById("contfric-data").textContent);
+const lines = {stable: stable_lines, unstable: unstable_lines, unknown: unknown_lines, bridge: bridge_lines};
+const by_id = (id) => document.getElementById(id);
+const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
+const floats = (text) => Array.from(new Float32Array(bytes(text)));
+const quantised = ([low, step, text]) => Array.from(new Uint16Array(bytes(text)), (n) => low + step * n);
+const hidden = new Set(); // names of branches that are switched off
+let shown_marks = [];
+let selected = null;
+
+const row = () => data.rows[by_id("row").selectedIndex];
+const is_shown = (i) => {
+  const branch = data.branches[i];
+  const off = branch.bridge ? !by_id("bridges").checked : hidden.has(branch.name);
+  return !off && !row().left_out.includes(i);
+};
+const name_is_on = (name) =>
+  data.branches.some((b) => b.name === name && (b.bridge ? by_id("bridges").checked : !hidden.has(name)));
+
+function draw() {
+  const found = {};
+  for (const style in lines) found[style] = {x: [], y: [], colour: []};
+  let [low, high] = [Infinity, -Infinity];
+  for (const run of data.runs) {
+    if (!is_shown(run.branch)) continue;
+    for (const column of run.y[row().name]) {
+      const y = floats(column);
+      found[run.style].x.push(floats(run.x));
+      found[run.style].y.push(y);
+      found[run.style].colour.push(data.branches[run.branch].colour);
+      for (const v of y) if (v === v) [low, high] = [Math.min(low, v), Math.max(high, v)];
+    }
+  }
+  for (const style in lines) lines[style].data = found[style];
+  draw_marks();
+  return [low, high];
+}
+
+function fit([low, high]) {
+  const margin = low < high ? 0.12 * (high - low) : 0.5;
+  if (low > high) [low, high] = [0, 1];
+  top.y_range.setv({start: low - margin, end: high + margin, reset_start: low - margin, reset_end: high + margin});
+  top.left[0].axis_label = row().label;
+}
+
+function draw_marks() {
+  const on = by_id("events").checked;
+  shown_marks = row().marks.filter(
+    (m) => on && (!m.on_bridges || by_id("bridges").checked) &&
+      (m.branches.length === 0 || m.branches.some(name_is_on)));
+  const columns = {x: [], y: [], shape: [], angle: [], face: [], size: [], label: [], meaning: []};
+  for (const mark of shown_marks) {
+    const look = data.looks[mark.kind] ?? data.looks.other;
+    for (const y of mark.y) {
+      for (const key of ["shape", "angle", "face"]) columns[key].push(look[key]);
+      columns.size.push(mark.on_bridges ? 0.6 * look.size : look.size);
+      for (const key of ["x", "label", "meaning"]) columns[key].push(mark[key]);
+      columns.y.push(y);
+    }
+  }
+  marks.data = columns;
+  thin();
+}
+
+// Pixels for one unit of each axis.
+const scales = () => [
+  (top.inner_width || 800) / (top.x_range.end - top.x_range.start),
+  (top.inner_height || 380) / (top.y_range.end - top.y_range.start)];
+
+// A label that would lie on an earlier one is left out until there is space: zooming in shows it.
+function thin() {
+  const [sx, sy] = scales();
+  const kept = [];
+  const rank = (m) => (m.kind === "T" ? 2 : m.on_bridges ? 1 : 0);
+  for (const mark of [...shown_marks].sort((a, b) => rank(a) - rank(b))) {
+    const label = {x: mark.x, y: Math.max(...mark.y), label: mark.label};
+    const inside = label.x >= top.x_range.start && label.x <= top.x_range.end;
+    const free = kept.every((other) =>
+      Math.abs(other.x - label.x) * sx > 3.4 * (other.label.length + label.label.length) + 4 ||
+      Math.abs(other.y - label.y) * sy > 14);
+    if (inside && free) kept.push(label);
+  }
+  labels.data = {x: kept.map((k) => k.x), y: kept.map((k) => k.y), label: kept.map((k) => k.label)};
+}
+
+function pick(x, y) {
+  const [sx, sy] = scales();
+  let [best, nearest] = [Infinity, null];
+  for (const point of data.points) {
+    if (!is_shown(point.branch) || (point.event && !by_id("events").checked)) continue;
+    for (const value of point.y[row().name]) {
+      const far = value === null ? Infinity : Math.hypot((point.x - x) * sx, (value - y) * sy);
+      if (far < best) [best, nearest] = [far, point];
+    }
+  }
+  if (nearest) show(nearest);
+  return nearest;
+}
+
+function show(point) {
+  selected = point;
+  mark_selected();
+  const branch = data.branches[point.branch];
+  const stability = point.stable === null ? "not computed" : point.stable ? "stable" : "unstable";
+  const facts = {
+    orbit: branch.name + (branch.mirrored ? ", mirror image" : ""),
+    [data.parameter]: String(point.x),
+    signature: point.signature,
+    stability: branch.bridge ? "bridge: the least disturbance ends its hold" : stability,
+    "Floquet multipliers": point.multipliers ? point.multipliers.join(", ") : branch.bridge ? "none" : "not computed",
+    "smallest margin": point.margin,
+    period: String(point.period),
+    [data.autonomous ? "cycles" : "periods of the excitation"]: String(point.periods),
+  };
+  if (point.event) {
+    facts.event = point.event;
+    delete facts.stability;
+  }
+  const table = by_id("facts");
+  table.replaceChildren();
+  for (const [name, value] of Object.entries(facts)) {
+    const line = table.insertRow();
+    const head = document.createElement("th");
+    head.textContent = name;
+    line.append(head);
+    line.insertCell().textContent = value;
+  }
+  draw_orbit();
+}
+
+function mark_selected() {
+  if (!selected) return;
+  const values = is_shown(selected.branch) ? selected.y[row().name].filter((v) => v !== null) : [];
+  chosen.data = {x: values.map(() => selected.x), y: values};
+}
+
+function draw_orbit() {
+  if (!selected) return;
+  const t = quantised(selected.t);
+  const states = selected.s.map(quantised);
+  const [a, b] = [by_id("abscissa").selectedIndex, by_id("ordinate").selectedIndex];
+  const pieces = {x: [], y: [], colour: [], domain: []};
+  const starts = {x: [], y: [], colour: [], domain: []};
+  selected.parts.forEach(([from, domain], k) => {
+    const to = k + 1 < selected.parts.length ? selected.parts[k + 1][0] + 1 : t.length;
+    const colour = data.domains[domain] ?? "black";
+    pieces.x.push(states[a].slice(from, to));
+    pieces.y.push(states[b].slice(from, to));
+    starts.x.push(states[a][from]);
+    starts.y.push(states[b][from]);
+    for (const part of [pieces, starts]) {
+      part.colour.push(colour);
+      part.domain.push(domain);
+    }
+  });
+  parts.data = pieces;
+  joints.data = starts;
+  curves.data = {x: states.map(() => t), y: states, colour: data.state_colours, state: data.states};
+  phase.below[0].axis_label = data.states[a];
+  phase.left[0].axis_label = data.states[b];
+}
+
+function fill(select, names, index) {
+  for (const name of names) select.add(new Option(name));
+  select.selectedIndex = Math.min(index, names.length - 1);
+}
+
+fill(by_id("row"), data.rows.map((r) => r.label), 0);
+fill(by_id("abscissa"), data.states, 0);
+fill(by_id("ordinate"), data.states, 1);
+for (const name of new Set(data.branches.filter((b) => !b.bridge).map((b) => b.name))) {
+  const label = document.createElement("label");
+  const box = Object.assign(document.createElement("input"), {type: "checkbox", checked: true, value: name});
+  const text = document.createElement("span");
+  text.textContent = " " + name;
+  text.style.color = data.branches.find((b) => b.name === name && !b.bridge).colour;
+  label.append(box, text);
+  by_id("branches").append(label);
+}
+by_id("controls").addEventListener("change", (event) => {
+  if (event.target.closest("#branches")) {
+    if (event.target.checked) hidden.delete(event.target.value);
+    else hidden.add(event.target.value);
+  }
+  const extent = draw();
+  if (event.target.id === "row") fit(extent);
+  thin();
+  mark_selected();
+});
+for (const id of ["abscissa", "ordinate"]) by_id(id).addEventListener("change", draw_orbit);
+window.contfric = {data, pick, show, thin};
+fit(draw());
+thin();
+const stable = data.points.filter((p) => p.stable);
+if (data.points.length > 0) show(stable[stable.length >> 1] ?? data.points[0]);
+document.body.dataset.contfric = "ready"; // tests wait for it
