@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
 from contfric.continuation.accuracy import not_critical
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
-from contfric.continuation.continuum import LEVEL, in_continuum
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
+from contfric.continuation.limits import is_at_limit, limit_crossed, limit_end
 from contfric.continuation.locate import belongs_to, locate_events
 from contfric.continuation.outcomes import end_message
 from contfric.continuation.points import (
@@ -28,10 +27,10 @@ from contfric.continuation.section_joints import (
     is_on_section,
     move_joints,
 )
-from contfric.continuation.side import Side, first_point
+from contfric.continuation.side import Side
 from contfric.continuation.sliding import nearly_reached
 from contfric.continuation.smooth import SAME_PLACE
-from contfric.continuation.trial import locate_value
+from contfric.continuation.start import start_of
 from contfric.continuation.vertex_ends import (
     CROSSED,
     NEAREST,
@@ -44,15 +43,10 @@ from contfric.continuation.vertices import at_vertex
 from contfric.errors import ConvergenceError, function_of
 from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import canonical
-from contfric.orbit.solve import polish
 
 #: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).
 _AT_LIMIT = 1e-6
 
-#: Share of the range within which an event cannot be told from a physical limit, where conditions
-#: degenerate together (with S0 = S a release has no acceleration): the root of rounding.
-_NEAR_LIMIT = 1e-6
 #: A margin this negative (nondimensional) is violated; a located limit is good to rounding.
 _VIOLATED = 1e-9
 #: Points this near to a vertex (arclength) are left out: the system is singular there, and they are good
@@ -64,11 +58,6 @@ _CROWD = 5e-4
 _LONGER, _STANDS = 1.5, 1e-6
 #: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
 _NO_SIZE = 1e-5
-
-#: Tests of the events that have a multiplier 1 or -1, the first ones.
-_LINEAR = 3
-#: Where a start is looked for that is at no event, relative to the range: in the first steps from it.
-_BESIDE_START = (1.3e-3, -1.3e-3)
 
 #: A step this short after hundreds of points (arclength) gets nowhere.
 _CRAWLS = 1e-6
@@ -137,62 +126,12 @@ def follow_orbit(
     """Continue an orbit both ways, as :func:`continue_orbit` does; ``keep`` is that of :func:`trace_side`."""
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
-    orbit = canonical(orbit).as_half()
-    start = first_point(orbit, settings)
-    at_event = start is not None and _is_at_event(start, settings)
-    if start is None or (
-        at_event and in_continuum(orbit, orbit.model.index_of(settings.parameter))
-    ):
-        raise ConvergenceError(
-            f"the orbit has no unique continuation: {_why(orbit, settings)}", orbit
-        )
-    orbit, start = _off_events(orbit, start, settings)
+    orbit, start = start_of(orbit, settings)
     ahead = trace_side(orbit, start, settings, progress=progress, keep=keep)
     if ahead.end.reason in (EndReason.CLOSED, EndReason.INTERRUPTED):
         return assemble(orbit, settings, ahead, End(ahead.end.reason))
     behind = trace_side(orbit, start.reversed(), settings, progress=progress, keep=keep)
     return join(orbit, settings, behind, ahead)
-
-
-def _why(orbit: Orbit, settings: Settings) -> str:
-    """Return why an orbit has no unique continuation, and what to do."""
-    if in_continuum(orbit, orbit.model.index_of(settings.parameter)):
-        return (
-            f"it is one of a continuum of orbits, at each {settings.parameter} beside it, too. Continue the "
-            "symmetric one of them, or vary what makes them a continuum (the damping, the frequency)"
-        )
-    return "the equations are singular there (a bifurcation). Move the parameter a little and solve again"
-
-
-def _off_events(orbit: Orbit, start: Point, settings: Settings) -> tuple[Orbit, Point]:
-    """Return a start at which no smooth event happens: the same, or one beside it.
-
-    An event is seen where a test changes sign, and at the event itself its sign is rounding. Where it is that
-    beside the start, too, orbits are continua, and the start is as good as any.
-    """
-    if not _is_at_event(start, settings):
-        return orbit, start
-    active = orbit.model.index_of(settings.parameter)
-    for share in _BESIDE_START:
-        value = start.value + share * settings.width
-        if not settings.low <= value <= settings.high:
-            continue
-        vector = orbit.vector.copy()
-        vector[active] = value
-        beside = polish(replace(orbit, vector=vector))
-        point = first_point(beside, settings) if beside.converged and beside.admissible else None
-        if point is not None and not _is_at_event(point, settings):
-            return beside, point
-    return orbit, start
-
-
-def _is_at_event(point: Point, settings: Settings) -> bool:
-    """Tell whether the slope, chi(1) or chi(-1) is zero to rounding.
-
-    (The product of a pair of multipliers is 1 wherever nothing is dissipated between events.)
-    """
-    tests = point.tests[len(point.tests) - EXTRA :][: _LINEAR if settings.stability else 1]
-    return bool(np.any(np.abs(tests[np.isfinite(tests)]) < LEVEL))
 
 
 def _went_to_its_end(side: Side) -> bool:
@@ -258,9 +197,9 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     }
     if why in reasons:
         side.end = End(reasons[why])
-        if why in (kernels.STEP, kernels.BROKEN) and _is_at_limit(side.tip.value, settings):
+        if why in (kernels.STEP, kernels.BROKEN) and is_at_limit(side.tip.value, settings):
             upper = side.tip.value > 0.5 * (settings.low + settings.high)
-            side.end = _limit_end(upper, settings)
+            side.end = limit_end(upper, settings)
         elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
             end_stalled(orbit, side, settings)
         if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and _slows_down(side, settings):
@@ -306,7 +245,7 @@ def _end_of_holds(orbit: Orbit, side: Side, settings: Settings, stuck: bool) -> 
 def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     """Locate what happened over the last step; True if the side ends there."""
     before, after = side.before_tip, side.tip
-    limit = _limit_crossed(orbit, before, after, settings)
+    limit = limit_crossed(orbit, before, after, settings)
     located = locate_events(orbit, before, after, settings)
     if _comes_closer(side, located, after.arc - before.arc):
         return False
@@ -323,13 +262,13 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             or not settings.low <= point.value <= settings.high
         ):
             break
-        if _is_at_limit(point.value, settings):
+        if is_at_limit(point.value, settings):
             inside = [p for _, p in located if settings.low <= p.value <= settings.high]
             if inside:
                 side.put_tip(inside[0])
             else:  # conditions degenerate together there: the last good point is as near as one gets
                 side.drop_tip()
-            side.end = _limit_end(point.value > 0.5 * (settings.low + settings.high), settings)
+            side.end = limit_end(point.value > 0.5 * (settings.low + settings.high), settings)
             return True
         if side.at_event and belongs_to(bifurcation.kind, side.first, point, settings):
             continue
@@ -365,14 +304,14 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     reached = after if limit is None else limit[0]
     if np.any(reached.tests[:-EXTRA] < -_VIOLATED):
         side.drop_tip()
-        near = _is_at_limit(side.tip.value, settings)
+        near = is_at_limit(side.tip.value, settings)
         upper = side.tip.value > 0.5 * (settings.low + settings.high)
-        side.end = _limit_end(upper, settings) if near else End(EndReason.SINGULAR)
+        side.end = limit_end(upper, settings) if near else End(EndReason.SINGULAR)
         return True
     if limit is None:
         return False
     side.put_tip(limit[0])
-    side.end = _limit_end(after.value > settings.high, settings)
+    side.end = limit_end(after.value > settings.high, settings)
     return True
 
 
@@ -399,35 +338,9 @@ def _comes_closer(side: Side, located: list[tuple[Bifurcation, Point]], step: fl
     return True
 
 
-def _limit_end(upper: bool, settings: Settings) -> End:
-    reason = settings.high_reason if upper else settings.low_reason
-    kind = EndReason.LIMIT if reason else EndReason.RANGE
-    return End(kind, f"{kind.value}: {reason}" if reason else "")
-
-
-def _is_at_limit(value: float, settings: Settings) -> bool:
-    """Tell whether an event is at a physical limit: what is located there is the limit itself."""
-    near = _NEAR_LIMIT * settings.width
-    return bool(
-        (settings.low_reason and value - settings.low < near)
-        or (settings.high_reason and settings.high - value < near)
-    )
-
-
 def _is_start(side: Side, before: Point, point: Point) -> bool:
     """Tell whether a change of labels happens at the very start of a side, at an event."""
     return side.count == 2 and point.arc - before.arc < SAME_PLACE
-
-
-def _limit_crossed(
-    orbit: Orbit, before: Point, after: Point, settings: Settings
-) -> tuple[Point, str] | None:
-    if settings.low <= after.value <= settings.high:
-        return None
-    upper = after.value > settings.high
-    target = settings.high if upper else settings.low
-    point = locate_value(orbit, before, after, settings, target)
-    return point, settings.high_reason if upper else settings.low_reason
 
 
 def _ends_branch(bifurcation: Bifurcation, point: Point, orbit: Orbit) -> EndReason | None:

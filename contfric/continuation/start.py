@@ -1,0 +1,80 @@
+"""The first point of a branch: at no event, and with one direction to go on in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contfric.continuation.continuum import LEVEL, in_continuum
+from contfric.continuation.points import EXTRA, Point, Settings
+from contfric.continuation.side import first_point
+from contfric.errors import ConvergenceError
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.sections import canonical
+from contfric.orbit.solve import polish
+
+#: Tests of the events that have a multiplier 1 or -1, the first ones.
+_LINEAR = 3
+#: Where a start is looked for that is at no event, relative to the range: in the first steps from it.
+_BESIDE_START = (1.3e-3, -1.3e-3)
+
+
+def start_of(orbit: Orbit, settings: Settings) -> tuple[Orbit, Point]:
+    """Return the orbit that a branch is traced from, and its point; beside an event where it is at one.
+
+    Raises
+    ------
+    ConvergenceError
+        If the orbit has no unique continuation.
+    """
+    orbit = canonical(orbit).as_half()
+    start = first_point(orbit, settings)
+    at_event = start is not None and _is_at_event(start, settings)
+    if start is None or (
+        at_event and in_continuum(orbit, orbit.model.index_of(settings.parameter))
+    ):
+        why = _why(orbit, settings)
+        raise ConvergenceError(f"the orbit has no unique continuation: {why}", orbit)
+    return _off_events(orbit, start, settings)
+
+
+def _why(orbit: Orbit, settings: Settings) -> str:
+    """Return why an orbit has no unique continuation, and what to do."""
+    if in_continuum(orbit, orbit.model.index_of(settings.parameter)):
+        return (
+            f"it is one of a continuum of orbits, at each {settings.parameter} beside it, too. Continue the "
+            "symmetric one of them, or vary what makes them a continuum (the damping, the frequency)"
+        )
+    return "the equations are singular there (a bifurcation). Move the parameter a little and solve again"
+
+
+def _off_events(orbit: Orbit, start: Point, settings: Settings) -> tuple[Orbit, Point]:
+    """Return a start at which no smooth event happens: the same, or one beside it.
+
+    An event is seen where a test changes sign, and at the event itself its sign is rounding. Where it is that
+    beside the start, too, orbits are continua, and the start is as good as any.
+    """
+    if not _is_at_event(start, settings):
+        return orbit, start
+    active = orbit.model.index_of(settings.parameter)
+    for share in _BESIDE_START:
+        value = start.value + share * settings.width
+        if not settings.low <= value <= settings.high:
+            continue
+        vector = orbit.vector.copy()
+        vector[active] = value
+        beside = polish(replace(orbit, vector=vector))
+        point = first_point(beside, settings) if beside.converged and beside.admissible else None
+        if point is not None and not _is_at_event(point, settings):
+            return beside, point
+    return orbit, start
+
+
+def _is_at_event(point: Point, settings: Settings) -> bool:
+    """Tell whether the slope, chi(1) or chi(-1) is zero to rounding.
+
+    (The product of a pair of multipliers is 1 wherever nothing is dissipated between events.)
+    """
+    tests = point.tests[len(point.tests) - EXTRA :][: _LINEAR if settings.stability else 1]
+    return bool(np.any(np.abs(tests[np.isfinite(tests)]) < LEVEL))
