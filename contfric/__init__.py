@@ -50,6 +50,9 @@ if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.simulation import simulate
     from contfric.orbit.solve import solve_orbit
+    from contfric.response.outcome import Outcome
+    from contfric.response.sweep import Sweep
+    from contfric.response.sweeping import sweep
     from contfric.results import load, save
     from contfric.signature import Signature, load_signature, signature_names, transition_graph
     from contfric.study import run_study
@@ -75,6 +78,7 @@ _HOMES = {
     "Motion": "contfric.chaos.status",
     "NotationError": "contfric.errors",
     "Orbit": "contfric.orbit.orbit",
+    "Outcome": "contfric.response.outcome",
     "OscillatorModel": "contfric.models.oscillator",
     "Plane": "contfric.atlas.plane",
     "ParameterError": "contfric.errors",
@@ -82,6 +86,7 @@ _HOMES = {
     "Seeds": "contfric.atlas.seeds",
     "Window": "contfric.atlas.adding",
     "Signature": "contfric.signature",
+    "Sweep": "contfric.response.sweep",
     "StudyError": "contfric.errors",
     "census": "contfric.atlas.census",
     "check_model": "contfric.models.check",
@@ -102,6 +107,7 @@ _HOMES = {
     "signature_names": "contfric.signature",
     "simulate": "contfric.orbit.simulation",
     "solve_orbit": "contfric.orbit.solve",
+    "sweep": "contfric.response.sweeping",
     "transition_graph": "contfric.signature",
 }
 
@@ -126,12 +132,14 @@ __all__ = [
     "NotationError",
     "Orbit",
     "OscillatorModel",
+    "Outcome",
     "ParameterError",
     "Plane",
     "ResultFileError",
     "Seeds",
     "Signature",
     "StudyError",
+    "Sweep",
     "Window",
     "__version__",
     "census",
@@ -153,6 +161,7 @@ __all__ = [
     "signature_names",
     "simulate",
     "solve_orbit",
+    "sweep",
     "transition_graph",
 ]
 

@@ -27,6 +27,9 @@ def findings(record: Record) -> Iterator[str]:
     if "lyapunov" in record:
         yield ""
         yield from _map(record["lyapunov"])
+    if "sweep" in record:
+        yield ""
+        yield from _sweep(record["sweep"])
 
 
 def _map(entry: Record) -> Iterator[str]:
@@ -36,6 +39,16 @@ def _map(entry: Record) -> Iterator[str]:
     yield f"largest   {entry['largest']:.6g}"
     if not entry["complete"]:
         yield "incomplete: the same command goes on from the finished tiles"
+
+
+def _sweep(entry: Record) -> Iterator[str]:
+    low, high, count = entry["values"]
+    found = ", ".join(f"{number} {outcome}" for outcome, number in entry["outcomes"].items())
+    points = ", ".join(f"{number} {direction}" for direction, number in entry["points"].items())
+    yield f"sweep at {count} values of {entry['parameter']} from {low:g} to {high:g}: {found}"
+    yield f"points    {points}"
+    if not entry["complete"]:
+        yield "incomplete: the same command goes on from what was found"
 
 
 def _diagram(record: Record) -> Iterator[str]:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from contfric.plot.lyapunov import plot_lyapunov_map
     from contfric.plot.orbit import plot_orbit, plot_orbit_in_time, plot_orbit_panels
     from contfric.plot.plane import plot_curves, plot_plane
+    from contfric.plot.response import plot_sweep
     from contfric.plot.save import new_figure, save_figure
     from contfric.plot.style import ROWS
 
@@ -34,6 +35,7 @@ _HOMES = {
     "plot_orbit_in_time": "contfric.plot.orbit",
     "plot_orbit_panels": "contfric.plot.orbit",
     "plot_plane": "contfric.plot.plane",
+    "plot_sweep": "contfric.plot.response",
     "plot_transition_graph": "contfric.plot.graph",
     "save_figure": "contfric.plot.save",
 }
@@ -51,6 +53,7 @@ __all__ = [
     "plot_orbit_in_time",
     "plot_orbit_panels",
     "plot_plane",
+    "plot_sweep",
     "plot_transition_graph",
     "save_figure",
 ]

@@ -5,7 +5,7 @@ Drawing stands below the results that it draws; it knows them by what they offer
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -247,6 +247,43 @@ class LyapunovMapLike(Protocol):
 
     def absent(self, missing: bool) -> NDArray[np.bool_]:
         """Tell where no motion has an exponent, or (``missing``) where nothing was computed."""
+
+
+class SweepLike(Protocol):
+    """Simulated points along a parameter."""
+
+    @property
+    def parameter(self) -> str:
+        """The parameter that varies."""
+
+    @property
+    def params(self) -> Mapping[str, float]:
+        """The parameters that do not vary."""
+
+    @property
+    def values(self) -> FloatArray:
+        """Its values."""
+
+    @property
+    def model(self) -> Model:
+        """The model that moves."""
+
+    @property
+    def section(self) -> str | float:
+        """What the points lie on."""
+
+    @property
+    def runs(self) -> Mapping[str, object]:
+        """The directions."""
+
+    def state_index(self, state: str | None) -> int:
+        """Return the number of a state by its name."""
+
+    def points(self, direction: str, state: str | None = None) -> tuple[FloatArray, FloatArray]:
+        """Return the parameter and one state of each point."""
+
+    def quantity(self, row: str) -> Iterable[tuple[str, FloatArray, FloatArray]]:
+        """Return (direction, parameter, what a diagram shows in one of its rows)."""
 
 
 class SpecialLike(Protocol):

@@ -41,6 +41,8 @@ def _rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row, ..
             _check_task(located, content, index, "a graph of branches")
         if figure.kind is FigureKind.LYAPUNOV and content.lyapunov is None:
             located.fail(("figures", index), "a map of Lyapunov exponents needs 'lyapunov'")
+        if figure.kind is FigureKind.SWEEP and content.sweep is None:
+            located.fail(("figures", index), "a figure of a sweep needs 'sweep'")
         if figure.kind is FigureKind.PLANE and content.plane is None:
             located.fail(("figures", index), "a plane needs 'plane'")
         return ()

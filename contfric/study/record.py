@@ -18,6 +18,7 @@ from contfric.continuation.events import Proposal
 from contfric.orbit.counts import Counts
 from contfric.orbit.orbit import Orbit
 from contfric.results import replacing
+from contfric.study import responses
 from contfric.study.findings import Findings
 from contfric.study.plan import Plan
 from contfric.study.record_plane import map_entries, plane_entries
@@ -66,6 +67,7 @@ def record_of(
         **(_diagram_entries(found.diagram) if found.diagram is not None else {}),
         **({"plane": plane_entries(found.plane)} if found.plane is not None else {}),
         **({"lyapunov": map_entries(found.lyapunov)} if found.lyapunov is not None else {}),
+        **{key: responses.entries_of(x) for key, x in found.responses.items()},
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,8 @@ from contfric.study.read import Study
 if TYPE_CHECKING:
     from contfric.atlas.plane import Plane
     from contfric.chaos.map import LyapunovMap
+    from contfric.response.sweep import Sweep
+    from contfric.study.responses import Response
 
 
 class RunStatus(str, Enum):
@@ -52,6 +54,8 @@ class StudyResult:
         The files written.
     goes_on : bool
         Whether a checkpoint was left, from which the same call goes on.
+    responses : dict
+        Simulated responses by their keys in the study.
     """
 
     study: Study
@@ -65,6 +69,12 @@ class StudyResult:
     info: dict[str, Any]
     files: tuple[Path, ...]
     goes_on: bool = False
+    responses: dict[str, Response] = field(default_factory=dict)
+
+    @property
+    def sweep(self) -> Sweep | None:
+        """The sweep, if the study asks for one."""
+        return self.responses.get("sweep")
 
     def __repr__(self) -> str:
         return f"<StudyResult {self.study.name}: {self.status.value}, in {self.out}>"
