@@ -50,7 +50,11 @@ if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.simulation import simulate
     from contfric.orbit.solve import solve_orbit
+    from contfric.response.basin_map import basins
+    from contfric.response.basins import Basins
     from contfric.response.outcome import Outcome
+    from contfric.response.poincare import poincare, release_map
+    from contfric.response.returns import ReleaseMap, Returns
     from contfric.response.sweep import Sweep
     from contfric.response.sweeping import sweep
     from contfric.results import load, save
@@ -60,6 +64,7 @@ if TYPE_CHECKING:
 #: Where each public name lives; imported at first use.
 _HOMES = {
     "AperiodicError": "contfric.errors",
+    "Basins": "contfric.response.basins",
     "Bifurcation": "contfric.continuation.events",
     "Branch": "contfric.continuation.branch",
     "Census": "contfric.atlas.census_result",
@@ -82,12 +87,15 @@ _HOMES = {
     "OscillatorModel": "contfric.models.oscillator",
     "Plane": "contfric.atlas.plane",
     "ParameterError": "contfric.errors",
+    "ReleaseMap": "contfric.response.returns",
     "ResultFileError": "contfric.errors",
+    "Returns": "contfric.response.returns",
     "Seeds": "contfric.atlas.seeds",
     "Window": "contfric.atlas.adding",
     "Signature": "contfric.signature",
     "Sweep": "contfric.response.sweep",
     "StudyError": "contfric.errors",
+    "basins": "contfric.response.basin_map",
     "census": "contfric.atlas.census",
     "check_model": "contfric.models.check",
     "continue_bifurcation": "contfric.curves.trace",
@@ -102,6 +110,8 @@ _HOMES = {
     "lyapunov_map": "contfric.chaos.compute",
     "model_names": "contfric.models",
     "period_adding": "contfric.atlas.adding",
+    "poincare": "contfric.response.poincare",
+    "release_map": "contfric.response.poincare",
     "run_study": "contfric.study",
     "save": "contfric.results",
     "signature_names": "contfric.signature",
@@ -113,6 +123,7 @@ _HOMES = {
 
 __all__ = [
     "AperiodicError",
+    "Basins",
     "Bifurcation",
     "Branch",
     "Census",
@@ -135,13 +146,16 @@ __all__ = [
     "Outcome",
     "ParameterError",
     "Plane",
+    "ReleaseMap",
     "ResultFileError",
+    "Returns",
     "Seeds",
     "Signature",
     "StudyError",
     "Sweep",
     "Window",
     "__version__",
+    "basins",
     "census",
     "check_model",
     "continue_bifurcation",
@@ -156,6 +170,8 @@ __all__ = [
     "lyapunov_map",
     "model_names",
     "period_adding",
+    "poincare",
+    "release_map",
     "run_study",
     "save",
     "signature_names",

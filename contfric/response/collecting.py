@@ -58,9 +58,9 @@ def collect(
     times, states, modes, ons = starts
     count, n = len(vectors), states.shape[1]
     points, ends = empty_points(_POINTS * count, n), empty_ends(count, n)
-    flag = new_stop() if stop is None else stop
     done, state = 0, np.ascontiguousarray(states)
-    while done < count and not flag[0]:
+    while done < count:
+        flag = new_stop() if stop is None else stop  # a call in a thread uses it up
         part = slice(done, count)
         rest = ends.behind(done)
         arguments = (
@@ -81,7 +81,7 @@ def collect(
         )
         more = until_interrupted(cut_solutions, arguments, flag if stop is None else None)
         done += int(more)
-        if done == count or flag[0]:
+        if done == count or (stop is not None and stop[0] != 0):
             break
         carried = ends.states[done - 1 : done] if done else state[:1]
         if how.carried and more and not _goes_on(int(ends.outcomes[done - 1])):

@@ -11,12 +11,19 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray
 
-#: A joint within this distance of one of a stable orbit has converged to it: where an orbit attracts, its
-#: neighbourhood of this size does, unless a fold, or a jump of the flow, is as near as that.
-NEAR = 1e-6
-#: Share of the distance between two orbits that the radius is at most, so that neither takes what is of the
-#: other.
+#: A joint is at most so far from one of a stable orbit that it has converged to it (nondimensional, small
+#: against orbits of size 1): the linear map of the orbit holds there.
+NEAR = 1e-3
+#: The same as a share of 1 - |mu| with the largest multiplier mu: where the orbit meets an unstable one in a
+#: fold, that one is as far as 1 - |mu| divided by a curvature of order 1.
+_OF_MULTIPLIER = 1e-2
+#: The same as a share of the distance to another orbit, and of the margins of the orbit's inequalities: where one
+#: is violated the segments are others, and what they lead to as well.
 _SHARE = 0.1
+#: A margin below this is zero, and bounds nothing: a joint that lies at an event by its definition.
+_ZERO = 1e-9
+#: No radius is less: a solution does not come nearer to an orbit than rounding, amplified along it.
+_LEAST = 1e-9
 
 
 class Targets(NamedTuple):
@@ -53,18 +60,29 @@ def targets_of(model: Model, orbits: Sequence[Orbit]) -> Targets:
         rows.append(begins)
     z, key = np.concatenate(rows), np.array(keys, dtype=np.int64)
     owner = np.array(owners, dtype=np.int64)
+    least = np.array([_reach(orbit) for orbit in orbits])
     turn = orbits[0].period / orbits[0].periods if orbits and not model.autonomous else 0.0
-    return Targets(key, z, owner, _radii(key, z, owner, turn))
+    return Targets(key, z, owner, _radii(key, z, owner, turn, least))
 
 
-def _radii(key: IntArray, z: FloatArray, owner: IntArray, turn: float) -> FloatArray:
-    """Return the radius of each joint: small, and smaller where a joint of another orbit is near."""
-    radius = np.full(len(key), NEAR)
+def _reach(orbit: Orbit) -> float:
+    """Return how near a joint has to be, for what the orbit itself says."""
+    margins = np.abs(orbit.margins)
+    slack = 1.0 - float(np.max(np.abs(orbit.multipliers), initial=0.0))
+    bounds = [NEAR, _OF_MULTIPLIER * slack, *(_SHARE * margins[margins > _ZERO])]
+    return max(_LEAST, min(bounds))
+
+
+def _radii(
+    key: IntArray, z: FloatArray, owner: IntArray, turn: float, least: FloatArray
+) -> FloatArray:
+    """Return the radius of each joint: that of its orbit, smaller where a joint of another one is near."""
+    radius = np.empty(len(key))
     for i in range(len(key)):
-        other = (key == key[i]) & (owner != owner[i])
-        apart = np.abs(z[other] - z[i])
+        radius[i] = least[owner[i]]
+        apart = np.abs(z[(key == key[i]) & (owner != owner[i])] - z[i])
         if turn > 0.0:
             apart[:, 0] = np.minimum(apart[:, 0], turn - apart[:, 0])
         if len(apart):
-            radius[i] = min(NEAR, _SHARE * float(np.min(np.max(apart, axis=1))))
+            radius[i] = min(radius[i], _SHARE * float(np.min(np.max(apart, axis=1))))
     return radius

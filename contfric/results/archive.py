@@ -27,14 +27,27 @@ from contfric.files import replacing
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
+from contfric.response.basins import Basins
+from contfric.response.returns import ReleaseMap, Returns
 from contfric.response.sweep import Sweep
 from contfric.results.curves import pack_curve, pack_plane, unpack_curve, unpack_plane
 from contfric.results.lyapunov import pack_map, unpack_map
 from contfric.results.pack import Arrays, Header, Packer
-from contfric.results.response import pack_sweep, unpack_sweep
+from contfric.results.response import (
+    pack_basins,
+    pack_releases,
+    pack_returns,
+    pack_sweep,
+    unpack_basins,
+    unpack_releases,
+    unpack_returns,
+    unpack_sweep,
+)
 from contfric.results.unpack import Unpacker
 
-Saveable: TypeAlias = Orbit | Branch | Diagram | Curve | Plane | LyapunovMap | Sweep
+Saveable: TypeAlias = (
+    Orbit | Branch | Diagram | Curve | Plane | LyapunovMap | Sweep | Returns | ReleaseMap | Basins
+)
 
 #: Version of the format; it grows when an older contfric could not read what is written. Files of version 1
 #: have no digests: that they are as they were written is not known.
@@ -150,6 +163,12 @@ def _content(x: Saveable, packer: Packer) -> Header:
         return {"kind": "lyapunov map", **pack_map(x, packer.arrays)}
     if isinstance(x, Sweep):
         return {"kind": "sweep", **pack_sweep(x, packer.arrays)}
+    if isinstance(x, Returns):
+        return {"kind": "returns", **pack_returns(x, packer.arrays)}
+    if isinstance(x, ReleaseMap):
+        return {"kind": "release map", **pack_releases(x, packer.arrays)}
+    if isinstance(x, Basins):
+        return {"kind": "basins", **pack_basins(x, packer)}
     return {"kind": "diagram", **packer.diagram(x)}
 
 
@@ -210,6 +229,12 @@ def _restored(content: Header, pool: Unpacker) -> Saveable:
         return unpack_map(pool.model, content, pool.arrays)
     if kind == "sweep":
         return unpack_sweep(pool.model, content, pool.arrays)
+    if kind == "returns":
+        return unpack_returns(pool.model, content, pool.arrays)
+    if kind == "release map":
+        return unpack_releases(pool.model, content, pool.arrays)
+    if kind == "basins":
+        return unpack_basins(pool.model, content, pool.arrays, pool.orbits)
     raise ValueError(f"unknown kind of result {kind!r}")
 
 

@@ -9,8 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.models.definition import Model
+from contfric.orbit.orbit import Orbit
+from contfric.response.basins import Basins
+from contfric.response.outcome import Outcome
+from contfric.response.returns import ReleaseMap, Returns
 from contfric.response.sweep import Sweep, SweepRun
-from contfric.results.pack import Arrays, Header
+from contfric.results.pack import Arrays, Header, Packer
 
 _POINTS = ("index", "cycles", "modes", "times", "states")
 
@@ -50,6 +54,65 @@ def unpack_sweep(model: Model, header: Header, arrays: Arrays) -> Sweep:
     section = header["section"]
     expect(isinstance(section, (str, float, int)) and bool(runs))
     return Sweep(model, header["parameter"], values, vector, section, runs)
+
+
+_RETURNS = ("cycles", "modes", "times", "states")
+_RELEASES = ("phases", "images", "returns", "branch", "states")
+
+
+def pack_returns(found: Returns, arrays: Arrays) -> Header:
+    """Return the header of the points of a solution; their arrays are added as they are."""
+    arrays |= {"vector": found.vector, **{name: getattr(found, name) for name in _RETURNS}}
+    return {"section": found.section, "outcome": found.outcome.name, "complete": found.complete}
+
+
+def unpack_returns(model: Model, header: Header, arrays: Arrays) -> Returns:
+    """Return the points of a header; errors as for a sweep."""
+    found = [arrays[name] for name in _RETURNS]
+    check_points(model, found)
+    expect(arrays["vector"].shape == (len(model.parameters),))
+    outcome = Outcome[header["outcome"]]
+    return Returns(model, arrays["vector"], header["section"], outcome, *found, header["complete"])
+
+
+def pack_releases(found: ReleaseMap, arrays: Arrays) -> Header:
+    """Return the header of a release map; its arrays are added as they are."""
+    arrays |= {"vector": found.vector, **{name: getattr(found, name) for name in _RELEASES}}
+    arrays["period"] = np.array([found.period])
+    return {"mode": found.mode, "surface": found.surface, "complete": found.complete}
+
+
+def unpack_releases(model: Model, header: Header, arrays: Arrays) -> ReleaseMap:
+    """Return the release map of a header; errors as for a sweep."""
+    found = [arrays[name] for name in _RELEASES]
+    check_points(model, found)
+    expect(arrays["vector"].shape == (len(model.parameters),) and arrays["period"].shape == (1,))
+    place, period = (str(header["mode"]), str(header["surface"])), float(arrays["period"][0])
+    return ReleaseMap(model, arrays["vector"], *place, period, *found, header["complete"])
+
+
+def pack_basins(found: Basins, packer: Packer) -> Header:
+    """Return the header of basins; their arrays and orbits are added as they are."""
+    for k, values in enumerate(found.axes.values()):
+        packer.arrays[f"axis{k}"] = values
+    packer.arrays |= {"vector": found.vector, "labels": found.labels, "motions": found.motions}
+    packer.arrays["at"] = np.array(list(found.at.values()), dtype=np.float64)
+    orbits = [packer.orbit(orbit) for orbit in found.orbits]
+    return {"axes": list(found.axes), "at": list(found.at), "orbits": orbits}
+
+
+def unpack_basins(model: Model, header: Header, arrays: Arrays, orbits: list[Orbit]) -> Basins:
+    """Return the basins of a header; errors as for a sweep."""
+    names = [str(name) for name in header["axes"]]
+    axes = {name: arrays[f"axis{k}"] for k, name in enumerate(names)}
+    labels, motions = arrays["labels"], arrays["motions"]
+    expect(labels.shape == motions.shape == tuple(len(v) for v in axes.values()))
+    expect(labels.dtype == np.int32 and motions.dtype == np.uint8)
+    expect(set(names) <= set(model.states) and len(axes) == 2)
+    chosen = tuple(orbits[k] for k in header["orbits"])
+    expect(int(labels.max(initial=-1)) < len(chosen))
+    at = dict(zip(header["at"], arrays["at"].tolist(), strict=True))
+    return Basins(model, axes, arrays["vector"], at, chosen, labels, motions)
 
 
 def check_points(model: Model, arrays: Iterable[NDArray[Any]]) -> None:
