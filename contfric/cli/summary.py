@@ -27,9 +27,10 @@ def findings(record: Record) -> Iterator[str]:
     if "lyapunov" in record:
         yield ""
         yield from _map(record["lyapunov"])
-    if "sweep" in record:
-        yield ""
-        yield from _sweep(record["sweep"])
+    for key, lines in (("sweep", _sweep), ("poincare", _points), ("basins", _basins)):
+        if key in record:
+            yield ""
+            yield from lines(record[key])
 
 
 def _map(entry: Record) -> Iterator[str]:
@@ -37,6 +38,22 @@ def _map(entry: Record) -> Iterator[str]:
     found = ", ".join(f"{count} {motion}" for motion, count in entry["motions"].items())
     yield f"exponents at {' x '.join(sides)}, {entry['starts']} start(s) each: {found}"
     yield f"largest   {entry['largest']:.6g}"
+    if not entry["complete"]:
+        yield "incomplete: the same command goes on from the finished tiles"
+
+
+def _points(entry: Record) -> Iterator[str]:
+    yield f"{entry['points']} points of a solution at {entry['section']}"
+
+
+def _basins(entry: Record) -> Iterator[str]:
+    sides = (f"{n} {low:g} to {high:g} ({k})" for n, (low, high, k) in entry["grid"].items())
+    yield f"basins at {' x '.join(sides)}"
+    rows = [["", "starts", "share", "95 % interval"]]
+    for s in entry["shares"]:
+        interval = f"{s['low']:.2%} to {s['high']:.2%}"
+        rows.append([s["name"], str(s["count"]), f"{s['share']:.2%}", interval])
+    yield from table(rows)
     if not entry["complete"]:
         yield "incomplete: the same command goes on from the finished tiles"
 

@@ -122,10 +122,7 @@ def basins(
     fixed = _checked_at(model, axes, {} if at is None else at)
     periods, tile = whole_number("periods", periods, least=1), whole_number("tile", tile, least=1)
     shape = tuple(len(values) for values in axes.values())
-    must_fit(
-        f"basins of {shape[0]} x {shape[1]} starts",
-        shape[0] * shape[1] * (_BYTES + 16 * len(model.states)),
-    )
+    _check_size(model, axes)
     period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0)))
     states = _states(model, axes, fixed)
     job = _Job(model, vector, fixed[PHASE] * period, states, periods, tile, executor, progress)
@@ -146,6 +143,25 @@ def basins(
             progress("interrupted: what is labelled is kept")
     labels, motions = rows.labels.reshape(shape), rows.motions.reshape(shape)
     return Basins(model, axes, vector, fixed, tuple(attractors.orbits), labels, motions)
+
+
+def check_starts(model: Model, grid: object, at: object) -> None:
+    """Check the starts that a user gave.
+
+    Raises
+    ------
+    ParameterError
+        If they are none of the model, or do not fit into the memory.
+    """
+    axes = _checked_grid(model, grid)
+    _checked_at(model, axes, at)
+    _check_size(model, axes)
+
+
+def _check_size(model: Model, axes: Mapping[str, FloatArray]) -> None:
+    rows, columns = (len(values) for values in axes.values())
+    size = rows * columns * (_BYTES + 16 * len(model.states))
+    must_fit(f"basins of {rows} x {columns} starts", size)
 
 
 def _checked_grid(model: Model, grid: object) -> dict[str, FloatArray]:

@@ -17,8 +17,8 @@ NEAR = 1e-3
 #: The same as a share of 1 - |mu| with the largest multiplier mu: where the orbit meets an unstable one in a
 #: fold, that one is as far as 1 - |mu| divided by a curvature of order 1.
 _OF_MULTIPLIER = 1e-2
-#: The same as a share of the distance to another orbit, and of the margins of the orbit's inequalities: where one
-#: is violated the segments are others, and what they lead to as well.
+#: The same as a share of the distance to another orbit, and of the margins of the orbit's inequalities:
+#: where one is violated the segments are others, and what they lead to as well.
 _SHARE = 0.1
 #: A margin below this is zero, and bounds nothing: a joint that lies at an event by its definition.
 _ZERO = 1e-9

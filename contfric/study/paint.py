@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from contfric.results import replacing
 from contfric.study.drawings import Drawing
@@ -23,6 +23,8 @@ _SIZES = {
     FigureKind.LYAPUNOV: (8.0, 5.6, 0.0),
     FigureKind.PLANE: (9.6, 7.0, 0.0),
     FigureKind.SWEEP: (9.6, 5.0, 0.0),
+    FigureKind.POINCARE: (6.4, 6.0, 0.0),
+    FigureKind.BASINS: (8.4, 6.0, 0.0),
 }
 #: Kinds that show a diagram.
 _OF_DIAGRAM = frozenset({FigureKind.DIAGRAM, FigureKind.BRANCHES})
@@ -41,7 +43,7 @@ def can_be_drawn(kind: FigureKind, found: Findings) -> bool:
 
 def _behind(found: Findings, rows: list[str]) -> Sweep | None:
     """Return the sweep that is drawn behind a diagram: along its parameter, with what its rows show."""
-    swept, diagram = found.responses.get("sweep"), found.diagram
+    swept, diagram = cast("Sweep | None", found.responses.get("sweep")), found.diagram
     if swept is None or diagram is None or swept.parameter != diagram.parameter:
         return None
     return swept if swept.section == "stops" or rows == ["stops"] else None

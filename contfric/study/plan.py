@@ -37,6 +37,8 @@ class StepName(str, Enum):
     PLANE = "plane"
     LYAPUNOV = "lyapunov"
     SWEEP = "sweep"
+    POINCARE = "poincare"
+    BASINS = "basins"
     TABLES = "tables"
     DATA = "data"
     FIGURES = "figures"

@@ -18,7 +18,6 @@ from contfric.continuation.events import Proposal
 from contfric.orbit.counts import Counts
 from contfric.orbit.orbit import Orbit
 from contfric.results import replacing
-from contfric.study import responses
 from contfric.study.findings import Findings
 from contfric.study.plan import Plan
 from contfric.study.record_plane import map_entries, plane_entries
@@ -67,8 +66,16 @@ def record_of(
         **(_diagram_entries(found.diagram) if found.diagram is not None else {}),
         **({"plane": plane_entries(found.plane)} if found.plane is not None else {}),
         **({"lyapunov": map_entries(found.lyapunov)} if found.lyapunov is not None else {}),
-        **{key: responses.entries_of(x) for key, x in found.responses.items()},
+        **_response_entries(found),
     }
+
+
+def _response_entries(found: Findings) -> dict[str, Any]:
+    if not found.responses:
+        return {}
+    from contfric.study.tables_response import entries_of
+
+    return {key: entries_of(x) for key, x in found.responses.items()}
 
 
 def _start_entries(orbit: Orbit) -> dict[str, Any]:

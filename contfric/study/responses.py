@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -11,19 +11,21 @@ import numpy as np
 
 from contfric.errors import ContfricError
 from contfric.models.definition import Model
-from contfric.study.schema_response import SweepTask
+from contfric.study.schema_response import BasinsTask, PoincareTask, SweepTask
 
 if TYPE_CHECKING:
+    from contfric.response.basins import Basins
+    from contfric.response.returns import Returns
     from contfric.response.sweep import Sweep
     from contfric.study.read import Study
     from contfric.study.schema import StudyFile
     from contfric.yaml_lines import LocatedYaml
 
-Response: TypeAlias = "Sweep"
+Response: TypeAlias = "Sweep | Returns | Basins"
 Say = Callable[[str], None]
 
 #: The keys of a study that ask for a response, in the order of the steps.
-KEYS = ("sweep",)
+KEYS = ("sweep", "poincare", "basins")
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,11 @@ def tasks_of(content: StudyFile) -> dict[str, Any]:
 
 def text_of(task: Any) -> str:
     """Return what a step does, in words."""
+    if isinstance(task, PoincareTask):
+        return f"points of one solution at {task.section if task.section is not None else 'stops'}"
+    if isinstance(task, BasinsTask):
+        sides = (f"{n} from {v[0]:g} to {v[1]:g} ({v[2]:g})" for n, v in task.grid.items())
+        return f"what starts converge to, {' x '.join(sides)}"
     low, high, count = task.values
     direction = "both" if task.direction is None else task.direction.value
     return (
@@ -54,12 +61,19 @@ def text_of(task: Any) -> str:
 
 def row_text(key: str) -> str:
     """Return what a row of its table is."""
-    return {"sweep": "one row a point of the sweep"}[key]
+    return {
+        "sweep": "one row a point of the sweep",
+        "poincare": "one row a point of the section",
+        "basins": "one row a start of the basins",
+    }[key]
 
 
 def check(located: LocatedYaml, content: StudyFile, model: Model) -> None:
     """Check what can be wrong with the tasks; what is fails with its line."""
     for key, task in tasks_of(content).items():
+        if isinstance(task, BasinsTask):
+            _check_basins(located, task, model)
+            continue
         if task.state is not None and len(task.state) != len(model.states):
             located.fail(
                 (key, "state"),
@@ -67,7 +81,27 @@ def check(located: LocatedYaml, content: StudyFile, model: Model) -> None:
                 f"({', '.join(model.states)}), got {len(task.state)}",
             )
         _check_section(located, key, task, model)
-        _check_sweep(located, key, task, model)
+        if isinstance(task, SweepTask):
+            _check_sweep(located, key, task, model)
+
+
+def _check_basins(located: LocatedYaml, task: BasinsTask, model: Model) -> None:
+    from contfric.response.basin_map import check_starts
+
+    for name, values in task.grid.items():
+        if name in model.states:
+            check_axis(located, ("basins", "grid", name), name, values)
+    try:
+        check_starts(model, _axes(task), task.at)
+    except ContfricError as error:
+        located.fail(("basins",), str(error))
+
+
+def _axes(task: BasinsTask) -> dict[str, Any]:
+    return {
+        name: np.linspace(values[0], values[1], int(values[2])) if len(values) == 3 else values
+        for name, values in task.grid.items()
+    }
 
 
 def _check_section(located: LocatedYaml, key: str, task: Any, model: Model) -> None:
@@ -105,7 +139,15 @@ def compute(study: Study, key: str, task: Any, tiles: Path, say: Say) -> Respons
     """Compute a response; finished parts are kept, and a killed run goes on from them."""
     import shutil
 
-    found = _sweep(study, task, tiles, say)
+    found: Response
+    if isinstance(task, PoincareTask):
+        from contfric.response.poincare import poincare
+
+        return poincare(study.model, study.params, **task.options())
+    if isinstance(task, BasinsTask):
+        found = _basins(study, task, tiles, say)
+    else:
+        found = _sweep(study, task, tiles, say)
     if found.complete:
         shutil.rmtree(tiles, ignore_errors=True)
     return found
@@ -122,38 +164,16 @@ def _sweep(study: Study, task: SweepTask, tiles: Path, say: Say) -> Sweep:
     )
 
 
-def header_of(found: Response) -> list[str]:
-    """Return the columns of the table of a response."""
-    return ["direction", found.parameter, "outcome", "period", "mode", "t", *found.model.states]
+def _basins(study: Study, task: BasinsTask, tiles: Path, say: Say) -> Basins:
+    from contfric.response.basin_map import basins
 
-
-def rows_of(found: Response) -> Iterator[tuple[Any, ...]]:
-    """Yield the rows of the table of a response."""
-    from contfric.response.outcome import Outcome
-
-    outcomes = [outcome.name.lower() for outcome in Outcome]
-    modes = [mode.name for mode in found.model.modes]
-    for name, run in found.runs.items():
-        for i, value in enumerate(run.index.tolist()):
-            yield (
-                name,
-                found.values[value].item(),
-                outcomes[run.outcomes[value]],
-                run.periods[value].item(),
-                modes[run.modes[i]],
-                run.times[i].item(),
-                *run.states[i].tolist(),
-            )
-
-
-def entries_of(found: Response) -> dict[str, Any]:
-    """Return what the record of a run says of a response."""
-    return {
-        "parameter": found.parameter,
-        "values": [float(found.values[0]), float(found.values[-1]), len(found.values)],
-        "params": found.params,
-        "section": found.section,
-        "complete": found.complete,
-        "points": {name: len(run) for name, run in found.runs.items()},
-        "outcomes": {outcome.name.lower(): count for outcome, count in found.counts().items()},
-    }
+    options = {} if task.periods is None else {"periods": task.periods}
+    return basins(
+        study.model,
+        study.params,
+        _axes(task),
+        task.at,
+        folder=tiles,
+        progress=say,
+        **options,
+    )

@@ -268,8 +268,10 @@ class _Run:
         if diagram is not None:
             self._write(BIFURCATIONS, lambda path: write_bifurcations(path, diagram))
         self._write_plane_tables(self.found.plane, self.found.lyapunov)
+        if self.found.responses:
+            from contfric.study.tables_response import header_of, rows_of
         for key, found in self.found.responses.items():
-            header, rows = responses.header_of(found), responses.rows_of(found)
+            header, rows = header_of(found), rows_of(found)
             self._write(responses.FILES[key].table, partial(write_table, header=header, rows=rows))
 
     def _write_plane_tables(self, plane: Plane | None, lmap: LyapunovMap | None) -> None:

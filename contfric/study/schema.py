@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
+from contfric.study.schema_response import BasinsTask, PoincareTask, SweepTask
 from contfric.study.schema_response import Part as _Part
-from contfric.study.schema_response import SweepTask
 from contfric.yaml_lines import as_truth
 
 _Truth = Annotated[bool, BeforeValidator(as_truth)]
@@ -33,6 +33,8 @@ class FigureKind(str, Enum):
     LYAPUNOV = "lyapunov"
     PLANE = "plane"
     SWEEP = "sweep"
+    POINCARE = "poincare"
+    BASINS = "basins"
 
 
 class Row(str, Enum):
@@ -234,7 +236,8 @@ class Figure(_Part):
     """One figure."""
 
     kind: Annotated[FigureKind, Field(strict=False)] = Field(
-        description="one of diagram, orbit, transitions, branches, lyapunov, plane, sweep"
+        description="one of diagram, orbit, transitions, branches, lyapunov, plane, sweep, "
+        "poincare, basins"
     )
     rows: _Rows | None = Field(
         None, description="a list of rows of a diagram: any of x_max, x_min, stops, psi"
@@ -286,6 +289,10 @@ class StudyFile(_Part):
         description="a mapping with parameter and values; also direction, periods, transient, "
         "section, sense, state",
     )
+    poincare: PoincareTask | None = Field(
+        None, description="a mapping with any of section, sense, state, time, periods, transient"
+    )
+    basins: BasinsTask | None = Field(None, description="a mapping with grid; also at, periods")
     want: _Wants = Field([], description="a list with any of stability, asymmetry, extrema, stops")
     figures: list[Figure] = Field([], description="a list of mappings, each with its kind")
 
@@ -298,7 +305,8 @@ class StudyFile(_Part):
     def needs_orbit(self) -> bool:
         """Whether anything is asked for that needs the orbit of the start."""
         shown = {figure.kind for figure in self.figures}
-        simulated = self.lyapunov is not None or self.sweep is not None
+        responses = (self.lyapunov, self.sweep, self.poincare, self.basins)
+        simulated = any(task is not None for task in responses)
         alone = simulated and self.task is None and self.plane is None
         return (
             not alone
