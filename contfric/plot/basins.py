@@ -57,8 +57,8 @@ def plot_basins(found: BasinsLike, ax: Axes | None = None) -> Axes:
     ax.legend(handles=handles, fontsize=SMALL, frameon=False, **BESIDE)
     ax.set_xlabel(f"${first}$", fontsize=TEXT + 1)
     ax.set_ylabel(f"${second}$", fontsize=TEXT + 1)
-    ax.set_xlim(edges_of(across)[[0, -1]])
-    ax.set_ylim(edges_of(up)[[0, -1]])
+    ax.set_xlim(edges_of(across)[0], edges_of(across)[-1])
+    ax.set_ylim(edges_of(up)[0], edges_of(up)[-1])
     ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
     return ax
 

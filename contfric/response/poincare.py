@@ -138,8 +138,10 @@ def release_map(
     must_fit(f"a map of {count} releases", _BYTES * count)
     release, rest = _release_of(model, surface)
     period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0)))
-    times = np.arange(count) * (period / count)
-    states = np.array([_state_at(model, vector, release, rest, float(t)) for t in times])
+    times: FloatArray = np.arange(count, dtype=np.float64) * (period / count)
+    states: FloatArray = np.array(
+        [_state_at(model, vector, release, rest, float(t)) for t in times]
+    )
     possible = np.flatnonzero(
         [_leaves(model, vector, release, float(t), y) for t, y in zip(times, states, strict=True)]
     )

@@ -70,7 +70,7 @@ def _reach(orbit: Orbit) -> float:
     margins = np.abs(orbit.margins)
     slack = 1.0 - float(np.max(np.abs(orbit.multipliers), initial=0.0))
     bounds = [NEAR, _OF_MULTIPLIER * slack, *(_SHARE * margins[margins > _ZERO])]
-    return max(_LEAST, min(bounds))
+    return max(_LEAST, float(min(bounds)))
 
 
 def _radii(

@@ -68,11 +68,11 @@ def pack_returns(found: Returns, arrays: Arrays) -> Header:
 
 def unpack_returns(model: Model, header: Header, arrays: Arrays) -> Returns:
     """Return the points of a header; errors as for a sweep."""
-    found = [arrays[name] for name in _RETURNS]
-    check_points(model, found)
+    check_points(model, [arrays[name] for name in _RETURNS])
     expect(arrays["vector"].shape == (len(model.parameters),))
-    outcome = Outcome[header["outcome"]]
-    return Returns(model, arrays["vector"], header["section"], outcome, *found, header["complete"])
+    named = {name: arrays[name] for name in _RETURNS}
+    what = Outcome[header["outcome"]], bool(header["complete"])
+    return Returns(model, arrays["vector"], header["section"], what[0], **named, complete=what[1])
 
 
 def pack_releases(found: ReleaseMap, arrays: Arrays) -> Header:
@@ -84,11 +84,12 @@ def pack_releases(found: ReleaseMap, arrays: Arrays) -> Header:
 
 def unpack_releases(model: Model, header: Header, arrays: Arrays) -> ReleaseMap:
     """Return the release map of a header; errors as for a sweep."""
-    found = [arrays[name] for name in _RELEASES]
-    check_points(model, found)
+    named = {name: arrays[name] for name in _RELEASES}
+    check_points(model, named.values())
     expect(arrays["vector"].shape == (len(model.parameters),) and arrays["period"].shape == (1,))
     place, period = (str(header["mode"]), str(header["surface"])), float(arrays["period"][0])
-    return ReleaseMap(model, arrays["vector"], *place, period, *found, header["complete"])
+    complete = bool(header["complete"])
+    return ReleaseMap(model, arrays["vector"], *place, period, **named, complete=complete)
 
 
 def pack_basins(found: Basins, packer: Packer) -> Header:

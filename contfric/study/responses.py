@@ -167,7 +167,7 @@ def _sweep(study: Study, task: SweepTask, tiles: Path, say: Say) -> Sweep:
 def _basins(study: Study, task: BasinsTask, tiles: Path, say: Say) -> Basins:
     from contfric.response.basin_map import basins
 
-    options = {} if task.periods is None else {"periods": task.periods}
+    options: dict[str, Any] = {} if task.periods is None else {"periods": task.periods}
     return basins(
         study.model,
         study.params,
