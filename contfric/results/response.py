@@ -84,12 +84,21 @@ def pack_releases(found: ReleaseMap, arrays: Arrays) -> Header:
 
 def unpack_releases(model: Model, header: Header, arrays: Arrays) -> ReleaseMap:
     """Return the release map of a header; errors as for a sweep."""
-    named = {name: arrays[name] for name in _RELEASES}
-    check_points(model, named.values())
+    check_points(model, [arrays[name] for name in _RELEASES])
     expect(arrays["vector"].shape == (len(model.parameters),) and arrays["period"].shape == (1,))
-    place, period = (str(header["mode"]), str(header["surface"])), float(arrays["period"][0])
-    complete = bool(header["complete"])
-    return ReleaseMap(model, arrays["vector"], *place, period, **named, complete=complete)
+    return ReleaseMap(
+        model,
+        arrays["vector"],
+        str(header["mode"]),
+        str(header["surface"]),
+        float(arrays["period"][0]),
+        arrays["phases"],
+        arrays["images"],
+        arrays["returns"],
+        arrays["branch"],
+        arrays["states"],
+        bool(header["complete"]),
+    )
 
 
 def pack_basins(found: Basins, packer: Packer) -> Header:
