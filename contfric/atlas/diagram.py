@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from contfric.atlas.verification import Verification
-    from contfric.plot.protocols import SweepLike
+    from contfric.plot.protocols_response import SweepLike
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
 from contfric.plot.lyapunov import edges_of
-from contfric.plot.protocols import BasinsLike
+from contfric.plot.protocols_response import BasinsLike
 from contfric.plot.save import axes_or_new
 from contfric.plot.style import BESIDE, GREY, SMALL, TEXT, branch_colours, lighter
 

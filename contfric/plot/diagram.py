@@ -11,7 +11,8 @@ from matplotlib.lines import Line2D
 
 from contfric.plot.events import Mark, draw_marks, label_marks, marks_of
 from contfric.plot.labels import settle
-from contfric.plot.protocols import BifurcationLike, BranchLike, DiagramLike, SweepLike
+from contfric.plot.protocols import BifurcationLike, BranchLike, DiagramLike
+from contfric.plot.protocols_response import SweepLike
 from contfric.plot.response import draw_overlay
 from contfric.plot.runs import stability_runs
 from contfric.plot.save import axes_or_new, figure_or_new

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray
-from contfric.plot.protocols import SweepLike
+from contfric.plot.protocols_response import SweepLike
 from contfric.plot.save import axes_or_new
 from contfric.plot.style import GREY, SMALL, TEXT, lighter, parameter_label
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from contfric.models.definition import FloatArray
-from contfric.plot.protocols import ReleaseMapLike, ReturnsLike
+from contfric.plot.protocols_response import ReleaseMapLike, ReturnsLike
 from contfric.plot.save import axes_or_new
 from contfric.plot.style import GREY, LINE_WIDTH, SMALL, TEXT, branch_colours, lighter
 

@@ -11,14 +11,11 @@ one more cycle is complete, and the points of that cycle are kept.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
-import numpy as np
 from numba import types
 
 from contfric.chaos.cells import StartingType, start_mode
 from contfric.compiled import (
-    allocating_helper,
     f8,
     helper,
     i8,
@@ -28,9 +25,7 @@ from contfric.compiled import (
     table,
     vector,
 )
-from contfric.models.definition import FloatArray
 from contfric.orbit.equations import FunctionsType
-from contfric.orbit.system import IntArray
 from contfric.orbit.trajectory import (
     ALL_EVENTS,
     ALL_TIME,
@@ -39,13 +34,18 @@ from contfric.orbit.trajectory import (
     INFINITE,
     QUIET,
     RowsType,
-    StateRoom,
     TablesType,
     copy_state,
     follow,
-    whole_turns,
 )
 from contfric.response.cuts import BATCH, Cut, Ends, Following, Points
+from contfric.response.cutting import (
+    MEMORIES,
+    cut_inside,
+    cut_joint,
+    new_workspace,
+    set_strobe,
+)
 
 CutType = types.NamedTuple([table, indices, i8, i8, f8, i8], Cut)
 FollowingType = types.NamedTuple([f8, f8, f8, i8, i8], Following)
@@ -54,127 +54,14 @@ EndsType = types.NamedTuple([indices, indices, indices, indices, matrix], Ends)
 
 #: Numbers of what a solution came to, in the order of :class:`contfric.response.outcome.Outcome`.
 PERIODIC, APERIODIC, AT_REST, UNBOUNDED, NO_MOTION, CHATTERING, MEETS_NOTHING = range(7)
-#: Joints that are remembered: one for short cycles, one for long ones.
-_MEMORIES = 2
 #: A joint is remembered for so many events at first, then for twice as many: Brent's cycle detection
 #: (BIT 20 (1980) 176-184).
 _SPANS = (8, 64)
 #: Share of a cycle that a solution without excitation is followed beyond its last joint, so that it
 #: ends inside of a segment: the golden section, which no symmetry makes a joint.
 _BEYOND = 0.6180339887498949
-#: Most crossings inside of one segment: one with more never ends (as for stops of orbits).
-_MOST_CROSSINGS = 1000
 #: Factor and offset by which a sequence of segments becomes a number (a linear congruential hash).
 _FACTOR, _OFFSET = 6364136223846793005, 1442695040888963407
-
-
-class Segment(NamedTuple):
-    """Where the segment under way began: (mode, surfaces it is on as bits, period), time, state."""
-
-    at: IntArray
-    time: FloatArray
-    y: FloatArray
-
-
-class Remembered(NamedTuple):
-    """Joints that are remembered: key, event, period, events until replaced; phase and state."""
-
-    whole: IntArray
-    z: FloatArray
-
-
-class Workspace(NamedTuple):
-    """All room that the solutions of one call share; ``strobe`` is the number of the next strobe."""
-
-    state: StateRoom
-    segment: Segment
-    memory: Remembered
-    y: FloatArray
-    work: FloatArray
-    found: FloatArray
-    carry: FloatArray
-    strobe: IntArray
-
-
-@allocating_helper
-def new_workspace(n):  # type: ignore[no-untyped-def]
-    """Return room for solutions of n states."""
-    none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
-    return Workspace(
-        StateRoom(none, empty, nothing, np.empty(n), np.empty(n)),
-        Segment(np.zeros(3, dtype=np.int64), np.zeros(1), np.empty(n)),
-        Remembered(np.empty((_MEMORIES, 4), dtype=np.int64), np.empty((_MEMORIES, 1 + n))),
-        np.empty(n),
-        np.empty(n),
-        np.empty(n),
-        np.zeros(CARRIED),
-        np.zeros(1, dtype=np.int64),
-    )
-
-
-@helper
-def put(points, cycle, t, y, mode):  # type: ignore[no-untyped-def]
-    """Add a point; one that does not fit is counted only."""
-    k = points.number[0]
-    points.number[0] = k + 1
-    if k < points.times.shape[0]:
-        points.cycles[k], points.modes[k], points.times[k] = cycle, mode, t
-        for j in range(y.shape[0]):
-            points.states[k, j] = y[j]
-
-
-@helper
-def has_sense(functions, cut, mode, t, y, p, room):  # type: ignore[no-untyped-def]
-    """Tell whether the section is crossed in the sense asked for."""
-    if cut.sense == 0:
-        return True
-    return cut.sense * functions[6](mode, cut.observable, t, y, p, room.none, room.empty) > 0.0
-
-
-@helper
-def set_strobe(cut, period, segment, strobe):  # type: ignore[no-untyped-def]
-    """Set the number of the first strobe behind the start of the segment."""
-    strobe[0] = segment.at[2]
-    if cut.phase * period <= segment.time[0]:
-        strobe[0] += 1
-
-
-@helper
-def cut_inside(functions, cut, duration, p, period, ws, points):  # type: ignore[no-untyped-def]
-    """Collect the points of the section inside of a segment."""
-    segment, room = ws.segment, ws.state
-    mode, cycle, t = segment.at[0], segment.at[2], segment.time[0]
-    if cut.phase >= 0.0:
-        while True:
-            later = (ws.strobe[0] - cycle) * period + (cut.phase * period - t)
-            if later > duration:
-                break
-            functions[0](mode, t, segment.y, later, p, room.none, ws.found, room.nothing)
-            put(points, ws.strobe[0], cut.phase * period, ws.found, mode)
-            ws.strobe[0] += 1
-    elif cut.inside[mode] != 0:
-        level = functions[2](cut.surface, p, room.none, room.empty) if cut.surface >= 0 else 0.0
-        started = cut.surface >= 0 and (segment.at[1] >> cut.surface) & 1 == 1
-        copy_state(segment.y, ws.work)
-        left = duration
-        for _ in range(_MOST_CROSSINGS):
-            tau = functions[4](mode, cut.observable, level, started, t, ws.work, left, p, ws.found)
-            if tau < 0.0:
-                break
-            turns, t = whole_turns(t + tau, period)
-            cycle, left, started = cycle + turns, left - tau, True
-            if has_sense(functions, cut, mode, t, ws.found, p, room):
-                put(points, cycle, t, ws.found, mode)
-            copy_state(ws.found, ws.work)
-
-
-@helper
-def cut_joint(functions, cut, mode, surface, cycle, t, y, p, ws, points):  # type: ignore[no-untyped-def]
-    """Collect a joint, if it counts."""
-    if cut.phase < 0.0 and cut.joints[mode, surface] != 0:
-        copy_state(y, ws.found)
-        if has_sense(functions, cut, mode, t, ws.found, p, ws.state):
-            put(points, cycle, t, ws.found, mode)
 
 
 @helper
@@ -194,7 +81,7 @@ def step_behind(functions, tables, mode, surface, following, cycle, t, y, p, ws)
 @helper
 def forget(memory):  # type: ignore[no-untyped-def]
     """Remember nothing."""
-    for i in range(_MEMORIES):
+    for i in range(MEMORIES):
         memory.whole[i, 0] = -1
         memory.whole[i, 3] = _SPANS[i]
 
@@ -203,7 +90,7 @@ def forget(memory):  # type: ignore[no-untyped-def]
 def repeats(memory, key, event, segment, period, timeless, within):  # type: ignore[no-untyped-def]
     """Return (events, periods) since a joint that this one repeats to within rounding; zeros if none."""
     cycle, t, y = segment.at[2], segment.time[0], segment.y
-    for i in range(_MEMORIES):
+    for i in range(MEMORIES):
         if memory.whole[i, 0] == key:
             turns, slip = cycle - memory.whole[i, 2], t - memory.z[i, 0]
             if slip > 0.5 * period:
