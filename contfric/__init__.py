@@ -50,6 +50,13 @@ if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.simulation import simulate
     from contfric.orbit.solve import solve_orbit
+    from contfric.response.basin_map import basins
+    from contfric.response.basins import Basins
+    from contfric.response.outcome import Outcome
+    from contfric.response.poincare import poincare, release_map
+    from contfric.response.returns import ReleaseMap, Returns
+    from contfric.response.sweep import Sweep
+    from contfric.response.sweeping import sweep
     from contfric.results import load, save
     from contfric.signature import Signature, load_signature, signature_names, transition_graph
     from contfric.study import run_study
@@ -57,6 +64,7 @@ if TYPE_CHECKING:
 #: Where each public name lives; imported at first use.
 _HOMES = {
     "AperiodicError": "contfric.errors",
+    "Basins": "contfric.response.basins",
     "Bifurcation": "contfric.continuation.events",
     "Branch": "contfric.continuation.branch",
     "Census": "contfric.atlas.census_result",
@@ -75,14 +83,19 @@ _HOMES = {
     "Motion": "contfric.chaos.status",
     "NotationError": "contfric.errors",
     "Orbit": "contfric.orbit.orbit",
+    "Outcome": "contfric.response.outcome",
     "OscillatorModel": "contfric.models.oscillator",
     "Plane": "contfric.atlas.plane",
     "ParameterError": "contfric.errors",
+    "ReleaseMap": "contfric.response.returns",
     "ResultFileError": "contfric.errors",
+    "Returns": "contfric.response.returns",
     "Seeds": "contfric.atlas.seeds",
     "Window": "contfric.atlas.adding",
     "Signature": "contfric.signature",
+    "Sweep": "contfric.response.sweep",
     "StudyError": "contfric.errors",
+    "basins": "contfric.response.basin_map",
     "census": "contfric.atlas.census",
     "check_model": "contfric.models.check",
     "continue_bifurcation": "contfric.curves.trace",
@@ -97,16 +110,20 @@ _HOMES = {
     "lyapunov_map": "contfric.chaos.compute",
     "model_names": "contfric.models",
     "period_adding": "contfric.atlas.adding",
+    "poincare": "contfric.response.poincare",
+    "release_map": "contfric.response.poincare",
     "run_study": "contfric.study",
     "save": "contfric.results",
     "signature_names": "contfric.signature",
     "simulate": "contfric.orbit.simulation",
     "solve_orbit": "contfric.orbit.solve",
+    "sweep": "contfric.response.sweeping",
     "transition_graph": "contfric.signature",
 }
 
 __all__ = [
     "AperiodicError",
+    "Basins",
     "Bifurcation",
     "Branch",
     "Census",
@@ -126,14 +143,19 @@ __all__ = [
     "NotationError",
     "Orbit",
     "OscillatorModel",
+    "Outcome",
     "ParameterError",
     "Plane",
+    "ReleaseMap",
     "ResultFileError",
+    "Returns",
     "Seeds",
     "Signature",
     "StudyError",
+    "Sweep",
     "Window",
     "__version__",
+    "basins",
     "census",
     "check_model",
     "continue_bifurcation",
@@ -148,11 +170,14 @@ __all__ = [
     "lyapunov_map",
     "model_names",
     "period_adding",
+    "poincare",
+    "release_map",
     "run_study",
     "save",
     "signature_names",
     "simulate",
     "solve_orbit",
+    "sweep",
     "transition_graph",
 ]
 

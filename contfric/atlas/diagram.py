@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from contfric.atlas.verification import Verification
+    from contfric.plot.protocols_response import SweepLike
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,11 +221,13 @@ class Diagram:
             tables.append(table)
         return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
-    def plot(self, ax: Axes | None = None, row: str = "x_max") -> Axes:
-        """Draw one quantity of all branches with the bifurcations."""
+    def plot(
+        self, ax: Axes | None = None, row: str = "x_max", overlay: SweepLike | None = None
+    ) -> Axes:
+        """Draw one quantity of all branches with the bifurcations; behind them the points of a sweep."""
         from contfric.plot.diagram import plot_diagram_row
 
-        return plot_diagram_row(self, row, ax=ax)
+        return plot_diagram_row(self, row, ax=ax, overlay=overlay)
 
     def to_html(self, path: str | PathLike[str]) -> Path:
         """Write the diagram as one page for a browser (needs bokeh: the extra ``live``).

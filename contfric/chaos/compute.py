@@ -14,10 +14,18 @@ from numpy.typing import ArrayLike
 from contfric.chaos.exponents import checked_time, limits_of
 from contfric.chaos.map import LyapunovMap, points_of
 from contfric.chaos.rows import Limits
-from contfric.chaos.running import Progress, Timer, compute_all
+from contfric.chaos.running import Progress, Timer, check_executor, compute_all
 from contfric.chaos.starts import StateLike, given_states, number_of_starts
-from contfric.chaos.store import TileFolder, digest, open_tiles
-from contfric.chaos.tiles import Place, Tile, TileRows, empty_tile, inside, places
+from contfric.chaos.store import TileFolder, digest, open_tiles, versions
+from contfric.chaos.tiles import (
+    Place,
+    Tile,
+    TileRows,
+    compute_tile,
+    empty_tile,
+    inside,
+    places,
+)
 from contfric.errors import ParameterError, function_of, mapping_of, shown, whole_number
 from contfric.memory import must_fit
 from contfric.models import ModelSource, load_model
@@ -63,15 +71,8 @@ class _Job:
 
     def record(self) -> dict[str, Any]:
         """Describe the map, so that tiles of another one, or of another version, are not taken for its."""
-        from importlib.metadata import version
-
-        from contfric.compiled import cache_folder
-
         return {
-            "contfric": version("contfric"),
-            "kernels": cache_folder(Path(__file__)).name,
-            "model": self.model.name,
-            **({"definition": self.model.definition} if self.model.definition else {}),
+            **versions(self.model),
             "params": self.model.mapping(self.vector),
             "axes": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in self.axes.items()},
             "grid": digest(*self.axes.values()),
@@ -141,11 +142,7 @@ def lyapunov_map(
     model = load_model(model)
     limits = limits_of(transient, periods, tolerance, confirm)
     tile = whole_number("tile", tile, least=1)
-    if executor is not None and not isinstance(executor, Executor):
-        raise ParameterError(
-            f"executor is a concurrent.futures.Executor, got {type(executor).__name__} (of a dask "
-            "client: client.get_executor())"
-        )
+    check_executor(executor)
     grid = _checked_axes(model, axes)
     shape = tuple(len(values) for values in grid.values())
     check_size(shape, whole_number("starts", starts, least=1), len(model.states))
@@ -183,7 +180,7 @@ def _computed(
     cut, tiles = job.places(), {}
     for number, place in enumerate(cut):
         tile = job.tile(place)
-        finished = kept.read(number, tile) if kept is not None else None
+        finished = _finished(kept, number, tile) if kept is not None else None
         if finished is None:
             tiles[number] = tile
         else:
@@ -194,14 +191,25 @@ def _computed(
     try:
         if tiles:
             _compile(job.model)
-        for number, found in compute_all(tiles, executor, timer.say):
+        for number, found in compute_all(tiles, executor, timer.say, compute_tile):
             if kept is not None:
-                kept.write(number, found)
+                kept.write(number, vars(found))
             _put(rows, cut[number], found)
             timer.tick()
     except KeyboardInterrupt:
         timer.say(f"interrupted: {timer.done} of {len(cut)} tiles are finished")
     return rows
+
+
+def _finished(kept: TileFolder, number: int, tile: Tile) -> TileRows | None:
+    """Return a finished tile; None if it has not been finished, or does not fit."""
+    found, like = kept.read(number), empty_tile(tile.shape, len(tile.model.states))
+    if found is None or found.keys() != vars(like).keys():
+        return None
+    for name, wanted in vars(like).items():
+        if found[name].shape != wanted.shape or found[name].dtype != wanted.dtype:
+            return None
+    return TileRows(**found)
 
 
 def _put(rows: TileRows, place: Place, found: TileRows) -> None:

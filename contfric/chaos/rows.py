@@ -5,7 +5,7 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -134,16 +134,20 @@ def follow(
         flag,
         rows,
     )
-    if stop is not None:
-        follow_cells(*arguments)
-        return rows
-    assert follow_cells.dispatcher is not None  # compiled here, not where nobody could interrupt it
+    until_interrupted(follow_cells, arguments, flag if stop is None else None)
+    return rows
+
+
+def until_interrupted(kernel: Any, arguments: tuple[Any, ...], flag: IntArray | None) -> Any:
+    """Call a kernel; with a flag, in a thread, and Ctrl-C writes a 1 to the flag to end it."""
+    if flag is None:
+        return kernel(*arguments)
+    assert kernel.dispatcher is not None  # compiled here, not where nobody could interrupt it
     with ThreadPoolExecutor(1) as pool:  # a kernel hears no Ctrl-C, but who waits for it does
         try:
-            pool.submit(follow_cells, *arguments).result()
+            return pool.submit(kernel, *arguments).result()
         finally:
             flag[0] = 1
-    return rows
 
 
 def new_stop() -> IntArray:

@@ -12,12 +12,16 @@ from concurrent.futures import (
     as_completed,
 )
 from time import monotonic
-from typing import TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from contfric.chaos.rows import new_stop
-from contfric.chaos.tiles import Tile, TileRows, compute_tile
+from contfric.errors import ParameterError
 
 Progress: TypeAlias = Callable[[str], None]
+#: What computes a task: without a second argument until Ctrl-C, with one until that is set.
+Compute: TypeAlias = Callable[..., Any]
+T = TypeVar("T")
+K = TypeVar("K")
 
 #: Tiles that one process has under way for each of its threads: enough that none waits for the next,
 #: few enough that an interrupt has little to wait for.
@@ -31,13 +35,29 @@ def processors() -> int:
     return os.cpu_count() or 1
 
 
+def check_executor(executor: object) -> None:
+    """Check what a user gave as an executor.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    if executor is not None and not isinstance(executor, Executor):
+        raise ParameterError(
+            f"executor is a concurrent.futures.Executor, got {type(executor).__name__} (of a dask "
+            "client: client.get_executor())"
+        )
+
+
 def compute_all(
-    tiles: Mapping[int, Tile], executor: Executor | None, say: Progress
-) -> Iterator[tuple[int, TileRows]]:
+    tiles: Mapping[int, T], executor: Executor | None, say: Progress, compute: Compute
+) -> Iterator[tuple[int, Any]]:
     """Yield (number, rows) of each tile as it is finished.
 
     Parameters
     ----------
+    compute : returns the rows of a tile
     executor : where the tiles are computed; by default threads of this process, as the kernels run
         without Python's lock
     say : called when the executor has lost tiles
@@ -48,23 +68,23 @@ def compute_all(
     left = dict(tiles)
     if executor is not None:
         lost: dict[int, BaseException] = {}
-        yield from _on_executor(left, executor, lost)
+        yield from _on_executor(left, executor, lost, compute)
         left = {number: tiles[number] for number in sorted(lost)}
         if left:
             why = type(next(iter(lost.values()))).__name__
             say(f"{len(left)} tiles were lost by the executor ({why}): they are computed here")
     if left:
-        yield from _on_threads(left)
+        yield from _on_threads(left, compute)
 
 
 def _on_executor(
-    tiles: Mapping[int, Tile], executor: Executor, lost: dict[int, BaseException]
-) -> Iterator[tuple[int, TileRows]]:
-    numbers: dict[Future[TileRows], int] = {}
+    tiles: Mapping[int, T], executor: Executor, lost: dict[int, BaseException], compute: Compute
+) -> Iterator[tuple[int, Any]]:
+    numbers: dict[Future[Any], int] = {}
     try:
         for number, tile in tiles.items():
             try:
-                numbers[executor.submit(compute_tile, tile)] = number
+                numbers[executor.submit(compute, tile)] = number
             except (
                 Exception
             ) as error:  # a pool that is broken, or has been shut down, takes no more
@@ -80,16 +100,16 @@ def _on_executor(
         _cancel(numbers)
 
 
-def _on_threads(tiles: Mapping[int, Tile]) -> Iterator[tuple[int, TileRows]]:
+def _on_threads(tiles: Mapping[int, T], compute: Compute) -> Iterator[tuple[int, Any]]:
     count = min(processors(), len(tiles))
     pool = ThreadPoolExecutor(count, thread_name_prefix="contfric-tile")
     waiting = iter(tiles.items())
-    running: dict[Future[TileRows], int] = {}
+    running: dict[Future[Any], int] = {}
     stop = new_stop()
 
     def start(most: int) -> None:
         while len(running) < most and (following := next(waiting, None)) is not None:
-            running[pool.submit(compute_tile, following[1], stop)] = following[0]
+            running[pool.submit(compute, following[1], stop)] = following[0]
 
     try:
         start(count * _AHEAD)
@@ -103,15 +123,72 @@ def _on_threads(tiles: Mapping[int, Tile]) -> Iterator[tuple[int, TileRows]]:
         pool.shutdown(cancel_futures=True)
 
 
-def _cancel(futures: Iterable[Future[TileRows]]) -> None:
+def _cancel(futures: Iterable[Future[Any]]) -> None:
     for future in futures:
         future.cancel()
 
 
-class Timer:
-    """Says how far a map is, and when it will be done."""
+def compute_chains(
+    first: Mapping[K, T],
+    following: Callable[[K, Any], T | None],
+    executor: Executor | None,
+    say: Progress,
+    compute: Compute,
+) -> Iterator[tuple[K, Any]]:
+    """Yield (name, rows) of tasks of which each needs the rows of the one before in its chain.
 
-    def __init__(self, total: int, done: int, progress: Progress | None) -> None:
+    Parameters
+    ----------
+    first : first task of each chain
+    following : returns the next task of a chain from the rows of the last one; None at its end
+
+    What the executor loses is computed in this process.
+    """
+    stop = new_stop()
+    own = ThreadPoolExecutor(max(1, len(first))) if executor is None else None
+    running: dict[Future[Any], tuple[K, T]] = {}
+
+    def submit(name: K, task: T) -> None:
+        future: Future[Any] = Future()
+        try:
+            future = own.submit(compute, task, stop) if own else executor.submit(compute, task)  # type: ignore[union-attr] # one of them is there
+        except Exception as error:  # a pool that is broken takes no more
+            future.set_exception(error)
+        running[future] = name, task
+
+    try:
+        for name, task in first.items():
+            submit(name, task)
+        while running:
+            done = next(as_completed(running))
+            name, task = running.pop(done)
+            try:
+                rows = done.result()
+            except (Exception, CancelledError) as error:
+                if own is not None:
+                    raise
+                say(
+                    f"a part was lost by the executor ({type(error).__name__}): it is computed here"
+                )
+                rows = compute(task)
+            yield name, rows
+            after = following(name, rows)
+            if after is not None:
+                submit(name, after)
+    finally:
+        stop[0] = 1
+        _cancel(running)
+        if own is not None:
+            own.shutdown(cancel_futures=True)
+
+
+class Timer:
+    """Says how far a computation is, and when it will be done."""
+
+    def __init__(
+        self, total: int, done: int, progress: Progress | None, what: str = "Lyapunov map"
+    ) -> None:
+        self.what = what
         self.total, self.first, self.done = total, done, done
         self.progress, self.began = progress, monotonic()
 
@@ -125,7 +202,7 @@ class Timer:
         self.done += 1
         if self.progress is None:
             return
-        text = f"Lyapunov map: {self.done} of {self.total} tiles"
+        text = f"{self.what}: {self.done} of {self.total} tiles"
         left = self.total - self.done
         if left:
             each = (monotonic() - self.began) / (self.done - self.first)

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from contfric.chaos.tiles import Tile, TileRows, empty_tile
 from contfric.errors import ResultFileError
 from contfric.files import replacing, unwritable
+from contfric.models.definition import Model
 
 _RECORD = "map.json"
 
@@ -27,24 +28,18 @@ class TileFolder:
 
     path: Path
 
-    def read(self, number: int, tile: Tile) -> TileRows | None:
-        """Return a finished tile, or None if it has not been finished."""
+    def read(self, number: int) -> dict[str, np.ndarray[Any, Any]] | None:
+        """Return the arrays of a finished tile, or None if it has not been finished."""
         path = self._file(number)
         if not path.is_file():
             return None
-        like = empty_tile(tile.shape, len(tile.model.states))
         try:
             with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-                found = {field.name: archive[field.name] for field in fields(TileRows)}
+                return {name: archive[name] for name in archive.files}
         except Exception:  # the readers of zip and npy raise a dozen kinds on damaged bytes
             return None
-        for name, array in found.items():
-            wanted = getattr(like, name)
-            if array.shape != wanted.shape or array.dtype != wanted.dtype:
-                return None
-        return TileRows(**found)
 
-    def write(self, number: int, rows: TileRows) -> None:
+    def write(self, number: int, arrays: Mapping[str, np.ndarray[Any, Any]]) -> None:
         """Keep a finished tile.
 
         Raises
@@ -53,7 +48,7 @@ class TileFolder:
             If it cannot be written.
         """
         with replacing(self._file(number)) as temporary, temporary.open("wb") as file:
-            np.savez(file, **{field.name: getattr(rows, field.name) for field in fields(rows)})
+            np.savez(file, **dict[str, Any](arrays))
 
     def _file(self, number: int) -> Path:
         return self.path / f"tile-{number:06d}.npz"
@@ -103,3 +98,17 @@ def digest(*arrays: np.ndarray[Any, Any] | None) -> str:
             content.update(repr((array.shape, array.dtype.str)).encode())
             content.update(np.ascontiguousarray(array).tobytes())
     return content.hexdigest()[:16]
+
+
+def versions(model: Model) -> dict[str, Any]:
+    """Return what the last digits of a tile depend on, beyond its numbers: the program and the model."""
+    from importlib.metadata import version
+
+    from contfric.compiled import cache_folder
+
+    return {
+        "contfric": version("contfric"),
+        "kernels": cache_folder(Path(__file__)).name,
+        "model": model.name,
+        **({"definition": model.definition} if model.definition else {}),
+    }

@@ -88,7 +88,7 @@ class Tile:
 
     def __reduce__(self) -> tuple[Any, ...]:
         rest = (self.vector, self.varied, self.values, self.starts, self.states, self.time)
-        return _rebuilt, (_packed(self.model), tuple(self.limits), *rest)
+        return _rebuilt, (packed(self.model), tuple(self.limits), *rest)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -104,7 +104,8 @@ class Tile:
         return vectors.reshape(rows * columns, -1)
 
 
-def _packed(model: Model) -> str | bytes:
+def packed(model: Model) -> str | bytes:
+    """Return a model as a task carries it: by its name, or as it is."""
     try:
         if load_model(model.name) is model:
             return model.name
@@ -114,14 +115,15 @@ def _packed(model: Model) -> str | bytes:
 
 
 @lru_cache(maxsize=16)
-def _unpacked(model: str | bytes) -> Model:
+def unpacked(model: str | bytes) -> Model:
+    """Return the model of a task."""
     found = load_model(model) if isinstance(model, str) else pickle.loads(model)
     assert isinstance(found, Model)
     return found
 
 
 def _rebuilt(model: str | bytes, limits: tuple[int, int, float, int], *rest: Any) -> Tile:
-    return Tile(_unpacked(model), Limits(*limits), *rest)
+    return Tile(unpacked(model), Limits(*limits), *rest)
 
 
 def inside(model: Model, named: Mapping[str, Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:

@@ -27,6 +27,10 @@ def findings(record: Record) -> Iterator[str]:
     if "lyapunov" in record:
         yield ""
         yield from _map(record["lyapunov"])
+    for key, lines in (("sweep", _sweep), ("poincare", _points), ("basins", _basins)):
+        if key in record:
+            yield ""
+            yield from lines(record[key])
 
 
 def _map(entry: Record) -> Iterator[str]:
@@ -36,6 +40,32 @@ def _map(entry: Record) -> Iterator[str]:
     yield f"largest   {entry['largest']:.6g}"
     if not entry["complete"]:
         yield "incomplete: the same command goes on from the finished tiles"
+
+
+def _points(entry: Record) -> Iterator[str]:
+    yield f"{entry['points']} points of a solution at {entry['section']}"
+
+
+def _basins(entry: Record) -> Iterator[str]:
+    sides = (f"{n} {low:g} to {high:g} ({k})" for n, (low, high, k) in entry["grid"].items())
+    yield f"basins at {' x '.join(sides)}"
+    rows = [["", "starts", "share", "95 % interval"]]
+    for s in entry["shares"]:
+        interval = f"{s['low']:.2%} to {s['high']:.2%}"
+        rows.append([s["name"], str(s["count"]), f"{s['share']:.2%}", interval])
+    yield from table(rows)
+    if not entry["complete"]:
+        yield "incomplete: the same command goes on from the finished tiles"
+
+
+def _sweep(entry: Record) -> Iterator[str]:
+    low, high, count = entry["values"]
+    found = ", ".join(f"{number} {outcome}" for outcome, number in entry["outcomes"].items())
+    points = ", ".join(f"{number} {direction}" for direction, number in entry["points"].items())
+    yield f"sweep at {count} values of {entry['parameter']} from {low:g} to {high:g}: {found}"
+    yield f"points    {points}"
+    if not entry["complete"]:
+        yield "incomplete: the same command goes on from what was found"
 
 
 def _diagram(record: Record) -> Iterator[str]:

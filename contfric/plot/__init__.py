@@ -11,12 +11,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from contfric.plot.basins import plot_basins
     from contfric.plot.branch_graph import plot_branch_graph
     from contfric.plot.diagram import plot_branches, plot_diagram, plot_diagram_row
     from contfric.plot.graph import plot_transition_graph
     from contfric.plot.lyapunov import plot_lyapunov_map
     from contfric.plot.orbit import plot_orbit, plot_orbit_in_time, plot_orbit_panels
     from contfric.plot.plane import plot_curves, plot_plane
+    from contfric.plot.response import plot_sweep
+    from contfric.plot.returns import plot_release_map, plot_returns
     from contfric.plot.save import new_figure, save_figure
     from contfric.plot.style import ROWS
 
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "ROWS": "contfric.plot.style",
     "new_figure": "contfric.plot.save",
+    "plot_basins": "contfric.plot.basins",
     "plot_branch_graph": "contfric.plot.branch_graph",
     "plot_branches": "contfric.plot.diagram",
     "plot_curves": "contfric.plot.plane",
@@ -34,6 +38,9 @@ _HOMES = {
     "plot_orbit_in_time": "contfric.plot.orbit",
     "plot_orbit_panels": "contfric.plot.orbit",
     "plot_plane": "contfric.plot.plane",
+    "plot_release_map": "contfric.plot.returns",
+    "plot_returns": "contfric.plot.returns",
+    "plot_sweep": "contfric.plot.response",
     "plot_transition_graph": "contfric.plot.graph",
     "save_figure": "contfric.plot.save",
 }
@@ -41,6 +48,7 @@ _HOMES = {
 __all__ = [
     "ROWS",
     "new_figure",
+    "plot_basins",
     "plot_branch_graph",
     "plot_branches",
     "plot_curves",
@@ -51,6 +59,9 @@ __all__ = [
     "plot_orbit_in_time",
     "plot_orbit_panels",
     "plot_plane",
+    "plot_release_map",
+    "plot_returns",
+    "plot_sweep",
     "plot_transition_graph",
     "save_figure",
 ]

@@ -13,6 +13,8 @@ from contfric.errors import either
 from contfric.plot.events import Mark, draw_marks, label_marks, marks_of
 from contfric.plot.labels import settle
 from contfric.plot.protocols import BifurcationLike, BranchLike, DiagramLike
+from contfric.plot.protocols_response import SweepLike
+from contfric.plot.response import draw_overlay
 from contfric.plot.runs import stability_runs
 from contfric.plot.save import axes_or_new, figure_or_new
 from contfric.plot.style import (
@@ -86,6 +88,7 @@ def plot_diagram_row(
     ax: Axes | None = None,
     events: bool = True,
     legend: bool = True,
+    overlay: SweepLike | None = None,
 ) -> Axes:
     """Draw one quantity of all branches of a diagram, with its bifurcations.
 
@@ -100,6 +103,8 @@ def plot_diagram_row(
         Whether to mark and label the bifurcations.
     legend : bool
         Whether to draw the legend.
+    overlay : Sweep, optional
+        Simulated points of the same parameter, drawn behind the branches.
 
     Examples
     --------
@@ -111,6 +116,7 @@ def plot_diagram_row(
     found = diagram.bifurcations if events else ()
     new = axes_or_new(ax)
     new.set_xlim(*diagram.range)
+    draw_overlay([new], [row], diagram.parameter, overlay)
     return _plot_row(new, diagram.branches, found, row, legend, outside=ax is None)
 
 
@@ -118,6 +124,7 @@ def plot_diagram(
     diagram: DiagramLike,
     rows: Sequence[str] = ("x_max", "stops", "psi"),
     fig: Figure | None = None,
+    overlay: SweepLike | None = None,
 ) -> list[Axes]:
     """Draw a diagram in several rows over one parameter axis, as Figs. 4-7 of the reference.
 
@@ -128,6 +135,8 @@ def plot_diagram(
         The quantities from top to bottom.
     fig : Figure, optional
         An empty figure to draw in; a new one by default.
+    overlay : Sweep, optional
+        Simulated points of the same parameter, drawn behind the branches.
 
     Returns
     -------
@@ -145,6 +154,7 @@ def plot_diagram(
     fig = figure_or_new(fig, 8.4, 1.2 + 2.4 * len(rows))
     axes = list(fig.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0])
     axes[0].set_xlim(*diagram.range)
+    draw_overlay(axes, rows, diagram.parameter, overlay)
     axes[0].set_title(fixed_parameters(diagram.branches), fontsize=TEXT)
     marks = [
         marks_of(diagram.bifurcations, diagram.branches, ROWS[row].attribute, diagram.parameter)

@@ -47,6 +47,10 @@ class OrbitLike(Protocol):
         """Duration of the orbit."""
 
     @property
+    def periods(self) -> int:
+        """Number of excitation periods."""
+
+    @property
     def word(self) -> Sequence[tuple[str, str]]:
         """Mode and exit surface of each segment."""
 

@@ -12,7 +12,7 @@ import hashlib
 import json
 import zipfile
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +27,27 @@ from contfric.files import replacing
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
+from contfric.response.basins import Basins
+from contfric.response.returns import ReleaseMap, Returns
+from contfric.response.sweep import Sweep
 from contfric.results.curves import pack_curve, pack_plane, unpack_curve, unpack_plane
 from contfric.results.lyapunov import pack_map, unpack_map
 from contfric.results.pack import Arrays, Header, Packer
+from contfric.results.response import (
+    pack_basins,
+    pack_releases,
+    pack_returns,
+    pack_sweep,
+    unpack_basins,
+    unpack_releases,
+    unpack_returns,
+    unpack_sweep,
+)
 from contfric.results.unpack import Unpacker
 
-Saveable: TypeAlias = Orbit | Branch | Diagram | Curve | Plane | LyapunovMap
+Saveable: TypeAlias = (
+    Orbit | Branch | Diagram | Curve | Plane | LyapunovMap | Sweep | Returns | ReleaseMap | Basins
+)
 
 #: Version of the format; it grows when an older contfric could not read what is written. Files of version 1
 #: have no digests: that they are as they were written is not known.
@@ -49,7 +64,7 @@ _DAMAGE = (ValueError, LookupError, TypeError, AttributeError, AssertionError)
 
 
 def save(x: Saveable, path: str | Path) -> None:
-    """Write an orbit, branch, diagram, curve, plane or Lyapunov map to a file, which is replaced.
+    """Write a result (an orbit, a diagram, a Lyapunov map, a sweep, ...) to a file, which is replaced.
 
     Raises
     ------
@@ -68,7 +83,7 @@ def save(x: Saveable, path: str | Path) -> None:
     """
     if not isinstance(x, Saveable):
         raise ResultFileError(
-            "only an Orbit, a Branch, a Diagram, a Curve, a Plane or a LyapunovMap can be saved, "
+            f"only results can be saved ({', '.join(kind.__name__ for kind in get_args(Saveable))}), "
             f"got {type(x).__name__}"
         )
     place = path_of("the file of a result", path)
@@ -146,11 +161,19 @@ def _content(x: Saveable, packer: Packer) -> Header:
         return {"kind": "plane", **pack_plane(x, packer)}
     if isinstance(x, LyapunovMap):
         return {"kind": "lyapunov map", **pack_map(x, packer.arrays)}
+    if isinstance(x, Sweep):
+        return {"kind": "sweep", **pack_sweep(x, packer.arrays)}
+    if isinstance(x, Returns):
+        return {"kind": "returns", **pack_returns(x, packer.arrays)}
+    if isinstance(x, ReleaseMap):
+        return {"kind": "release map", **pack_releases(x, packer.arrays)}
+    if isinstance(x, Basins):
+        return {"kind": "basins", **pack_basins(x, packer)}
     return {"kind": "diagram", **packer.diagram(x)}
 
 
 def load(path: str | Path, model: Model | None = None) -> Saveable:
-    """Read what :func:`save` wrote: an orbit, branch, diagram, curve, plane or Lyapunov map.
+    """Read what :func:`save` wrote.
 
     Parameters
     ----------
@@ -204,6 +227,14 @@ def _restored(content: Header, pool: Unpacker) -> Saveable:
         return unpack_plane(content, pool)
     if kind == "lyapunov map":
         return unpack_map(pool.model, content, pool.arrays)
+    if kind == "sweep":
+        return unpack_sweep(pool.model, content, pool.arrays)
+    if kind == "returns":
+        return unpack_returns(pool.model, content, pool.arrays)
+    if kind == "release map":
+        return unpack_releases(pool.model, content, pool.arrays)
+    if kind == "basins":
+        return unpack_basins(pool.model, content, pool.arrays, pool.orbits)
     raise ValueError(f"unknown kind of result {kind!r}")
 
 

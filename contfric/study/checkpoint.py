@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -18,11 +18,14 @@ from contfric.journal import Journal, belongs, digest_of, keeping, program
 from contfric.resources import user_cache
 from contfric.stored import UnstorableError, Writer
 from contfric.study.read import Study
+from contfric.study.responses import KEYS
 
 #: The journal, in the folder of the run.
 CHECKPOINT = "checkpoint"
-#: Folder of the finished tiles of a map, inside that of the run, until the map is complete.
+#: Folders of the finished tiles of a map, or of a simulated response, inside that of the run, until it is
+#: complete.
 TILES = "lyapunov-tiles"
+ALL_TILES = (TILES, *(f"{key}-tiles" for key in KEYS))
 #: Seconds after which a checkpoint in the user's cache is forgotten: a month.
 _FORGOTTEN = 30 * 86400
 
@@ -59,7 +62,8 @@ def check_unfinished(path: Path, key: str, force: bool) -> None:
             "start anew (--force, force=True)"
         )
     Journal(path / CHECKPOINT, key).remove()  # unless another process is writing to it
-    shutil.rmtree(path / TILES, ignore_errors=True)
+    for name in ALL_TILES:
+        shutil.rmtree(path / name, ignore_errors=True)
 
 
 class Checkpoint:
@@ -69,8 +73,8 @@ class Checkpoint:
     ----------
     journal : Journal or None
         None where no file can be written: then nothing is kept.
-    tiles : Path, optional
-        Folder of the finished tiles of a map, which goes with it.
+    tiles : sequence of Path
+        Folders of finished tiles, which go with it.
 
     Attributes
     ----------
@@ -78,7 +82,7 @@ class Checkpoint:
         Results of an interrupted computation that were found in it.
     """
 
-    def __init__(self, journal: Journal | None, tiles: Path | None = None) -> None:
+    def __init__(self, journal: Journal | None, tiles: Sequence[Path] = ()) -> None:
         self._journal, self._tiles = journal, tiles
         self.earlier = 0 if journal is None else len(journal)
 
@@ -99,12 +103,12 @@ class Checkpoint:
     def done(self) -> None:
         """Remove it: the computation has ended well."""
         self._end(remove=True)
-        if self._tiles is not None:
-            shutil.rmtree(self._tiles, ignore_errors=True)
+        for path in self._tiles:
+            shutil.rmtree(path, ignore_errors=True)
 
     def leave(self) -> bool:
         """Leave it for a computation that goes on, if anything is in it; whether that is so."""
-        tiles = self._tiles is not None and self._tiles.exists()
+        tiles = any(path.exists() for path in self._tiles)
         full = self._journal is not None and (tiles or len(self._journal) > 0)
         self._end(remove=not full)
         return full
@@ -120,7 +124,7 @@ class Checkpoint:
 
 def checkpoint_in(folder: Path, key: str) -> Checkpoint:
     """Return the checkpoint of a run, in its folder."""
-    return Checkpoint(Journal(folder / CHECKPOINT, key), folder / TILES)
+    return Checkpoint(Journal(folder / CHECKPOINT, key), [folder / name for name in ALL_TILES])
 
 
 def checkpoint_of(asked: tuple[object, ...]) -> Checkpoint:

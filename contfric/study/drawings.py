@@ -7,6 +7,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from contfric.errors import did_you_mean
+from contfric.study.responses import KEYS
 from contfric.study.schema import Figure, FigureKind, Format, Row, StudyFile
 
 if TYPE_CHECKING:
@@ -41,6 +42,9 @@ def _rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row, ..
             _check_task(located, content, index, "a graph of branches")
         if figure.kind is FigureKind.LYAPUNOV and content.lyapunov is None:
             located.fail(("figures", index), "a map of Lyapunov exponents needs 'lyapunov'")
+        key = figure.kind.value
+        if key in KEYS and getattr(content, key) is None:
+            located.fail(("figures", index), f"a figure of kind {key} needs '{key}'")
         if figure.kind is FigureKind.PLANE and content.plane is None:
             located.fail(("figures", index), "a plane needs 'plane'")
         return ()

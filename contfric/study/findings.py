@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from contfric.atlas.diagram import Diagram
@@ -12,6 +12,7 @@ from contfric.orbit.orbit import Orbit
 if TYPE_CHECKING:
     from contfric.atlas.plane import Plane
     from contfric.chaos.map import LyapunovMap
+    from contfric.study.responses import Response
 
 
 @dataclass(eq=False)
@@ -25,6 +26,7 @@ class Findings:
     diagram : the diagram, if the study has a task in one parameter
     plane : the curves of a plane of two parameters
     lyapunov : the map of Lyapunov exponents
+    responses : sweeps and other simulated responses, by their keys
     """
 
     orbit: Orbit | None = None
@@ -32,8 +34,9 @@ class Findings:
     diagram: Diagram | None = None
     plane: Plane | None = None
     lyapunov: LyapunovMap | None = None
+    responses: dict[str, Response] = field(default_factory=dict)
 
     @property
     def empty(self) -> bool:
         """Whether nothing has been found."""
-        return self.orbit is None and self.lyapunov is None
+        return self.orbit is None and self.lyapunov is None and not self.responses

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 from contfric.results import replacing
 from contfric.study.drawings import Drawing
 from contfric.study.findings import Findings
+from contfric.study.responses import KEYS
 from contfric.study.schema import FigureKind
+
+if TYPE_CHECKING:
+    from contfric.response.sweep import Sweep
 
 #: Size in inches: width, height, height added by each row of a diagram.
 _SIZES = {
@@ -17,6 +22,9 @@ _SIZES = {
     FigureKind.BRANCHES: (9.6, 4.4, 0.0),
     FigureKind.LYAPUNOV: (8.0, 5.6, 0.0),
     FigureKind.PLANE: (9.6, 7.0, 0.0),
+    FigureKind.SWEEP: (9.6, 5.0, 0.0),
+    FigureKind.POINCARE: (6.4, 6.0, 0.0),
+    FigureKind.BASINS: (8.4, 6.0, 0.0),
 }
 #: Kinds that show a diagram.
 _OF_DIAGRAM = frozenset({FigureKind.DIAGRAM, FigureKind.BRANCHES})
@@ -26,9 +34,19 @@ def can_be_drawn(kind: FigureKind, found: Findings) -> bool:
     """Tell whether a run, perhaps interrupted, has found what a figure shows."""
     if kind is FigureKind.LYAPUNOV:
         return found.lyapunov is not None
+    if kind.value in KEYS:
+        return kind.value in found.responses
     if kind is FigureKind.PLANE:
         return found.plane is not None
     return (found.diagram if kind in _OF_DIAGRAM else found.orbit) is not None
+
+
+def _behind(found: Findings, rows: list[str]) -> Sweep | None:
+    """Return the sweep that is drawn behind a diagram: along its parameter, with what its rows show."""
+    swept, diagram = cast("Sweep | None", found.responses.get("sweep")), found.diagram
+    if swept is None or diagram is None or swept.parameter != diagram.parameter:
+        return None
+    return swept if swept.section == "stops" or rows == ["stops"] else None
 
 
 def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
@@ -48,6 +66,9 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
         assert lmap is not None
         figure.suptitle(title)
         plot_lyapunov_map(lmap, ax=figure.add_subplot())
+    elif drawing.kind.value in KEYS:
+        figure.suptitle(title)
+        found.responses[drawing.kind.value].plot(ax=figure.add_subplot())
     elif drawing.kind is FigureKind.PLANE:
         assert plane is not None
         figure.suptitle(title)
@@ -59,7 +80,8 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
         assert diagram is not None
         figure.suptitle(title)
         if drawing.kind is FigureKind.DIAGRAM:
-            plot_diagram(diagram, rows=[row.value for row in drawing.rows], fig=figure)
+            rows = [row.value for row in drawing.rows]
+            plot_diagram(diagram, rows=rows, fig=figure, overlay=_behind(found, rows))
         else:
             plot_branch_graph(diagram, ax=figure.add_subplot())
     else:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
+from contfric.study import responses
 from contfric.study.read import Study
 from contfric.study.schema import ContinueTask, ExploreTask, LyapunovTask, PlaneTask, Want
 
@@ -25,7 +26,8 @@ SPECIAL = "special.csv"
 REGIONS = "regions.csv"
 _TABLES = (POINTS, BIFURCATIONS, CURVES, SPECIAL, REGIONS, LYAPUNOV_TABLE)
 #: Files that every run may write, figures apart.
-RESULT_FILES = (RECORD, *_TABLES, ORBIT, BRANCH, DIAGRAM, VIEW, PLANE, LYAPUNOV)
+_RESPONSES = tuple(name for f in responses.FILES.values() for name in (f.table, f.data))
+RESULT_FILES = (RECORD, *_TABLES, ORBIT, BRANCH, DIAGRAM, VIEW, PLANE, LYAPUNOV, *_RESPONSES)
 
 
 class StepName(str, Enum):
@@ -36,6 +38,9 @@ class StepName(str, Enum):
     CONTINUE = "continue"
     PLANE = "plane"
     LYAPUNOV = "lyapunov"
+    SWEEP = "sweep"
+    POINCARE = "poincare"
+    BASINS = "basins"
     TABLES = "tables"
     DATA = "data"
     FIGURES = "figures"
@@ -112,6 +117,8 @@ def _steps(study: Study) -> Iterator[Step]:
         yield Step(StepName.PLANE, _plane_text(study.content.plane))
     if study.content.lyapunov is not None:
         yield Step(StepName.LYAPUNOV, _lyapunov_text(study.content.lyapunov))
+    for key, task_of_key in responses.tasks_of(study.content).items():
+        yield Step(StepName(key), responses.text_of(task_of_key))
     yield Step(StepName.TABLES, _tables_text(study), _table_files(study))
     yield Step(StepName.DATA, "all that a restart needs", _data_files(study))
     if study.drawings:
@@ -176,6 +183,7 @@ def _tables_text(study: Study) -> str:
         parts.append("points of curves, of codimension two, regions")
     if content.lyapunov is not None:
         parts.append("one row a motion of the map")
+    parts += [responses.row_text(key) for key in responses.tasks_of(content)]
     return "; ".join(parts)
 
 
@@ -186,6 +194,7 @@ def _table_files(study: Study) -> tuple[str, ...]:
         *((BIFURCATIONS,) if study.task is not None else ()),
         *((CURVES, SPECIAL, REGIONS) if content.plane is not None else ()),
         *((LYAPUNOV_TABLE,) if content.lyapunov is not None else ()),
+        *(responses.FILES[key].table for key in responses.tasks_of(content)),
     )
 
 
@@ -199,6 +208,7 @@ def _data_files(study: Study) -> tuple[str, ...]:
         *found,
         *((PLANE,) if content.plane is not None else ()),
         *((LYAPUNOV,) if content.lyapunov is not None else ()),
+        *(responses.FILES[key].data for key in responses.tasks_of(content)),
     )
 
 

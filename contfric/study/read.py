@@ -20,6 +20,7 @@ from contfric.models.definition import Model
 from contfric.models.files import relative_model
 from contfric.orbit.orbit import Orbit
 from contfric.signature import Signature, load_signature
+from contfric.study import responses
 from contfric.study.drawings import Drawing, drawings_of
 from contfric.study.explain_error import fail_with
 from contfric.study.library import SUFFIXES, study_path
@@ -130,6 +131,7 @@ def _checked(located: LocatedYaml, content: StudyFile) -> Study:
     _check_task(located, content, model, params)
     _check_grid(located, content, model)
     _check_plane(located, content, model)
+    responses.check(located, content, model)
     return Study(
         located.path,
         content,

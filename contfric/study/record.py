@@ -66,7 +66,16 @@ def record_of(
         **(_diagram_entries(found.diagram) if found.diagram is not None else {}),
         **({"plane": plane_entries(found.plane)} if found.plane is not None else {}),
         **({"lyapunov": map_entries(found.lyapunov)} if found.lyapunov is not None else {}),
+        **_response_entries(found),
     }
+
+
+def _response_entries(found: Findings) -> dict[str, Any]:
+    if not found.responses:
+        return {}
+    from contfric.study.tables_response import entries_of
+
+    return {key: entries_of(x) for key, x in found.responses.items()}
 
 
 def _start_entries(orbit: Orbit) -> dict[str, Any]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from contfric.atlas.diagram import Diagram
 from contfric.continuation.branch import Branch
@@ -16,6 +16,10 @@ from contfric.study.read import Study
 if TYPE_CHECKING:
     from contfric.atlas.plane import Plane
     from contfric.chaos.map import LyapunovMap
+    from contfric.response.basins import Basins
+    from contfric.response.returns import Returns
+    from contfric.response.sweep import Sweep
+    from contfric.study.responses import Response
 
 
 class RunStatus(str, Enum):
@@ -52,6 +56,8 @@ class StudyResult:
         The files written.
     goes_on : bool
         Whether a checkpoint was left, from which the same call goes on.
+    responses : dict
+        Simulated responses by their keys in the study.
     """
 
     study: Study
@@ -65,6 +71,25 @@ class StudyResult:
     info: dict[str, Any]
     files: tuple[Path, ...]
     goes_on: bool = False
+    responses: dict[str, Response] = field(default_factory=dict)
+
+    @property
+    def sweep(self) -> Sweep | None:
+        """The sweep, if the study asks for one."""
+        found = self.responses.get("sweep")
+        return None if found is None else cast("Sweep", found)
+
+    @property
+    def poincare(self) -> Returns | None:
+        """The points of a section, if the study asks for them."""
+        found = self.responses.get("poincare")
+        return None if found is None else cast("Returns", found)
+
+    @property
+    def basins(self) -> Basins | None:
+        """The basins, if the study asks for them."""
+        found = self.responses.get("basins")
+        return None if found is None else cast("Basins", found)
 
     def __repr__(self) -> str:
         return f"<StudyResult {self.study.name}: {self.status.value}, in {self.out}>"

@@ -15,6 +15,7 @@ from contfric.errors import ContfricError, ResultFileError, path_of
 from contfric.orbit.counts import Counts, counts
 from contfric.orbit.orbit import Orbit
 from contfric.results import save
+from contfric.study import responses
 from contfric.study.checkpoint import (
     TILES,
     Checkpoint,
@@ -186,6 +187,19 @@ class _Run:
             self.found.lyapunov = lmap
             if not lmap.complete:
                 self.status = RunStatus.INTERRUPTED
+                return
+        self._respond()
+
+    def _respond(self) -> None:
+        """Compute the simulated responses; what an interrupt leaves of one is kept."""
+        for key, task in responses.tasks_of(self.study.content).items():
+            tiles = self.folder.path / f"{key}-tiles"
+            step = partial(responses.compute, self.study, key, task, tiles, self.say)
+            found = self._timed(StepName(key), step)
+            self.found.responses[key] = found
+            if not found.complete:
+                self.status = RunStatus.INTERRUPTED
+                return
 
     def _find_plane(self) -> None:
         study, orbit, task = self.study, self.found.orbit, self.study.content.plane
@@ -245,7 +259,7 @@ class _Run:
         self.say(f"written to {self.folder.path}")
 
     def _write_tables(self, unfinished: bool) -> None:
-        from contfric.study.tables import write_bifurcations, write_points
+        from contfric.study.tables import write_bifurcations, write_points, write_table
 
         orbit, diagram = self.found.orbit, self.found.diagram
         if orbit is not None and not unfinished:
@@ -254,6 +268,11 @@ class _Run:
         if diagram is not None:
             self._write(BIFURCATIONS, lambda path: write_bifurcations(path, diagram))
         self._write_plane_tables(self.found.plane, self.found.lyapunov)
+        if self.found.responses:
+            from contfric.study.tables_response import header_of, rows_of
+        for key, found in self.found.responses.items():
+            header, rows = header_of(found), rows_of(found)
+            self._write(responses.FILES[key].table, partial(write_table, header=header, rows=rows))
 
     def _write_plane_tables(self, plane: Plane | None, lmap: LyapunovMap | None) -> None:
         from contfric.study import tables_plane
@@ -274,6 +293,7 @@ class _Run:
             (DIAGRAM, whole),
             (PLANE, found.plane),
             (LYAPUNOV, found.lyapunov),
+            *((responses.FILES[key].data, x) for key, x in found.responses.items()),
         ):
             if result is not None:
                 self._write(name, partial(save, result))
@@ -330,6 +350,7 @@ class _Run:
             record,
             tuple(self.folder.path / name for name in self.written),
             self.goes_on,
+            self.found.responses,
         )
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from enum import Enum
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field
 
+from contfric.study.schema_response import BasinsTask, PoincareTask, SweepTask
+from contfric.study.schema_response import Part as _Part
 from contfric.yaml_lines import as_truth
 
 _Truth = Annotated[bool, BeforeValidator(as_truth)]
@@ -30,6 +32,9 @@ class FigureKind(str, Enum):
     BRANCHES = "branches"
     LYAPUNOV = "lyapunov"
     PLANE = "plane"
+    SWEEP = "sweep"
+    POINCARE = "poincare"
+    BASINS = "basins"
 
 
 class Row(str, Enum):
@@ -65,10 +70,6 @@ class Format(str, Enum):
 # YAML has texts where Python has enumerations: these fields alone are converted
 _Wants = Annotated[list[Annotated[Want, Field(strict=False)]], Field()]
 _Rows = Annotated[list[Annotated[Row, Field(strict=False)]], Field(min_length=1)]
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
 class Simulated(_Part):
@@ -235,7 +236,8 @@ class Figure(_Part):
     """One figure."""
 
     kind: Annotated[FigureKind, Field(strict=False)] = Field(
-        description="one of diagram, orbit, transitions, branches, lyapunov, plane"
+        description="one of diagram, orbit, transitions, branches, lyapunov, plane, sweep, "
+        "poincare, basins"
     )
     rows: _Rows | None = Field(
         None, description="a list of rows of a diagram: any of x_max, x_min, stops, psi"
@@ -282,6 +284,15 @@ class StudyFile(_Part):
         description="a mapping with parameters and range; also sections, kinds, seeds, max_step, "
         "max_periods, max_curves, max_sections",
     )
+    sweep: SweepTask | None = Field(
+        None,
+        description="a mapping with parameter and values; also direction, periods, transient, "
+        "section, sense, state",
+    )
+    poincare: PoincareTask | None = Field(
+        None, description="a mapping with any of section, sense, state, time, periods, transient"
+    )
+    basins: BasinsTask | None = Field(None, description="a mapping with grid; also at, periods")
     want: _Wants = Field([], description="a list with any of stability, asymmetry, extrema, stops")
     figures: list[Figure] = Field([], description="a list of mappings, each with its kind")
 
@@ -294,7 +305,9 @@ class StudyFile(_Part):
     def needs_orbit(self) -> bool:
         """Whether anything is asked for that needs the orbit of the start."""
         shown = {figure.kind for figure in self.figures}
-        alone = self.lyapunov is not None and self.task is None and self.plane is None
+        responses = (self.lyapunov, self.sweep, self.poincare, self.basins)
+        simulated = any(task is not None for task in responses)
+        alone = simulated and self.task is None and self.plane is None
         return (
             not alone
             or "start" in self.model_fields_set

@@ -25,8 +25,11 @@ from contfric.continuation.march import march
 from contfric.curves.bracket import locate_on_curve
 from contfric.curves.march import march_curve
 from contfric.orbit.trajectory import simulate
+from contfric.response.capture import capture
+from contfric.response.section import cut_solutions
 
-for kernel in (sweep, follow_cells, locate, march, locate_on_curve, march_curve, simulate):
+kernels = (sweep, follow_cells, locate, march, locate_on_curve, march_curve, simulate, capture, cut_solutions)
+for kernel in kernels:
     kernel.dispatcher  # compiled before anything is interrupted
 model, start, parameter, bounds, other, span = {
     "coulomb": ("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, "Omega", (0.3, 0.7), "S", (0.2, 0.4)),
@@ -37,6 +40,8 @@ narrow = cf.explore(orbit, parameter, (0.48, 0.55) if model == "coulomb" else (1
 box = {parameter: bounds, other: span}
 event = next(b for b in narrow.bifurcations if b.kind.value in ("SN", "BP", "PD", "CS", "GS"))
 bridge = next((b for b in narrow.branches if b.bridge), None)
+plane = {name: np.linspace(-1, 1, 400) for name in cf.load_model(model).states[:2]}
+other_params = {name: value for name, value in start.items() if name != parameter}
 grid = {parameter: np.linspace(*bounds, 60), other: np.linspace(*span, 60)}
 
 def cut(*ends):
@@ -63,6 +68,12 @@ calls = {
     "lyapunov_exponent": (
         lambda: cf.lyapunov_exponent(model, start, periods=10**7, tolerance=0.0, confirm=10**7), None
     ),
+    "sweep": (
+        lambda: cf.sweep(model, parameter, np.linspace(*bounds, 20000), other_params, transient=500),
+        lambda s: not s.complete,
+    ),
+    "basins": (lambda: cf.basins(model, start, plane), lambda b: not b.complete),
+    "poincare": (lambda: cf.poincare(model, start, periods=1e7), None),
     "period_adding": (lambda: cf.period_adding(bridge, longest=8) if bridge else None, None),
 }
 for name in sys.argv[2:]:
@@ -84,8 +95,10 @@ KEPT = (
     "explore_plane",
     "census",
     "lyapunov_map",
+    "sweep",
+    "basins",
 )
-RAISED = ("find_orbit", "simulate", "lyapunov_exponent", "period_adding")
+RAISED = ("find_orbit", "simulate", "lyapunov_exponent", "poincare", "period_adding")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals as a terminal sends them")

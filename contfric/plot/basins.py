@@ -1,0 +1,82 @@
+"""Basins of attraction: each in a colour, and the orbits at the phase of the starts."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.patches import Patch
+
+from contfric.plot.lyapunov import edges_of
+from contfric.plot.protocols_response import BasinsLike
+from contfric.plot.save import axes_or_new
+from contfric.plot.style import BESIDE, GREY, SMALL, TEXT, branch_colours, lighter
+
+#: What converges to no orbit: from black (chaos) to white.
+_OTHERS = ("#222222", "#8A8A8A", "#C8C8C8", "#E6E6E6")
+
+
+def plot_basins(found: BasinsLike, ax: Axes | None = None) -> Axes:
+    """Draw basins of attraction.
+
+    Parameters
+    ----------
+    found : Basins
+        Its first state is the horizontal axis.
+    ax : Axes, optional
+        Where to draw; new axes by default.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> grid = {"x": np.linspace(-2, 2, 8), "v": np.linspace(-1, 1, 8)}
+    >>> found = cf.basins("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, grid)
+    >>> plot_basins(found).get_xlabel()
+    '$x$'
+    """
+    ax = axes_or_new(ax)
+    (first, across), (second, up) = found.axes.items()
+    colours = [lighter(c, 0.35) for c in branch_colours(found.names).values()]
+    kinds = np.unique(found.motions[found.labels < 0]).tolist()
+    number = found.labels.copy()
+    for k, code in enumerate(kinds):
+        number[(found.labels < 0) & (found.motions == code)] = len(colours) + k
+        colours.append(_OTHERS[min(k, len(_OTHERS) - 1)])
+    mesh = ax.pcolormesh(
+        edges_of(across),
+        edges_of(up),
+        number.T,
+        cmap=ListedColormap(colours or [GREY]),
+        vmin=-0.5,
+        vmax=max(1, len(colours)) - 0.5,
+    )
+    mesh.set_rasterized(True)  # a vector file of a million rectangles opens nowhere
+    _draw_orbits(ax, found, first, second)
+    names = [f"{s.name}: {s.share:.1%}" for s in found.shares]
+    handles = [Patch(color=c, label=n) for c, n in zip(_shown(found, colours), names, strict=False)]
+    ax.legend(handles=handles, fontsize=SMALL, frameon=False, **BESIDE)
+    ax.set_xlabel(f"${first}$", fontsize=TEXT + 1)
+    ax.set_ylabel(f"${second}$", fontsize=TEXT + 1)
+    ax.set_xlim(edges_of(across)[0], edges_of(across)[-1])
+    ax.set_ylim(edges_of(up)[0], edges_of(up)[-1])
+    ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
+    return ax
+
+
+def _shown(found: BasinsLike, colours: list[str]) -> list[str]:
+    """Return the colours of the shares, in their order."""
+    others = iter(colours[len(found.names) :])
+    return [colours[s.orbit] if s.orbit >= 0 else next(others, GREY) for s in found.shares]
+
+
+def _draw_orbits(ax: Axes, found: BasinsLike, first: str, second: str) -> None:
+    """Mark where the orbits are at the phase of the starts, once in each period."""
+    names = found.model.states
+    i, j = names.index(first), names.index(second)
+    for orbit in found.orbits:
+        if found.model.autonomous:
+            continue
+        turn = orbit.period / orbit.periods
+        times = (found.at["phase"] + np.arange(orbit.periods)) * turn
+        states = np.array([orbit.state(float(t)) for t in times])
+        ax.plot(states[:, i], states[:, j], "o", color="white", mec="black", ms=5)

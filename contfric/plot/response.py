@@ -1,0 +1,88 @@
+"""Sweeps: simulated points along a parameter, alone or behind the branches of a diagram."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+
+from contfric.errors import ParameterError
+from contfric.models.definition import FloatArray
+from contfric.plot.protocols_response import SweepLike
+from contfric.plot.save import axes_or_new
+from contfric.plot.style import GREY, SMALL, TEXT, lighter, parameter_label
+
+#: Colours of the directions: both read in grey.
+_COLOURS = {"up": "#1F4E79", "down": "#C04F15"}
+#: Size of a point: a thousand values give a thousand columns, which a page does not resolve finer.
+_POINT = 1.2
+
+
+def plot_sweep(sweep: SweepLike, ax: Axes | None = None, state: str | None = None) -> Axes:
+    r"""Draw one state of the points of a sweep against its parameter.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    ax : Axes, optional
+        Where to draw; new axes by default.
+    state : str, optional
+        The state; the displacement by default.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> plot_sweep(cf.sweep("coulomb", "Omega", [0.4, 0.45, 0.5])).get_xlabel()
+    '$\\Omega$'
+    """
+    name = sweep.model.states[sweep.state_index(state)]
+    ax = axes_or_new(ax)
+    for direction in sweep.runs:
+        x, y = sweep.points(direction, state)
+        _draw(ax, x, y, _COLOURS[direction], 2.0, direction)
+    ax.set_xlabel(parameter_label(sweep.parameter), fontsize=TEXT + 1)
+    ax.set_ylabel(f"${name}$ at {_section(sweep.section)}", fontsize=TEXT + 1)
+    ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
+    fixed = (f"{parameter_label(n)} = {v:.6g}" for n, v in sweep.params.items() if v != 0.0)
+    ax.set_title(", ".join(fixed), fontsize=TEXT)
+    if len(sweep.runs) > 1:
+        ax.legend(fontsize=SMALL, markerscale=4.0, loc="best")
+    return ax
+
+
+def draw_overlay(
+    axes: Sequence[Axes], rows: Sequence[str], parameter: str, overlay: SweepLike | None
+) -> None:
+    """Draw the points of a sweep behind the rows of a diagram; nothing if there is none.
+
+    Raises
+    ------
+    ParameterError
+        If it is along another parameter, or its section does not have a row.
+    """
+    if overlay is None:
+        return
+    if not hasattr(overlay, "quantity"):
+        raise ParameterError(f"overlay is a sweep (cf.sweep), got a {type(overlay).__name__}")
+    if overlay.parameter != parameter:
+        raise ParameterError(
+            f"the sweep is along '{overlay.parameter}', and the diagram along '{parameter}'"
+        )
+    found = [list(overlay.quantity(row)) for row in rows]  # all of them, before anything is drawn
+    for ax, points in zip(axes, found, strict=True):
+        for _, x, y in points:
+            _draw(ax, x, y, lighter(GREY, 0.2), 0.5, None)
+
+
+def _draw(
+    ax: Axes, x: FloatArray, y: FloatArray, colour: str, zorder: float, label: str | None
+) -> None:
+    (points,) = ax.plot(
+        x, y, linestyle="none", marker=".", markersize=_POINT, color=colour, zorder=zorder
+    )
+    points.set_label(label or "_nolegend_")
+    points.set_rasterized(True)  # a vector file of a million points opens nowhere
+
+
+def _section(section: str | float) -> str:
+    return section if isinstance(section, str) else f"phase {section:g}"

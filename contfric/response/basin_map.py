@@ -1,0 +1,271 @@
+"""The computation of basins: arguments checked, orbits found, tiles spread, gathered, kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from contfric.chaos.running import Progress, Timer, check_executor, compute_all
+from contfric.chaos.status import Motion
+from contfric.chaos.store import TileFolder, digest, open_tiles, versions
+from contfric.errors import (
+    ParameterError,
+    did_you_mean,
+    function_of,
+    mapping_of,
+    real_number,
+    shown,
+    whole_number,
+)
+from contfric.memory import must_fit
+from contfric.models import ModelSource, load_model
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.system import IntArray
+from contfric.response.attractors import Attractors, given_orbits
+from contfric.response.basin_tile import BasinRows, BasinTile, compute_basin_tile
+from contfric.response.basins import Basins
+from contfric.response.sweeping import checked_values
+
+#: Starts, spread over the grid, whose orbits are found before all others: any basin of a tenth of the grid
+#: is hit by one of them with probability 0.999; those that are not are found when the grid is done.
+_SEEDS = 64
+#: Steps between seeds, as a share of the grid: the golden section spreads them evenly.
+_GOLDEN = 0.6180339887498949
+#: Bytes of a start beyond its state.
+_BYTES = 32
+#: What a periodic solution is called whose orbit is not known.
+_UNKNOWN = (Motion.PERIODIC.code, Motion.TRANSIENT.code)
+PHASE = "phase"
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """Starts to be labelled, one after the other."""
+
+    model: Model
+    vector: FloatArray
+    time: float
+    states: FloatArray
+    periods: int
+    side: int
+    executor: Executor | None
+    progress: Progress | None
+
+    def tile(self, attractors: Attractors, chosen: IntArray) -> BasinTile:
+        targets, states = attractors.targets, self.states[chosen]
+        return BasinTile(self.model, self.vector, targets, self.time, states, self.periods)
+
+    def parts(self, chosen: IntArray) -> list[IntArray]:
+        return [chosen[k : k + self.side] for k in range(0, len(chosen), self.side)]
+
+
+def basins(
+    model: ModelSource,
+    params: Mapping[str, float] | None = None,
+    grid: Mapping[str, ArrayLike] | None = None,
+    at: Mapping[str, float] | None = None,
+    *,
+    orbits: Any = None,
+    periods: int = 600,
+    executor: Executor | None = None,
+    folder: str | Path | None = None,
+    tile: int = 4096,
+    progress: Progress | None = None,
+) -> Basins:
+    """Label starts on a grid of two states by the solved orbit that each converges to.
+
+    A start is followed until one of its joints lies at a joint of a known stable orbit. What no orbit catches
+    is told apart by its Lyapunov exponent: chaotic, unbounded, at rest; or periodic, and then its orbit is
+    found, solved and known. The result is the same to the last bit for any number of workers. Ctrl-C
+    ends the computation; what was found is returned.
+
+    Parameters
+    ----------
+    model, params : the model (or its name) and its parameters; defaults fill in
+    grid : mapping of two states to their values, each ascending
+    at : values of the other states, and "phase", that of the start as a share of the period; 0 by default
+    orbits : orbits that are known: a :class:`~contfric.Diagram` that contains the parameters, or a list of
+        orbits; others are found all the same
+    periods : periods of the excitation (units of time without one) that a start is followed
+    executor : any :class:`concurrent.futures.Executor`: processes, loky, dask, MPI; by default threads
+        of this process. What it loses is computed here.
+    folder : where finished tiles are kept; the same call goes on from them
+    tile : starts in a tile
+    progress : called with one line of text now and then
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not valid.
+    ResultFileError
+        If the folder holds tiles of another computation, or cannot be written.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> grid = {"x": np.linspace(-2, 2, 10), "v": np.linspace(-1, 1, 10)}
+    >>> found = cf.basins("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, grid)
+    >>> sum(share.count for share in found.shares)
+    100
+    """
+    model = load_model(model)
+    check_executor(executor)
+    function_of("progress", progress)
+    vector = model.vector(mapping_of("params", {} if params is None else params, "{'S0': 0.4}"))
+    axes = _checked_grid(model, grid)
+    fixed = _checked_at(model, axes, {} if at is None else at)
+    periods, tile = whole_number("periods", periods, least=1), whole_number("tile", tile, least=1)
+    shape = tuple(len(values) for values in axes.values())
+    _check_size(model, axes)
+    period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0)))
+    states = _states(model, axes, fixed)
+    job = _Job(model, vector, fixed[PHASE] * period, states, periods, tile, executor, progress)
+    attractors = Attractors(model, vector)
+    for orbit in () if orbits is None else given_orbits(model, vector, orbits):
+        attractors.add(orbit)
+    rows = BasinRows(
+        np.full(len(states), -1, dtype=np.int32),
+        np.full(len(states), Motion.MISSING.code, dtype=np.uint8),
+    )
+    try:
+        _find_by_seeds(job, attractors)
+        kept = None if folder is None else open_tiles(Path(folder), _record(job, attractors, axes))
+        _label(job, attractors, np.arange(len(states)), rows, kept)
+        _resolve(job, attractors, rows)
+    except KeyboardInterrupt:
+        if progress is not None:
+            progress("interrupted: what is labelled is kept")
+    labels, motions = rows.labels.reshape(shape), rows.motions.reshape(shape)
+    return Basins(model, axes, vector, fixed, tuple(attractors.orbits), labels, motions)
+
+
+def check_starts(model: Model, grid: object, at: object) -> None:
+    """Check the starts that a user gave.
+
+    Raises
+    ------
+    ParameterError
+        If they are none of the model, or do not fit into the memory.
+    """
+    axes = _checked_grid(model, grid)
+    _checked_at(model, axes, at)
+    _check_size(model, axes)
+
+
+def _check_size(model: Model, axes: Mapping[str, FloatArray]) -> None:
+    rows, columns = (len(values) for values in axes.values())
+    size = rows * columns * (_BYTES + 16 * len(model.states))
+    must_fit(f"basins of {rows} x {columns} starts", size)
+
+
+def _checked_grid(model: Model, grid: object) -> dict[str, FloatArray]:
+    if not isinstance(grid, Mapping) or len(grid) != 2:
+        raise ParameterError(
+            f"grid is a mapping of two of the states {', '.join(model.states)} to their values, such as "
+            f"{{'{model.states[0]}': [-1, 0, 1], ...}}; got {shown(grid)}"
+        )
+    for name in grid:
+        if name not in model.states:
+            raise ParameterError(
+                f"'{name}' is no state of '{model.name}'{did_you_mean(name, model.states)}"
+            )
+    return {name: checked_values(model, name, values) for name, values in grid.items()}
+
+
+def _checked_at(model: Model, axes: Mapping[str, FloatArray], at: object) -> dict[str, float]:
+    given = mapping_of("at", at, "{'phase': 0.25}")
+    allowed = [name for name in model.states if name not in axes] + [PHASE]
+    for name in given:
+        if name not in allowed:
+            raise ParameterError(
+                f"at has values of {', '.join(allowed)}, got {shown(name)}{did_you_mean(name, allowed)}"
+            )
+    if model.autonomous and given.get(PHASE):
+        raise ParameterError(f"model '{model.name}' has no excitation, and no phase")
+    return {name: real_number(f"at['{name}']", given.get(name, 0.0)) for name in allowed}
+
+
+def _states(model: Model, axes: Mapping[str, FloatArray], at: Mapping[str, float]) -> FloatArray:
+    """Return the initial states, row by row, shape (starts, n)."""
+    (first, rows), (second, columns) = axes.items()
+    states = np.empty((len(rows), len(columns), len(model.states)))
+    for k, name in enumerate(model.states):
+        states[..., k] = at.get(name, 0.0)
+    states[..., model.states.index(first)] = rows[:, None]
+    states[..., model.states.index(second)] = columns[None, :]
+    return states.reshape(-1, len(model.states))
+
+
+def _record(job: _Job, attractors: Attractors, axes: Mapping[str, FloatArray]) -> dict[str, Any]:
+    """Describe the computation, so that tiles of another one are not taken for its."""
+    return {
+        **versions(job.model),
+        "kind": "basins",
+        "params": job.model.mapping(job.vector),
+        "axes": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in axes.items()},
+        "states": digest(job.states),
+        "orbits": digest(*attractors.targets),
+        "time": job.time,
+        "limits": [job.periods],
+        "tile": job.side,
+    }
+
+
+def _unknown(rows: BasinRows) -> IntArray:
+    """Return the starts that are periodic, and whose orbit is not known."""
+    return np.flatnonzero((rows.labels < 0) & np.isin(rows.motions, _UNKNOWN))
+
+
+def _find_by_seeds(job: _Job, attractors: Attractors) -> None:
+    """Find the orbits of some starts, spread over the grid."""
+    count = len(job.states)
+    spread = np.floor(np.mod(_GOLDEN * np.arange(1, _SEEDS + 1), 1.0) * count).astype(np.int64)
+    chosen = np.unique(spread)
+    left = chosen
+    while len(left):
+        rows = compute_basin_tile(job.tile(attractors, left))
+        left = left[_unknown(rows)]
+        while len(left) and not attractors.search(job.states[left[0]], job.time):
+            left = left[1:]
+
+
+def _label(
+    job: _Job, attractors: Attractors, chosen: IntArray, rows: BasinRows, kept: TileFolder | None
+) -> None:
+    """Label some starts, tile by tile, as any executor computes them."""
+    parts, tiles = job.parts(chosen), {}
+    for number, part in enumerate(parts):
+        finished = BasinRows.checked(kept.read(number), len(part)) if kept is not None else None
+        if finished is None:
+            tiles[number] = job.tile(attractors, part)
+        else:
+            _put(rows, part, finished)
+    timer = Timer(len(parts), len(parts) - len(tiles), job.progress, "basins")
+    for number, found in compute_all(tiles, job.executor, timer.say, compute_basin_tile):
+        if kept is not None:
+            kept.write(number, vars(found))
+        _put(rows, parts[number], found)
+        timer.tick()
+
+
+def _put(rows: BasinRows, part: IntArray, found: BasinRows) -> None:
+    # motions last: an interrupt in between must not leave a tile that counts as computed
+    rows.labels[part] = found.labels
+    rows.motions[part] = found.motions
+
+
+def _resolve(job: _Job, attractors: Attractors, rows: BasinRows) -> None:
+    """Find the orbits of what is periodic and unknown, until nothing is left that has one."""
+    left = _unknown(rows)
+    while len(left):
+        if attractors.search(job.states[left[0]], job.time):
+            _label(job, attractors, left, rows, None)
+            left = np.intersect1d(left, _unknown(rows))
+        else:  # its orbit cannot be told: it stays periodic, without a number
+            left = left[1:]

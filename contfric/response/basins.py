@@ -1,0 +1,171 @@
+"""Basins of attraction on a grid of two states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.chaos.status import Motion
+from contfric.extras import need_pandas
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.orbit import Orbit
+from contfric.response.attractors import named
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+#: Quantile of the normal distribution for intervals of 95 percent.
+_QUANTILE = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class Share:
+    """The share of the starts that lead to one attractor.
+
+    Attributes
+    ----------
+    name : name of the orbit, or what the solutions are
+    orbit : number of the orbit, -1 if there is none
+    count : starts
+    share, low, high : share of all starts that are computed, with the limits of its 95 % interval (Wilson)
+    """
+
+    name: str
+    orbit: int
+    count: int
+    share: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class Basins:
+    """What starts on a grid converge to; the result of :func:`contfric.basins`.
+
+    Attributes
+    ----------
+    model : Model
+    axes : dict
+        The two states that vary and their values, in the order of the arrays' axes.
+    vector : ndarray, shape (parameters,)
+    at : dict
+        The states that do not vary, and the phase of the start as a share of the period.
+    orbits : tuple of Orbit
+        The solved orbits that starts converge to.
+    labels : ndarray, shape (len, len)
+        Number of the orbit that each start converges to, -1 if it converges to none.
+    motions : ndarray, shape (len, len)
+        Code of the :class:`~contfric.chaos.status.Motion` of each start.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> grid = {"x": np.linspace(-2, 2, 8), "v": np.linspace(-1, 1, 8)}
+    >>> cf.basins("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, grid).shares[0].name
+    '1a (1)'
+    """
+
+    model: Model
+    axes: dict[str, FloatArray]
+    vector: FloatArray
+    at: dict[str, float]
+    orbits: tuple[Orbit, ...]
+    labels: NDArray[np.int32]
+    motions: NDArray[np.uint8]
+
+    @property
+    def params(self) -> dict[str, float]:
+        """All parameters by name."""
+        return self.model.mapping(self.vector)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Lengths of the two axes."""
+        rows, columns = self.labels.shape
+        return rows, columns
+
+    @property
+    def complete(self) -> bool:
+        """Whether all starts have been computed; False after an interrupt."""
+        return not bool(np.any(self.motions == Motion.MISSING.code))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the orbits."""
+        return tuple(named(self.orbits))
+
+    def where(self, what: int | Motion) -> NDArray[np.bool_]:
+        """Tell which starts converge to an orbit by its number, or are solutions of a kind without one."""
+        if isinstance(what, Motion):
+            return np.asarray((self.labels < 0) & (self.motions == what.code))
+        return np.asarray(self.labels == what)
+
+    @cached_property
+    def shares(self) -> tuple[Share, ...]:
+        """Shares of all that occurs: orbits in their order, then what converges to none.
+
+        The interval is that of as many starts drawn at random. A regular grid does better: only cells at the
+        boundary are uncertain.
+        """
+        total = int(np.sum(self.motions != Motion.MISSING.code))
+        found = [(name, k, int(np.sum(self.labels == k))) for k, name in enumerate(self.names)]
+        found += [
+            (motion.name.lower(), -1, int(np.sum(self.where(motion))))
+            for motion in Motion
+            if motion is not Motion.MISSING
+        ]
+        return tuple(
+            Share(name, k, count, count / total, *wilson(count, total))
+            for name, k, count in found
+            if count
+        )
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return one row for each start: its two states, orbit, name, kind of motion (needs pandas)."""
+        need_pandas()
+        import pandas as pd
+
+        (first, rows), (second, columns) = self.axes.items()
+        names = np.array([*self.names, ""])
+        motions = np.array([motion.name.lower() for motion in Motion])
+        return pd.DataFrame(
+            {
+                first: np.repeat(rows, len(columns)),
+                second: np.tile(columns, len(rows)),
+                "orbit": self.labels.ravel(),
+                "name": names[self.labels.ravel()],
+                "motion": motions[self.motions.ravel()],
+            }
+        )
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the basins, each in a colour, and the orbits at the phase of the starts."""
+        from contfric.plot.basins import plot_basins
+
+        return plot_basins(self, ax=ax)
+
+    def __repr__(self) -> str:
+        shape = " x ".join(str(length) for length in self.shape)
+        found = ", ".join(f"{s.name} {s.share:.1%}" for s in self.shares)
+        return f"<Basins of {self.model.name}: {shape} starts in {', '.join(self.axes)}; {found}>"
+
+
+def wilson(count: int, total: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212).
+
+    Examples
+    --------
+    >>> [round(x, 4) for x in wilson(8, 10)]
+    [0.4902, 0.9433]
+    """
+    share, square = count / total, _QUANTILE**2
+    middle = (share + square / (2 * total)) / (1 + square / total)
+    half = _QUANTILE * sqrt(share * (1 - share) / total + square / (4 * total**2))
+    half /= 1 + square / total
+    return max(0.0, middle - half), min(1.0, middle + half)

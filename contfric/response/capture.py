@@ -1,0 +1,105 @@
+"""Which of some orbits a solution converges to, compiled.
+
+A solution is followed from joint to joint. It has converged where a joint lies so near to one of an orbit
+that nothing but that orbit attracts it: same mode, same surface, same phase, and a state within the radius
+that the joint was given (:mod:`contfric.response.targets`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import types
+
+from contfric.chaos.cells import StartingType, start_mode
+from contfric.chaos.tangent import ARRIVED, new_walk, state_room, to_joint
+from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
+from contfric.orbit.equations import FunctionsType
+from contfric.orbit.trajectory import TablesType
+from contfric.response.targets import Targets
+
+TargetsType = types.NamedTuple([indices, matrix, indices, vector], Targets)
+
+#: What a solution is that starts in no domain, and that was not captured in time.
+NO_START, NOT_YET = -1, -2
+
+
+@helper
+def caught(targets, key, t, y, period, timeless):  # type: ignore[no-untyped-def]
+    """Return the orbit whose joint a joint lies at; -1 if there is none."""
+    for i in range(targets.key.shape[0]):
+        if targets.key[i] != key:
+            continue
+        within = targets.radius[i]
+        slip = 0.0 if timeless else abs(t - targets.z[i, 0])
+        if slip > 0.5 * period:
+            slip = period - slip
+        near = slip <= within
+        for j in range(y.shape[0]):
+            near = near and abs(y[j] - targets.z[i, 1 + j]) <= within
+        if near:
+            return targets.owner[i]
+    return -1
+
+
+@kernel(
+    types.void(
+        FunctionsType,
+        TablesType,
+        StartingType,
+        TargetsType,
+        f8,
+        vector,
+        matrix,
+        i8,
+        indices,
+        indices,
+        indices,
+        indices,
+    )
+)
+def capture(  # type: ignore[no-untyped-def]
+    functions, tables, starting, targets, time, p, states, periods, stop, labels, ends, followed
+):
+    """Follow solutions from ``states`` at ``time`` until an orbit catches them, or the periods are over.
+
+    Parameters
+    ----------
+    stop : another thread writes a 1 to it when nobody waits for the result any more
+    labels, ends, followed : orbit, -1 if none; how a solution without one ended, as simulations do,
+        ``NO_START`` or ``NOT_YET``; periods followed; shape (k,)
+    """
+    n, surfaces = states.shape[1], tables.observables.shape[0]
+    walk, room = new_walk(n), state_room(n)
+    period = functions[5](p, room.none, room.empty)
+    timeless, walls = period <= 0.0, 0
+    if timeless:
+        period = 1.0
+    for k in range(surfaces):
+        walls = 1 if tables.bounds[0, k] == 2 else walls
+    walk.at_once[1] = 2 * walls + (1 if timeless else 0)
+    phase = time if timeless else time - math.floor(time / period) * period
+    for cell in range(states.shape[0]):
+        if stop[0] != 0:
+            break
+        for j in range(n):
+            walk.y[j] = states[cell, j]
+        walk.at_once[0] = walk.at_once[2] = 0
+        labels[cell], ends[cell], cycle, t = -1, NOT_YET, 0, phase
+        mode, on = start_mode(functions, tables, starting, time, walk.y, p, room)
+        if mode < 0:
+            ends[cell] = NO_START
+        while mode >= 0 and cycle < periods and stop[0] == 0:
+            outcome, surface, following, _, turns, t = to_joint(
+                functions, tables, mode, on, t, p, period, walk, room
+            )
+            if outcome != ARRIVED:
+                ends[cell] = outcome
+                break
+            on = (1 << surface) | (tables.lies_on[mode] & tables.kept[surface])
+            mode, cycle = following, cycle + turns
+            label = caught(targets, mode * surfaces + surface, t, walk.y, period, timeless)
+            if label >= 0:
+                labels[cell] = label
+                break
+        followed[cell] = cycle

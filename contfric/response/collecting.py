@@ -1,0 +1,113 @@
+"""Calls of the compiled sections: room that grows, and starts where nothing can be carried over."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.chaos.rows import new_stop, starting, until_interrupted
+from contfric.errors import ParameterError
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.simulation import tables
+from contfric.orbit.starts import displaced
+from contfric.orbit.system import IntArray
+from contfric.response.cuts import (
+    Cut,
+    Ends,
+    Following,
+    Points,
+    empty_batch,
+    empty_ends,
+    empty_points,
+)
+from contfric.response.outcome import Outcome
+
+#: Points that there is room for at first, for each solution.
+_POINTS = 64
+#: Factor by which the room grows.
+_GROWTH = 4
+#: A return that differs by this many units of the model's rounding is a return to the same point: what
+#: is left of a thousand such steps is 1e-11.
+_ROUNDINGS = 10.0
+
+
+def repeats_of(model: Model) -> float:
+    """Return the difference of a return that is none."""
+    return _ROUNDINGS * model.rounding
+
+
+def collect(
+    model: Model,
+    cut: Cut,
+    how: Following,
+    vectors: FloatArray,
+    starts: tuple[FloatArray, FloatArray, IntArray, IntArray],
+    stop: IntArray | None = None,
+) -> tuple[Points, Ends]:
+    """Follow solutions and return their points on a section, and what they came to.
+
+    Parameters
+    ----------
+    vectors : parameters of each, shape (k, parameters)
+    starts : initial times (k,) and states (k, n), modes (-1 where the state decides) and the surfaces
+        that each lies on, as bits; of the states only the first counts if they are carried over
+    stop : shape (1,); another thread writes a 1 to it to end the computation. Without it the solutions are
+        followed in a thread, and Ctrl-C ends them.
+    """
+    from contfric.response.section import cut_solutions
+
+    times, states, modes, ons = starts
+    count, n = len(vectors), states.shape[1]
+    points, ends = empty_points(_POINTS * count, n), empty_ends(count, n)
+    done, state = 0, np.ascontiguousarray(states)
+    while done < count:
+        flag = new_stop() if stop is None else stop  # a call in a thread uses it up
+        part = slice(done, count)
+        rest = ends.behind(done)
+        arguments = (
+            model.flow.following(),
+            tables(model),
+            starting(model),
+            cut,
+            how,
+            np.ascontiguousarray(vectors[part]),
+            np.ascontiguousarray(times[part]),
+            state if how.carried else state[part],
+            modes[part].copy(),
+            ons[part].copy(),
+            flag,
+            empty_batch(n),
+            points,
+            rest,
+        )
+        more = until_interrupted(cut_solutions, arguments, flag if stop is None else None)
+        done += int(more)
+        if done == count or (stop is not None and stop[0] != 0):
+            break
+        carried = ends.states[done - 1 : done] if done else state[:1]
+        if how.carried and more and not _goes_on(int(ends.outcomes[done - 1])):
+            carried = _fresh(model, vectors[done], carried)
+        else:
+            points = _longer(points)
+        state = carried.copy() if how.carried else state
+    return points.first(int(ends.upto[-1]) if count else 0), ends
+
+
+def _goes_on(outcome: int) -> bool:
+    return outcome in (Outcome.PERIODIC.code, Outcome.APERIODIC.code, Outcome.HELD.code)
+
+
+def _fresh(model: Model, vector: FloatArray, otherwise: FloatArray) -> FloatArray:
+    """Return the start by default, where nothing can be carried over."""
+    try:
+        return displaced(model, vector)[None]
+    except ParameterError:  # no state is in a domain: the kernel says so
+        return otherwise
+
+
+def _longer(points: Points) -> Points:
+    longer = empty_points(_GROWTH * len(points.times), points.states.shape[1])
+    count = int(points.number[0])
+    longer.number[0] = count
+    for name in ("cycles", "modes", "times", "states"):
+        getattr(longer, name)[:count] = getattr(points, name)[:count]
+    return longer

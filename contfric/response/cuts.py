@@ -1,0 +1,136 @@
+"""What the compiled sections take and fill: the section, how solutions are followed, points and ends."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from contfric.models.definition import FloatArray
+from contfric.orbit.simulation import EventRows
+from contfric.orbit.system import IntArray
+
+#: Events that are followed between two looks at the section: a period or two of most orbits.
+BATCH = 16
+
+
+class Cut(NamedTuple):
+    """A section, as the kernel takes it.
+
+    Attributes
+    ----------
+    joints : whether a joint counts, by the mode that ends and its exit surface, shape (modes, surfaces)
+    inside : whether crossings are looked for inside of the segments of a mode, shape (modes,)
+    observable : observable of the section
+    surface : surface whose level it takes there; -1 for the level 0
+    phase : phase of the excitation, as a share of its period; negative if it is no stroboscopic section
+    sense : 1 if the observable rises, -1 if it falls, 0 for either
+    """
+
+    joints: IntArray
+    inside: IntArray
+    observable: int
+    surface: int
+    phase: float
+    sense: int
+
+
+class Following(NamedTuple):
+    """How solutions are followed.
+
+    Attributes
+    ----------
+    transient, span : periods before points are collected, and all periods
+    repeats : difference (relative to 1 + state) of a return that is none; 0 to follow to the end
+    most : points after which a solution is left
+    carried : 1 if each starts where the one before has ended
+    """
+
+    transient: float
+    span: float
+    repeats: float
+    most: int
+    carried: int
+
+
+class Points(NamedTuple):
+    """Points on a section.
+
+    Attributes
+    ----------
+    number : number found, more than the arrays hold if they are too short, shape (1,)
+    cycles, modes : periods completed and mode, shape (k,)
+    times, states : phase and state, shapes (k,) and (k, n)
+    """
+
+    number: IntArray
+    cycles: IntArray
+    modes: IntArray
+    times: FloatArray
+    states: FloatArray
+
+    def first(self, count: int) -> Points:
+        """Return the first points, copied."""
+        return Points(
+            np.array([count]),
+            self.cycles[:count].copy(),
+            self.modes[:count].copy(),
+            self.times[:count].copy(),
+            self.states[:count].copy(),
+        )
+
+
+class Ends(NamedTuple):
+    """What solutions came to, one row each.
+
+    Attributes
+    ----------
+    outcomes : number of the :class:`~contfric.response.outcome.Outcome`, shape (k,)
+    turns : periods after which the solution repeats itself, 0 if it does not, shape (k,)
+    upto : points found with it and all before, shape (k,)
+    words : a number for the sequence of its segments, shape (k,)
+    states : state at the end, shape (k, n)
+    """
+
+    outcomes: IntArray
+    turns: IntArray
+    upto: IntArray
+    words: IntArray
+    states: FloatArray
+
+    def behind(self, done: int) -> Ends:
+        """Return the rows behind those that are done, as views."""
+        return Ends(
+            self.outcomes[done:],
+            self.turns[done:],
+            self.upto[done:],
+            self.words[done:],
+            self.states[done:],
+        )
+
+
+def empty_points(count: int, n: int) -> Points:
+    """Return room for points."""
+    return Points(
+        np.zeros(1, dtype=np.int64),
+        np.zeros(count, dtype=np.int64),
+        np.zeros(count, dtype=np.int64),
+        np.zeros(count),
+        np.zeros((count, n)),
+    )
+
+
+def empty_ends(count: int, n: int) -> Ends:
+    """Return room for the ends of solutions."""
+    outcomes, turns, upto, words = np.zeros((4, count), dtype=np.int64)
+    return Ends(outcomes, turns, upto, words, np.zeros((count, n)))
+
+
+def empty_batch(n: int) -> EventRows:
+    """Return room for the events between two looks."""
+    return EventRows(
+        np.empty((BATCH, 2), dtype=np.int64),
+        np.empty(BATCH, dtype=np.int64),
+        np.empty(BATCH),
+        np.empty((BATCH, n)),
+    )

@@ -1,0 +1,32 @@
+"""What a solution came to while it was followed."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class Outcome(str, Enum):
+    """What a solution came to; the text says what its points are.
+
+    The order is that of the numbers in arrays.
+
+    Examples
+    --------
+    >>> Outcome.HELD.code
+    2
+    """
+
+    PERIODIC = "it repeats itself to rounding; the points are those of one period"
+    APERIODIC = "it did not repeat itself within the periods followed; the points are all of them"
+    HELD = "it ends at rest, for ever"
+    UNBOUNDED = "it grew with no bound in sight"
+    NO_MOTION = "no solution starts there, or its events follow each other at once"
+    CHATTER = "impacts follow each other faster and faster, and it does not go on"
+    QUIET = "it meets no surface any more"
+    OUTSIDE = "the model is not defined there"
+    MISSING = "not computed: the computation was interrupted"
+
+    @property
+    def code(self) -> int:
+        """Its number in arrays."""
+        return list(Outcome).index(self)

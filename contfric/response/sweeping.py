@@ -1,0 +1,288 @@
+"""The computation of a sweep: arguments checked, stretches computed one after the other, gathered, kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from contfric.chaos.running import Progress, Timer, check_executor, compute_chains
+from contfric.chaos.store import TileFolder, digest, open_tiles, versions
+from contfric.chaos.tiles import inside
+from contfric.errors import (
+    ParameterError,
+    function_of,
+    mapping_of,
+    real_number,
+    shown,
+)
+from contfric.memory import must_fit
+from contfric.models import ModelSource, load_model
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.starts import checked_state
+from contfric.orbit.system import IntArray
+from contfric.response.collecting import repeats_of
+from contfric.response.cuts import Cut, Following
+from contfric.response.outcome import Outcome
+from contfric.response.sections import STOPS, SectionLike, section_of
+from contfric.response.stretch import STRETCH, Stretch, StretchRows, compute_stretch
+from contfric.response.sweep import Sweep, SweepRun
+
+_DIRECTIONS = {"both": ("up", "down"), "up": ("up",), "down": ("down",)}
+#: Bytes of a value: its parameters, its result, and a few points.
+_BYTES = 1024
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """A sweep to be computed; ``defined`` are the numbers of the values at which the model is."""
+
+    model: Model
+    parameter: str
+    values: FloatArray
+    vector: FloatArray
+    defined: IntArray
+    directions: Sequence[str]
+    cut: Cut
+    how: Following
+    starts: Mapping[str, FloatArray]
+
+    def numbers(self, direction: str, part: int) -> IntArray:
+        """Return the numbers of the values of a stretch, in the order in which they are computed."""
+        order = self.defined if direction == "up" else self.defined[::-1]
+        return order[part * STRETCH : (part + 1) * STRETCH]
+
+    def stretch(self, direction: str, part: int, state: FloatArray) -> Stretch | None:
+        """Return a stretch; None behind the last one."""
+        numbers = self.numbers(direction, part)
+        if not len(numbers):
+            return None
+        vectors = np.tile(self.vector, (len(numbers), 1))
+        vectors[:, self.model.index_of(self.parameter)] = self.values[numbers]
+        return Stretch(self.model, self.cut, self.how, vectors, state)
+
+    def record(self) -> dict[str, Any]:
+        """Describe the sweep, so that stretches of another one are not taken for its."""
+        return {
+            **versions(self.model),
+            "kind": "sweep",
+            "params": self.model.mapping(self.vector),
+            "parameter": self.parameter,
+            "values": digest(self.values),
+            "states": digest(*self.starts.values()),
+            "section": [*map(float, self.cut[2:]), digest(self.cut.joints, self.cut.inside)],
+            "limits": list(self.how),
+            "tile": STRETCH,
+        }
+
+
+def sweep(
+    model: ModelSource,
+    parameter: str,
+    values: ArrayLike,
+    params: Mapping[str, float] | None = None,
+    *,
+    direction: str = "both",
+    periods: float = 100.0,
+    transient: float = 100.0,
+    section: SectionLike = STOPS,
+    sense: str = "either",
+    state: ArrayLike | None = None,
+    executor: Executor | None = None,
+    folder: str | Path | None = None,
+    progress: Progress | None = None,
+) -> Sweep:
+    """Compute a brute-force bifurcation diagram: simulate along a parameter, the state carried over.
+
+    At each value the solution goes on from the state at the value before. Its points on the section are
+    collected behind a transient. One that repeats itself to rounding is left at once, and has the points
+    of one period. Where nothing can be carried over (the solution grew, or no solution starts there) the
+    next value begins with the model's start. Ctrl-C ends the computation; what was found is returned.
+
+    Parameters
+    ----------
+    model, params : the model (or its name) and the other parameters; defaults fill in
+    parameter, values : the parameter that varies, and its values, ascending
+    direction : "both", "up" or "down"; each begins with ``state`` at its own end
+    periods, transient : periods of the excitation (units of time without one) of which points are collected,
+        and before that
+    section : "stops", "releases", a surface of the model by its name, or a phase of the excitation as a share
+        of its period
+    sense : of a surface: "either", "rising" or "falling"
+    state : initial state, shape (n,); by default displaced from rest
+    executor : any :class:`concurrent.futures.Executor`; the two directions are independent of each other
+    folder : where finished parts are kept; the same call goes on from them
+    progress : called with one line of text now and then
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not valid, or the model is defined at none of the values.
+    ResultFileError
+        If the folder holds parts of another computation, or cannot be written.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> found = cf.sweep("coulomb", "Omega", np.linspace(0.4, 0.6, 21), section=0.0)
+    >>> found.counts()
+    {<Outcome.PERIODIC: 'it repeats itself to rounding; the points are those of one period'>: 42}
+    """
+    model = load_model(model)
+    check_executor(executor)
+    function_of("progress", progress)
+    cut = section_of(model, section, sense)
+    how = Following(
+        real_number("transient", transient, least=0.0),
+        real_number("transient", transient, least=0.0) + positive("periods", periods),
+        repeats_of(model),
+        np.iinfo(np.int64).max,
+        1,
+    )
+    if direction not in [*_DIRECTIONS]:
+        raise ParameterError(
+            f"direction is one of {', '.join(_DIRECTIONS)}, got {shown(direction)}"
+        )
+    grid = checked_values(model, parameter, values)
+    must_fit(f"a sweep of {len(grid)} values", _BYTES * len(grid))
+    fixed = mapping_of("params", {} if params is None else params, "{'S0': 0.4}")
+    defined = _defined(model, parameter, grid, fixed)
+    example = model.check_params({**fixed, parameter: float(grid[defined[0]])})
+    vector, starts = model.vector(example), {}
+    for name in _DIRECTIONS[direction]:
+        at = vector.copy()
+        at[model.index_of(parameter)] = grid[defined[0 if name == "up" else -1]]
+        starts[name] = checked_state(model, at, state)
+    job = _Job(model, parameter, grid, vector, defined, _DIRECTIONS[direction], cut, how, starts)
+    kept = None if folder is None else open_tiles(Path(folder), job.record())
+    runs = _computed(job, executor, kept, progress)
+    return Sweep(model, parameter, grid, vector, section, runs)
+
+
+def positive(name: str, value: object) -> float:
+    """Return a positive finite number that a user gave.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    number = real_number(name, value, least=0.0)
+    if number == 0.0:
+        raise ParameterError(f"{name} is a number > 0, got 0")
+    return number
+
+
+def checked_values(model: Model, name: str, given: ArrayLike) -> FloatArray:
+    """Return the values of a parameter, or of a state, that a user gave: finite and ascending.
+
+    Raises
+    ------
+    ParameterError
+        If they are not.
+    """
+    if name not in model.states:
+        model.index_of(name)
+    try:
+        values = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        values = np.empty(0)
+    fine = values.ndim == 1 and len(values) > 0 and bool(np.isfinite(values).all())
+    if not fine or np.any(np.diff(values) <= 0.0):
+        raise ParameterError(
+            f"the values of '{name}' are a list of finite numbers in ascending order, got {shown(given)}"
+        )
+    return values
+
+
+def _defined(
+    model: Model, parameter: str, grid: FloatArray, fixed: Mapping[str, float]
+) -> IntArray:
+    """Return the numbers of the values at which the model is defined; all where none is, for the message."""
+    named = {**model.defaults, **fixed, parameter: grid}
+    try:
+        found = np.flatnonzero(inside(model, named, grid.shape))
+    except (TypeError, OverflowError):  # a value that is no number: what follows says so
+        found = np.arange(0)
+    return np.asarray(found if len(found) else np.arange(len(grid)), dtype=np.int64)
+
+
+def _computed(
+    job: _Job, executor: Executor | None, kept: TileFolder | None, progress: Progress | None
+) -> dict[str, SweepRun]:
+    parts = -(-len(job.defined) // STRETCH)
+    done: dict[str, list[StretchRows]] = {name: [] for name in job.directions}
+    states = len(job.model.states)
+    for place, name in enumerate(job.directions):
+        while kept is not None and len(done[name]) < parts:
+            number = len(done[name])
+            size = len(job.numbers(name, number))
+            rows = StretchRows.checked(kept.read(place * parts + number), size, states)
+            if rows is None:
+                break
+            done[name].append(rows)
+    finished = sum(map(len, done.values()))
+    timer = Timer(parts * len(job.directions), finished, progress, "sweep")
+
+    def following(name: str, rows: StretchRows) -> Stretch | None:
+        return job.stretch(name, len(done[name]), rows.last)
+
+    tasks = {}
+    for name in job.directions:
+        state = done[name][-1].last if done[name] else job.starts[name]
+        first = job.stretch(name, len(done[name]), state)
+        if first is not None:
+            tasks[name] = first
+    try:
+        if tasks:
+            compiled(job.model)
+        for name, rows in compute_chains(tasks, following, executor, timer.say, compute_stretch):
+            if kept is not None:
+                kept.write(job.directions.index(name) * parts + len(done[name]), vars(rows))
+            done[name].append(rows)
+            timer.tick()
+    except KeyboardInterrupt:
+        timer.say(f"interrupted: {timer.done} of {timer.total} tiles are finished")
+    return {name: _run(job, name, rows) for name, rows in done.items()}
+
+
+def compiled(model: Model) -> None:
+    """Compile before tasks are spread, so that it is done once and found in the cache."""
+    from contfric.response.section import cut_solutions
+
+    model.flow.following()
+    assert cut_solutions.dispatcher is not None
+
+
+def _run(job: _Job, direction: str, stretches: Sequence[StretchRows]) -> SweepRun:
+    """Return the stretches of a direction as one, from the lowest value up."""
+    outcomes = np.full(len(job.values), Outcome.OUTSIDE.code, dtype=np.uint8)
+    outcomes[job.defined] = Outcome.MISSING.code
+    periods = np.zeros(len(job.values), dtype=np.int32)
+    index = [np.empty(0, dtype=np.int64)]
+    for part, rows in enumerate(stretches):
+        numbers = job.numbers(direction, part)
+        outcomes[numbers], periods[numbers] = rows.outcomes, rows.periods
+        index.append(np.repeat(numbers, np.diff(rows.upto, prepend=0)))
+    found = np.concatenate(index)
+    order = np.argsort(found, kind="stable")
+
+    def joined(name: str, like: Any) -> Any:
+        arrays = [getattr(rows, name) for rows in stretches]
+        return np.concatenate([like, *arrays])[order]
+
+    none = np.empty(0, dtype=np.int64)
+    return SweepRun(
+        outcomes,
+        periods,
+        found[order].astype(np.int32),
+        joined("cycles", none).astype(np.int32),
+        joined("modes", none).astype(np.uint8),
+        joined("times", np.empty(0)),
+        joined("states", np.empty((0, len(job.model.states)))),
+    )

@@ -1,0 +1,90 @@
+"""The tables of simulated responses, and what the record of a run says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from contfric.chaos.status import Motion
+from contfric.response.basins import Basins
+from contfric.response.outcome import Outcome
+from contfric.response.returns import Returns
+from contfric.response.sweep import Sweep
+
+if TYPE_CHECKING:
+    from contfric.study.responses import Response
+
+
+def header_of(found: Response) -> list[str]:
+    """Return the columns of the table of a response."""
+    if isinstance(found, Basins):
+        return [*found.axes, "orbit", "name", "motion"]
+    if isinstance(found, Returns):
+        return ["cycle", "t", "mode", *found.model.states]
+    return ["direction", found.parameter, "outcome", "period", "mode", "t", *found.model.states]
+
+
+def rows_of(found: Response) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of the table of a response."""
+    if isinstance(found, Basins):
+        return _starts(found)
+    return _points(found) if isinstance(found, Returns) else _swept(found)
+
+
+def _starts(found: Basins) -> Iterator[tuple[Any, ...]]:
+    motions, names = [motion.name.lower() for motion in Motion], [*found.names, ""]
+    rows, columns = (values.tolist() for values in found.axes.values())
+    for i, a in enumerate(rows):
+        for j, b in enumerate(columns):
+            label = int(found.labels[i, j])
+            yield a, b, label, names[label], motions[found.motions[i, j]]
+
+
+def _points(found: Returns) -> Iterator[tuple[Any, ...]]:
+    modes = [mode.name for mode in found.model.modes]
+    for k in range(len(found)):
+        place = found.cycles[k].item(), found.times[k].item(), modes[found.modes[k]]
+        yield *place, *found.states[k].tolist()
+
+
+def _swept(found: Sweep) -> Iterator[tuple[Any, ...]]:
+    outcomes = [outcome.name.lower() for outcome in Outcome]
+    modes = [mode.name for mode in found.model.modes]
+    for name, run in found.runs.items():
+        for i, value in enumerate(run.index.tolist()):
+            yield (
+                name,
+                found.values[value].item(),
+                outcomes[run.outcomes[value]],
+                run.periods[value].item(),
+                modes[run.modes[i]],
+                run.times[i].item(),
+                *run.states[i].tolist(),
+            )
+
+
+def entries_of(found: Response) -> dict[str, Any]:
+    """Return what the record of a run says of a response."""
+    if isinstance(found, Basins):
+        return {
+            "grid": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in found.axes.items()},
+            "at": found.at,
+            "complete": found.complete,
+            "shares": [vars(share) for share in found.shares],
+        }
+    if isinstance(found, Returns):
+        return {
+            "section": found.section,
+            "points": len(found),
+            "outcome": found.outcome.name.lower(),
+            "complete": found.complete,
+        }
+    return {
+        "parameter": found.parameter,
+        "values": [float(found.values[0]), float(found.values[-1]), len(found.values)],
+        "params": found.params,
+        "section": found.section,
+        "complete": found.complete,
+        "points": {name: len(run) for name, run in found.runs.items()},
+        "outcomes": {outcome.name.lower(): count for outcome, count in found.counts().items()},
+    }

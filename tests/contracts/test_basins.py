@@ -1,0 +1,222 @@
+"""Basins: labels against orbits that are found start by start, and all that a result has to be able to do."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.response import targets
+from contfric.study.result import RunStatus
+
+#: Two images of an asymmetric orbit, and a symmetric one, coexist.
+THREE = {"Omega": 0.541, "S": 0.32, "S0": 0.4}
+CHAOS = {"Omega": 0.35, "S": 0.05, "S0": 0.4}
+GRID = {"x": np.linspace(-2.0, 2.0, 24), "v": np.linspace(-1.5, 1.5, 20)}
+
+
+def bits(found: cf.Basins) -> bytes:
+    joints = b"".join(orbit.joints.tobytes() for orbit in found.orbits)
+    return found.labels.tobytes() + found.motions.tobytes() + joints
+
+
+def nearest(orbit: cf.Orbit, others: Sequence[cf.Orbit]) -> int:
+    """Return the number of the orbit that is the same one."""
+    apart = [float(np.linalg.norm(orbit.state(0.2) - other.state(0.2))) for other in others]
+    assert min(apart) < 1e-9
+    return int(np.argmin(apart))
+
+
+@pytest.fixture(scope="module")
+def three() -> cf.Basins:
+    return cf.basins("coulomb", THREE, GRID)
+
+
+def test_labels_are_the_orbits_that_starts_converge_to(three: cf.Basins) -> None:
+    """Random starts, simulated and solved one by one."""
+    assert len(three.orbits) == 3 and all(orbit.stable for orbit in three.orbits)
+    draw = np.random.default_rng(5)
+    for _ in range(25):
+        i, j = draw.integers(24), draw.integers(20)
+        start = [GRID["x"][i], GRID["v"][j]]
+        found = cf.find_orbit("coulomb", THREE, state=start)
+        times = np.linspace(0.0, found.period, 7)
+        mine = np.array([found.state(t) for t in times])
+        theirs = np.array([three.orbits[three.labels[i, j]].state(t) for t in times])
+        np.testing.assert_allclose(mine, theirs, atol=1e-9)
+
+
+def test_a_phase_moves_the_starts() -> None:
+    found = cf.basins("coulomb", THREE, GRID, {"phase": 0.3})
+    period = 2.0 * np.pi / THREE["Omega"]
+    draw = np.random.default_rng(6)
+    for _ in range(8):
+        i, j = draw.integers(24), draw.integers(20)
+        start = [GRID["x"][i], GRID["v"][j]]
+        orbit = cf.find_orbit("coulomb", THREE, state=start, time=0.3 * period)
+        label = found.orbits[found.labels[i, j]]
+        np.testing.assert_allclose(orbit.state(1.0), label.state(1.0), atol=1e-9)
+
+
+def test_the_symmetry_of_the_model_is_that_of_the_basins() -> None:
+    """The image of a start is half a period later: its basin is that of the image of the orbit."""
+    one = cf.basins("coulomb", THREE, GRID)
+    other = cf.basins("coulomb", THREE, GRID, {"phase": 0.5})
+    image = {k: nearest(orbit.mirror(), other.orbits) for k, orbit in enumerate(one.orbits)}
+    mirrored = np.vectorize(image.get)(one.labels)[::-1, ::-1]
+    np.testing.assert_array_equal(mirrored, other.labels)
+
+
+def test_a_wide_radius_takes_no_start_of_another_basin(
+    three: cf.Basins, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(targets, "NEAR", 1e-8)
+    np.testing.assert_array_equal(cf.basins("coulomb", THREE, GRID).labels, three.labels)
+
+
+def test_given_orbits_and_a_diagram(three: cf.Basins) -> None:
+    given = cf.basins("coulomb", THREE, GRID, orbits=three.orbits[::-1])
+    order = [nearest(orbit, given.orbits) for orbit in three.orbits]
+    np.testing.assert_array_equal(np.array(order)[three.labels], given.labels)
+    diagram = cf.explore(three.orbits[0], "Omega", (0.535, 0.545), max_periods=2)
+    known = cf.basins("coulomb", THREE, GRID, orbits=diagram)
+    counts = sorted(share.count for share in known.shares)
+    assert counts == sorted(share.count for share in three.shares)
+    with pytest.raises(cf.ParameterError, match="other parameters"):
+        cf.basins("coulomb", {**THREE, "S": 0.3}, GRID, orbits=diagram)
+    with pytest.raises(cf.ParameterError, match="another model, or of other"):
+        cf.basins("coulomb", {**THREE, "S": 0.3}, GRID, orbits=[three.orbits[0]])
+    with pytest.raises(cf.ParameterError, match="a diagram or a list"):
+        cf.basins("coulomb", THREE, GRID, orbits=3)
+
+
+def test_chaos_is_named_and_shares_have_intervals() -> None:
+    small = {"x": [-1.0, 0.0, 1.0], "v": [0.0, 0.5]}
+    found = cf.basins("coulomb", CHAOS, small, periods=150)
+    (share,) = found.shares
+    assert (share.name, share.orbit, share.count, share.share) == ("chaotic", -1, 6, 1.0)
+    assert 0.5 < share.low < 1.0 and share.high == 1.0
+    assert found.where(cf.Motion.CHAOTIC).all()
+
+
+def test_escaping_starts_are_named() -> None:
+    """Negative damping: what is large grows."""
+    grid = {"x": [0.0, 4.0], "v": [0.0, 1.0]}
+    found = cf.basins("coulomb", {"Omega": 0.5, "S": 0.0, "S0": 0.0, "zeta": -0.1}, grid)
+    assert [share.name for share in found.shares] == ["unbounded"]
+
+
+def test_without_excitation() -> None:
+    belt = cf.load_model("belt")
+    first, second = belt.states[:2]
+    width = belt.spread(belt.defaults)
+    grid = {first: width[0] * np.linspace(0.4, 1, 3), second: width[1] * np.linspace(0.1, 0.9, 3)}
+    found = cf.basins(belt, None, grid)
+    for i, j in ((0, 0), (2, 1)):
+        label = found.labels[i, j]
+        start = [float(grid[first][i]), float(grid[second][j])]
+        if label < 0:
+            assert found.motions[i, j] != cf.Motion.PERIODIC.code
+            continue
+        orbit = cf.find_orbit(belt, state=start)
+        assert orbit.period == pytest.approx(found.orbits[label].period, abs=1e-9)
+    with pytest.raises(cf.ParameterError, match="no phase"):
+        cf.basins(belt, None, grid, {"phase": 0.2})
+
+
+def test_the_same_bits_for_any_number_of_workers(three: cf.Basins) -> None:
+    for tile in (7, 100):
+        assert bits(cf.basins("coulomb", THREE, GRID, tile=tile)) == bits(three)
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        assert bits(cf.basins("coulomb", THREE, GRID, tile=100, executor=pool)) == bits(three)
+    with ThreadPoolExecutor(1) as pool:
+        pool.shutdown()  # takes nothing: all is computed here
+        assert bits(cf.basins("coulomb", THREE, GRID, tile=100, executor=pool)) == bits(three)
+
+
+def test_interrupted_and_gone_on(three: cf.Basins, tmp_path: Path) -> None:
+    def stop(text: str) -> None:
+        if "%" in text:
+            raise KeyboardInterrupt
+
+    options: dict[str, Any] = {"tile": 100, "folder": tmp_path}
+    part = cf.basins("coulomb", THREE, GRID, progress=stop, **options)
+    assert not part.complete and np.any(part.labels >= 0)
+    assert sum(share.count for share in part.shares) < part.labels.size
+    whole = cf.basins("coulomb", THREE, GRID, **options)
+    assert whole.complete and bits(whole) == bits(three)
+    with pytest.raises(cf.ResultFileError, match="another"):
+        cf.basins("coulomb", CHAOS, GRID, **options)
+
+
+def test_saved_table_and_drawn(three: cf.Basins, tmp_path: Path) -> None:
+    cf.save(three, tmp_path / "basins.npz")
+    again = cf.load(tmp_path / "basins.npz")
+    assert isinstance(again, cf.Basins) and bits(again) == bits(three)
+    assert again.shares == three.shares and again.at == three.at
+    table = three.to_dataframe()
+    assert len(table) == three.labels.size
+    assert (table["orbit"].to_numpy().reshape(three.shape) == three.labels).all()
+    assert list(table["x"][:2]) == [-2.0, -2.0] and table["v"][1] == GRID["v"][1]
+    ax = three.plot()
+    assert len(ax.get_legend().get_texts()) == 3 and len(ax.lines) == 3
+
+
+@pytest.mark.parametrize(
+    ("grid", "at", "options", "message"),
+    [
+        ({"x": [0.0, 1.0]}, {}, {}, "two of the states"),
+        ({"x": [0.0, 1.0], "w": [0.0]}, {}, {}, "'w' is no state"),
+        ({"x": [1.0, 0.0], "v": [0.0]}, {}, {}, "ascending"),
+        (GRID, {"x": 1.0}, {}, "at has values of phase"),
+        (GRID, {"phase": float("inf")}, {}, "finite"),
+        (GRID, {}, {"periods": 0}, "periods"),
+        (GRID, {}, {"tile": 0}, "tile"),
+        (GRID, {}, {"executor": 2}, "Executor"),
+        ({"x": np.arange(1e6), "v": np.arange(1e6)}, {}, {}, "GB"),
+        (None, {}, {}, "two of the states"),
+    ],
+)
+def test_bad_input(grid: Any, at: Any, options: dict[str, Any], message: str) -> None:
+    with pytest.raises(cf.ParameterError, match=message) as caught:
+        cf.basins("coulomb", THREE, grid, at, **options)
+    assert "\n" not in str(caught.value)
+
+
+HEAD = "model: coulomb\nparams: {Omega: 0.541, S: 0.32, S0: 0.4}\n"
+BASINS = "basins: {grid: {x: [-2, 2, 24], v: [-1.5, 1.5, 20]}}\n"
+
+
+def test_study(three: cf.Basins, tmp_path: Path) -> None:
+    path = tmp_path / "scene.yaml"
+    path.write_text(HEAD + BASINS + "figures: [{kind: basins}]\n")
+    result = cf.run_study(path, tmp_path / "out")
+    assert result.status is RunStatus.DONE
+    assert {f.name for f in result.files} == {"basins.csv", "basins.npz", "basins.png", "run.json"}
+    assert result.basins is not None and bits(result.basins) == bits(three)
+    with (tmp_path / "out" / "basins.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["orbit"]) for row in rows] == three.labels.ravel().tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("basins: {grid: {x: [-2, 2, 5], w: [0, 1, 2]}}\n", "scene.yaml:3: .*no state"),
+        ("basins: {grid: {x: [2, -2, 5], v: [0, 1, 2]}}\n", "scene.yaml:3: .*low < high"),
+        ("basins: {grid: {x: [-2, 2, 5], v: [0, 1, 2]}, at: {y: 1}}\n", "scene.yaml:3: .*phase"),
+        ("figures: [{kind: basins}]\n", "scene.yaml:3: .*needs 'basins'"),
+    ],
+)
+def test_bad_study(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "scene.yaml"
+    path.write_text(HEAD + text)
+    with pytest.raises(cf.StudyError, match=message):
+        cf.run_study(path, tmp_path / "out")

@@ -1,0 +1,273 @@
+"""Sweeps: their points against solved orbits and simulations, and all that a result has to be able to do."""
+
+from __future__ import annotations
+
+import csv
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.study.result import RunStatus
+
+GRID = np.linspace(0.3, 0.6, 150)
+
+
+def bits(sweep: cf.Sweep) -> bytes:
+    arrays = (a for run in sweep.runs.values() for a in vars(run).values())
+    return b"".join(a.tobytes() for a in arrays)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_points_are_those_of_solved_orbits(seed: int) -> None:
+    """On a stable branch: stops, strobes at a random phase, releases, a surface; up and down."""
+    draw = np.random.default_rng(seed)
+    values, fixed = np.sort(draw.uniform(0.3, 0.46, 5)), {"S": 0.32, "S0": 0.4}
+    orbits = [cf.find_orbit("coulomb", {"Omega": omega, **fixed}) for omega in values]
+    for section in ("stops", float(draw.uniform(0.0, 1.0)), "releases", "F+"):
+        sweep = cf.sweep("coulomb", "Omega", values, fixed, section=section)
+        for run in sweep.runs.values():
+            for i, orbit in enumerate(orbits):
+                assert run.periods[i] == orbit.periods
+                found = np.sort(run.states[run.index == i], axis=0)
+                np.testing.assert_allclose(found, _on(orbit, section), rtol=0.0, atol=1e-10)
+
+
+def _on(orbit: cf.Orbit, section: str | float) -> np.ndarray[Any, Any]:
+    """The points of a solved orbit, from its joints."""
+    if isinstance(section, float):
+        return orbit.state(section * orbit.period)[None]
+    chosen = [
+        (section == "stops" and exit_ == "v")
+        or (section == "releases" and mode == "stick")
+        or (section == "F+" and exit_ == "F+")
+        for mode, exit_ in orbit.word
+    ]
+    found = list(orbit.ends[np.array(chosen), 1:])
+    if section == "F+":  # motion is not cut there while it slides
+        found += _crossings(orbit)
+    return np.sort(np.array(found), axis=0)
+
+
+def _crossings(orbit: cf.Orbit) -> list[np.ndarray[Any, Any]]:
+    """States at which the load takes the static limit while the mass slides, by bisection."""
+
+    def load(t: float) -> float:
+        force = np.cos(orbit.params["Omega"] * t)
+        return float(orbit.state(t)[0] - force - orbit.params["S0"])
+
+    found = []
+    for i, (mode, _) in enumerate(orbit.word):
+        if mode == "stick":
+            continue
+        # inside of the segment: at its ends the load may stand at the limit to rounding
+        start, end = orbit.cycle[i, 0] + 1e-6, orbit.ends[i, 0] - 1e-6
+        times = np.linspace(start, end, 400)
+        values = np.array([load(t) for t in times])
+        for k in np.flatnonzero(values[:-1] * values[1:] < 0.0):
+            low, high = times[k], times[k + 1]
+            for _ in range(60):  # to the last digit
+                t = 0.5 * (low + high)
+                low, high = (t, high) if load(t) * values[k] > 0.0 else (low, t)
+            found.append(orbit.state(0.5 * (low + high)))
+    return found
+
+
+def test_points_are_those_of_a_simulation() -> None:
+    """One chaotic value: every stop after the transient, to the last bit."""
+    params = {"Omega": 0.35, "S": 0.05, "S0": 0.4}
+    sweep = cf.sweep("coulomb", "Omega", [0.35], params, direction="up", periods=20, transient=10)
+    found = cf.simulate("coulomb", params, periods=30)
+    assert sweep.counts() == {cf.Outcome.APERIODIC: 1}
+    v = [s.name for s in found.model.surfaces].index("v")
+    behind = np.flatnonzero(found.cycles >= 10)[0]  # the event that ends the transient
+    stop = (found.exits == v) & (np.arange(len(found)) > behind)
+    np.testing.assert_array_equal(sweep.up.states, found.states[stop])
+    np.testing.assert_array_equal(sweep.up.times, found.times[stop])
+
+
+def test_the_state_is_carried_over() -> None:
+    """Between a fold and an event both branches are stable: which is met depends on the direction."""
+    sweep = cf.sweep("coulomb", "Omega", np.linspace(0.3, 0.7, 201), {"S": 0.32, "S0": 0.4})
+    low, high = (
+        r.states[r.index == np.argmin(np.abs(sweep.values - 0.541)), 0] for r in sweep.runs.values()
+    )
+    assert len(sweep.up) and len(sweep.down)
+    assert sorted(np.abs(low)) != pytest.approx(sorted(np.abs(high)), abs=1e-3)
+
+
+def test_models_without_excitation_and_with_impacts() -> None:
+    belt = cf.load_model("belt")
+    name = belt.parameter_names[0]
+    around = belt.defaults[name] * np.linspace(1.0, 1.01, 3)
+    sweep = cf.sweep(belt, name, around, section="stops", periods=300, transient=300)
+    orbit = cf.find_orbit(belt, {name: float(around[1])})
+    found = np.sort(sweep.up.states[sweep.up.index == 1, 0])
+    np.testing.assert_allclose(found, np.sort(orbit.stops), atol=1e-9)
+    with pytest.raises(cf.ParameterError, match="no period of excitation"):
+        cf.sweep(belt, name, around, section=0.5)
+
+
+def test_impacts() -> None:
+    model = cf.load_model("impact")
+    orbit = cf.find_orbit(model)
+    name = model.parameter_names[0]
+    at = [model.defaults[name]]
+    (wall,) = model.reset_by_surface
+    sweep = cf.sweep(model, name, at, section=wall, transient=500.0)
+    hits = [k for k, (_, exit_) in enumerate(orbit.word) if exit_ == wall]
+    np.testing.assert_allclose(
+        np.sort(sweep.up.states, axis=0), np.sort(orbit.ends[hits, 1:], axis=0), atol=1e-9
+    )
+
+
+def test_a_sense_halves_the_crossings() -> None:
+    options: Any = {"direction": "up", "section": "F+"}
+    both, up, down = (
+        cf.sweep("coulomb", "Omega", [0.4], sense=s, **options).up.states[:, 0].tolist()
+        for s in ("either", "rising", "falling")
+    )
+    assert up and down and sorted(both) == sorted([*up, *down])
+
+
+def test_the_same_bits_for_any_number_of_workers() -> None:
+    expected = bits(cf.sweep("coulomb", "Omega", GRID))
+    with ThreadPoolExecutor(1) as pool:
+        assert bits(cf.sweep("coulomb", "Omega", GRID, executor=pool)) == expected
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        assert bits(cf.sweep("coulomb", "Omega", GRID, executor=pool)) == expected
+    with ThreadPoolExecutor(1) as pool:
+        pool.shutdown()  # takes nothing: all is computed here
+        assert bits(cf.sweep("coulomb", "Omega", GRID, executor=pool)) == expected
+
+
+def test_interrupted_and_gone_on(tmp_path: Path) -> None:
+    def stop(text: str) -> None:
+        if "%" in text:
+            raise KeyboardInterrupt
+
+    part = cf.sweep("coulomb", "Omega", GRID, folder=tmp_path, progress=stop)
+    assert not part.complete and part.counts()[cf.Outcome.PERIODIC] > 0
+    said: list[str] = []
+    whole = cf.sweep("coulomb", "Omega", GRID, folder=tmp_path, progress=said.append)
+    assert whole.complete and bits(whole) == bits(cf.sweep("coulomb", "Omega", GRID))
+    assert len([text for text in said if "of 6 tiles" in text]) < 6
+    with pytest.raises(cf.ResultFileError, match="another"):
+        cf.sweep("coulomb", "Omega", GRID, folder=tmp_path, section=0.5)
+
+
+def test_saved_table_and_drawn(tmp_path: Path) -> None:
+    sweep = cf.sweep("coulomb", "Omega", np.linspace(0.4, 0.6, 21))
+    cf.save(sweep, tmp_path / "sweep.npz")
+    again = cf.load(tmp_path / "sweep.npz")
+    assert isinstance(again, cf.Sweep) and bits(again) == bits(sweep)
+    assert (again.section, again.parameter, again.params) == ("stops", "Omega", sweep.params)
+    table = sweep.to_dataframe()
+    assert len(table) == len(sweep.up) + len(sweep.down)
+    assert set(table["direction"]) == {"up", "down"}
+    ax = sweep.plot(state="v")
+    assert len(ax.lines) == 2 and len(ax.lines[0].get_xdata()) == len(sweep.up)
+
+
+def test_overlay() -> None:
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    diagram = cf.explore(orbit, "Omega", (0.45, 0.55))
+    sweep = cf.sweep("coulomb", "Omega", np.linspace(0.45, 0.55, 11), orbit.params)
+    bare = diagram.plot(row="x_max")
+    ax = diagram.plot(row="x_max", overlay=sweep)
+    assert len(ax.lines) == len(bare.lines) + 2
+    x, y = (np.asarray(d) for d in ax.lines[1].get_data())
+    assert (x.min(), x.max()) == pytest.approx((0.45, 0.55))
+    solved = cf.find_orbit("coulomb", {**orbit.params, "Omega": float(x[0])})
+    assert y[0] == pytest.approx(solved.x_max, abs=1e-10)
+    other = cf.sweep("coulomb", "S", [0.1, 0.2])
+    with pytest.raises(cf.ParameterError, match="along 'S'"):
+        diagram.plot(overlay=other)
+    strobed = cf.sweep("coulomb", "Omega", [0.45, 0.5], section=0.0)
+    with pytest.raises(cf.ParameterError, match="stops"):
+        diagram.plot(row="psi", overlay=strobed)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"parameter": "Omga"}, "did you mean 'Omega'"),
+        ({"values": [0.5, 0.4]}, "ascending"),
+        ({"values": []}, "ascending"),
+        ({"direction": "sideways"}, "direction is one of"),
+        ({"section": "F"}, "no section 'F'"),
+        ({"section": 1.0}, "0 <= phase < 1"),
+        ({"section": True}, "a section is"),
+        ({"sense": "rising"}, "needs a surface"),
+        ({"periods": 0}, "> 0"),
+        ({"periods": float("nan")}, "finite"),
+        ({"state": [1.0]}, "2 finite numbers"),
+        ({"executor": 3}, "Executor"),
+        ({"values": [-2.0, -1.0]}, "Omega > 0"),
+    ],
+)
+def test_bad_input(options: dict[str, Any], message: str) -> None:
+    arguments = {"parameter": "Omega", "values": [0.4, 0.5], **options}
+    with pytest.raises(cf.ParameterError, match=message) as caught:
+        cf.sweep("coulomb", arguments.pop("parameter"), arguments.pop("values"), **arguments)
+    assert "\n" not in str(caught.value)
+
+
+def test_values_outside_of_the_model_are_named() -> None:
+    sweep = cf.sweep("coulomb", "S", [0.2, 0.3, 0.5], {"S0": 0.4})
+    assert sweep.up.outcomes[2] == cf.Outcome.OUTSIDE.code and sweep.complete
+
+
+HEAD = "model: coulomb\nparams: {S: 0.32, S0: 0.4}\n"
+SWEEP = "sweep: {parameter: Omega, values: [0.3, 0.6, 150]}\n"
+
+
+def test_study(tmp_path: Path) -> None:
+    path = tmp_path / "scene.yaml"
+    path.write_text(HEAD + SWEEP + "figures: [{kind: sweep}]\n")
+    result = cf.run_study(path, tmp_path / "out")
+    assert {f.name for f in result.files} == {"sweep.csv", "sweep.npz", "sweep.png", "run.json"}
+    direct = cf.sweep("coulomb", "Omega", GRID, {"S": 0.32, "S0": 0.4})
+    assert result.sweep is not None and bits(result.sweep) == bits(direct)
+    with (tmp_path / "out" / "sweep.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(direct.up) + len(direct.down)
+    assert float(rows[3]["x"]) == direct.up.states[3, 0]
+    assert result.info["sweep"]["outcomes"]["periodic"] > 0
+
+
+def test_study_interrupted_goes_on(tmp_path: Path) -> None:
+    path = tmp_path / "scene.yaml"
+    path.write_text(HEAD + SWEEP)
+
+    def stop(text: str) -> None:
+        if "%" in text:
+            raise KeyboardInterrupt
+
+    first = cf.run_study(path, tmp_path / "out", progress=stop)
+    assert first.status is RunStatus.INTERRUPTED and first.goes_on
+    second = cf.run_study(path, tmp_path / "out")
+    assert second.status is RunStatus.DONE and second.sweep is not None
+    assert not list((tmp_path / "out").glob("*tiles*"))
+    assert bits(second.sweep) == bits(cf.sweep("coulomb", "Omega", GRID, {"S": 0.32, "S0": 0.4}))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("sweep: {parameter: Omga, values: [0.3, 0.6, 5]}\n", "scene.yaml:3: .*Omega"),
+        ("sweep: {parameter: Omega, values: [0.6, 0.3, 5]}\n", "scene.yaml:3: .*low < high"),
+        (SWEEP.replace("}", ", section: F}"), "scene.yaml:3: .*no section 'F'"),
+        (SWEEP.replace("}", ", state: [1]}"), "scene.yaml:3: .*2 numbers"),
+        ("figures: [{kind: sweep}]\n", "scene.yaml:3: .*needs 'sweep'"),
+    ],
+)
+def test_bad_study(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "scene.yaml"
+    path.write_text(HEAD + text)
+    with pytest.raises(cf.StudyError, match=message):
+        cf.run_study(path, tmp_path / "out")
