@@ -275,5 +275,8 @@ def inlined_helper(function: F) -> F:
 
 
 def allocating_helper(function: F) -> F:
-    """Compile a function that allocates into the kernels that call it."""
-    return numba.njit(error_model="numpy", nogil=True, **_INSIDE)(function)  # type: ignore[no-any-return]
+    """Compile a function that allocates into the kernels that call it.
+
+    (What numba counts references with is asked for: a helper that calls it would hand on that it has none.)
+    """
+    return numba.njit(error_model="numpy", nogil=True, _nrt=True, **_INSIDE)(function)  # type: ignore[no-any-return]

@@ -250,6 +250,15 @@ class Formulas:
         return found
 
 
+def moves_in_closed_form(description: Description, forms: Sequence[object]) -> bool:
+    """Tell whether a mode in which something moves is affine: for rest alone a second flow does not pay."""
+    pieces = 1 << len(description.kinks)
+    return any(
+        not isinstance(form, str) and 0 not in description.modes[i // pieces].sides.values()
+        for i, form in enumerate(forms)
+    )
+
+
 def integrated_modes(description: Description) -> dict[str, str]:
     """Return the modes that are not affine, each with the reason."""
     formulas = Formulas(description)
@@ -257,6 +266,8 @@ def integrated_modes(description: Description) -> dict[str, str]:
     forms = formulas.affine_fields()
     for m, mode in enumerate(description.modes):
         reasons = [f for f in forms[m * pieces : (m + 1) * pieces] if isinstance(f, str)]
+        if not reasons and not moves_in_closed_form(description, forms):
+            reasons = ["closed forms would be those of rest alone"]
         if reasons:
             found[mode.name] = reasons[0]
     return found
@@ -323,6 +334,8 @@ class _Writer:
     def linear(self) -> tuple[list[int], list[int]]:
         """Write the helpers of what is affine; return the pieces and the observables that are."""
         forms = self.f.affine_fields()
+        if not moves_in_closed_form(self.f.description, forms):
+            return [], []
         sights = [self.f.affine([o]) for o in self.f.observables()]
         every = [
             form for found in (*forms, *sights) if not isinstance(found, str) for form in found

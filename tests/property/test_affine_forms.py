@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import sympy
+from scipy.integrate import solve_ivp
 
 import contfric as cf
 from contfric.models.affine import NotAffineError, affine_form
@@ -95,7 +97,7 @@ def test_what_is_not_affine_says_why(text: str, reason: str) -> None:
         ("coulomb-yaml", ("slide+", "slide-", "stick")),
         ("impact", ("up", "down")),
         ("dead-band", ("fast+", "band", "fast-", "hold+", "hold-")),
-        ("popp", ("stick",)),
+        ("popp", ()),
         ("bang-bang", ()),
         ("belt-lugre", ()),
     ],
@@ -105,3 +107,22 @@ def test_models_say_which_modes_are_closed_forms(name: str, closed: tuple[str, .
     assert model.closed_form == closed
     assert set(model.integrated) == {m.name for m in model.modes} - set(closed)
     assert all(mode in repr(model) for mode in (*closed, *model.integrated))
+
+
+def test_a_model_may_have_modes_of_both_kinds() -> None:
+    """Linear below a contact, cubic above it: the orbit is that of another integrator."""
+    path = Path(__file__).parents[1] / "models" / "half_linear.yaml"
+    orbit = cf.find_orbit(path, {})
+    model, p = orbit.model, orbit.params
+    assert model.closed_form == ("free",) and set(model.integrated) == {"pressed"}
+
+    def field(t: float, y: list[float]) -> list[float]:
+        force = p["F"] * np.cos(p["w"] * t) - y[0] - 2.0 * p["zeta"] * y[1]
+        return [y[1], force - p["k"] * max(y[0] - p["gap"], 0.0) ** 3]
+
+    start = orbit.cycle[0]
+    # the field is smooth to its second derivative at the contact
+    span = (start[0], start[0] + orbit.period)
+    end = solve_ivp(field, span, start[1:], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    assert np.max(np.abs(end - start[1:])) < 1e-9
+    assert orbit.converged and orbit.admissible
