@@ -17,6 +17,9 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from coulomb_limit import distances, extrema, holds, released
 from coulomb_limit_theory import RELEASE, Law, amplification, amplitudes, interpolated
 
+#: Integrated models from end to end: minutes of processor time, run by `make test-all`.
+pytestmark = pytest.mark.slow
+
 WHERE = {"Omega": 0.5, "S": 0.2, "S0": 0.4}
 RATE = 0.4
 

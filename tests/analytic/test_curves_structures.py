@@ -24,6 +24,9 @@ from contfric.curves.points import CurveRows, first_curve_point, march_rows
 from contfric.curves.trace import continue_bifurcation
 from tests.curve_check import miss
 
+#: Integrated models from end to end: minutes of processor time, run by `make test-all`.
+pytestmark = pytest.mark.slow
+
 SWITCHED = str(Path(__file__).parents[1] / "models" / "switched.yaml")
 
 #: Where each model's diagram starts: parameters, start of the simulation, and the range.

@@ -22,6 +22,9 @@ from scipy.optimize import brentq, fsolve
 import contfric as cf
 from contfric.study import read_study
 
+#: Integrated models from end to end: minutes of processor time, run by `make test-all`.
+pytestmark = pytest.mark.slow
+
 
 @cache
 def diagram(name: str) -> cf.Diagram:

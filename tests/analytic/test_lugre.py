@@ -17,6 +17,9 @@ from contfric.continuation.side import first_point
 from contfric.continuation.trace import trace_side
 from contfric.orbit.solve import polish
 
+#: Integrated models from end to end: minutes of processor time, run by `make test-all`.
+pytestmark = pytest.mark.slow
+
 WHERE = {"Omega": 0.5, "S0": 0.4}
 #: Events of the symmetric branch of Fig. 17 between S = 0.374 and S = 0.378 (docs/gallery/fig17.md).
 FOLDS = (0.3750595439839, 0.3757051387250)

@@ -18,6 +18,9 @@ import contfric as cf
 from contfric import Motion
 from contfric.chaos.two_orbits import two_orbit_estimate
 
+#: Integrated models from end to end: minutes of processor time, run by `make test-all`.
+pytestmark = pytest.mark.slow
+
 JERK = Path(__file__).parents[1] / "models" / "jerk.yaml"
 #: Stable orbits: model, parameters, initial state and time (None: the default). Of Popp's oscillator with
 #: and without stick; of the belt with and without; of the dead band with slides on its edges and without.
