@@ -92,10 +92,13 @@ def continua_of(branch: Branch) -> Iterator[str]:
         between = " and ".join("an end" if b is None else b.kind.value for b in ends)
         yield f"a continuum of orbits at {name} = {middle:.10g}, between {between}"
         return
-    mu = branch.multipliers
+    mu = branch.turn_multipliers
     if mu is None:
         return
-    at_one = np.min(np.abs(mu - 1.0), axis=1) < _ONE
+    away = np.abs(mu - 1.0)
+    if branch.system.half:  # a multiplier of the whole is the square of one of the half
+        away = np.minimum(away, np.abs(mu + 1.0))
+    at_one = np.min(away, axis=1) < _ONE
     for first, last in _runs(at_one):
         low, high = sorted((values[first], values[last]))
         yield (

@@ -16,9 +16,8 @@ otherwise goes through to the other side. Behind a reset the signs of the mapped
 several domains can follow (:attr:`Model.targets`).
 
 Motion is cut at switching surfaces and at resets, and only there: each has a mode of its own on each
-side. An orbit needs one such joint at least. A model whose cycles may be smooth therefore declares the
-surface of its stops (``v = 0``) with two modes of the same field. They are one mode
-(:attr:`Model.joined`), and the surface is a section: transparent, but for cycles that meet nothing else.
+side. Where cycles may be smooth, the surface of the stops (``v = 0``) has two modes of the same field on its
+sides: it is a section (:mod:`contfric.models.section_maps`).
 """
 
 from __future__ import annotations
@@ -47,6 +46,7 @@ from contfric.models.parts import (
     Surface,
     Symmetry,
 )
+from contfric.models.section_maps import SectionMaps
 from contfric.stored import given
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ __all__ = [
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Model:
+class Model(SectionMaps):
     """A piecewise-smooth oscillator: its definition, and a factory of its compiled flow.
 
     Attributes
@@ -105,8 +105,7 @@ class Model:
         The displacement as an observable, where it may have extrema inside of segments; empty where they
         are at joints, as they are with a joint wherever the mass stops.
     definition : str
-        Text from which the model can be built anywhere (:mod:`contfric.models.description`); empty if
-        it is known by its name only.
+        Text from which the model can be built; empty if it is known by its name only.
     """
 
     name: str
@@ -144,15 +143,11 @@ class Model:
 
     @cached_property
     def integrated(self) -> dict[str, str]:
-        """Modes whose motion is integrated numerically, each with the reason; others are in closed form.
-
-        Of a model that is declared by its equations the formulas decide; of a flow that is written by hand
-        nothing is said.
-        """
+        """Modes that are integrated numerically, and why (of a model that is declared by its equations)."""
         if not self.definition:
             return {}
         from contfric.models.describe import from_text
-        from contfric.models.generate import integrated_modes
+        from contfric.models.symbols import integrated_modes
 
         return integrated_modes(from_text(self.definition))
 
@@ -165,23 +160,20 @@ class Model:
 
     def __repr__(self) -> str:
         """Say what the model is, and how its modes move."""
+        values = ", ".join(f"{p.name} = {p.default:g}" for p in self.parameters)
         lines = [f"Model {self.name}: {self.title}", f"  states: {', '.join(self.states)}"]
-        lines.append(
-            f"  parameters: {', '.join(f'{p.name} = {p.default:g}' for p in self.parameters)}"
-        )
-        if self.closed_form:
-            lines.append(f"  closed form: {', '.join(self.closed_form)}")
-        lines += [f"  integrated: {mode} ({reason})" for mode, reason in self.integrated.items()]
-        return "\n".join(lines)
+        closed = [f"  closed form: {', '.join(self.closed_form)}"] if self.closed_form else []
+        rest = [f"  integrated: {mode} ({reason})" for mode, reason in self.integrated.items()]
+        return "\n".join([*lines, f"  parameters: {values}", *closed, *rest])
+
+    def __getstate__(self) -> dict[str, Any]:
+        # what is derived, compiled code above all, belongs to this process
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @cached_property
     def flow(self) -> CompiledFlow:
         """The compiled flow of this model (loads numba at first use)."""
         return self.flow_factory()
-
-    def __getstate__(self) -> dict[str, Any]:
-        # what is derived, compiled code above all, belongs to this process
-        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def directions(self) -> int:
@@ -217,55 +209,6 @@ class Model:
     def reset_by_surface(self) -> dict[str, Reset]:
         """Resets by the names of their surfaces."""
         return {r.surface: r for r in self.resets}
-
-    @cached_property
-    def joined(self) -> dict[str, str]:
-        """The mode that each mode is a part of, for modes that were declared and are one with others."""
-        return {d.declared: d.mode for d in self.domains if d.declared}
-
-    def whole_mode(self, mode: str) -> str:
-        """Return the mode that a mode is a part of: itself, but where modes have one field."""
-        return self.joined.get(mode, mode)
-
-    @cached_property
-    def sections(self) -> frozenset[tuple[str, str]]:
-        """Pairs (declared mode, surface) that lead from one part of a mode to another: nothing changes."""
-        return frozenset(
-            (here.declared, surface)
-            for (name, surface), target in self.transitions.items()
-            if (here := self.domain_by_name[name]).declared
-            and here.mode == self.domain_by_name[target].mode
-            and here.declared != self.domain_by_name[target].declared
-        )
-
-    @cached_property
-    def section_sides(self) -> dict[tuple[str, str], int]:
-        """The side from which each section is crossed."""
-        return {
-            (d.declared, surface): d.signs[surface]
-            for d in self.domains
-            for mode, surface in self.sections
-            if d.declared == mode
-        }
-
-    def section_pair(self, mode: str, surface: str) -> tuple[str, str]:
-        """Return (mode, surface) of a section, the same for all modes that cross it from that side."""
-        whole, side = self.joined[mode], self.section_sides[mode, surface]
-        return next(
-            pair
-            for pair, other in self.section_sides.items()
-            if pair[1] == surface and other == side and self.joined[pair[0]] == whole
-        )
-
-    @cached_property
-    def section_surfaces(self) -> frozenset[str]:
-        """Surfaces that are sections, of some mode at least."""
-        return frozenset(surface for _, surface in self.sections)
-
-    @property
-    def stops_at_joints(self) -> bool:
-        """Whether motion is cut wherever the displacement is stationary on the stop surface."""
-        return self.cuts(self.stop_surface) and self.stop_surface not in self.section_surfaces
 
     def cuts(self, surface: str) -> bool:
         """Return whether motion is cut at a surface: it is switching, or has a reset."""

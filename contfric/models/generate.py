@@ -9,23 +9,17 @@ This module imports sympy; it is loaded when a model is built for the first time
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from typing import Any
 
 import sympy
 
-from contfric.errors import ModelError
-from contfric.models.affine import AffineForm, NotAffineError, affine_form
+from contfric.models.affine import AffineForm
 from contfric.models.code import SLOPES, VALUES, Lines, Output, write_block
 from contfric.models.description import Description
-from contfric.models.entries import EntryError
-from contfric.models.formulas import FORMULAS, formula, resolved
-from contfric.models.grammar import TIME, parse
 from contfric.models.linear_code import Layout, LinearWriter, layout_of, places_of
 from contfric.models.motion import motion_code, piece_code
-from contfric.models.regions import engine_order, known_sides
-from contfric.yaml_lines import Address
+from contfric.models.symbols import Formulas, moves_in_closed_form
 
 _HEAD = '''"""Compiled functions of a model, generated from its definition; not to be edited.
 
@@ -102,175 +96,6 @@ def reset(k, t, y, p, which, y1, jac):
     reset_at(k, t, y, p, which, y1, jac)
 
 """
-
-
-class Formulas:
-    """The formulas of a description, in the symbols t, s0 ... and p0 ..."""
-
-    def __init__(self, description: Description) -> None:
-        self.description = description
-        self.surfaces = engine_order(description)
-        self.t = sympy.Symbol("t")
-        self.y = sympy.symbols(f"s:{len(description.states)}")
-        self.p = sympy.symbols(f"p:{len(description.parameters)}")
-        names = [TIME, *description.states, *(p.name for p in description.parameters)]
-        values = dict(zip(names, (self.t, *self.y, *self.p), strict=True))
-        self._scope = description.names.scope(FORMULAS, values)
-        for name, text in description.define:
-            self.read(("define", name), text)
-
-    def read(self, address: Address, text: str) -> Any:
-        """Return one expression as a formula."""
-        try:
-            return formula(parse(text), self._scope)
-        except EntryError:
-            raise
-        except ModelError as error:
-            raise EntryError(address, str(error)) from None
-
-    def observables(self) -> list[Any]:
-        """Return the formula of each observable."""
-        return [self.read(("observables", o.name), o.formula) for o in self.description.observables]
-
-    def levels(self) -> list[Any]:
-        """Return the level of each surface, in the order of the description."""
-        return [
-            self.read(("surfaces", s.name, "level"), s.level) for s in self.description.surfaces
-        ]
-
-    def period(self) -> Any:
-        """Return the period, 0 if there is none."""
-        return self.read(("period",), self.description.period or "0")
-
-    def fields(self) -> list[list[Any]]:
-        """Return the field of each piece of each mode, without the kinks that the piece does not see."""
-        observables = {
-            o.name: f for o, f in zip(self.description.observables, self.observables(), strict=True)
-        }
-        found = []
-        for mode, bits in itertools.product(self.description.modes, self.pieces):
-            signs = {
-                observables[name]: bit
-                for name, bit in zip(self.description.kinks, bits, strict=True)
-            }
-            known = known_sides(mode, self.surfaces)
-            for surface, level in zip(self.description.surfaces, self.levels(), strict=True):
-                side = known.get(surface.name, 0)
-                above = observables[surface.observable] - level
-                if side != 0 and not above.is_number:
-                    signs[above] = side
-            found.append(
-                [
-                    resolved(self.read(("modes", mode.name, "field", state), rate), signs)
-                    for state, rate in zip(self.description.states, mode.field, strict=True)
-                ]
-            )
-        return found
-
-    def affine(self, formulas: list[Any]) -> list[AffineForm] | str:
-        """Return formulas as affine forms, or why one of them is none."""
-        states, found = self.description.states, []
-        for i, f in enumerate(formulas):
-            try:
-                found.append(affine_form(f, self.t, self.y, states))
-            except NotAffineError as error:
-                what = f"the rate of {states[i]}: " if len(formulas) == len(states) else ""
-                return f"{what}{error}"
-        return found
-
-    def affine_fields(self) -> list[list[AffineForm] | str]:
-        """Return the field of each piece as affine forms, or why it is none.
-
-        A model that asks for an implicit method has fast decays, along which a series takes many steps.
-        """
-        method = self.description.method
-        if method != "explicit":
-            return [f"the model asks for the method '{method}'" for _ in self.fields()]
-        return [self.affine(field) for field in self.fields()]
-
-    @property
-    def pieces(self) -> list[tuple[int, ...]]:
-        """Signs of the kinks in each piece of a mode, in the order of their bits."""
-        count = len(self.description.kinks)
-        return [
-            tuple(1 if piece >> k & 1 else -1 for k in range(count)) for piece in range(1 << count)
-        ]
-
-    def rates(self) -> list[list[Any]]:
-        """Return the rate of each observable along each piece of each mode."""
-        return [
-            [
-                sympy.expand_mul(o.diff(self.t))
-                + sum(o.diff(s) * f for s, f in zip(self.y, field, strict=True))
-                for o in self.observables()
-            ]
-            for field in self.fields()
-        ]
-
-    def projections(self) -> list[list[Any]]:
-        """Return the state on the surfaces that each mode moves on, beside a state: one Newton step.
-
-        A mode that slides forgets what its start has off its surfaces.
-        """
-        observables = dict(
-            zip((o.name for o in self.description.observables), self.observables(), strict=True)
-        )
-        found = []
-        for mode in self.description.modes:
-            state = list(self.y)
-            for surface, level in zip(self.description.surfaces, self.levels(), strict=True):
-                if mode.sides.get(surface.name) == 0:
-                    above = (observables[surface.observable] - level).xreplace(
-                        dict(zip(self.y, state, strict=True))
-                    )
-                    slope = [above.diff(s) for s in self.y]
-                    square = sum(g**2 for g in slope)
-                    state = [s - above * g / square for s, g in zip(state, slope, strict=True)]
-            found.append([sympy.expand(s) for s in state])
-        return found
-
-    def scales(self) -> list[Any]:
-        """Return the natural size of each state: its spread."""
-        return [
-            self.read(("spread", state), text)
-            for state, text in zip(self.description.states, self.description.spread, strict=True)
-        ]
-
-    def resets(self) -> list[list[Any]]:
-        """Return the map of the state at each surface."""
-        found = []
-        for surface in self.description.surfaces:
-            texts = self.description.resets.get(surface.name, {})
-            found.append(
-                [
-                    self.read(("resets", surface.name, state), texts.get(state, state))
-                    for state in self.description.states
-                ]
-            )
-        return found
-
-
-def moves_in_closed_form(description: Description, forms: Sequence[object]) -> bool:
-    """Tell whether a mode in which something moves is affine: for rest alone a second flow does not pay."""
-    pieces = 1 << len(description.kinks)
-    return any(
-        not isinstance(form, str) and 0 not in description.modes[i // pieces].sides.values()
-        for i, form in enumerate(forms)
-    )
-
-
-def integrated_modes(description: Description) -> dict[str, str]:
-    """Return the modes that are not affine, each with the reason."""
-    formulas = Formulas(description)
-    pieces, found = 1 << len(description.kinks), {}
-    forms = formulas.affine_fields()
-    for m, mode in enumerate(description.modes):
-        reasons = [f for f in forms[m * pieces : (m + 1) * pieces] if isinstance(f, str)]
-        if not reasons and not moves_in_closed_form(description, forms):
-            reasons = ["closed forms would be those of rest alone"]
-        if reasons:
-            found[mode.name] = reasons[0]
-    return found
 
 
 def module_source(description: Description, digest: str) -> str:

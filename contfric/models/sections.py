@@ -164,7 +164,7 @@ def _same_formulas(description: Description, a: str, b: str) -> bool:
     """Tell whether the fields of two modes are the same formulas, resolved on their sides."""
     import sympy
 
-    from contfric.models.generate import Formulas
+    from contfric.models.symbols import Formulas
 
     try:
         formulas = Formulas(description)

@@ -12,7 +12,7 @@ def check_kinks(report: ModelReport, model: Model) -> None:
     if not model.definition:
         return
     from contfric.models.formulas import kinks_in
-    from contfric.models.generate import Formulas
+    from contfric.models.symbols import Formulas
 
     formulas = Formulas(from_text(model.definition))
     symbols = (*formulas.y, *formulas.p)

@@ -1,0 +1,81 @@
+"""What a model says of its sections: surfaces between two parts of one mode, across which nothing changes.
+
+An orbit needs one joint at least. A model whose cycles may be smooth therefore declares the surface of its
+stops (``v = 0``) with two modes of the same field. They are one mode (:attr:`SectionMaps.joined`), and the
+surface is a section: transparent, but for cycles that meet nothing else.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from contfric.models.parts import Domain
+
+
+class SectionMaps:
+    """The part of a model that derives its sections from its domains and transitions."""
+
+    if TYPE_CHECKING:
+        domains: tuple[Domain, ...]
+        stop_surface: str
+
+        @cached_property
+        def domain_by_name(self) -> dict[str, Domain]:
+            """Domains by their names."""
+
+        @cached_property
+        def transitions(self) -> dict[tuple[str, str], str]:
+            """Next domain for each possible (domain, surface)."""
+
+        def cuts(self, surface: str) -> bool:
+            """Return whether motion is cut at a surface."""
+
+    @cached_property
+    def joined(self) -> dict[str, str]:
+        """The mode that each mode is a part of, for modes that were declared and are one with others."""
+        return {d.declared: d.mode for d in self.domains if d.declared}
+
+    def whole_mode(self, mode: str) -> str:
+        """Return the mode that a mode is a part of: itself, but where modes have one field."""
+        return self.joined.get(mode, mode)
+
+    @cached_property
+    def sections(self) -> frozenset[tuple[str, str]]:
+        """Pairs (declared mode, surface) that lead from one part of a mode to another: nothing changes."""
+        return frozenset(
+            (here.declared, surface)
+            for (name, surface), target in self.transitions.items()
+            if (here := self.domain_by_name[name]).declared
+            and here.mode == self.domain_by_name[target].mode
+            and here.declared != self.domain_by_name[target].declared
+        )
+
+    @cached_property
+    def section_sides(self) -> dict[tuple[str, str], int]:
+        """The side from which each section is crossed."""
+        return {
+            (d.declared, surface): d.signs[surface]
+            for d in self.domains
+            for mode, surface in self.sections
+            if d.declared == mode
+        }
+
+    def section_pair(self, mode: str, surface: str) -> tuple[str, str]:
+        """Return (mode, surface) of a section, the same for all modes that cross it from that side."""
+        whole, side = self.joined[mode], self.section_sides[mode, surface]
+        return next(
+            pair
+            for pair, other in self.section_sides.items()
+            if pair[1] == surface and other == side and self.joined[pair[0]] == whole
+        )
+
+    @cached_property
+    def section_surfaces(self) -> frozenset[str]:
+        """Surfaces that are sections, of some mode at least."""
+        return frozenset(surface for _, surface in self.sections)
+
+    @property
+    def stops_at_joints(self) -> bool:
+        """Whether motion is cut wherever the displacement is stationary on the stop surface."""
+        return self.cuts(self.stop_surface) and self.stop_surface not in self.section_surfaces
