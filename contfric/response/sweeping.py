@@ -130,8 +130,8 @@ def sweep(
     --------
     >>> import contfric as cf
     >>> found = cf.sweep("coulomb", "Omega", np.linspace(0.4, 0.6, 21), section=0.0)
-    >>> found.counts()
-    {<Outcome.PERIODIC: 'it repeats itself to rounding; the points are those of one period'>: 42}
+    >>> sum(found.counts().values())
+    42
     """
     model = load_model(model)
     check_executor(executor)
