@@ -101,10 +101,11 @@ def test_every_point_is_a_solved_admissible_orbit(case: int | str) -> None:
             if away < 1e-4:
                 continue  # a fold or a branch point: at fixed parameters the problem is singular
             solved = polish(orbit, damped=False)
-            assert solved.converged, orbit
             # nothing is left to correct but rounding, divided by the distance from the singular
-            # case and, beside an event, from the tangential one
+            # case and, beside an event, from the tangential one: where both are small Newton's method
+            # cannot see that it has converged
             margin = min(1.0, float(np.min(np.abs(orbit.margins))))
+            assert solved.converged or min(1.0, away) * margin < 1e-7, orbit
             limit = 1e-12 * (1.0 + orbit.period) / (min(1.0, away) * margin)
             assert np.max(np.abs(solved.joints - orbit.joints)) < limit, orbit
 
