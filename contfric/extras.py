@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 from contfric.errors import ContfricError
 
 
 class MissingPackageError(ContfricError, ImportError):
     """A package is needed that was not installed; the message says how to get it."""
+
+
+def _need(package: str, what: str, extra: str) -> None:
+    try:
+        import_module(package)
+    except ImportError as error:
+        raise MissingPackageError(
+            f"{what} need {package} ({error}): pip install 'contfric[{extra}]'"
+        ) from None
 
 
 def need_pandas() -> None:
@@ -17,12 +28,7 @@ def need_pandas() -> None:
     MissingPackageError
         If it is not installed.
     """
-    try:
-        import pandas  # noqa: F401
-    except ImportError as error:
-        raise MissingPackageError(
-            f"tables need pandas ({error}): pip install 'contfric[pandas]'"
-        ) from None
+    _need("pandas", "tables", "pandas")
 
 
 def need_bokeh() -> None:
@@ -33,9 +39,4 @@ def need_bokeh() -> None:
     MissingPackageError
         If it is not installed.
     """
-    try:
-        import bokeh  # noqa: F401
-    except ImportError as error:
-        raise MissingPackageError(
-            f"live diagrams need bokeh ({error}): pip install 'contfric[live]'"
-        ) from None
+    _need("bokeh", "live diagrams", "live")

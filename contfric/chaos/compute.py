@@ -235,17 +235,28 @@ def _checked_axes(model: Model, axes: object) -> dict[str, FloatArray]:
     grid: dict[str, FloatArray] = {}
     for name, given in axes.items():
         model.index_of(name)
-        try:
-            values = np.array(given, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
-            values = np.empty(0)
-        fine = values.ndim == 1 and len(values) > 0 and bool(np.isfinite(values).all())
-        if not fine or np.any(np.diff(values) <= 0.0):
-            raise ParameterError(
-                f"the values of '{name}' are a list of finite numbers in ascending order, got {shown(given)}"
-            )
-        grid[name] = values
+        grid[name] = ascending(name, given)
     return grid
+
+
+def ascending(name: str, given: object) -> FloatArray:
+    """Return the values of a parameter, or of a state, that a user gave: finite and ascending.
+
+    Raises
+    ------
+    ParameterError
+        If they are not.
+    """
+    try:
+        values = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        values = np.empty(0)
+    fine = values.ndim == 1 and len(values) > 0 and bool(np.isfinite(values).all())
+    if not fine or np.any(np.diff(values) <= 0.0):
+        raise ParameterError(
+            f"the values of '{name}' are a list of finite numbers in ascending order, got {shown(given)}"
+        )
+    return values
 
 
 def _checked_params(

@@ -57,8 +57,6 @@ from contfric.flow.dop853 import POWER, STAGES
 from contfric.flow.folding import folded
 from contfric.flow.hits import first_hit
 from contfric.flow.linear.method import (
-    automatic_or_linear,
-    automatic_or_linear_probe,
     explicit_or_linear,
     explicit_or_linear_probe,
 )
@@ -82,11 +80,8 @@ _METHODS = {
     Method.IMPLICIT: (implicit, implicit_probe, IMPLICIT_STAGES),
     Method.AUTOMATIC: (automatic, automatic_probe, IMPLICIT_STAGES),
 }
-#: The same where some modes are affine; those need no implicit method.
-_OR_LINEAR = {
-    Method.EXPLICIT: (explicit_or_linear, explicit_or_linear_probe, 0),
-    Method.AUTOMATIC: (automatic_or_linear, automatic_or_linear_probe, IMPLICIT_STAGES),
-}
+#: The same where some modes are affine: models that ask for another method have none in closed form.
+_OR_LINEAR = (explicit_or_linear, explicit_or_linear_probe, 0)
 #: Error that a step may make, relative to a state and relative to its scale: the error of a segment is
 #: about as large (docs/integration.md), and Newton's method on a chain of segments sees a smooth map.
 TOLERANCE = 1e-12
@@ -131,7 +126,7 @@ def integrated_motion(
     ValueError
         For an unknown method.
     """
-    attempt, probe, stages = (_METHODS if linear is None else _OR_LINEAR)[Method(method)]
+    attempt, probe, stages = _METHODS[Method(method)] if linear is None else _OR_LINEAR
     own = {} if linear is None else {k: v for k, v in linear.items() if k != "period"}
     return Bundle(
         **own,

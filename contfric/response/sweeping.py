@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.chaos.compute import ascending
 from contfric.chaos.running import Progress, Timer, check_executor, compute_chains
 from contfric.chaos.store import TileFolder, digest, open_tiles, versions
 from contfric.chaos.tiles import inside
@@ -188,16 +189,7 @@ def checked_values(model: Model, name: str, given: ArrayLike) -> FloatArray:
     """
     if name not in model.states:
         model.index_of(name)
-    try:
-        values = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        values = np.empty(0)
-    fine = values.ndim == 1 and len(values) > 0 and bool(np.isfinite(values).all())
-    if not fine or np.any(np.diff(values) <= 0.0):
-        raise ParameterError(
-            f"the values of '{name}' are a list of finite numbers in ascending order, got {shown(given)}"
-        )
-    return values
+    return ascending(name, given)
 
 
 def _defined(

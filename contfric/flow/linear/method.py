@@ -14,7 +14,6 @@ from contfric.flow.dop853 import POWER
 from contfric.flow.linear.flow import MOST_STEPS, advance
 from contfric.flow.linear.system import REACH, WAVES, rows_of, set_up, silenced, system_in
 from contfric.flow.stepping import explicit, explicit_probe
-from contfric.flow.stiffness import automatic, automatic_probe
 
 
 @allocating_helper
@@ -88,19 +87,3 @@ def explicit_or_linear_probe(motion, mode, c, t, h, p, which, room):  # type: ig
     if motion.closed(mode):
         return linear_probe(motion, mode, c, t, h, p, which, room)
     return explicit_probe(motion, mode, c, t, h, p, which, room)
-
-
-@helper
-def automatic_or_linear(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
-    """Step by the closed form where there is one (a method)."""
-    if motion.closed(mode):
-        return linear_attempt(motion, mode, c, t, h, p, which, room)
-    return automatic(motion, mode, c, t, h, p, which, room)
-
-
-@helper
-def automatic_or_linear_probe(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
-    """Probe by the closed form where there is one."""
-    if motion.closed(mode):
-        return linear_probe(motion, mode, c, t, h, p, which, room)
-    return automatic_probe(motion, mode, c, t, h, p, which, room)
