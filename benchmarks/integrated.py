@@ -19,20 +19,18 @@ import matplotlib.pyplot as plt
 import numba
 import numpy as np
 from numba import types
-from numba.core import config
 from scipy.integrate import solve_ivp
 
 import contfric as cf
-from contfric import compiled
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "integrated"))
 
 import coulomb_integrated
 import lugre_integrated
 
-from contfric.compiled import f8, flow_signature, vector
+from contfric.compiled import f8, vector
 from contfric.flow import forced_oscillator
-from contfric.flow.integrated import integrated_flow, integrated_motion
+from contfric.flow.integrated import Method
 
 ROOT = Path(__file__).resolve().parents[1]
 NONE, NOTHING = np.empty(0, dtype=np.int64), np.empty((0, 0))
@@ -123,25 +121,9 @@ def generality() -> str:
 
 @cache
 def kernel_of(module: Any, method: str, tolerance: float) -> Callable[..., Any]:
-    """A flow with a method and a tolerance of its own, compiled as the package compiles."""
-    motion = integrated_motion(
-        field=module.field,
-        observe=module.value_of,
-        rate=module.rate_of,
-        period=module.period_of,
-        scale=module.scale_of,
-        method=method,
-        relative=tolerance,
-        absolute=tolerance,
-    )
-
-    config.OPT, config.LOOP_VECTORIZE = compiled._OPTIMISATION, compiled._VECTORISE
-
-    @numba.njit(flow_signature, error_model="numpy")
-    def flow(mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
-        integrated_flow(motion, mode, t0, y0, dt, p, which, y1, jac)
-
-    return flow  # type: ignore[no-any-return]
+    """A flow with a method and a tolerance of its own."""
+    own = replace(module.FUNCTIONS, method=Method(method), relative=tolerance, absolute=tolerance)
+    return own.flow(module.level).flow  # type: ignore[no-any-return]
 
 
 #: What is integrated: module, mode, t0, y0, dt, p, scales of the states.
@@ -197,7 +179,7 @@ def error_against_time() -> tuple[str, dict[str, Any]]:
     global field  # noqa: PLW0603
     rows, curves = [], {}
     for name, (module, segment, scales) in SEGMENTS.items():
-        field = module.field
+        field = numba.njit(error_model="numpy")(module.field.__wrapped__)
         exact, y1 = np.empty(len(scales)), np.empty(len(scales))
         kernel_of(module, "explicit", 1e-14)(*segment, NONE, exact, NOTHING)
 

@@ -7,8 +7,8 @@ Two decorators:
 ``helper``
     a small function that is compiled into the kernels that call it, and not cached by itself.
 
-A flow reaches the engine as first-class functions of the fixed types below. That is what lets
-numba cache the engine: a kernel that takes a jitted function as an ordinary argument would be
+A flow reaches the engine as addresses of functions of the fixed types below (:mod:`contfric.handle`). That is
+what lets numba cache the engine: a kernel that takes a jitted function as an ordinary argument would be
 compiled anew in every process.
 
 The cache lives in ``$CONTFRIC_CACHE_DIR``, else in ``$NUMBA_CACHE_DIR``, else in the user's cache
@@ -26,7 +26,6 @@ import hashlib
 import os
 import subprocess
 import sys
-import warnings
 from collections.abc import Callable, Sequence
 from functools import cache, cached_property
 from pathlib import Path
@@ -35,15 +34,11 @@ from typing import Any, TypeVar
 import numba
 from numba import types
 from numba.core import config
-from numba.core.errors import NumbaExperimentalFeatureWarning
 
 from contfric.checked import discard, discard_damaged, list_files
 from contfric.errors import ResultFileError
 from contfric.inlined import part_options
 from contfric.resources import user_cache
-
-# First-class functions are what makes the cache possible; numba still calls them experimental.
-warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -76,21 +71,14 @@ rate_signature = f8(i8, i8, f8, vector, vector, indices, vector)
 #: reset(k, t, y, p, which, y1, jac): state behind the reset at surface k; ``jac`` (n, 1 + n + len(which))
 #: holds its derivatives with respect to t, y and the parameters ``which``; not filled if it is empty.
 reset_signature = types.void(i8, f8, vector, vector, indices, vector, matrix)
+#: field(mode, t, y, p, which, out, jac): dy/dt along a mode; ``jac`` as that of reset.
+field_signature = reset_signature
+#: scale(i, p): natural size of state i.
+scale_signature = f8(i8, vector)
 #: second(mode, c, t, y, dt, p, which, direction, jac, room): derivative of flow's ``jac`` in a direction
 #: (1 + n + 1) of (t0, y0, dt); with c >= 0 that of observable c's gradient in a direction of (t, y), in
 #: the first row of ``jac``. ``room`` holds 8 + n numbers. 0 where a flow has none.
 second_signature = i8(i8, i8, f8, vector, f8, vector, indices, vector, matrix, vector)
-
-FlowType = types.FunctionType(flow_signature)
-ObserveType = types.FunctionType(observe_signature)
-LevelType = types.FunctionType(level_signature)
-TurningType = types.FunctionType(turning_signature)
-HitType = types.FunctionType(hit_signature)
-PeriodType = types.FunctionType(period_signature)
-RateType = types.FunctionType(rate_signature)
-ResetType = types.FunctionType(reset_signature)
-SecondType = types.FunctionType(second_signature)
-
 
 #: How an entry point is compiled, and the files that numba caches it in.
 _OPTIONS = {"nogil": True, "error_model": "numpy"}
@@ -105,10 +93,12 @@ class Kernel:
     handed over must have exactly the types of the signature.
     """
 
-    def __init__(self, function: Callable[..., Any], signature: Any) -> None:
+    def __init__(self, function: Callable[..., Any], signature: Any, label: str = "") -> None:
         self.__wrapped__ = function
         self.__doc__ = function.__doc__
         self.signature = signature
+        #: Added to the name of its folder: one function may be compiled for several signatures.
+        self.label = label
 
     @cached_property
     def dispatcher(self) -> Any:
@@ -118,7 +108,7 @@ class Kernel:
         if aside is not None:
             aside.wait()  # another process is compiling it into the cache
         shelf = cache_folder(Path(function.__code__.co_filename))
-        folder = shelf / f"{function.__module__}.{function.__name__}"
+        folder = shelf / f"{function.__module__}.{function.__name__}{self.label}"
         before = config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE
         config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = str(folder), _OPTIMISATION, _VECTORISE
         try:
@@ -148,6 +138,12 @@ class Kernel:
     def _entry(self) -> Callable[..., Any]:
         (result,) = self.dispatcher.overloads.values()
         return result.entry_point  # type: ignore[no-any-return]
+
+    @cached_property
+    def address(self) -> int:
+        """Where the machine code lies: what other compiled code calls."""
+        (result,) = self.dispatcher.overloads.values()
+        return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled code."""
@@ -198,26 +194,6 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     if process.poll() is None:
         process.terminate()
     process.wait()
-
-
-class FirstClass(types.WrapperAddressProtocol):  # type: ignore[misc]
-    """A kernel as a first-class function: its address is looked up once, not at every call.
-
-    Handing numba the kernel itself costs about 16 microseconds an argument and call.
-    """
-
-    def __init__(self, kernel: Kernel) -> None:
-        from numba.experimental.function_type import _get_wrapper_address
-
-        self._kernel = kernel  # keeps the compiled code alive
-        self._address = _get_wrapper_address(kernel.dispatcher, kernel.signature)
-
-    def __wrapper_address__(self) -> int:
-        return int(self._address)
-
-    def signature(self) -> Any:
-        """Return the signature of the function."""
-        return self._kernel.signature
 
 
 #: LLVM's level, and vectorised loops or not: loops are over 3 to 10 numbers here, so that more of

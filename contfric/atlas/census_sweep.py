@@ -30,8 +30,8 @@ from contfric.compiled import (
     table,
     vector,
 )
+from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
-from contfric.orbit.equations import FunctionsType
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
 from contfric.orbit.trajectory import (
@@ -119,8 +119,8 @@ def place(functions, tables, t, y, p, none, empty, room):  # type: ignore[no-unt
         far = False
         for i in range(count):
             surface = room.surfaces[i]
-            value = functions[1](tables.observables[surface], t, y, p, none, room.grad)
-            target = functions[2](surface, p, none, empty)
+            value = functions.observe(tables.observables[surface], t, y, p, none, room.grad)
+            target = functions.level(surface, p, none, empty)
             residual[i] = value - target
             far = far or not abs(residual[i]) <= _ON * (1.0 + abs(target))
             for j in range(n):
@@ -146,8 +146,8 @@ def place(functions, tables, t, y, p, none, empty, room):  # type: ignore[no-unt
 def exit_rate(functions, tables, mode, t, y, p, none, state, room):  # type: ignore[no-untyped-def]
     """Return the rate of the exit's observable along the mode that ends."""
     at_once = t - t
-    functions[0](mode, t, y, at_once, p, none, state, room.rate)
-    functions[1](tables.observables[room.surfaces[0]], t, y, p, none, room.grad)
+    functions.flow(mode, t, y, at_once, p, none, state, room.rate)
+    functions.observe(tables.observables[room.surfaces[0]], t, y, p, none, room.grad)
     n = y.shape[0]
     rate = room.grad[0]
     for j in range(n):
@@ -157,7 +157,7 @@ def exit_rate(functions, tables, mode, t, y, p, none, state, room):  # type: ign
 
 @kernel(
     types.i8(
-        FunctionsType,
+        FlowType,
         TablesType,
         i8,
         i8,

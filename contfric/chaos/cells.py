@@ -53,8 +53,8 @@ from contfric.chaos.tangent import (
     to_joint,
 )
 from contfric.compiled import allocating_helper, f8, helper, i8, indices, kernel, matrix
+from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
-from contfric.orbit.equations import FunctionsType
 from contfric.orbit.trajectory import QUIET, StateRoom, TablesType
 
 #: A separation that grew by this factor has grown from rounding to the size of the motion: the motion
@@ -97,8 +97,8 @@ def start_code(functions, observables, t, y, p, room):  # type: ignore[no-untype
     """Return the row of an initial state in the table of starts: the signs as digits."""
     code, place = 0, 1
     for k in range(observables.shape[0]):
-        value = functions[1](observables[k], t, y, p, room.none, room.empty)
-        value -= functions[2](k, p, room.none, room.empty)
+        value = functions.observe(observables[k], t, y, p, room.none, room.empty)
+        value -= functions.level(k, p, room.none, room.empty)
         code += place * (1 if value == 0.0 else (2 if value > 0.0 else 0))
         place *= 3
     return code
@@ -132,7 +132,7 @@ def start_mode(functions, tables, starting, t, y, p, room):  # type: ignore[no-u
         for k in range(count):
             if rest % 3 == 1 and bounds[mode, k] != 0:
                 sense = 1.0 if (choice >> k) & 1 == 1 else -1.0
-                rate = functions[6](mode, observables[k], t, y, p, room.none, room.empty)
+                rate = functions.rate(mode, observables[k], t, y, p, room.none, room.empty)
                 fits = fits and sense * rate > 0.0
                 on |= 1 << k
             rest //= 3
@@ -292,7 +292,7 @@ def follow_cell(  # type: ignore[no-untyped-def]
 
 @kernel(
     types.void(
-        FunctionsType,
+        FlowType,
         TablesType,
         StartingType,
         f8,
@@ -323,7 +323,7 @@ def follow_cells(functions, tables, starting, time, vectors, states, limits, sto
         for j in range(n):
             rooms.walk.y[j] = states[cell, j]
         rows.turns[cell], rows.followed[cell] = 0, 0
-        period = functions[5](p, rooms.state.none, rooms.state.empty)
+        period = functions.period(p, rooms.state.none, rooms.state.empty)
         timeless = period <= 0.0
         rooms.walk.at_once[1] = rooms.cycle.walk.at_once[1] = 2 * walls + (1 if timeless else 0)
         if timeless:

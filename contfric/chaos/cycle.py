@@ -279,7 +279,7 @@ def stands_still(functions, mode, p, cycle, room):  # type: ignore[no-untyped-de
     """Tell whether hardly anything moves at the joint ``cycle.z``: a motion shrinks to an equilibrium."""
     walk, z, still = cycle.walk, cycle.z, True
     n = walk.y.shape[0]
-    functions[0](mode, z[0], z[1:], 0.0, p, room.none, walk.end, walk.jac)
+    functions.flow(mode, z[0], z[1:], 0.0, p, room.none, walk.end, walk.jac)
     for j in range(n):
         still = still and abs(walk.jac[j, 1 + n]) <= _SLOW * (1.0 + abs(z[1 + j]))
     return still

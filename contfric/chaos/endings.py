@@ -74,7 +74,7 @@ def averaged(averages, live, turns, over, tolerance, rows, cell):  # type: ignor
 def flow_spectrum(functions, rank, mode, t, p, time, walk, cycle, rows):  # type: ignore[no-untyped-def]
     """Write the multipliers of a mode's flow over some time to ``cycle.mu``."""
     n = walk.y.shape[0]
-    functions[0](mode, t, walk.y, time, p, rows.turns[:0], walk.end, walk.jac)
+    functions.flow(mode, t, walk.y, time, p, rows.turns[:0], walk.end, walk.jac)
     for i in range(n):
         for j in range(n):
             cycle.work[i, j] = walk.jac[i, 1 + j]
@@ -112,7 +112,7 @@ def polish(functions, mode, t, p, walk, cycle, rows):  # type: ignore[no-untyped
     """Move ``walk.y`` to the equilibrium of a mode beside it, where there is one and no continuum."""
     n = walk.y.shape[0]
     for _ in range(_POLISHES):
-        functions[0](mode, t, walk.y, 1.0, p, rows.turns[:0], walk.end, walk.jac)
+        functions.flow(mode, t, walk.y, 1.0, p, rows.turns[:0], walk.end, walk.jac)
         for i in range(n):
             for j in range(n):
                 cycle.left[i, j] = (1.0 if i == j else 0.0) - walk.jac[i, 1 + j]
@@ -162,7 +162,7 @@ def write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, c
 def speed(functions, mode, t, p, walk, rows):  # type: ignore[no-untyped-def]
     """Return how fast a state changes in a mode, relative to 1 + its size."""
     n, fastest = walk.y.shape[0], 0.0
-    functions[0](mode, t, walk.y, 0.0, p, rows.turns[:0], walk.end, walk.jac)
+    functions.flow(mode, t, walk.y, 0.0, p, rows.turns[:0], walk.end, walk.jac)
     for j in range(n):
         share = abs(walk.jac[j, 1 + n]) / (1.0 + abs(walk.y[j]))
         fastest = share if not share <= fastest else fastest
@@ -184,10 +184,10 @@ def starts_at_rest(functions, tables, ranks, t, p, walk, cycle, rows, cell):  # 
 def write_quiet(functions, tables, ranks, mode, t, p, period, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
     """Write what a motion is that no surface cuts any more: at rest, of one period, or nothing."""
     n, excited = walk.y.shape[0], walk.at_once[1] & 1 == 0
-    functions[0](mode, t, walk.y, _SETTLES * period, p, rows.turns[:0], walk.image, walk.jac[:0])
+    functions.flow(mode, t, walk.y, _SETTLES * period, p, rows.turns[:0], walk.image, walk.jac[:0])
     for j in range(n):
         walk.y[j] = walk.image[j]
-    functions[0](mode, t, walk.y, period, p, rows.turns[:0], walk.end, walk.jac)
+    functions.flow(mode, t, walk.y, period, p, rows.turns[:0], walk.end, walk.jac)
     still, large = True, False
     for j in range(n):
         still = still and abs(walk.end[j] - walk.y[j]) <= _STILL * (1.0 + abs(walk.y[j]))

@@ -144,7 +144,7 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
         if walk.at_once[0] > MOST_AT_ONCE:
             return CHATTER if struck else IMPOSSIBLE, surface, mode, duration, turns, t
         if reset:  # the state before it stays where the hit has left it
-            functions[7](surface, t, room.after, p, room.none, y, room.nothing)
+            functions.reset(surface, t, room.after, p, room.none, y, room.nothing)
         code = sign_code(functions, observables, surface, t, y, p, room.none, room.empty)
         count = observables.shape[0]
         following = tables.following[(mode * count + surface) * (1 << count) + code]
@@ -167,7 +167,7 @@ def too_large(functions, mode, duration, p, walk, room):  # type: ignore[no-unty
     for _ in range(_HALVINGS):
         middle, finite, here = 0.5 * (low + high), True, 0.0
         time = middle * duration
-        functions[0](mode, start[0], start[1:], time, p, room.none, walk.end, room.nothing)
+        functions.flow(mode, start[0], start[1:], time, p, room.none, walk.end, room.nothing)
         for j in range(y.shape[0]):
             finite = finite and abs(walk.end[j]) < TOO_LARGE
             here = max(here, abs(walk.end[j]))
@@ -183,9 +183,9 @@ def differentiate(functions, observable, mode, duration, t, p, walk, none):  # t
     """Differentiate the segment that a walk has just finished; return the rate at its exit."""
     n = walk.y.shape[0]
     jac, grad, start = walk.jac, walk.grad, walk.start
-    functions[0](mode, start[0], start[1:], duration, p, none, walk.end, jac)
+    functions.flow(mode, start[0], start[1:], duration, p, none, walk.end, jac)
     met = walk.end if walk.at_once[1] & 2 != 0 else walk.y  # before a reset
-    functions[1](observable, t, met, p, none, grad)
+    functions.observe(observable, t, met, p, none, grad)
     rate = grad[0]
     for k in range(n):
         rate += grad[1 + k] * jac[k, 1 + n]
@@ -196,7 +196,7 @@ def differentiate(functions, observable, mode, duration, t, p, walk, none):  # t
 def behind(functions, surface, t, p, frame, count, walk, room, reset):  # type: ignore[no-untyped-def]
     """Carry the first rows of a frame behind a joint: over its reset, and without time if there is none."""
     if reset:
-        functions[7](surface, t, room.after, p, room.none, walk.end, walk.jac)
+        functions.reset(surface, t, room.after, p, room.none, walk.end, walk.jac)
         leap(frame, count, walk.jac, walk.image)
     if walk.at_once[1] & 1 != 0:
         for i in range(count):

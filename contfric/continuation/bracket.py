@@ -26,7 +26,8 @@ from contfric.continuation.steps import (
     settle,
     step_room,
 )
-from contfric.orbit.equations import FunctionsType, LayoutType, close_chain
+from contfric.flow.layouts import FlowType
+from contfric.orbit.equations import LayoutType, close_chain
 from contfric.orbit.monitor import (
     count_margins,
     crossings,
@@ -157,7 +158,7 @@ def between(za, zb, ta, tb, wa, wb, sa, sb, length, x, z, t):  # type: ignore[no
 
 @kernel(
     f8(
-        FunctionsType,
+        FlowType,
         LayoutType,
         vector,
         i8,

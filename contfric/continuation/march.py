@@ -33,7 +33,8 @@ from contfric.continuation.steps import (
     settle,
     step_room,
 )
-from contfric.orbit.equations import FunctionsType, LayoutType
+from contfric.flow.layouts import FlowType
+from contfric.orbit.equations import LayoutType
 from contfric.orbit.newton import ALONG, INTEGRATED, ON_THE_WAY
 
 #: Why a march stopped.
@@ -117,7 +118,7 @@ StartType = types.UniTuple(matrix, 4)
 
 @kernel(
     types.Tuple((i8, i8, f8))(
-        FunctionsType,
+        FlowType,
         LayoutType,
         vector,
         i8,

@@ -35,10 +35,10 @@ def segment_jacobian(functions, layout, i, start, duration, p, which, out, equat
         n = state.shape[0]
         leap(functions, layout, i, start, p, which, equations)
         begin = equations.behind[n, :n]
-        functions[0](mode, start[0], begin, duration, p, which, state, out)
+        functions.flow(mode, start[0], begin, duration, p, which, state, out)
         behind_reset(out, equations.behind, equations.grad, n)
     else:
-        functions[0](mode, start[0], start[1:], duration, p, which, state, out)
+        functions.flow(mode, start[0], start[1:], duration, p, which, state, out)
 
 
 @helper
@@ -48,7 +48,7 @@ def bend_flow(  # type: ignore[no-untyped-def]
     """Write the derivative of the flow's jacobian in a direction."""
     mode = layout.modes[i]
     none = min(mode, 0) - 1  # -1, but no literal
-    if layout.departs[i] >= RETURNS and second(
+    if layout.departs[i] >= RETURNS and second.second(
         mode, none, start[0], start[1:], duration, p, which, along, out, bordered.numbers
     ):
         return
@@ -94,7 +94,7 @@ def bend_mean_rate(functions, layout, i, start, duration, p, which, along, room)
 @helper
 def bend_observable(functions, second, c, at, p, which, along, out, bordered, equations):  # type: ignore[no-untyped-def]
     """Write the derivative of an observable's gradient in a direction of (t, y) to the first row."""
-    if second(0, c, at[0], at[1:], 0.0, p, which, along, out, bordered.numbers):
+    if second.second(0, c, at[0], at[1:], 0.0, p, which, along, out, bordered.numbers):
         return
     m, step = at.shape[0], bordered.difference[0]
     displaced, grad = bordered.start, equations.grad
@@ -102,6 +102,6 @@ def bend_observable(functions, second, c, at, p, which, along, out, bordered, eq
         h = step if side == 0 else -step
         for j in range(m):
             displaced[j] = at[j] + h * along[j]
-        functions[1](c, displaced[0], displaced[1:], p, which, grad)
+        functions.observe(c, displaced[0], displaced[1:], p, which, grad)
         for j in range(grad.shape[0]):
             out[0, j] = grad[j] if side == 0 else (out[0, j] - grad[j]) / (2.0 * step)

@@ -12,13 +12,14 @@ import math
 import numpy as np
 from numba import types
 
-from contfric.compiled import SecondType, blocks, f8, helper, i8, indices, kernel, matrix, vector
+from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, vector
 from contfric.continuation.bracket import BY_LABEL, BY_PARAMETER, BY_TEST
 from contfric.continuation.steps import AT_EVENT
 from contfric.curves.conditions import ConditionType, curve_room
 from contfric.curves.correct import observe_curve, settle_curve
 from contfric.curves.march import RowsType
-from contfric.orbit.equations import FunctionsType, LayoutType
+from contfric.flow.layouts import FlowType, SecondType
+from contfric.orbit.equations import LayoutType
 
 __all__ = ["BY_LABEL", "BY_PARAMETER", "BY_TEST", "locate_on_curve"]
 
@@ -84,7 +85,7 @@ def keep_trial(points):  # type: ignore[no-untyped-def]
 
 @kernel(
     types.Tuple((i8, f8))(
-        FunctionsType,
+        FlowType,
         SecondType,
         LayoutType,
         ConditionType,

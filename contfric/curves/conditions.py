@@ -109,7 +109,7 @@ def interior_value(functions, layout, condition, z, p, which, room):  # type: ig
         found = find_behind(functions, layout, i, c, z, p, equations, turnings)
     else:
         found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
-    target = functions[2](surface, p, which, level_grad)
+    target = functions.level(surface, p, which, level_grad)
     best = -1
     for k in range(found):
         if best < 0 or abs(turnings.values[k] - target) < abs(turnings.values[best] - target):
@@ -118,7 +118,7 @@ def interior_value(functions, layout, condition, z, p, which, room):  # type: ig
         return np.nan
     time, state = turnings.times[best], equations.state
     segment_jacobian(functions, layout, i, z[i], time, p, which, jac, equations)
-    value = functions[1](c, z[i, 0] + time, state, p, which, grad) - target
+    value = functions.observe(c, z[i, 0] + time, state, p, which, grad) - target
     room.d[1, i, 0] += grad[0]
     for a in range(n):
         for k in range(1 + n):
@@ -137,12 +137,12 @@ def start_condition(functions, layout, i, c, target, z, p, which, room):  # type
     grad, behind = equations.grad, equations.behind
     n = z.shape[1] - 1
     if layout.departs[i] >= RETURNS:
-        value = functions[1](c, z[i, 0], z[i, 1:], p, which, grad) - target
+        value = functions.observe(c, z[i, 0], z[i, 1:], p, which, grad) - target
         for j in range(1 + n):
             room.d[1, i, j] += grad[j]
     else:
         leap(functions, layout, i, z[i], p, which, equations)
-        value = functions[1](c, z[i, 0], behind[n, :n], p, which, grad) - target
+        value = functions.observe(c, z[i, 0], behind[n, :n], p, which, grad) - target
         room.d[1, i, 0] += grad[0]
         for a in range(n):
             for j in range(1 + n):
@@ -171,15 +171,15 @@ def condition_value(functions, second, layout, condition, z, p, which, border, r
     c = layout.observables[surface]
     after = z[i + 1] if i + 1 < z.shape[0] else equations.last
     if condition.kind == EXIT:
-        value = functions[6](layout.modes[i], c, after[0], after[1:], p, which, grad)
+        value = functions.rate(layout.modes[i], c, after[0], after[1:], p, which, grad)
         spread_end(grad, i, room)
         return value
     level_grad = equations.level_grad
-    target = functions[2](surface, p, which, level_grad)
+    target = functions.level(surface, p, which, level_grad)
     for k in range(which.shape[0]):
         room.e[1, k] -= level_grad[k]
     if condition.kind == JOINT:
-        value = functions[1](c, after[0], after[1:], p, which, grad) - target
+        value = functions.observe(c, after[0], after[1:], p, which, grad) - target
         spread_end(grad, i, room)
         return value
     return start_condition(functions, layout, i, c, target, z, p, which, room)

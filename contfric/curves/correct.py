@@ -125,7 +125,7 @@ def add_rate(functions, layout, i, after, p, which, grad, rows):  # type: ignore
     """
     m, free = after.shape[0], which.shape[0]
     row, c = 2 * m - 1, layout.observables[layout.exits[i]]
-    rate = functions[6](layout.modes[i], c, after[0], after[1:], p, which, grad)
+    rate = functions.rate(layout.modes[i], c, after[0], after[1:], p, which, grad)
     for k in range(m):
         rows[row, 2 * m + k] += grad[k]
     for k in range(free):
@@ -262,7 +262,7 @@ def bend_value(functions, second, layout, condition, z, p, which, room):  # type
         i, equations = condition.segment, room.equations
         after = z[i + 1] if i + 1 < z.shape[0] else equations.last
         c = layout.observables[condition.surface]
-        return functions[6](
+        return functions.rate(
             condition.rest, c, after[0], after[1:], p, equations.none, equations.empty
         )
     return 1.0
@@ -278,7 +278,7 @@ def other_touches(functions, layout, row, z, p, room):  # type: ignore[no-untype
         found = find_behind(functions, layout, i, c, z, p, equations, turnings)
     else:
         found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
-    target = functions[2](surface, p, equations.none, equations.empty)
+    target = functions.level(surface, p, equations.none, equations.empty)
     touch, least = -1, np.inf
     for k in range(found):
         gap = abs(turnings.values[k] - target)

@@ -14,7 +14,6 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import (
-    SecondType,
     blocks,
     f8,
     helper,
@@ -51,7 +50,8 @@ from contfric.curves.correct import (
     plane_product,
     settle_curve,
 )
-from contfric.orbit.equations import FunctionsType, LayoutType
+from contfric.flow.layouts import FlowType, SecondType
+from contfric.orbit.equations import LayoutType
 
 #: The points of a curve as the march writes them, one a row: joints, parameters, both tangents,
 #: arclength, tests, labels, multipliers.
@@ -110,7 +110,7 @@ def closes(z, w, last_z, last_w, start_z, start_w, scale, step):  # type: ignore
 
 @kernel(
     types.Tuple((i8, i8, f8))(
-        FunctionsType,
+        FlowType,
         SecondType,
         LayoutType,
         ConditionType,

@@ -131,7 +131,7 @@ def first_hit(motion, mode, c, target, on, t0, y0, dt_max, p, room, y1):  # type
         write(y0, y1)
         return 0.0
     sign, multiple = leaving(left, on)
-    side = motion.side(mode, c) if on else 0.0
+    side = motion.sides[(mode >> motion.kinks) * motion.observables + c] if on else 0.0
     if sign * side < 0.0:  # it leaves the level to where the mode does not live
         write(y0, y1)
         return 0.0

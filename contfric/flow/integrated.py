@@ -1,42 +1,24 @@
-"""Flow by numerical integration: the seven functions of a model from its fields.
+"""A flow from the functions of a model: its fields, its observables, and what else is its own.
 
-To write a model whose motion is integrated, write a module with these helpers (decorated with
-:func:`contfric.compiled.helper`: they must not allocate). There are n states; ``which`` lists the m
-parameters that are differentiated by; whatever has no room (an array of length 0) is not filled.
+To write a model by hand, write its functions as kernels (decorated with
+:func:`contfric.compiled.kernel`). There are n states; ``which`` lists the m parameters that are
+differentiated by; whatever has no room (an array of length 0) is not filled.
 
-1. ``field(mode, t, y, p, which, out, jac)``: write dy/dt to ``out`` (n,) and, if ``jac`` (n, 1 + n + m)
-   has rows, its derivatives by t, y and ``p[which]``. A mode is one smooth field: it is evaluated a
-   little beyond the surfaces that bound it, so that ``|v|`` is ``v`` in the mode with v > 0, and not
-   ``abs(v)``.
+1. ``field(mode, t, y, p, which, out, jac)`` (``field_signature``): write dy/dt to ``out`` (n,) and, if
+   ``jac`` (n, 1 + n + m) has rows, its derivatives by t, y and ``p[which]``. A mode is one smooth field: it
+   is evaluated a little beyond the surfaces that bound it, so that ``|v|`` is ``v`` in the mode with v > 0,
+   and not ``abs(v)``.
 2. ``observe(c, t, y, p, which, grad)``: return observable c; its derivatives to ``grad`` (1 + n + m,).
 3. ``rate(mode, c, t, y, p, which, grad)``: return the rate of observable c along a mode; the same
    gradient.
 4. ``period(p, which, grad)``: return the period of the excitation, 0 if there is none; ``grad`` (m,).
    The field and the observables must have this period.
-5. ``scale(i, p)``: return the natural size of state i, the unit of its absolute tolerance. A state that
-   is multiplied by a stiffness of 1000 in the field has the scale 1/1000.
-6. ``side(mode, c)``, if a mode lives on one side of a level of observable c that its segments start on:
-   return 1 above it, -1 below it, 0 otherwise. A start that leaves to the other side hits at once.
+5. ``scale(i, p)`` (``scale_signature``): return the natural size of state i, the unit of its absolute
+   tolerance. A state that is multiplied by a stiffness of 1000 in the field has the scale 1/1000.
+6. ``level(k, p, which, grad)``: return the level of surface k.
 
-Then bundle them, and write the kernels::
-
-    MOTION = integrated_motion(field=field, observe=observe, rate=rate, period=period, scale=scale)
-
-    @kernel(flow_signature)
-    def flow(mode, t0, y0, dt, p, which, y1, jac):
-        integrated_flow(MOTION, mode, t0, y0, dt, p, which, y1, jac)
-
-    @kernel(hit_signature)
-    def hit(mode, c, target, on, t0, y0, dt_max, p, y1):
-        return integrated_hit(MOTION, mode, c, target, on, t0, y0, dt_max, p, y1)
-
-    @kernel(turning_signature)
-    def turning(mode, c, t0, y0, dt, p, times, values):
-        return integrated_turning(MOTION, mode, c, t0, y0, dt, p, times, values)
-
-The four other kernels (``observe``, ``level``, ``period``, ``rate``) call their helpers, and
-``CompiledFlow(flow, observe, level, turning, hit, period, rate)`` is the flow. A helper and a kernel
-need different names. ``tests/integrated`` has such modules written by hand.
+Then ``Functions(field=field, ...).flow(level)`` is the flow, a ``CompiledFlow``. ``tests/integrated`` has
+such modules. Only these functions are compiled for the model; the integrators are compiled once for all.
 
 What breaks down (a state beyond all numbers, too many steps, a field that is no number) is handed back
 as states that are no numbers, and as -1 stationary points; the engine says so.
@@ -44,27 +26,19 @@ as states that are no numbers, and as -1 stationary points; the engine says so.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+import dataclasses
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import Any
 
-import numpy as np
-
-from contfric.compiled import allocating_helper, helper
-from contfric.flow.bundle import Bundle
-from contfric.flow.dop853 import POWER, STAGES
-from contfric.flow.folding import folded
-from contfric.flow.hits import first_hit
-from contfric.flow.linear.method import (
-    explicit_or_linear,
-    explicit_or_linear_probe,
-)
-from contfric.flow.radau import IMPLICIT_STAGES
-from contfric.flow.stepping import explicit, explicit_probe, first_step, next_step, settle
-from contfric.flow.stiffness import automatic, automatic_probe, implicit, implicit_probe
-from contfric.flow.turnings import all_turnings
-from contfric.flow.variations import begin, make_room
+from contfric.compiled import Kernel
+from contfric.flow.dop853 import POWER
+from contfric.flow.general import Solver, kernels_of, still
+from contfric.flow.interface import CompiledFlow
+from contfric.flow.layouts import MODEL
+from contfric.handle import Block, Bound
 
 
 class Method(str, Enum):
@@ -75,146 +49,125 @@ class Method(str, Enum):
     AUTOMATIC = "automatic"
 
 
-_METHODS = {
-    Method.EXPLICIT: (explicit, explicit_probe, 0),
-    Method.IMPLICIT: (implicit, implicit_probe, IMPLICIT_STAGES),
-    Method.AUTOMATIC: (automatic, automatic_probe, IMPLICIT_STAGES),
-}
-#: The same where some modes are affine: models that ask for another method have none in closed form.
-_OR_LINEAR = (explicit_or_linear, explicit_or_linear_probe, 0)
 #: Error that a step may make, relative to a state and relative to its scale: the error of a segment is
 #: about as large (docs/integration.md), and Newton's method on a chain of segments sees a smooth map.
 TOLERANCE = 1e-12
 
 
-@helper
-def no_side(mode, c):  # type: ignore[no-untyped-def]
-    """Return that a mode may leave a level to both sides."""
-    return 0.0
+@dataclass(frozen=True)
+class AffineModes:
+    """The modes that are affine, and their functions (:mod:`contfric.models.linear_code`).
 
-
-def integrated_motion(
-    *,
-    field: Callable[..., Any],
-    observe: Callable[..., Any],
-    rate: Callable[..., Any],
-    period: Callable[..., Any],
-    scale: Callable[..., Any],
-    side: Callable[..., Any] | None = None,
-    method: Method | str = Method.EXPLICIT,
-    relative: float = TOLERANCE,
-    absolute: float = TOLERANCE,
-    kinks: int = 0,
-    kink: Callable[..., Any] | None = None,
-    linear: Mapping[str, Any] | None = None,
-) -> Bundle:
-    """Bundle the helpers of a model, as the kernels of its flow take them.
-
-    Parameters
+    Attributes
     ----------
-    field, observe, rate, period, scale, side : the helpers that the module describes
+    functions : by their names, ``entries`` to ``look`` (:mod:`contfric.flow.layouts`)
+    entries, waves : most coefficients of a mode or an observable, and number of frequencies
+    closed, seen : the pieces of modes, and the observables, that are affine
+    """
+
+    functions: Mapping[str, Kernel]
+    entries: int
+    waves: int
+    closed: Collection[int]
+    seen: Collection[int]
+
+
+@dataclass(frozen=True)
+class Functions:
+    """What motions are found from.
+
+    Attributes
+    ----------
+    field, observe, rate, period, scale : the functions that the module describes
+    modes, observables : how many there are
     method : ``explicit`` (order 8), or ``automatic`` where a mode is stiff: it changes to the implicit
-        method and back as the motion asks for it, and takes longer to compile
+        method and back as the motion asks for it
     relative, absolute : error that a step may make relative to a state, and to its scale
-    kinks, kink : number of kinks of the field, and a helper from a kink to the observable that vanishes
-        there (:mod:`contfric.flow.kinked`)
-    linear : helpers of the modes that are affine (:mod:`contfric.flow.linear`), with ``closed(mode)``, which
-        tells them from others
-
-    Raises
-    ------
-    ValueError
-        For an unknown method.
+    sides : for (mode, observable): the side, 1 or -1, of a level of the observable that segments of the
+        mode which start on it leave to; one that leaves to the other side hits at once
+    kinks : the observables that vanish where the field has a kink (:mod:`contfric.flow.kinked`); ``field``
+        and ``rate`` take pieces of modes then
+    slides, onto : modes that slide, and ``onto(mode, t, y, p, which, y1, jac)``, which puts a state on their
+        surfaces
+    idle : pairs (mode, observable) for which the observable keeps its value along the mode
+    timed : observables of time alone
+    affine : modes in closed form, if there are any
     """
-    attempt, probe, stages = _METHODS[Method(method)] if linear is None else _OR_LINEAR
-    own = {} if linear is None else {k: v for k, v in linear.items() if k != "period"}
-    return Bundle(
-        **own,
-        field=field,
-        observe=observe,
-        rate=rate,
-        period=period,
-        scale=scale,
-        side=no_side if side is None else side,
-        relative=float(relative),
-        absolute=float(absolute),
-        attempt=attempt,
-        probe=probe,
-        stages=stages,
-        looseness=(max(relative, absolute) / 1e-12) ** (1.0 / POWER),
-        kinks=int(kinks),
-        kink=kink or observe,
-    )
 
+    field: Kernel
+    observe: Kernel
+    rate: Kernel
+    period: Kernel
+    scale: Kernel
+    modes: int
+    observables: int
+    method: Method = Method.EXPLICIT
+    relative: float = TOLERANCE
+    absolute: float = TOLERANCE
+    sides: Mapping[tuple[int, int], int] = dataclasses.field(default_factory=dict)
+    kinks: Sequence[int] = ()
+    slides: Collection[int] = ()
+    onto: Kernel | None = None
+    idle: Collection[tuple[int, int]] = ()
+    timed: Collection[int] = ()
+    affine: AffineModes | None = None
 
-@helper
-def advance(motion, mode, t0, dt, y0, p, which, room):  # type: ignore[no-untyped-def]
-    """Integrate over ``dt`` (of either sign) in ``room``; tell whether the end was reached."""
-    begin(motion, y0, p, which, room)
-    first_step(motion, mode, -1, t0, dt, p, which, room)
-    if not math.isfinite(t0 + dt):
-        return False
-    done = 0.0
-    while done != dt:
-        left = dt - done
-        h = next_step(motion, mode, -1, t0 + done, left, p, which, room)
-        if math.isnan(h):
-            return False
-        done = dt if h == left else done + h
-        settle(room)
-    return True
+    @property
+    def solver(self) -> Solver:
+        """How motions are found."""
+        if self.affine is None:
+            return Solver(Method(self.method).value)
+        every = len(self.affine.closed) == self.modes << len(self.kinks)
+        seen = len(self.affine.seen) == self.observables
+        return Solver.CLOSED_FORM if every and seen and not self.kinks else Solver.MIXED
 
+    def flow(self, level: Kernel, **others: Any) -> CompiledFlow:
+        """Return the flow.
 
-@helper
-def hand_back(room, fine, y1, jac):  # type: ignore[no-untyped-def]
-    """Write the state and its derivatives by (t0, y0, dt, parameters)."""
-    n, columns = room.scales.shape[0], room.partial.shape[1]
-    for i in range(n):
-        y1[i] = room.start[i] if fine else math.nan
-    for i in range(n if columns > 0 else 0):
-        row = n + i * columns
-        for j in range(columns):
-            jac[i, j if j <= n else j + 1] = room.start[row + j] if fine else math.nan
-        jac[i, 1 + n] = room.slopes[0, i] if fine else math.nan
+        Parameters
+        ----------
+        level : levels of the surfaces
+        others : ``rate`` along modes, where that of pieces is another function; ``reset``
+        """
+        flow, hit, turning = (Bound(kernel, self.block) for kernel in kernels_of(self.solver))
+        rate = others.pop("rate", self.rate)
+        return CompiledFlow(flow, self.observe, level, turning, hit, self.period, rate, **others)
 
+    @cached_property
+    def block(self) -> Block:
+        """The memory that a handle of these functions points to."""
+        names = ("field", "observe", "rate", "period", "scale", "onto")
+        values: dict[str, Any] = {name: getattr(self, name) for name in names}
+        if self.affine is not None:
+            values |= self.affine.functions
+        if self.timed:
+            pieces = self.modes << len(self.kinks)
+            none: dict[str, Any] = {"sides": {}, "kinks": (), "slides": (), "idle": (), "timed": ()}
+            clock = dataclasses.replace(self, field=still, modes=pieces, affine=None, **none)
+            values["clock"] = clock.block
+        return Block(MODEL, {**values, **self._tables(), **self._numbers()})
 
-@allocating_helper
-def integrated_flow(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
-    """Advance a state by ``dt``, with derivatives where ``jac`` has room (``flow_signature``).
+    def _tables(self) -> dict[str, list[int]]:
+        pieces = range(self.modes << len(self.kinks))
+        modes, observables = range(self.modes), range(self.observables)
+        closed, seen = (self.affine.closed, self.affine.seen) if self.affine else ((), ())
+        return {
+            "closed": [int(piece in closed) for piece in pieces],
+            "seen": [int(c in seen) for c in observables],
+            "slides": [int(mode in self.slides) for mode in modes],
+            "idle": [int((mode, c) in self.idle) for mode in modes for c in observables],
+            "timed": [int(c in self.timed) for c in observables],
+            "sides": [self.sides.get((mode, c), 0) for mode in modes for c in observables],
+            "kink_of": list(self.kinks),
+        }
 
-    The phase is folded into one period; the fold depends on the parameters as the period does.
-    """
-    n, free = y0.shape[0], which.shape[0]
-    columns = 1 + n + free if jac.shape[0] > 0 else 0
-    grad = np.empty(free)
-    period = motion.period(p, which, grad)
-    cycles = folded(t0, period)
-    room = make_room(n, 0, columns, STAGES, motion.stages)
-    fine = advance(motion, mode, t0 - cycles * period, dt, y0, p, which, room)
-    hand_back(room, fine, y1, jac)
-    if columns > 0 and cycles != 0.0:
-        for i in range(n):
-            for k in range(free):
-                jac[i, 2 + n + k] -= cycles * grad[k] * jac[i, 0]
-
-
-@allocating_helper
-def integrated_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-untyped-def]
-    """Return the first time at which an observable takes a value (``hit_signature``)."""
-    if not dt_max > 0.0:
-        return -1.0
-    room = make_room(y0.shape[0], 1, 0, STAGES, motion.stages)
-    period = motion.period(p, room.none, room.empty)
-    phase = t0 - folded(t0, period) * period
-    return first_hit(motion, mode, c, target, on, phase, y0, dt_max, p, room, y1)
-
-
-@allocating_helper
-def integrated_turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
-    """Write the stationary points of an observable and return their number (``turning_signature``)."""
-    if not dt > 0.0:
-        return 0
-    room = make_room(y0.shape[0], 1, 0, STAGES, motion.stages)
-    period = motion.period(p, room.none, room.empty)
-    phase = t0 - folded(t0, period) * period
-    return all_turnings(motion, mode, c, phase, y0, dt, p, room, times, values)
+    def _numbers(self) -> dict[str, float]:
+        return {
+            "relative": float(self.relative),
+            "absolute": float(self.absolute),
+            "looseness": (max(self.relative, self.absolute) / 1e-12) ** (1.0 / POWER),
+            "kinks": len(self.kinks),
+            "observables": self.observables,
+            "entries_count": self.affine.entries if self.affine else 0,
+            "waves_count": self.affine.waves if self.affine else 0,
+        }

@@ -11,9 +11,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-#: Place of ``turning`` among the functions.
-_TURNING = 3
-
 
 @dataclass(frozen=True)
 class CompiledFlow:
@@ -43,47 +40,34 @@ class CompiledFlow:
     reset: Any = field(default=None, kw_only=True)
     second: Any = field(default=None, kw_only=True)
 
-    def functions(self) -> tuple[Any, ...]:
-        """Return the functions as kernels take them."""
-        return self._first_class
+    def functions(self) -> int:
+        """Return the functions as kernels take them: a handle (:mod:`contfric.flow.layouts`)."""
+        return self._blocks[0].address  # type: ignore[no-any-return]
 
-    def following(self) -> tuple[Any, ...]:
+    def following(self) -> int:
         """Return the functions for kernels that only follow motions: without ``turning``.
 
-        Where motion is integrated, ``turning`` takes half of the time of compilation; the orbits ask for
-        it, but neither a simulation nor a Lyapunov exponent does.
+        It is not compiled for them: the orbits ask for it, but neither a simulation nor a Lyapunov exponent.
         """
-        return self._without_turning
+        return self._blocks[1].address  # type: ignore[no-any-return]
+
+    @property
+    def second_derivatives(self) -> int:
+        """Return the second derivatives as kernels take them; what says that there are none by default."""
+        return self._blocks[2].address  # type: ignore[no-any-return]
 
     @cached_property
-    def second_derivatives(self) -> Any:
-        """Return the second derivatives as kernels take them; one that says that there is none by default."""
-        from contfric.compiled import FirstClass
-        from contfric.flow.without import no_second
-
-        return FirstClass(no_second if self.second is None else self.second)
-
-    @cached_property
-    def _without_turning(self) -> tuple[Any, ...]:
-        from contfric.compiled import FirstClass
+    def _blocks(self) -> tuple[Any, Any, Any]:
+        """The memory behind the handles: all functions, those without ``turning``, second derivatives."""
+        from contfric.flow.layouts import FLOW, SECOND
         from contfric.flow.resets import no_reset
-        from contfric.flow.without import no_turning
+        from contfric.flow.without import no_second, no_turning
+        from contfric.handle import Block
 
-        order = (
-            self.flow,
-            self.observe,
-            self.level,
-            no_turning,
-            self.hit,
-            self.period,
-            self.rate,
-            self.reset or no_reset,
+        values = {name: getattr(self, name) for name in FLOW}
+        values["reset"] = self.reset or no_reset
+        return (
+            Block(FLOW, values),
+            Block(FLOW, {**values, "turning": no_turning}),
+            Block(SECOND, {"second": self.second or no_second}),
         )
-        return tuple(FirstClass(kernel) for kernel in order)
-
-    @cached_property
-    def _first_class(self) -> tuple[Any, ...]:
-        from contfric.compiled import FirstClass
-
-        before, after = self._without_turning[:_TURNING], self._without_turning[_TURNING + 1 :]
-        return (*before, FirstClass(self.turning), *after)

@@ -32,7 +32,6 @@ from contfric.flow.dense import is_flat, node, probed, write
 from contfric.flow.dop853 import STAGES
 from contfric.flow.folding import folded
 from contfric.flow.hits import _FLAT, first_hit, first_in_step, leaving
-from contfric.flow.integrated import hand_back
 from contfric.flow.stepping import (
     FRESH,
     MOST_STEPS,
@@ -56,10 +55,10 @@ def piece_at(motion, mode, t, y, on, p, room):  # type: ignore[no-untyped-def]
     first = mode << motion.kinks
     n = room.scales.shape[0]
     for k in range(motion.kinks):
-        side = motion.observe(motion.kink(k), t, y, p, room.none, room.empty)
+        side = motion.observe(motion.kink_of[k], t, y, p, room.none, room.empty)
         if side == 0.0 or k == on:  # the fields of both sides are the same here
             motion.field(first, t, y, p, room.none, room.stage[:n], room.nothing)
-            c = motion.kink(k)
+            c = motion.kink_of[k]
             _, side, second = node(motion, first, c, 0.0, t, y, room.stage, p, room)
             side = second if side == 0.0 else side
         bits |= (1 << k) if side > 0.0 else 0
@@ -74,7 +73,7 @@ def first_crossing(motion, piece, t, h, on, p, room):  # type: ignore[no-untyped
     """
     found, which = -1.0, -1
     for k in range(motion.kinks):
-        c = motion.kink(k)
+        c = motion.kink_of[k]
         left = node(motion, piece, c, 0.0, t, room.start, room.slopes[0], p, room)
         right = node(motion, piece, c, 0.0, t + h, room.end, room.last, p, room)
         if is_flat(left, right, h):
@@ -95,6 +94,19 @@ def first_crossing(motion, piece, t, h, on, p, room):  # type: ignore[no-untyped
         if at >= 0.0 and (which < 0 or at < found):
             found, which = at, k
     return found, which
+
+
+@helper
+def hand_back(room, fine, y1, jac):  # type: ignore[no-untyped-def]
+    """Write the state and its derivatives by (t0, y0, dt, parameters)."""
+    n, columns = room.scales.shape[0], room.partial.shape[1]
+    for i in range(n):
+        y1[i] = room.start[i] if fine else math.nan
+    for i in range(n if columns > 0 else 0):
+        row = n + i * columns
+        for j in range(columns):
+            jac[i, j if j <= n else j + 1] = room.start[row + j] if fine else math.nan
+        jac[i, 1 + n] = room.slopes[0, i] if fine else math.nan
 
 
 @helper
@@ -164,7 +176,7 @@ def next_kink(motion, piece, t, y, on, left, p, room, behind):  # type: ignore[n
     n = y.shape[0]
     found, which = -1.0, -1
     for k in range(motion.kinks):
-        c = motion.kink(k)
+        c = motion.kink_of[k]
         at = first_hit(motion, piece, c, 0.0, on == k, t, y, left, p, room, room.stage[:n])
         if at >= 0.0 and (which < 0 or at < found):
             write(room.stage[:n], behind)
@@ -184,7 +196,7 @@ def kinked_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ign
     phase = t0 - folded(t0, period) * period
     kink = -1
     for k in range(motion.kinks):
-        if on and target == 0.0 and c == motion.kink(k):
+        if on and target == 0.0 and c == motion.kink_of[k]:
             kink = k
     piece = piece_at(motion, mode, phase, here, kink, p, room)
     done = 0.0
@@ -197,7 +209,7 @@ def kinked_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ign
         t, left = phase + done, dt_max - done
         until, k = next_kink(motion, piece, t, here, kink, left, p, room, behind)
         span = left if k < 0 else until
-        itself = k >= 0 and c == motion.kink(k) and target == 0.0
+        itself = k >= 0 and c == motion.kink_of[k] and target == 0.0
         if not itself:
             at = first_hit(motion, piece, c, target, on, t, here, span, p, room, y1)
             if at >= 0.0:

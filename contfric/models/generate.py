@@ -18,7 +18,7 @@ from contfric.models.affine import AffineForm
 from contfric.models.code import SLOPES, VALUES, Lines, Output, write_block
 from contfric.models.description import Description
 from contfric.models.linear_code import Layout, LinearWriter, layout_of, places_of
-from contfric.models.motion import motion_code, piece_code
+from contfric.models.motion import motion_code
 from contfric.models.symbols import Formulas, moves_in_closed_form
 
 _HEAD = '''"""Compiled functions of a model, generated from its definition; not to be edited.
@@ -32,19 +32,18 @@ import numpy as np
 
 from contfric.compiled import (
     allocating_helper,
-    flow_signature,
+    field_signature,
     helper,
-    hit_signature,
-    inlined_helper,
     kernel,
     level_signature,
     observe_signature,
     period_signature,
     rate_signature,
     reset_signature,
-    turning_signature,
+    scale_signature,
 )
-from contfric.flow.interface import CompiledFlow
+from contfric.flow.layouts import AFFINE as SIGNATURES
+from contfric.flow.integrated import AffineModes, Functions
 
 
 @helper
@@ -65,38 +64,6 @@ def power_log(base, exponent):
 
 '''
 
-_KERNELS = """
-@kernel(observe_signature)
-def observe(c, t, y, p, which, grad):
-    return observe_at(c, t, y, p, which, grad)
-
-
-@kernel(rate_signature)
-def rate(mode, c, t, y, p, which, grad):
-    return rate_at(piece_of(mode, t, y, p), c, t, y, p, which, grad)
-
-
-@kernel(level_signature)
-def level(k, p, which, grad):
-    return level_at(k, p, which, grad)
-
-
-@kernel(period_signature)
-def period(p, which, grad):
-    return period_at(p, which, grad)
-
-
-@kernel(reset_signature)  # the same types
-def field_of(mode, t, y, p, which, out, jac):
-    field(piece_of(mode, t, y, p), t, y, p, which, out, jac)
-
-
-@kernel(reset_signature)
-def reset(k, t, y, p, which, y1, jac):
-    reset_at(k, t, y, p, which, y1, jac)
-
-"""
-
 
 def module_source(description: Description, digest: str) -> str:
     """Return the module of a model.
@@ -116,16 +83,11 @@ def module_source(description: Description, digest: str) -> str:
     writer.scalars("observe_at(c, t, y, p, which, grad)", "c", formulas.observables())
     writer.rates(formulas.rates())
     levels, resets = formulas.levels(), formulas.resets()
-    writer.of_parameters(
-        "level_at(k, p, which, grad)", "k", [levels[names.index(n)] for n in order]
-    )
-    writer.of_parameters("period_at(p, which, grad)", None, [formulas.period()])
-    writer.vectors("reset_at", "k", "y1", [resets[names.index(n)] for n in order])
+    writer.of_parameters("level(k, p, which, grad)", "k", [levels[names.index(n)] for n in order])
+    writer.of_parameters("period(p, which, grad)", None, [formulas.period()])
+    writer.vectors("reset", "k", "y1", [resets[names.index(n)] for n in order])
     writer.vectors("onto", "mode", "y1", formulas.projections())
     writer.scales(formulas.scales())
-    kinks = [[o.name for o in description.observables].index(name) for name in description.kinks]
-    code.add(piece_code(kinks))
-    code.add(_KERNELS)
     timed = [
         c for c, o in enumerate(formulas.observables()) if not o.free_symbols & set(formulas.y)
     ]
@@ -148,6 +110,19 @@ def _idle(description: Description, rates: list[list[Any]]) -> list[tuple[int, i
             rate == 0 or (0 in mode.sides.values() and sympy.simplify(rate) == 0) for rate in every
         )
     ]
+
+
+#: The functions that are kernels, with their signatures; those of them that take the piece of a mode.
+_KERNELS = {
+    "field": "field",
+    "observe_at": "observe",
+    "rate_at": "rate",
+    "level": "level",
+    "period": "period",
+    "reset": "reset",
+    "onto": "field",
+}
+_OF_PIECES = {"field", "observe_at", "rate_at"}
 
 
 class _Writer:
@@ -231,16 +206,24 @@ class _Writer:
         """Write the sizes of states, the units of their tolerances: at most 1."""
         blocks = [[Output(VALUES, "value", e)] for e in values]
         self._blocks("size_of(i, p)", "i", blocks, "", [], "value")
-        self.code.add("", "@helper")
+        self.code.add("", "@kernel(scale_signature)")
         self.code.open("def scale_of(i, p):")
         self.code.add("size = abs(size_of(i, p))", "return size if 0.0 < size < 1.0 else 1.0")
         self.code.close()
 
     def _define(self, head: str, blocks: list[list[Output]]) -> None:
         """Write the head of a function, and take what its formulas need out of the arrays."""
-        self._head(head, [o.expression for outputs in blocks for o in outputs])
+        formulas = [o.expression for outputs in blocks for o in outputs]
+        self._head(head, formulas, self._decorator(head.partition("(")[0]))
 
-    def _head(self, head: str, formulas: Sequence[Any], decorator: str = "helper") -> None:
+    def _decorator(self, name: str) -> str:
+        """Return what a function is: a kernel, or a helper of others where these look for the piece first."""
+        kind = _KERNELS.get(name)
+        if kind is None or (self.f.description.kinks and name in _OF_PIECES):
+            return "helper"
+        return f"kernel({kind}_signature)"
+
+    def _head(self, head: str, formulas: Sequence[Any], decorator: str) -> None:
         self.code.add("", f"@{decorator}")
         self.code.open(f"def {head}:")
         used = {s for e in formulas for s in e.free_symbols}

@@ -16,8 +16,6 @@ import sympy
 from contfric.models.affine import AffineForm
 from contfric.models.code import VALUES, Lines, Output, write_block
 
-#: States up to which the products are inlined: with more, a call is nothing beside them.
-_SMALL = 6
 #: Coefficients that are taken out of their array before a loop: more would not stay in registers.
 _FEW = 24
 #: One over each whole number: a division in each term would cost as much as the rest of it.
@@ -115,7 +113,7 @@ class LinearWriter:
 
     def _values(self, head: str, index: str | None, vectors: Sequence[Sequence[Any]]) -> None:
         """Write vectors of formulas of the parameters, with their derivatives in the rows of ``jac``."""
-        self.define(head, [e for vector in vectors for e in vector], "inlined_helper")
+        self.define(head, [e for vector in vectors for e in vector], _decorator(head))
         blocks = []
         for vector in vectors:
             block = [Output(VALUES, f"out[{i}]", e) for i, e in enumerate(vector)]
@@ -133,7 +131,7 @@ class LinearWriter:
         self, head: str, index: str, layouts: Sequence[Layout | None], lines: Callable[..., Any]
     ) -> None:
         """Write lines that depend on the structure of a layout only."""
-        self.define(head, [], "inlined_helper" if self.states <= _SMALL else "helper")
+        self.define(head, [], _decorator(head))
         keys = [layout.structure if layout else ((), ()) for layout in layouts]
 
         def write(key: Any) -> None:
@@ -155,6 +153,11 @@ class LinearWriter:
             if not last:
                 self.code.close()
         self.code.close()
+
+
+def _decorator(head: str) -> str:
+    """Return what makes a kernel of a function."""
+    return f'kernel(SIGNATURES["{head.partition("(")[0]}"])'
 
 
 def _sum(terms: Sequence[str]) -> str:

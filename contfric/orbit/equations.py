@@ -31,14 +31,6 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import (
-    FlowType,
-    HitType,
-    LevelType,
-    ObserveType,
-    PeriodType,
-    RateType,
-    ResetType,
-    TurningType,
     allocating_helper,
     f8,
     helper,
@@ -60,10 +52,7 @@ _SHORT = 0.1
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _NODES, _WEIGHTS = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
 
-#: Type of the model's functions and of a layout, as kernels take them.
-FunctionsType = types.Tuple(
-    (FlowType, ObserveType, LevelType, TurningType, HitType, PeriodType, RateType, ResetType)
-)
+#: Type of a layout, as kernels take it.
 LayoutType = types.NamedTuple(
     [
         indices,
@@ -145,7 +134,7 @@ def close_chain(functions, layout, z, p, which, room):  # type: ignore[no-untype
     if layout.turn == 0.0:  # autonomous: the turn ends at time 0
         last[0], close[0, 0] = 0.0, 0.0
     else:
-        last[0], close[0, 0] = z[0, 0] + layout.turn * functions[5](p, which, grad), 1.0
+        last[0], close[0, 0] = z[0, 0] + layout.turn * functions.period(p, which, grad), 1.0
         for k in range(free):
             close_w[0, k] = layout.turn * grad[k]
     for i in range(n):
@@ -166,7 +155,7 @@ def leap(functions, layout, i, start, p, which, room):  # type: ignore[no-untype
     """
     n, surface = start.shape[0] - 1, ((PLAIN - layout.departs[i]) >> 1) - 1
     behind = room.behind
-    functions[7](surface, start[0], start[1:], p, which, behind[n, :n], behind[:n])
+    functions.reset(surface, start[0], start[1:], p, which, behind[n, :n], behind[:n])
 
 
 @helper
@@ -190,9 +179,9 @@ def pin_value(functions, layout, i, start, p, which, grad):  # type: ignore[no-u
     surface = layout.pins[i]
     if surface == TOUCH_PIN:
         c = layout.observables[layout.exits[i - 1]]
-        return functions[6](layout.modes[i - 1], c, start[0], start[1:], p, which, grad)
-    value = functions[1](layout.observables[surface], start[0], start[1:], p, which, grad)
-    return value - functions[2](surface, p, which, grad[grad.shape[0] :])
+        return functions.rate(layout.modes[i - 1], c, start[0], start[1:], p, which, grad)
+    value = functions.observe(layout.observables[surface], start[0], start[1:], p, which, grad)
+    return value - functions.level(surface, p, which, grad[grad.shape[0] :])
 
 
 @helper
@@ -202,7 +191,7 @@ def pin_row(functions, layout, i, at, start, after, p, which, room, rows):  # ty
     m, free, width = start.shape[0], which.shape[0], rows.shape[1]
     row, left = 2 * m - 1, layout.observables[layout.exits[i]]
     none, empty = room.none, room.empty
-    room.rates[i] = functions[6](layout.departs[i], left, after[0], after[1:], p, none, empty)
+    room.rates[i] = functions.rate(layout.departs[i], left, after[0], after[1:], p, none, empty)
     residual = pin_value(functions, layout, i, start, p, which, grad)
     for k in range(width):
         rows[row, k] = 0.0
@@ -211,7 +200,7 @@ def pin_row(functions, layout, i, at, start, after, p, which, room, rows):  # ty
     for k in range(free):
         rows[row, 3 * m + k] = grad[m + k]
     if layout.pins[i] >= 0:
-        functions[2](layout.pins[i], p, which, level_grad)
+        functions.level(layout.pins[i], p, which, level_grad)
         for k in range(free):
             rows[row, 3 * m + k] -= level_grad[k]
     rows[row, 3 * m + free] = -residual
@@ -232,11 +221,11 @@ def mean_rate_row(functions, layout, i, at, start, duration, p, which, room, row
         share, weight = _NODES[k], _WEIGHTS[k]
         time = share * duration
         if layout.departs[i] < RETURNS:
-            functions[0](mode, start[0], room.behind[n, :n], time, p, which, state, jac)
+            functions.flow(mode, start[0], room.behind[n, :n], time, p, which, state, jac)
             behind_reset(jac, room.behind, grad, n)
         else:
-            functions[0](mode, start[0], start[1:], time, p, which, state, jac)
-        mean += weight * functions[6](mode, c, start[0] + time, state, p, which, grad)
+            functions.flow(mode, start[0], start[1:], time, p, which, state, jac)
+        mean += weight * functions.rate(mode, c, start[0] + time, state, p, which, grad)
         for j in range(2 + n + free):  # t_0, y_0, duration, parameters
             slope = 0.0
             for a in range(n):
@@ -278,7 +267,7 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
     if layout.departs[i] < RETURNS:
         leap(functions, layout, i, start, p, which, room)
         begin = room.behind[n, :n]
-    functions[0](layout.modes[i], start[0], begin, after[0] - start[0], p, which, state, jac)
+    functions.flow(layout.modes[i], start[0], begin, after[0] - start[0], p, which, state, jac)
     if layout.departs[i] < RETURNS:
         behind_reset(jac, room.behind, grad, n)
     worst = 0.0
@@ -300,8 +289,8 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
     if layout.pins[i] != NO_PIN:
         worst += pin_row(functions, layout, i, at, start, after, p, which, room, rows)
         return worst if math.isfinite(worst) else np.inf
-    value = functions[1](layout.observables[surface], after[0], after[1:], p, which, grad)
-    residual = value - functions[2](surface, p, which, level_grad)
+    value = functions.observe(layout.observables[surface], after[0], after[1:], p, which, grad)
+    residual = value - functions.level(surface, p, which, level_grad)
     worst += abs(residual) / (1.0 + abs(value))
     rate = grad[0]
     for k in range(n):
@@ -337,13 +326,15 @@ def mismatch(functions, layout, z, p, room):  # type: ignore[no-untyped-def]
         if layout.departs[i] < RETURNS:
             leap(functions, layout, i, z[i], p, none, room)
             begin = room.behind[m - 1, : m - 1]
-        functions[0](layout.modes[i], z[i, 0], begin, duration, p, none, state, room.nothing)
+        functions.flow(layout.modes[i], z[i, 0], begin, duration, p, none, state, room.nothing)
         if layout.pins[i] != NO_PIN:
             here = abs(pin_value(functions, layout, i, z[i], p, none, empty))
         else:
             surface = layout.exits[i]
-            value = functions[1](layout.observables[surface], after[0], after[1:], p, none, empty)
-            here = abs(value - functions[2](surface, p, none, empty)) / (1.0 + abs(value))
+            value = functions.observe(
+                layout.observables[surface], after[0], after[1:], p, none, empty
+            )
+            here = abs(value - functions.level(surface, p, none, empty)) / (1.0 + abs(value))
         for j in range(m - 1):
             here += abs(state[j] - after[1 + j]) / (1.0 + abs(after[1 + j]))
         if not math.isfinite(here):

@@ -6,12 +6,13 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import i8, kernel, matrix, vector
-from contfric.orbit.equations import FunctionsType, LayoutType, close_chain, equation_room
+from contfric.flow.layouts import FlowType
+from contfric.orbit.equations import LayoutType, close_chain, equation_room
 from contfric.orbit.monitor import find_behind, find_turnings, start_value, turning_room
 from contfric.orbit.system import RETURNS
 
 
-@kernel(types.boolean(FunctionsType, LayoutType, i8, matrix, vector, vector))
+@kernel(types.boolean(FlowType, LayoutType, i8, matrix, vector, vector))
 def extent(functions, layout, c, z, p, out):  # type: ignore[no-untyped-def]
     """Write the least and the largest displacement of a whole orbit; False if a search fails.
 

@@ -14,9 +14,9 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import allocating_helper, helper, indices, kernel, matrix, vector
+from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
 from contfric.orbit.equations import (
-    FunctionsType,
     LayoutType,
     close_chain,
     equation_room,
@@ -60,7 +60,7 @@ def find_turnings(functions, layout, i, c, z, p, last, turnings):  # type: ignor
     duration = after[0] - z[i, 0]
     if duration <= 0.0:
         return 0
-    return functions[3](
+    return functions.turning(
         layout.modes[i], c, z[i, 0], z[i, 1:], duration, p, turnings.times, turnings.values
     )
 
@@ -74,7 +74,7 @@ def find_behind(functions, layout, i, c, z, p, room, turnings):  # type: ignore[
         return 0
     leap(functions, layout, i, z[i], p, room.none, room)
     begin = room.behind[n, :n]
-    return functions[3](
+    return functions.turning(
         layout.modes[i], c, z[i, 0], begin, duration, p, turnings.times, turnings.values
     )
 
@@ -102,7 +102,7 @@ def interior_margin(functions, layout, k, found, z, p, room, turnings):  # type:
         first = _AT_PIN * (1.0 + duration)
     if layout.pins[i] != NO_PIN or layout.pins[(i + 1) % count] != NO_PIN:
         last = duration - _AT_PIN * (1.0 + duration)
-    target = functions[2](layout.interior[k, 1], p, room.none, room.empty)
+    target = functions.level(layout.interior[k, 1], p, room.none, room.empty)
     return least_distance(found, float(layout.interior[k, 2]), target, turnings, first, last)
 
 
@@ -111,7 +111,7 @@ def start_value(functions, layout, i, c, z, p, room):  # type: ignore[no-untyped
     """Return observable c where segment i begins, behind its reset."""
     n = z.shape[1] - 1
     leap(functions, layout, i, z[i], p, room.none, room)
-    return functions[1](c, z[i, 0], room.behind[n, :n], p, room.none, room.empty)
+    return functions.observe(c, z[i, 0], room.behind[n, :n], p, room.none, room.empty)
 
 
 @helper
@@ -123,8 +123,8 @@ def joint_margin(functions, layout, k, z, p, room):  # type: ignore[no-untyped-d
     if layout.joint[k, 3] == 1:  # where the segment begins, behind a reset
         value = start_value(functions, layout, i, c, z, p, room)
     else:
-        value = functions[1](c, after[0], after[1:], p, room.none, room.empty)
-    return layout.joint[k, 2] * (value - functions[2](surface, p, room.none, room.empty))
+        value = functions.observe(c, after[0], after[1:], p, room.none, room.empty)
+    return layout.joint[k, 2] * (value - functions.level(surface, p, room.none, room.empty))
 
 
 @helper
@@ -188,10 +188,10 @@ def held_margin(functions, layout, k, z, p, room, turnings):  # type: ignore[no-
             time = turnings.times[j]
             if time < first or time > duration - first:
                 continue
-            functions[0](
+            functions.flow(
                 layout.modes[i], z[i, 0], z[i, 1:], time, p, room.none, state, room.nothing
             )
-            rate = functions[6](
+            rate = functions.rate(
                 layout.departs[i], left, z[i, 0] + time, state, p, room.none, room.empty
             )
             least = min(least, layout.exit_signs[i] * rate)
@@ -221,14 +221,14 @@ def ends_of(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
     )
     after = z[i + 1] if i + 1 < z.shape[0] else room.last
     if on >= 0:
-        first = functions[2](on, p, room.none, room.empty)
+        first = functions.level(on, p, room.none, room.empty)
     else:
-        first = functions[1](c, z[i, 0], z[i, 1:], p, room.none, room.empty)
+        first = functions.observe(c, z[i, 0], z[i, 1:], p, room.none, room.empty)
         if layout.departs[i] < RETURNS:
             first = start_value(functions, layout, i, c, z, p, room)
     if to >= 0:
-        return first, functions[2](to, p, room.none, room.empty)
-    return first, functions[1](c, after[0], after[1:], p, room.none, room.empty)
+        return first, functions.level(to, p, room.none, room.empty)
+    return first, functions.observe(c, after[0], after[1:], p, room.none, room.empty)
 
 
 @helper
@@ -268,7 +268,7 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
             surface = surfaces - 1 - j if following > value else j
             if layout.observables[surface] != c:
                 continue
-            target = functions[2](surface, p, room.none, room.empty)
+            target = functions.level(surface, p, room.none, room.empty)
             is_joint = (piece < 0 and surface == on) or (piece == found and surface == to)
             if not is_joint:
                 nearest = min(nearest, abs(following - target))
@@ -299,7 +299,7 @@ def watch(functions, layout, z, p, room, turnings, out, labels):  # type: ignore
     return True
 
 
-@kernel(types.boolean(FunctionsType, LayoutType, matrix, vector, vector, indices, indices))
+@kernel(types.boolean(FlowType, LayoutType, matrix, vector, vector, indices, indices))
 def examine(functions, layout, z, p, out, labels, counts):  # type: ignore[no-untyped-def]
     """Fill margins and labels of a solved orbit; False if something is not finite."""
     counts[CHECKS] += 1

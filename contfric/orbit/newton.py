@@ -26,9 +26,9 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import blocks, f8, helper, indices, kernel, matrix, vector
+from contfric.flow.layouts import FlowType
 from contfric.orbit.cyclic import finish, next_rows, room_for, start_border, take_out
 from contfric.orbit.equations import (
-    FunctionsType,
     LayoutType,
     close_chain,
     equation_room,
@@ -252,7 +252,7 @@ def correct(  # type: ignore[no-untyped-def]
     return NOT_CONVERGED, _MOST_STEPS, first, worst
 
 
-@kernel(types.UniTuple(f8, 4)(FunctionsType, LayoutType, matrix, vector, f8, blocks, indices))
+@kernel(types.UniTuple(f8, 4)(FlowType, LayoutType, matrix, vector, f8, blocks, indices))
 def solve(functions, layout, z, p, trust, pencil, counts):  # type: ignore[no-untyped-def]
     """Solve for the orbit at fixed parameters, in place; (status, steps, first, residual).
 
@@ -298,16 +298,14 @@ def rates_at_joint(functions, layout, i, after, p, which, room, rows):  # type: 
     n = after.shape[0] - 1
     m = n + 1
     jac = room.jac
-    functions[0](layout.modes[i], after[0], after[1:], 0.0, p, which, room.state, jac)
+    functions.flow(layout.modes[i], after[0], after[1:], 0.0, p, which, room.state, jac)
     for j in range(n):
         change = jac[j, 1 + n] - rows[m + j, 2 * m]
         rows[m + j, 2 * m] += change
         rows[m + j, m] -= change
 
 
-@kernel(
-    types.boolean(FunctionsType, LayoutType, matrix, vector, blocks, blocks, blocks, blocks, matrix)
-)
+@kernel(types.boolean(FlowType, LayoutType, matrix, vector, blocks, blocks, blocks, blocks, matrix))
 def linearise(functions, layout, z, p, a, b, c, r, close):  # type: ignore[no-untyped-def]
     """Fill the blocks of the full Jacobian for use outside of the engine.
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,8 +151,8 @@ class System:
         """Number of segments of one turn."""
         return len(self.word)
 
-    def functions(self) -> tuple[Any, ...]:
-        """Return the model's compiled functions in the order in which kernels take them."""
+    def functions(self) -> int:
+        """Return the model's compiled functions as kernels take them."""
         return self.model.flow.functions()
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, vector
+from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
-from contfric.orbit.equations import FunctionsType
 from contfric.orbit.simulation import EventRows, Tables
 from contfric.orbit.system import IntArray
 
@@ -75,8 +75,8 @@ def sign_code(functions, observables, surface, t, y, p, none, empty):  # type: i
             continue
         if observables[k] != observed:  # surfaces of one observable stand together
             observed = observables[k]
-            value = functions[1](observed, t, y, p, none, empty)
-        if value > functions[2](k, p, none, empty):
+            value = functions.observe(observed, t, y, p, none, empty)
+        if value > functions.level(k, p, none, empty):
             code |= 1 << k
     return code
 
@@ -105,9 +105,9 @@ def hit_within(functions, tables, mode, on, t, y, p, longest, room):  # type: ig
     for k in range(observables.shape[0]):
         if bounds[mode, k] == 0:
             continue
-        target = functions[2](k, p, none, empty)
+        target = functions.level(k, p, none, empty)
         started = (on >> k) & 1 == 1
-        tau = functions[4](mode, observables[k], target, started, t, y, best, p, room.trial)
+        tau = functions.hit(mode, observables[k], target, started, t, y, best, p, room.trial)
         if tau >= 0.0 and (which < 0 or tau < best):
             best, which = tau, k
             copy_state(room.trial, room.after)
@@ -137,7 +137,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, r
     """Follow a trajectory; see :func:`simulate`."""
     observables, following = tables.observables, tables.following
     joints, none, empty, after = rows.joints, room.none, room.empty, room.after
-    period = functions[5](p, none, empty)
+    period = functions.period(p, none, empty)
     unit = period if period > 0.0 else 1.0
     cycle, event, at_most = 0, 0, NO_TIME
     if carry[STARTED] == 0.0:
@@ -166,7 +166,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, r
         if surface < 0:
             if left > allowance:
                 return never_left(tables, mode), event, mode, cycle, t
-            functions[0](mode, t, y, left, p, none, after, room.nothing)
+            functions.flow(mode, t, y, left, p, none, after, room.nothing)
             copy_state(after, y)
             t += left
             if period > 0.0:
@@ -183,7 +183,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, r
         reset = tables.bounds[mode, surface] == 2
         if reset:  # rows keep the state before it, as the joints of orbits do
             copy_state(y, rows.states[event])
-            functions[7](surface, t, rows.states[event], p, none, y, room.nothing)
+            functions.reset(surface, t, rows.states[event], p, none, y, room.nothing)
         code = sign_code(functions, observables, surface, t, y, p, none, empty)
         target = following[
             (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code
@@ -213,7 +213,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, r
 
 @kernel(
     types.Tuple((i8, i8, i8, i8, f8))(
-        FunctionsType, TablesType, i8, i8, f8, vector, vector, f8, RowsType, vector, i8
+        FlowType, TablesType, i8, i8, f8, vector, vector, f8, RowsType, vector, i8
     )
 )
 def simulate(functions, tables, mode, on, t, y, p, periods, rows, carry, budget):  # type: ignore[no-untyped-def]

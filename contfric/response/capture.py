@@ -14,7 +14,7 @@ from numba import types
 from contfric.chaos.cells import StartingType, start_mode
 from contfric.chaos.tangent import ARRIVED, new_walk, state_room, to_joint
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
-from contfric.orbit.equations import FunctionsType
+from contfric.flow.layouts import FlowType
 from contfric.orbit.trajectory import TablesType
 from contfric.response.targets import Targets
 
@@ -44,7 +44,7 @@ def caught(targets, key, t, y, period, timeless):  # type: ignore[no-untyped-def
 
 @kernel(
     types.void(
-        FunctionsType,
+        FlowType,
         TablesType,
         StartingType,
         TargetsType,
@@ -71,7 +71,7 @@ def capture(  # type: ignore[no-untyped-def]
     """
     n, surfaces = states.shape[1], tables.observables.shape[0]
     walk, room = new_walk(n), state_room(n)
-    period = functions[5](p, room.none, room.empty)
+    period = functions.period(p, room.none, room.empty)
     timeless, walls = period <= 0.0, 0
     if timeless:
         period = 1.0

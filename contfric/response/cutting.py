@@ -77,7 +77,7 @@ def has_sense(functions, cut, mode, t, y, p, room):  # type: ignore[no-untyped-d
     """Tell whether the section is crossed in the sense asked for."""
     if cut.sense == 0:
         return True
-    return cut.sense * functions[6](mode, cut.observable, t, y, p, room.none, room.empty) > 0.0
+    return cut.sense * functions.rate(mode, cut.observable, t, y, p, room.none, room.empty) > 0.0
 
 
 @helper
@@ -98,16 +98,16 @@ def cut_inside(functions, cut, duration, p, period, ws, points):  # type: ignore
             later = (ws.strobe[0] - cycle) * period + (cut.phase * period - t)
             if later > duration:
                 break
-            functions[0](mode, t, segment.y, later, p, room.none, ws.found, room.nothing)
+            functions.flow(mode, t, segment.y, later, p, room.none, ws.found, room.nothing)
             put(points, ws.strobe[0], cut.phase * period, ws.found, mode)
             ws.strobe[0] += 1
     elif cut.inside[mode] != 0:
-        level = functions[2](cut.surface, p, room.none, room.empty) if cut.surface >= 0 else 0.0
+        level = functions.level(cut.surface, p, room.none, room.empty) if cut.surface >= 0 else 0.0
         started = cut.surface >= 0 and (segment.at[1] >> cut.surface) & 1 == 1
         copy_state(segment.y, ws.work)
         left = duration
         for _ in range(_MOST_CROSSINGS):
-            tau = functions[4](mode, cut.observable, level, started, t, ws.work, left, p, ws.found)
+            tau = functions.hit(mode, cut.observable, level, started, t, ws.work, left, p, ws.found)
             if tau < 0.0:
                 break
             turns, t = whole_turns(t + tau, period)

@@ -25,7 +25,7 @@ from contfric.compiled import (
     table,
     vector,
 )
-from contfric.orbit.equations import FunctionsType
+from contfric.flow.layouts import FlowType
 from contfric.orbit.trajectory import (
     ALL_EVENTS,
     ALL_TIME,
@@ -70,7 +70,7 @@ def step_behind(functions, tables, mode, surface, following, cycle, t, y, p, ws)
     segment, room = ws.segment, ws.state
     copy_state(y, ws.found)
     if tables.bounds[mode, surface] == 2:
-        functions[7](surface, t, ws.found, p, room.none, segment.y, room.nothing)
+        functions.reset(surface, t, ws.found, p, room.none, segment.y, room.nothing)
     else:
         copy_state(ws.found, segment.y)
     segment.at[0], segment.at[2] = following, cycle
@@ -154,7 +154,7 @@ def finish(functions, cut, end, cycle, t, p, period, unit, first, collecting, ws
             cut_inside(functions, cut, period, p, period, ws, points)
             points.number[0] = min(points.number[0], first + 1)
         left, room = period - segment.time[0], ws.state
-        functions[0](
+        functions.flow(
             segment.at[0], segment.time[0], segment.y, left, p, room.none, ws.y, room.nothing
         )
     elif outcome == APERIODIC and collecting:
@@ -218,7 +218,7 @@ def cut_solution(  # type: ignore[no-untyped-def]
 
 @kernel(
     i8(
-        FunctionsType,
+        FlowType,
         TablesType,
         StartingType,
         CutType,
@@ -270,7 +270,7 @@ def cut_solutions(  # type: ignore[no-untyped-def]
     segment, room = ws.segment, ws.state
     for row in range(vectors.shape[0]):
         p, first = vectors[row], points.number[0]
-        period = functions[5](p, room.none, room.empty)
+        period = functions.period(p, room.none, room.empty)
         t = times[row]
         for j in range(n):
             carried = how.carried != 0 and row > 0

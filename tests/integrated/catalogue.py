@@ -12,20 +12,24 @@ from __future__ import annotations
 
 import math
 
-from contfric.compiled import flow_signature, helper, hit_signature, kernel, turning_signature
-from contfric.flow.integrated import (
-    integrated_flow,
-    integrated_hit,
-    integrated_motion,
-    integrated_turning,
+from contfric.compiled import (
+    field_signature,
+    helper,
+    kernel,
+    level_signature,
+    observe_signature,
+    period_signature,
+    rate_signature,
+    scale_signature,
 )
+from contfric.flow.integrated import Functions
 
 MU, TOLERANCE, FIRST = 0, 1, 2
 OSCILLATOR, REST = range(2)
 HARMONICS = 4
 
 
-@helper
+@kernel(field_signature)
 def field(mode, t, y, p, which, out, jac):
     for i in range(jac.shape[0]):
         for j in range(jac.shape[1]):
@@ -58,7 +62,7 @@ def sums(t, p):
     return value, slope, bend
 
 
-@helper
+@kernel(observe_signature)
 def value_of(c, t, y, p, which, grad):
     if grad.shape[0] > 0:
         grad[:] = 0.0
@@ -71,7 +75,7 @@ def value_of(c, t, y, p, which, grad):
     return y[0] + value
 
 
-@helper
+@kernel(rate_signature)
 def rate_of(mode, c, t, y, p, which, grad):
     moves = 1.0 if mode == OSCILLATOR else 0.0
     x, v, mu = y[0], y[1], p[MU]
@@ -91,40 +95,36 @@ def rate_of(mode, c, t, y, p, which, grad):
     return slope + moves * v
 
 
-@helper
+@kernel(period_signature)
 def period_of(p, which, grad):
     for k in range(grad.shape[0]):
         grad[k] = 0.0
     return 0.0
 
 
-@helper
+@kernel(scale_signature)
 def scale_of(i, p):
     return p[TOLERANCE]
 
 
-#: The scale of the states is the tolerance, so that one kernel serves all tolerances.
-MOTION = integrated_motion(
+@kernel(level_signature)
+def level(k, p, which, grad):
+    for j in range(grad.shape[0]):
+        grad[j] = 0.0
+    return 0.0
+
+
+#: The scale of the states is the tolerance, so that one block of memory serves all tolerances.
+FUNCTIONS = Functions(
     field=field,
     observe=value_of,
     rate=rate_of,
     period=period_of,
     scale=scale_of,
+    modes=2,
+    observables=3,
     relative=0.0,
     absolute=1.0,
 )
-
-
-@kernel(flow_signature)
-def flow(mode, t0, y0, dt, p, which, y1, jac):
-    integrated_flow(MOTION, mode, t0, y0, dt, p, which, y1, jac)
-
-
-@kernel(hit_signature)
-def hit(mode, c, target, on, t0, y0, dt_max, p, y1):
-    return integrated_hit(MOTION, mode, c, target, on, t0, y0, dt_max, p, y1)
-
-
-@kernel(turning_signature)
-def turning(mode, c, t0, y0, dt, p, times, values):
-    return integrated_turning(MOTION, mode, c, t0, y0, dt, p, times, values)
+FLOW = FUNCTIONS.flow(level)
+flow, hit, turning = FLOW.flow, FLOW.hit, FLOW.turning

@@ -5,22 +5,16 @@ from __future__ import annotations
 import math
 
 from contfric.compiled import (
-    flow_signature,
+    field_signature,
     helper,
-    hit_signature,
     kernel,
     level_signature,
     observe_signature,
     period_signature,
     rate_signature,
-    turning_signature,
+    scale_signature,
 )
-from contfric.flow.integrated import (
-    integrated_flow,
-    integrated_hit,
-    integrated_motion,
-    integrated_turning,
-)
+from contfric.flow.integrated import Functions
 from contfric.flow.interface import CompiledFlow
 
 OMEGA, S, S0, H, ZETA = range(5)
@@ -50,7 +44,7 @@ def slope_of_rate(t, p):
     return by_omega, -3 * w * d3
 
 
-@helper
+@kernel(field_signature)
 def field(mode, t, y, p, which, out, jac):
     if mode == STICK:
         out[0] = 0.0
@@ -87,7 +81,7 @@ def field(mode, t, y, p, which, out, jac):
             jac[1, 3 + k] = -2 * y[1]
 
 
-@helper
+@kernel(observe_signature)
 def value_of(c, t, y, p, which, grad):
     f, f1, _, f_omega, f_h = force_of(t, p)
     for k in range(grad.shape[0]):
@@ -104,7 +98,7 @@ def value_of(c, t, y, p, which, grad):
     return y[0] - f
 
 
-@helper
+@kernel(rate_signature)
 def rate_of(mode, c, t, y, p, which, grad):
     f, f1, f2, f_omega, f_h = force_of(t, p)
     slides = 0.0 if mode == STICK else 1.0
@@ -137,7 +131,7 @@ def rate_of(mode, c, t, y, p, which, grad):
     return slides * (f - sign * p[S] - 2 * p[ZETA] * y[1] - y[0])
 
 
-@helper
+@kernel(period_signature)
 def period_of(p, which, grad):
     value = 2.0 * math.pi / p[OMEGA]
     for k in range(grad.shape[0]):
@@ -145,58 +139,18 @@ def period_of(p, which, grad):
     return value
 
 
-@helper
+@kernel(scale_signature)
 def scale_of(i, p):
     return 1.0
 
 
-@helper
-def side_of(mode, c):
-    return (1.0 if mode == 0 else -1.0) if c == SPEED and mode != STICK else 0.0
-
-
-MOTION = integrated_motion(
-    field=field,
-    observe=value_of,
-    rate=rate_of,
-    period=period_of,
-    scale=scale_of,
-    side=side_of,
-)
-
-
-@kernel(flow_signature)
-def flow(mode, t0, y0, dt, p, which, y1, jac):
-    integrated_flow(MOTION, mode, t0, y0, dt, p, which, y1, jac)
-    if mode == STICK:  # it rests, whatever came before
-        y1[SPEED] = 0.0
+@kernel(field_signature)
+def at_rest(mode, t, y, p, which, y1, jac):
+    """It rests, whatever came before."""
+    y1[0], y1[1] = y[0], 0.0
+    for i in range(jac.shape[0]):
         for j in range(jac.shape[1]):
-            jac[SPEED, j] = 0.0
-
-
-@kernel(hit_signature)
-def hit(mode, c, target, on, t0, y0, dt_max, p, y1):
-    return integrated_hit(MOTION, mode, c, target, on, t0, y0, dt_max, p, y1)
-
-
-@kernel(turning_signature)
-def turning(mode, c, t0, y0, dt, p, times, values):
-    return integrated_turning(MOTION, mode, c, t0, y0, dt, p, times, values)
-
-
-@kernel(observe_signature)
-def observe(c, t, y, p, which, grad):
-    return value_of(c, t, y, p, which, grad)
-
-
-@kernel(rate_signature)
-def rate(mode, c, t, y, p, which, grad):
-    return rate_of(mode, c, t, y, p, which, grad)
-
-
-@kernel(period_signature)
-def period(p, which, grad):
-    return period_of(p, which, grad)
+            jac[i, j] = 1.0 if i == 0 and j == 1 else 0.0
 
 
 @kernel(level_signature)
@@ -207,5 +161,23 @@ def level(k, p, which, grad):
     return sign * p[S0]
 
 
+FUNCTIONS = Functions(
+    field=field,
+    observe=value_of,
+    rate=rate_of,
+    period=period_of,
+    scale=scale_of,
+    modes=3,
+    observables=2,
+    sides={(0, SPEED): 1, (1, SPEED): -1},
+    slides=(STICK,),
+    onto=at_rest,
+)
+
+
 def compiled_flow() -> CompiledFlow:
-    return CompiledFlow(flow, observe, level, turning, hit, period, rate)
+    return FUNCTIONS.flow(level)
+
+
+FLOW = compiled_flow()
+flow, hit, turning, observe, rate = FLOW.flow, FLOW.hit, FLOW.turning, value_of, rate_of

@@ -2,34 +2,43 @@
 
 from __future__ import annotations
 
-from catalogue import MOTION
+from catalogue import FUNCTIONS
 
 from contfric.compiled import allocating_helper, f8, i8, indices, kernel, types, vector
 from contfric.flow.dop853 import STAGES, explicit_step
+from contfric.flow.general import Solver, handle_of
 from contfric.flow.radau import IMPLICIT_STAGES, implicit_step
 from contfric.flow.stepping import settle
 from contfric.flow.variations import begin, make_room, slope
+from contfric.handle import Bound
 
 
 @allocating_helper
-def march(implicit, mode, y0, dt, steps, p, which, out):
+def march(motion, implicit, mode, y0, dt, steps, p, which, out):
     """Write state and variations after equal steps; what they are integrated with does not matter."""
     n = y0.shape[0]
     room = make_room(n, 0, 1 + n + which.shape[0], STAGES, IMPLICIT_STAGES)
-    begin(MOTION, y0, p, which, room)
+    begin(motion, y0, p, which, room)
     h = dt / steps
     for i in range(steps):
         t = i * h
-        slope(MOTION, mode, -1, t, room.start, p, which, room, room.slopes[0])
+        slope(motion, mode, -1, t, room.start, p, which, room, room.slopes[0])
         if implicit:
-            implicit_step(MOTION, mode, -1, t, h, p, which, room, room.end, False)
+            implicit_step(motion, mode, -1, t, h, p, which, room, room.end, False)
         else:
-            explicit_step(MOTION, mode, -1, t, h, p, which, room, room.end)
+            explicit_step(motion, mode, -1, t, h, p, which, room, room.end)
         settle(room)
     for k in range(out.shape[0]):
         out[k] = room.start[k]
 
 
-@kernel(types.void(types.boolean, i8, vector, f8, i8, vector, indices, vector))
-def fixed_steps(implicit, mode, y0, dt, steps, p, which, out):
-    march(implicit, mode, y0, dt, steps, p, which, out)
+@kernel(
+    types.void(
+        handle_of(Solver.EXPLICIT), types.boolean, i8, vector, f8, i8, vector, indices, vector
+    )
+)
+def fixed_steps_of(motion, implicit, mode, y0, dt, steps, p, which, out):
+    march(motion, implicit, mode, y0, dt, steps, p, which, out)
+
+
+fixed_steps = Bound(fixed_steps_of, FUNCTIONS.block)

@@ -11,22 +11,16 @@ from __future__ import annotations
 import math
 
 from contfric.compiled import (
-    flow_signature,
+    field_signature,
     helper,
-    hit_signature,
     kernel,
     level_signature,
     observe_signature,
     period_signature,
     rate_signature,
-    turning_signature,
+    scale_signature,
 )
-from contfric.flow.integrated import (
-    integrated_flow,
-    integrated_hit,
-    integrated_motion,
-    integrated_turning,
-)
+from contfric.flow.integrated import Functions
 from contfric.flow.interface import CompiledFlow
 
 OMEGA, S, S0, SIGMA0, SIGMA1, C, VS = range(7)
@@ -54,7 +48,7 @@ def by_parameter(j, t, v, z, e, g, m, dz, sign, p):
     return a, b
 
 
-@helper
+@kernel(field_signature)
 def field(mode, t, y, p, which, out, jac):
     sign = 1.0 if mode == 0 else -1.0
     x, v, z = y[0], y[1], y[2]
@@ -89,7 +83,7 @@ def field(mode, t, y, p, which, out, jac):
         jac[2, 4 + q] = b
 
 
-@helper
+@kernel(observe_signature)
 def value_of(c, t, y, p, which, grad):
     j = 1 if c == 0 else 2
     for k in range(grad.shape[0]):
@@ -99,7 +93,7 @@ def value_of(c, t, y, p, which, grad):
     return y[j]
 
 
-@helper
+@kernel(rate_signature)
 def rate_of(mode, c, t, y, p, which, grad):
     """The rate of v or z: a row of the field, whose derivatives are few enough to be written again."""
     sign = 1.0 if mode == 0 else -1.0
@@ -126,7 +120,7 @@ def rate_of(mode, c, t, y, p, which, grad):
     return math.cos(p[OMEGA] * t) - x - k * z - p[SIGMA1] * dz - p[C] * v
 
 
-@helper
+@kernel(period_signature)
 def period_of(p, which, grad):
     value = 2.0 * math.pi / p[OMEGA]
     for k in range(grad.shape[0]):
@@ -134,55 +128,9 @@ def period_of(p, which, grad):
     return value
 
 
-@helper
+@kernel(scale_signature)
 def scale_of(i, p):
     return 1.0 / p[SIGMA0] if i == 2 else 1.0
-
-
-@helper
-def side_of(mode, c):
-    return (1.0 if mode == 0 else -1.0) if c == 0 else 0.0
-
-
-MOTION = integrated_motion(
-    field=field,
-    observe=value_of,
-    rate=rate_of,
-    period=period_of,
-    scale=scale_of,
-    side=side_of,
-    method="automatic",
-)
-
-
-@kernel(flow_signature)
-def flow(mode, t0, y0, dt, p, which, y1, jac):
-    integrated_flow(MOTION, mode, t0, y0, dt, p, which, y1, jac)
-
-
-@kernel(hit_signature)
-def hit(mode, c, target, on, t0, y0, dt_max, p, y1):
-    return integrated_hit(MOTION, mode, c, target, on, t0, y0, dt_max, p, y1)
-
-
-@kernel(turning_signature)
-def turning(mode, c, t0, y0, dt, p, times, values):
-    return integrated_turning(MOTION, mode, c, t0, y0, dt, p, times, values)
-
-
-@kernel(observe_signature)
-def observe(c, t, y, p, which, grad):
-    return value_of(c, t, y, p, which, grad)
-
-
-@kernel(rate_signature)
-def rate(mode, c, t, y, p, which, grad):
-    return rate_of(mode, c, t, y, p, which, grad)
-
-
-@kernel(period_signature)
-def period(p, which, grad):
-    return period_of(p, which, grad)
 
 
 @kernel(level_signature)
@@ -192,5 +140,22 @@ def level(k, p, which, grad):
     return 0.0
 
 
+FUNCTIONS = Functions(
+    field=field,
+    observe=value_of,
+    rate=rate_of,
+    period=period_of,
+    scale=scale_of,
+    modes=2,
+    observables=2,
+    sides={(0, 0): 1, (1, 0): -1},
+    method="automatic",
+)
+
+
 def compiled_flow() -> CompiledFlow:
-    return CompiledFlow(flow, observe, level, turning, hit, period, rate)
+    return FUNCTIONS.flow(level)
+
+
+FLOW = compiled_flow()
+flow, hit, turning, observe, rate = FLOW.flow, FLOW.hit, FLOW.turning, value_of, rate_of

@@ -76,7 +76,7 @@ def linear_probe(motion, mode, c, t, h, p, which, room):  # type: ignore[no-unty
 @helper
 def explicit_or_linear(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
     """Step by the closed form where there is one (a method)."""
-    if motion.closed(mode):
+    if motion.closed[mode] != 0:
         return linear_attempt(motion, mode, c, t, h, p, which, room)
     return explicit(motion, mode, c, t, h, p, which, room)
 
@@ -84,6 +84,6 @@ def explicit_or_linear(motion, mode, c, t, h, p, which, room):  # type: ignore[n
 @helper
 def explicit_or_linear_probe(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
     """Probe by the closed form where there is one."""
-    if motion.closed(mode):
+    if motion.closed[mode] != 0:
         return linear_probe(motion, mode, c, t, h, p, which, room)
     return explicit_probe(motion, mode, c, t, h, p, which, room)
