@@ -12,7 +12,7 @@ DEMO := demo
 STRESS := .stress
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint types contracts unit test-all gate bench stress studies gallery docs clean
+.PHONY: help setup kernels demo test lint types contracts unit test-all gate bench stress studies gallery docs clean
 MAKEFLAGS += --no-print-directory
 
 help:
@@ -25,10 +25,15 @@ help:
 	@echo "make studies  every bundled study from the shell, each with a time limit, to docs/studies.md"
 	@echo "make gallery  the figures of docs/gallery"
 	@echo "make docs     the documentation as a site, in $(SITE)/; a warning or a broken link fails it"
-	@echo "make setup    a virtual environment in $(VENV)/ (the others do this by themselves)"
+	@echo "make setup    a virtual environment in $(VENV)/, and all kernels compiled"
 	@echo "make clean    removes what make and the tests wrote, and keeps $(VENV)/"
 
-setup: $(STAMP)
+setup: $(STAMP) kernels
+
+# What is compiled already is not compiled again: a second when there is nothing to do.
+kernels: $(STAMP)
+	@echo "== kernels"
+	@$(BIN)/contfric doctor --compile --workers $(WORKERS)
 
 $(STAMP): pyproject.toml
 	@echo "== setup: $(VENV)"
@@ -74,7 +79,7 @@ contracts: $(STAMP)
 	@echo "== lint-imports"
 	@$(BIN)/lint-imports
 
-unit: $(STAMP)
+unit: $(STAMP) kernels
 	@echo "== pytest"
 	@$(BIN)/python -m pytest -n $(WORKERS) -m "not slow"
 

@@ -100,6 +100,21 @@ class Kernel:
         #: Added to the name of its folder: one function may be compiled for several signatures.
         self.label = label
 
+    @property
+    def name(self) -> str:
+        """The name of its folder in the cache."""
+        return f"{self.__wrapped__.__module__}.{self.__wrapped__.__name__}{self.label}"
+
+    def cached(self) -> bool:
+        """Tell whether it lies in the cache; damaged files are thrown away."""
+        try:
+            return discard_damaged(self._folder(), _CACHED)
+        except OSError:
+            return False
+
+    def _folder(self) -> Path:
+        return cache_folder(Path(self.__wrapped__.__code__.co_filename)) / self.name
+
     @cached_property
     def dispatcher(self) -> Any:
         """The function as numba knows it."""
@@ -107,8 +122,7 @@ class Kernel:
         aside = _ASIDE.get(f"{function.__module__}:{function.__name__}")
         if aside is not None:
             aside.wait()  # another process is compiling it into the cache
-        shelf = cache_folder(Path(function.__code__.co_filename))
-        folder = shelf / f"{function.__module__}.{function.__name__}{self.label}"
+        folder = self._folder()
         before = config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE
         config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = str(folder), _OPTIMISATION, _VECTORISE
         try:

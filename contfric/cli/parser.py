@@ -7,11 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from contfric.cli import commands, view
+from contfric.cli import commands, doctor, view
 from contfric.errors import ContfricError, did_you_mean
 from contfric.models import DEFAULT_MODEL
 
-_COMMANDS = ("run", "explain", "info", "signatures", "check", "graph", "simulate", "census", "view")
+_COMMANDS = (
+    *("run", "explain", "info", "signatures", "check", "graph", "simulate", "census", "view"),
+    "doctor",
+)
 _DEBUG = "show the traceback of an error"
 
 
@@ -86,6 +89,7 @@ def _parser() -> _Parser:
     _fill_simulate(add("simulate", commands.simulate, "print the events of a trajectory as CSV"))
     _fill_census(add("census", commands.census, "list all periodic orbits, stable or not"))
     _fill_view(add("view", view.view, "write the diagram of a run folder as a page to click on"))
+    _fill_doctor(add("doctor", doctor.doctor, "say what is compiled, and compile what is not"))
     return parser
 
 
@@ -117,6 +121,12 @@ def _fill_info(parser: argparse.ArgumentParser) -> None:
 def _fill_view(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", metavar="DIR", type=Path, help="folder of a run")
     parser.add_argument("--open", action="store_true", help="open the page in a browser")
+
+
+def _fill_doctor(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--compile", action="store_true", help="compile all kernels that are not in the cache")
+    add("--workers", type=_count, metavar="N", help="processes (default: one a core)")
 
 
 def _fill_signatures(parser: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""The flow of any model from its functions: three kernels for each method, compiled once for all models.
+"""The flow of any model from its functions: three kernels for each kind, compiled once for all models.
 
 A mode moves by its closed form where it is affine (:mod:`contfric.flow.linear`), else by integration
 (:mod:`contfric.flow.kinked`). A mode that slides starts on its surfaces: what is moved is the state put
@@ -29,15 +29,8 @@ from contfric.flow.linear.flow import linear_flow
 from contfric.flow.linear.method import explicit_or_linear, explicit_or_linear_probe
 from contfric.flow.linear.search import linear_hit, linear_turning
 from contfric.flow.radau import IMPLICIT_STAGES
-from contfric.flow.stepping import explicit, explicit_probe
-from contfric.flow.stiffness import automatic, automatic_probe, implicit, implicit_probe
+from contfric.flow.stiffness import automatic, automatic_probe
 from contfric.handle import HandleType, with_handle
-
-
-@allocating_helper
-def stepped(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
-    """Move a state by integration."""
-    kinked_flow(motion, mode, t0, y0, dt, p, which, y1, jac)
 
 
 @allocating_helper
@@ -132,27 +125,15 @@ def still(mode, t, y, p, which, out, jac):  # type: ignore[no-untyped-def]
             jac[i, j] = 0.0
 
 
-class Solver(str, Enum):
-    """How the motions of a model are found."""
+class Kind(str, Enum):
+    """Which methods a model's motions are found by: each kind has kernels of its own."""
 
-    EXPLICIT = "explicit"
-    IMPLICIT = "implicit"
-    AUTOMATIC = "automatic"
-    CLOSED_FORM = "closed form"
-    MIXED = "mixed"
+    PLAIN = "plain"  # steps of the explicit method, and the closed form
+    STIFF = "stiff"  # steps of either method, chosen on the way or always implicit
 
 
-_STEPPED = {"moved": stepped, "first": stepped_hit, "turnings": stepped_turning}
-_MEMBERS: dict[Solver, dict[str, Any]] = {
-    Solver.EXPLICIT: {"attempt": explicit, "probe": explicit_probe, "stages": 0, **_STEPPED},
-    Solver.IMPLICIT: {
-        "attempt": implicit, "probe": implicit_probe, "stages": IMPLICIT_STAGES, **_STEPPED
-    },
-    Solver.AUTOMATIC: {
-        "attempt": automatic, "probe": automatic_probe, "stages": IMPLICIT_STAGES, **_STEPPED
-    },
-    Solver.CLOSED_FORM: {"moved": linear_flow, "first": linear_hit, "turnings": linear_turning},
-    Solver.MIXED: {
+_MEMBERS: dict[Kind, dict[str, Any]] = {
+    Kind.PLAIN: {
         "attempt": explicit_or_linear,
         "probe": explicit_or_linear_probe,
         "stages": 0,
@@ -160,19 +141,27 @@ _MEMBERS: dict[Solver, dict[str, Any]] = {
         "first": either_hit,
         "turnings": either_turning,
     },
-}  # fmt: skip
+    Kind.STIFF: {
+        "attempt": automatic,
+        "probe": automatic_probe,
+        "stages": IMPLICIT_STAGES,
+        "moved": kinked_flow,
+        "first": stepped_hit,
+        "turnings": stepped_turning,
+    },
+}
 
 
 @cache
-def handle_of(solver: Solver) -> HandleType:
-    """Return the type of handles of models that are solved in one way."""
-    return HandleType(solver.value.replace(" ", "_"), MODEL, _MEMBERS[solver])
+def handle_of(kind: Kind) -> HandleType:
+    """Return the type of handles of models of one kind."""
+    return HandleType(kind.value, MODEL, _MEMBERS[kind])
 
 
 @cache
-def kernels_of(solver: Solver) -> tuple[Kernel, Kernel, Kernel]:
-    """Return the kernels ``flow``, ``hit`` and ``turning`` of one way."""
-    handle, label = handle_of(solver), f"-{solver.value.replace(' ', '-')}"
+def kernels_of(kind: Kind) -> tuple[Kernel, Kernel, Kernel]:
+    """Return the kernels ``flow``, ``hit`` and ``turning`` of one kind."""
+    handle, label = handle_of(kind), f"-{kind.value}"
     return (
         Kernel(flow, with_handle(flow_signature, handle), label),
         Kernel(hit, with_handle(hit_signature, handle), label),

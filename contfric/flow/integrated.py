@@ -35,7 +35,7 @@ from typing import Any
 
 from contfric.compiled import Kernel
 from contfric.flow.dop853 import POWER
-from contfric.flow.general import Solver, kernels_of, still
+from contfric.flow.general import Kind, kernels_of, still
 from contfric.flow.interface import CompiledFlow
 from contfric.flow.layouts import MODEL
 from contfric.handle import Block, Bound
@@ -91,7 +91,7 @@ class Functions:
         surfaces
     idle : pairs (mode, observable) for which the observable keeps its value along the mode
     timed : observables of time alone
-    affine : modes in closed form, if there are any
+    affine : modes in closed form, if there are any; for the explicit method
     """
 
     field: Kernel
@@ -113,13 +113,9 @@ class Functions:
     affine: AffineModes | None = None
 
     @property
-    def solver(self) -> Solver:
-        """How motions are found."""
-        if self.affine is None:
-            return Solver(Method(self.method).value)
-        every = len(self.affine.closed) == self.modes << len(self.kinks)
-        seen = len(self.affine.seen) == self.observables
-        return Solver.CLOSED_FORM if every and seen and not self.kinks else Solver.MIXED
+    def kind(self) -> Kind:
+        """Which kernels the motions are found by."""
+        return Kind.PLAIN if Method(self.method) is Method.EXPLICIT else Kind.STIFF
 
     def flow(self, level: Kernel, **others: Any) -> CompiledFlow:
         """Return the flow.
@@ -129,7 +125,7 @@ class Functions:
         level : levels of the surfaces
         others : ``rate`` along modes, where that of pieces is another function; ``reset``
         """
-        flow, hit, turning = (Bound(kernel, self.block) for kernel in kernels_of(self.solver))
+        flow, hit, turning = (Bound(kernel, self.block) for kernel in kernels_of(self.kind))
         rate = others.pop("rate", self.rate)
         return CompiledFlow(flow, self.observe, level, turning, hit, self.period, rate, **others)
 
@@ -166,6 +162,7 @@ class Functions:
             "relative": float(self.relative),
             "absolute": float(self.absolute),
             "looseness": (max(self.relative, self.absolute) / 1e-12) ** (1.0 / POWER),
+            "implicit": int(Method(self.method) is Method.IMPLICIT),
             "kinks": len(self.kinks),
             "observables": self.observables,
             "entries_count": self.affine.entries if self.affine else 0,

@@ -87,11 +87,13 @@ TABLES = (
     "sides",  # of a pair: the side of its level that segments of the mode leave to; 0: either
     "kink_of",  # of a kink: the observable that vanishes there
 )
-#: Numbers: tolerances of a step, how much they are looser than 1e-12 in steps, and counts.
+#: Numbers: tolerances of a step, how much they are looser than 1e-12 in steps, whether all steps are
+#: implicit, and counts.
 NUMBERS = {
     "relative": f8,
     "absolute": f8,
     "looseness": f8,
+    "implicit": i8,
     "kinks": i8,
     "observables": i8,
     "entries_count": i8,

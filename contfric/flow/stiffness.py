@@ -69,10 +69,13 @@ def spectral_radius(room):  # type: ignore[no-untyped-def]
 
 @helper
 def choose(motion, mode, t, h, p, room):  # type: ignore[no-untyped-def]
-    """Evaluate the Jacobian at the start of a step and choose its method."""
+    """Evaluate the Jacobian at the start of a step and choose its method, where there is a choice."""
     control, n = room.control, room.scales.shape[0]
     motion.field(mode, t, room.start[:n], p, room.none, room.stage[:n], room.local)
     control[FRESH] = 1.0
+    if motion.implicit != 0:
+        control[KIND], control[FALLS] = 1.0, IMPLICIT_STAGES + 1.0
+        return
     if h < 0.0:
         return  # backwards in time what decays grows, and has to be followed
     radius = spectral_radius(room) / motion.looseness
@@ -88,16 +91,6 @@ def choose(motion, mode, t, h, p, room):  # type: ignore[no-untyped-def]
         control[KIND], control[FALLS], control[LIMITED] = 0.0, POWER, 0.0
         control[PATIENCE] = _GROWTH * control[PATIENCE] if control[SINCE] == _TRIALS else 1.0
         control[NEXT] = min(control[NEXT], _HELD_BACK / radius)
-
-
-@helper
-def implicit(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
-    """Return the error of an implicit step (a method)."""
-    control, n = room.control, room.scales.shape[0]
-    if control[FRESH] == 0.0:
-        motion.field(mode, t, room.start[:n], p, room.none, room.stage[:n], room.local)
-        control[FRESH], control[FALLS] = 1.0, IMPLICIT_STAGES + 1.0
-    return implicit_trial(motion, mode, c, t, h, p, which, room)
 
 
 @helper
