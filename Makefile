@@ -106,7 +106,7 @@ bench: $(BENCH_STAMP)
 	@$(BIN)/python benchmarks/scenes.py
 	@$(BIN)/python benchmarks/integrated.py
 
-# An hour or more; sequences go on where they were interrupted.
+# An hour or more; sequences and restarts go on where they were interrupted.
 stress: $(STAMP)
 	@echo "== stress"
 	@mkdir -p $(STRESS)
@@ -115,7 +115,7 @@ stress: $(STAMP)
 	@$(BIN)/python benchmarks/stress/orbits.py --count 400 --seed 3 --out $(STRESS)/orbits.json
 	@$(BIN)/python benchmarks/stress/events.py --count 400 --seed 2 --out $(STRESS)/events.json
 	@$(BIN)/python benchmarks/stress/continuation.py --count 300 --seed 2 --out $(STRESS)/continuation.json
-	@$(BIN)/python benchmarks/stress/restarts.py --count 3000 --seed 1 --out $(STRESS)/restarts.json
+	@$(BIN)/python benchmarks/stress/restarts.py --count 3000 --seed 1 --workers $(WORKERS) --out $(STRESS)/restarts.json
 	@$(BIN)/python benchmarks/stress/write_page.py $(STRESS)/*.json --out docs/stress.md
 
 # A study that does not end within the limit, or ends with an error, fails this.

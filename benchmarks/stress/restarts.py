@@ -1,6 +1,6 @@
 """Random diagrams in all five parameters, explored again from up to six of their branches.
 
-``python benchmarks/stress/restarts.py --count 3000 --seed 1 --out restarts.json``
+``python benchmarks/stress/restarts.py --count 3000 --seed 1 --workers 2 --out restarts.json``
 
 Each restart has 0.31 times the step. What differs is counted by class. The classes that are excused are
 fixed here, each by a test on the events of the diagram; everything else is a fault. Points are asked for
@@ -10,12 +10,12 @@ admissibility, and sums of indices are tested.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from report import Report, Tally, command_line
+from chunks import Chunked
+from report import Tally
 from scenes import time_limit
 
 import contfric as cf
@@ -26,14 +26,13 @@ WHAT = "Diagrams of random scenes in all five parameters, explored again from up
 LIMIT = 60.0
 #: Most branches of a diagram; those with more are counted as cut.
 MOST_BRANCHES = 60
-#: Restarts a scene.
-RESTARTS = 6
+#: Restarts a scene, and scenes of a chunk of work.
+RESTARTS, CHUNK = 6, 10
 #: S0 and S this near (relative) are equal: conditions degenerate together.
 EQUAL = 1e-6
 #: Omega this near to 1/(2 n) with this little damping: slides that last whole natural periods, continua.
 RESONANT, UNDAMPED = 1e-6, 1e-6
 
-Progress = Callable[[str], None] | None
 VARIED = ("Omega", "S", "S0", "h", "zeta")
 
 
@@ -86,10 +85,10 @@ def excuse(found: Scene, diagram: cf.Diagram) -> str:
     return ""
 
 
-def run(count: int, seed: int, *, first: int = 0, progress: Progress = None) -> Report:
-    """Explore random scenes and restart them."""
-    began, tally = time.perf_counter(), Tally()
-    for index in range(first, first + count):
+def chunk(seed: int, first: int, last: int) -> Tally:
+    """Explore the random scenes of a range of indices, and restart them."""
+    tally = Tally()
+    for index in range(first, last):
         tally.index = index
         start = time.process_time()
         try:
@@ -101,10 +100,8 @@ def run(count: int, seed: int, *, first: int = 0, progress: Progress = None) -> 
             Exception
         ) as error:  # whatever it is, it is a failure of this scene and not of the run
             tally.check("no exception", False, f"{scene(seed, index)}: {error!r}")
-        tally.largest("seconds of one scene", time.process_time() - start)
-        if progress is not None and index % 10 == 9:
-            progress(f"restarts: {index + 1 - first} of {count}, {len(tally.failed)} failures")
-    return tally.report("restarts", WHAT, count, seed, time.perf_counter() - began)
+        tally.largest("processor seconds of one scene", time.process_time() - start)
+    return tally
 
 
 def one_scene(tally: Tally, found: Scene, most: int = RESTARTS) -> None:
@@ -149,5 +146,7 @@ def report(tally: Tally, found: Scene, held: Verification, name: str) -> None:
     tally.met("sums that tell of another component", len(held.missing))
 
 
+RUN = Chunked("restarts", WHAT, chunk, CHUNK)
+
 if __name__ == "__main__":
-    command_line(run, count=60)
+    RUN.command_line(count=60, seed=0)

@@ -31,7 +31,7 @@ release becomes tangential and the orbit is one of a continuum.
     python benchmarks/stress/write_page.py *.json --out docs/stress.md
 """
 #: Order of the sections; others follow by name.
-ORDER = ("sequences", "segments", "orbits", "events", "continuation")
+ORDER = ("sequences", "segments", "orbits", "events", "continuation", "restarts")
 
 
 def page(reports: list[Report]) -> str:

@@ -1,0 +1,122 @@
+"""Runs in chunks of cases: in several processes, kept as they are done, and gone on with later."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+
+from report import Failure, Report, Tally, say
+
+Progress = Callable[[str], None] | None
+
+
+def keep_all(worst: dict[str, float]) -> None:
+    """Keep every largest value."""
+
+
+@dataclass(frozen=True)
+class Chunked:
+    """A run in chunks.
+
+    Attributes
+    ----------
+    name, what : of the report
+    chunk : from a seed and a range of indices to the tally of those cases
+    size : cases of a chunk, so many that one takes some ten seconds
+    tidy : drops largest values that the report does not name
+    """
+
+    name: str
+    what: str
+    chunk: Callable[[int, int, int], Tally]
+    size: int
+    tidy: Callable[[dict[str, float]], None] = keep_all
+
+    def run(
+        self,
+        count: int,
+        seed: int,
+        progress: Progress = None,
+        workers: int = 1,
+        out: Path | None = None,
+    ) -> Report:
+        """Run ``count`` cases; with ``out``, what is done is kept there and not done again."""
+        began = time.perf_counter()
+        done, spent = restore(out, seed)
+        ranges = [(a, min(a + self.size, count)) for a in range(0, count, self.size)]
+        todo = [r for r in ranges if f"{r[0]}-{r[1]}" not in done]
+        for (first, last), tally in zip(todo, self._results(seed, todo, workers), strict=True):
+            done[f"{first}-{last}"] = tally
+            if out is not None:
+                keep(out, seed, done, spent + time.perf_counter() - began)
+            if progress is not None:
+                failed = len(self.merged(list(done.values())).failed)
+                progress(f"{len(done)}/{len(ranges)} chunks, {failed} failed")
+        whole = self.merged([done[f"{a}-{b}"] for a, b in ranges])
+        return whole.report(self.name, self.what, count, seed, spent + time.perf_counter() - began)
+
+    def merged(self, tallies: list[Tally]) -> Tally:
+        """Return one tally for all."""
+        whole = Tally()
+        for tally in tallies:
+            for mine, theirs in ((whole.tried, tally.tried), (whole.passed, tally.passed)):
+                for name, times in theirs.items():
+                    mine[name] = mine.get(name, 0) + times
+            for name, times in tally.counts.items():
+                whole.met(name, times)
+            for name, value in tally.worst.items():
+                whole.largest(name, value)
+            whole.failed.extend(tally.failed)
+        self.tidy(whole.worst)
+        return whole
+
+    def _results(self, seed: int, ranges: list[tuple[int, int]], workers: int) -> Iterator[Tally]:
+        firsts, lasts = [r[0] for r in ranges], [r[1] for r in ranges]
+        if workers <= 1:
+            yield from map(partial(self.chunk, seed), firsts, lasts)
+            return
+        with ProcessPoolExecutor(workers) as pool:
+            yield from pool.map(partial(self.chunk, seed), firsts, lasts)
+
+    def command_line(self, count: int, seed: int) -> None:
+        """Run from the command line; exit status 1 if something failed."""
+        parser = argparse.ArgumentParser(description=self.what)
+        parser.add_argument("--count", type=int, default=count)
+        parser.add_argument("--seed", type=int, default=seed)
+        parser.add_argument("--workers", type=int, default=1)
+        parser.add_argument("--out", type=Path)
+        args = parser.parse_args()
+        report = self.run(args.count, args.seed, say, args.workers, args.out)
+        print(*report.lines(), sep="\n")
+        if args.out is not None:
+            report.write(args.out)
+        sys.exit(1 if report.failed else 0)
+
+
+def keep(out: Path, seed: int, done: dict[str, Tally], seconds: float) -> None:
+    """Write what is done, beside the report to come."""
+    data = {"seed": seed, "seconds": seconds, "done": {k: asdict(v) for k, v in done.items()}}
+    part = out.with_suffix(".part")
+    part.write_text(json.dumps(data), encoding="utf-8")
+    part.replace(out.with_suffix(".chunks"))
+
+
+def restore(out: Path | None, seed: int) -> tuple[dict[str, Tally], float]:
+    """Return what an earlier run with the same seed has done, and the time it took."""
+    path = None if out is None else out.with_suffix(".chunks")
+    if path is None or not path.exists():
+        return {}, 0.0
+    data = json.loads(path.read_text(encoding="utf-8"))
+    if data["seed"] != seed:
+        return {}, 0.0
+    done = {}
+    for name, tally in data["done"].items():
+        done[name] = Tally(**{**tally, "failed": [Failure(**f) for f in tally["failed"]]})
+    return done, data["seconds"]

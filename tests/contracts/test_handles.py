@@ -1,0 +1,98 @@
+"""Blocks of memory by their addresses: what is behind a handle, and kernels that are bound to one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from contfric.ahead import every_kernel, missing
+from contfric.cli import main
+from contfric.compiled import f8, helper, i8, kernel, vector
+from contfric.handle import ITSELF, TABLE, Block, Bound, HandleType, with_handle
+
+LAYOUT = {"scaled": f8(f8), "table": TABLE, "count": i8, "factor": f8, "other": ITSELF}
+
+
+@helper
+def shifted(x):
+    return x + 0.5
+
+
+HANDLE = HandleType("of the tests", LAYOUT, {"shift": shifted, "twice": 2})
+
+
+@kernel(f8(f8))
+def thrice(x):
+    return 3.0 * x
+
+
+@kernel(f8(f8))
+def halved(x):
+    return 0.5 * x
+
+
+@kernel(with_handle(f8(f8, vector), HANDLE))
+def total(motion, x, out):
+    for k in range(motion.count):
+        out[k] = motion.table[k] + motion.other.factor
+    return motion.twice * motion.shift(motion.factor * motion.scaled(x)) + motion.other.scaled(x)
+
+
+def block(function, factor, table, other=None):
+    values = {"scaled": function, "table": table, "count": len(table), "factor": factor}
+    return Block(LAYOUT, values if other is None else {**values, "other": other})
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_members_are_what_the_block_holds(seed):
+    rng = np.random.default_rng(seed)
+    a, b, x = rng.normal(size=3)
+    table = rng.integers(-(2**40), 2**40, 4).tolist()
+    inner = block(halved, b, [7])
+    outer = block(thrice, a, table, inner)
+    bound, out = Bound(total, outer), np.empty(4)
+    expected = 2 * (a * (3.0 * x) + 0.5) + 0.5 * x
+    assert total(outer.address, x, out) == expected
+    assert bound(x, out) == expected
+    assert out.tolist() == [t + b for t in table]
+
+
+def test_a_bound_kernel_is_a_function_of_a_block():
+    """Compiled code calls it like any other: two blocks, one kernel, and neither knows of the other."""
+    layout = {"one": f8(f8, vector), "two": f8(f8, vector)}
+    handle = HandleType("of bound kernels", layout)
+
+    def difference(pair, x, out):
+        return pair.one(x, out) - pair.two(x, out)
+
+    first, second = (block(thrice, f, [1], block(halved, 0.0, [])) for f in (2.0, 5.0))
+    pair = Block(layout, {"one": Bound(total, first), "two": Bound(total, second)})
+    compiled = kernel(with_handle(f8(f8, vector), handle))(difference)
+    out = np.empty(1)
+    x = 1.25
+    assert compiled(pair.address, x, out) == pytest.approx(2 * 3 * x * (2.0 - 5.0), rel=1e-15)
+
+
+def test_a_member_that_a_block_does_not_have_is_an_error_of_the_compiler():
+    def wrong(motion, x):
+        return motion.scale(x)
+
+    with pytest.raises(Exception, match="Unknown attribute 'scale'"):
+        kernel(with_handle(f8(f8), HANDLE))(wrong).dispatcher  # noqa: B018
+
+
+def test_doctor_says_what_is_compiled(capsys, tmp_path, monkeypatch):
+    assert main(["doctor"]) == 0
+    lines = capsys.readouterr().out
+    count = len(every_kernel())
+    assert f"{count - len(missing())} of {count} compiled" in lines
+    monkeypatch.setenv("CONTFRIC_CACHE_DIR", str(tmp_path))
+    assert main(["doctor"]) == 0
+    assert f"0 of {count} compiled" in (out := capsys.readouterr().out)
+    assert "contfric doctor --compile" in out
+
+
+def test_every_kernel_of_the_package_is_known():
+    names = set(every_kernel())
+    assert {"contfric.continuation.march.march", "contfric.flow.general.hit-stiff"} <= names
+    assert not any(name.startswith("contfric_model") for name in names)
