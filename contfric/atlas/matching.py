@@ -22,6 +22,9 @@ SAME_MOTION = 1e-4
 _SAME_ORBIT = 1e-8
 #: Names of one and the same sliding event, those that say more first.
 _TELLING = {kind: rank for rank, kind in enumerate((Kind.GS, Kind.AS, Kind.SS, Kind.CS, Kind.BP))}
+#: Events this far apart (relative to the range) are two, however badly they are known: how well that is
+#: need not be computed.
+_APART = 0.05
 
 
 def identity(orbit: Orbit) -> frozenset[ReducedWord]:
@@ -67,8 +70,8 @@ def same_event(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> 
 
 def same_place(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> bool:
     """Tell whether two events have the same parameters and the same motion (or its mirror image)."""
-    near = max(ACCURACY, a.accuracy, b.accuracy) * width
-    if abs(a.params[parameter] - b.params[parameter]) > near:
+    gap = abs(a.params[parameter] - b.params[parameter]) / width
+    if gap > ACCURACY and (gap > _APART or gap > max(a.accuracy, b.accuracy)):
         return False
     return a.outline.apart(b.outline) < SAME_MOTION
 

@@ -68,35 +68,45 @@ class _Condition:
     gradient: tuple[FloatArray, float] | None = None
 
 
-def accuracy_of(
-    kind: Kind,
-    here: Orbit,
-    tests: tuple[Test, ...],
-    sides: tuple[Point, Point | None],
-    point: Point,
-    settings: Settings,
-) -> float:
-    """Return a bound of the error of an event's parameter, relative to the range.
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A bound of the error of an event's parameter, relative to the range; called for its value.
 
-    Parameters
+    Attributes
     ----------
-    here : the orbit at the event
+    kind, here : the event, and the orbit at it
     tests : the margins that vanish; at T the segment and the observable
     sides, point : the points before and after it, and the located one
+    parameter, width : what varies, and its range
+    least : the value is not below this: what is known otherwise of the event
     """
-    active = here.model.index_of(settings.parameter)
-    if tests:
-        labels = kind is Kind.T and tests[0].margin is Margin.INTERIOR  # else a joint on a section
-        condition = (_touch if labels else _margin)(here, tests[0], active)
-        error = None if condition is None else _error_of(here, active, condition)
-        otherwise = _SINGULAR
-    elif kind is Kind.SN:
-        error, otherwise = _fold_error(here, active, sides, point), _SINGULAR
-    else:
-        error, otherwise = _multiplier_error(kind, here, active, settings.width), ACCURACY
-    if error is None or not np.isfinite(error):
-        return otherwise
-    return max(LEAST, error / settings.width)
+
+    kind: Kind
+    here: Orbit
+    tests: tuple[Test, ...]
+    sides: tuple[Point, Point | None]
+    point: Point
+    parameter: str
+    width: float
+    least: float = 0.0
+
+    def __call__(self) -> float:
+        """Return the bound."""
+        error, otherwise = self._error()
+        if error is None or not np.isfinite(error):
+            return max(self.least, otherwise)
+        return max(LEAST, self.least, error / self.width)
+
+    def _error(self) -> tuple[float | None, float]:
+        """Return the error, and what is claimed if there is none."""
+        kind, here, active = self.kind, self.here, self.here.model.index_of(self.parameter)
+        if self.tests:
+            labels = kind is Kind.T and self.tests[0].margin is Margin.INTERIOR  # else a joint
+            condition = (_touch if labels else _margin)(here, self.tests[0], active)
+            return None if condition is None else _error_of(here, active, condition), _SINGULAR
+        if kind is Kind.SN:
+            return _fold_error(here, active, self.sides, self.point), _SINGULAR
+        return _multiplier_error(kind, here, active, self.width), ACCURACY
 
 
 def _margin(here: Orbit, test: Test, active: int) -> _Condition:
@@ -216,7 +226,7 @@ def _moved(orbit: Orbit, active: int, row: FloatArray, left: float) -> float | N
 def _rounding(orbit: Orbit) -> FloatArray:
     """Return the rounding of every equation of a chain, shape (N m,)."""
     size = np.max(np.abs(orbit.joints), axis=1)
-    size = 1.0 + np.maximum(size, np.roll(size, -1))
+    size = 1.0 + np.maximum(size, np.append(size[1:], size[0]))
     unit = _UNITS * np.finfo(float).eps + orbit.model.rounding
     return np.repeat(unit * size, orbit.joints.shape[1])
 

@@ -24,8 +24,8 @@ out of the region where it can stay.
 
 from __future__ import annotations
 
-from collections.abc import Set
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Set
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from functools import cached_property
 
@@ -37,6 +37,7 @@ from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import Outline, outline_of
 from contfric.orbit.system import Margin, System, Test, inside_sign
+from contfric.stored import made_of
 
 
 class Kind(str, Enum):
@@ -181,9 +182,8 @@ class Bifurcation:
     located : bool
         False if a test changed sign but Newton failed on the way to the place: the parameters are
         those of the last solved point before it.
-    accuracy : float
-        How well the parameter is located, relative to the range: a bound of what rounding does to the
-        equations of the event (:mod:`contfric.continuation.accuracy`).
+    bound : float or callable
+        The accuracy, or what returns it when it is asked for.
     proposals : tuple of Proposal
         What an exploration proposed to follow it, in order, and what became of it.
     """
@@ -196,8 +196,17 @@ class Bifurcation:
     stable_before: bool | None = None
     stable_after: bool | None = None
     located: bool = True
-    accuracy: float = ACCURACY
+    bound: float | Callable[[], float] = ACCURACY
     proposals: tuple[Proposal, ...] = ()
+
+    @cached_property
+    def accuracy(self) -> float:
+        """How well the parameter is located, relative to the range.
+
+        A bound of what rounding does to the equations of the event
+        (:mod:`contfric.continuation.accuracy`).
+        """
+        return self.bound() if callable(self.bound) else self.bound
 
     @property
     def group(self) -> int:
@@ -244,6 +253,15 @@ class Bifurcation:
     def __repr__(self) -> str:
         values = ", ".join(f"{k}={v:.12g}" for k, v in self.params.items())
         return f"<{self.label}: {values}{'' if self.located else ' (not located)'}>"
+
+
+def _parts(bifurcation: Bifurcation) -> tuple[object, ...]:
+    """Return what an event is stored as: with its accuracy, and not with what computes that."""
+    plain = replace(bifurcation, bound=bifurcation.accuracy)
+    return tuple(getattr(plain, f.name) for f in fields(plain))
+
+
+made_of(Bifurcation, _parts, Bifurcation)
 
 
 def meaning_of(kind: Kind, model: Model, surfaces: Set[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contfric.continuation.accuracy import accuracy_of
+from contfric.continuation.accuracy import Estimate
 from contfric.continuation.events import Bifurcation, Kind, outward_rate
 from contfric.continuation.points import Point, Settings
 from contfric.orbit.orbit import Orbit
@@ -27,7 +27,8 @@ def bifurcation_at(
     tests: tuple[Test, ...] = (),
 ) -> Bifurcation:
     """Return the event at a point, with the stability of the points before and after it."""
-    accuracy = accuracy_of(kind, here, tests, (before, after), point, settings)
+    sides, least = (before, after), ROUGH if _is_rough(kind, here, tests) else 0.0
+    bound = Estimate(kind, here, tests, sides, point, settings.parameter, settings.width, least)
     return Bifurcation(
         kind,
         here.params,
@@ -35,7 +36,7 @@ def bifurcation_at(
         tests,
         point.arc,
         *_stability(kind, here, before, after, point, settings),
-        accuracy=max(accuracy, ROUGH) if _is_rough(kind, here, tests) else accuracy,
+        bound=bound,
     )
 
 

@@ -86,9 +86,7 @@ def sliding_events(
     )
     found = bifurcation_at(kind, here, before, None, point, settings, group)
     point.rough = rough
-    return [
-        (replace(found, accuracy=max(found.accuracy, ROUGHLY_REACHED)) if rough else found, point)
-    ]
+    return [(replace(found, bound=max(found.accuracy, ROUGHLY_REACHED)) if rough else found, point)]
 
 
 def _pulled_in(orbit: Orbit, before: Point, point: Point, settings: Settings) -> Point:

@@ -117,7 +117,7 @@ def smooth_events(
             continue  # the fold there says what it is; beside it chi(1) is rounding
         event = bifurcation_at(kind, here, before, beyond, point, settings)
         if column == CHI_MINUS and not opens_through(here, active):
-            event = replace(event, accuracy=ROUGH)
+            event = replace(event, bound=ROUGH)
         found.append((event, point))
     return [*found, *_tangencies(orbit, before, beyond, settings)]
 
@@ -299,5 +299,5 @@ def _fold(
         kind = Kind.SN
     found = bifurcation_at(kind, here, before, after, point, settings)
     if kind is not Kind.SN and not opens_through(here, active):
-        found = replace(found, accuracy=ROUGH)
+        found = replace(found, bound=ROUGH)
     return found, point

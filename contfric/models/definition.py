@@ -185,7 +185,7 @@ class Model(SectionMaps):
         """A fresh mapping of every parameter to its default value."""
         return {p.name: p.default for p in self.parameters}
 
-    @property
+    @cached_property
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the parameters in the order of the engine's vectors."""
         return tuple(p.name for p in self.parameters)

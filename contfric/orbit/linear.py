@@ -114,15 +114,10 @@ def null_space(
 
 
 def pencil_of_turn(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:
-    """Return (P, Q) with ``P z_0 + Q z_N = 0`` for one turn, shape (2, m, m).
+    """Return (P, Q) with ``P z_0 + Q z_N = 0`` for one turn, shape (2, m, m): without inner joints."""
+    from contfric.orbit.turn import turn_pencil
 
-    Each inner joint is taken out by an orthogonal transformation of the two blocks that it stands
-    in: the last m rows of the transposed Q of their QR factorisation annihilate it.
-    """
     a, b, _, _ = jacobian_blocks(system, joints, vector, parameters=False)
-    m = joints.shape[1]
-    p, q = a[0], b[0]
-    for i in range(1, len(a)):
-        rest = np.linalg.qr(np.vstack([q, a[i]]), mode="complete")[0][:, m:].T
-        p, q = rest[:, :m] @ p, rest[:, m:] @ b[i]
-    return np.stack([p, q])
+    pencil = np.empty((2, *a.shape[1:]))
+    turn_pencil(a, b, pencil)
+    return pencil

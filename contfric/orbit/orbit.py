@@ -123,7 +123,7 @@ class Orbit:
 
     # ------------------------------------------------------------------ the whole cycle
 
-    @property
+    @cached_property
     def word(self) -> Word:
         """Mode and exit surface of each segment of the whole orbit."""
         return whole_of(self.model, self.system.word, self.system.half)
@@ -141,7 +141,7 @@ class Orbit:
     @cached_property
     def ends(self) -> FloatArray:
         """End time and state of each segment of the whole orbit, shape (segments, 1 + n)."""
-        ends = np.roll(self.cycle, -1, axis=0)
+        ends = np.concatenate((self.cycle[1:], self.cycle[:1]))
         ends[-1, 0] += self.period
         return ends
 

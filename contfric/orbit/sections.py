@@ -198,7 +198,7 @@ class _Crossings:
         self.model = model
         surface = next(s for s in model.surface_by_name if any(pair[1] == s for pair in word))
         self.at = [i for i, pair in enumerate(word) if pair[1] == surface]
-        self.ends = np.roll(joints, -1, axis=0)
+        self.ends = np.concatenate((joints[1:], joints[:1]))
         self.ends[-1, 0] = end
         self.period = end - float(joints[0, 0])
         self.rates = {i: _rate(model, word[i], self.ends[i], vector) for i in self.at}
