@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +93,11 @@ class Estimate:
 
     def __call__(self) -> float:
         """Return the bound."""
+        return self._value
+
+    @cached_property
+    def _value(self) -> float:
+        """The bound, once for the copies of an event and its mirror image."""
         error, otherwise = self._error()
         if error is None or not np.isfinite(error):
             return max(self.least, otherwise)
