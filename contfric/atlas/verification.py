@@ -24,6 +24,8 @@ from contfric.atlas.matching import on_branch, same_place
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation
 from contfric.continuation.points import LARGEST_STEP
+from contfric.errors import ConvergenceError
+from contfric.orbit.orbit import Orbit
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
@@ -130,6 +132,9 @@ def verify(diagram: Diagram, restarts: int = 6, step: float = STEP) -> Verificat
 
 # --------------------------------------------------------------------------------- restarts
 
+#: Where a branch is restarted, as shares of its points: in its middle unless the equations are singular.
+_SHARES = (0.5, 0.25, 0.75)
+
 
 def _chosen(diagram: Diagram, most: int) -> list[int]:
     """Return the branches to restart from: spread over the bridges and over the others."""
@@ -147,30 +152,36 @@ def _spread(places: list[int], most: int) -> list[int]:
 
 
 def _restart(diagram: Diagram, i: int, step: float) -> Restart:
+    branch, refused = diagram.branches[i], ""
+    for share in _SHARES:
+        start = branch[int(share * len(branch))]
+        value = start.params[diagram.parameter]
+        try:
+            again = _explored(diagram, start, step)
+        except ConvergenceError as error:  # it is singular just there
+            refused = refused or f"anything: {error}"
+            continue
+        more, less = tuple(differences(again, diagram)), tuple(differences(diagram, again))
+        return Restart(i, value, less, more, again.complete)
+    return Restart(i, value, (refused,), (), True)
+
+
+def _explored(diagram: Diagram, start: Orbit, step: float) -> Diagram:
+    """Explore a diagram again from one of its orbits, with a share of its largest step."""
     from contfric.atlas.explore import explore
 
     asked = diagram.settings
-    branch = diagram.branches[i]
-    start = branch[len(branch) // 2]
-    again = explore(
+    return explore(
         start,
         diagram.parameter,
         diagram.range,
-        max_step=step * (asked.max_step or branch.model.max_step or LARGEST_STEP),
+        max_step=step * (asked.max_step or start.model.max_step or LARGEST_STEP),
         stability=asked.stability,
         bridges=asked.bridges,
         max_periods=asked.max_periods,
         copies=asked.copies,
         max_branches=asked.max_branches,
         max_points=max(asked.max_points, int(asked.max_points / step)),
-    )
-    value = start.params[diagram.parameter]
-    return Restart(
-        i,
-        value,
-        tuple(differences(diagram, again)),
-        tuple(differences(again, diagram)),
-        again.complete,
     )
 
 

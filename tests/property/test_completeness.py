@@ -7,6 +7,7 @@ are degenerate), and the scenes whose diagrams once differed.
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -83,6 +84,29 @@ def test_a_sum_tells_of_another_component() -> None:
     assert not whole.missing
     part = cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.4, 0.6), bridges=False)
     assert not part.verify(restarts=0).sums  # without bridges nothing adds up, and nothing is asked
+
+
+@pytest.mark.parametrize("refused", [1, 3])
+def test_a_restart_that_cannot_start_is_told(refused: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It starts elsewhere on the branch; where it can start nowhere, that is what differs, and no error."""
+    module = import_module("contfric.atlas.explore")  # the package has a function of that name
+    params = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
+    diagram = cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.45, 0.56))
+    explore, asked = module.explore, []
+
+    def sometimes(start: cf.Orbit, *args: object, **kwargs: object) -> cf.Diagram:
+        asked.append(start.params["Omega"])
+        if len(asked) <= refused:
+            raise cf.ConvergenceError("singular there", start)
+        return explore(start, *args, **kwargs)
+
+    monkeypatch.setattr(module, "explore", sometimes)
+    found = diagram.verify(restarts=1)
+    assert len(found.restarts) == 1
+    assert found.same is (refused == 1)
+    assert len(set(asked)) == len(asked) == min(refused + 1, 3)
+    if refused == 3:
+        assert "without anything: singular there" in str(found)
 
 
 # ------------------------------------------------------------------------------------ sequences
