@@ -15,7 +15,7 @@ from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 
-from contfric.compiled import Kernel
+from contfric.compiled import Kernel, cache_folder
 
 Progress = Callable[[str], None]
 
@@ -52,14 +52,28 @@ def missing() -> list[str]:
     return [name for name, kernel in every_kernel().items() if not kernel.cached()]
 
 
+def writable() -> bool:
+    """Tell whether what is compiled can be kept."""
+    folder = cache_folder(Path(__file__))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)
+
+
 def compile_missing(workers: int | None = None, progress: Progress | None = None) -> list[str]:
     """Compile what is not in the cache, in several processes; return the names.
+
+    Nothing where the cache cannot be written: what other processes compile would be lost.
 
     Parameters
     ----------
     workers : number of processes; that of the processor's cores if None
     progress : called with what was done
     """
+    if not writable():
+        return []
     names = missing()
     groups: dict[int, list[str]] = {}
     for name in names:

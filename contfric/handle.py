@@ -7,10 +7,10 @@ way the engine gets the functions of a flow. What a block has is its *layout*, w
 handle's type; so may be helpers and numbers that are known when a kernel is compiled.
 
 A kernel whose first argument is a handle becomes one without it by *binding*: a few machine instructions
-that put the address before the other arguments (:class:`Bound`), made in a millisecond.
+that put the address before the other arguments (:class:`Bound`), made without numba's compiler.
 
-Python hands an address over in 20 nanoseconds. Numba's own first-class functions cost 16 microseconds each,
-and an interrupt that comes just then is lost.
+Python hands an address over like any integer. Each of numba's own first-class functions is looked up in
+Python at every call, and an interrupt that comes just then is lost.
 """
 
 from __future__ import annotations

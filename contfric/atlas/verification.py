@@ -159,7 +159,7 @@ def _restart(diagram: Diagram, i: int, step: float) -> Restart:
         try:
             again = _explored(diagram, start, step)
         except ConvergenceError as error:  # it is singular just there
-            refused = refused or f"anything: {error}"
+            refused = refused or f"any continuation: {error}"
             continue
         more, less = tuple(differences(again, diagram)), tuple(differences(diagram, again))
         return Restart(i, value, less, more, again.complete)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import platform
-import sys
 from pathlib import Path
 
 from contfric.cli.exits import Exit
@@ -18,7 +17,7 @@ def doctor(options: argparse.Namespace) -> int:
 
     from contfric import __file__ as package
     from contfric import __version__
-    from contfric.ahead import compile_missing, every_kernel, missing
+    from contfric.ahead import compile_missing, every_kernel, missing, writable
     from contfric.compiled import cache_folder
 
     absent = missing()
@@ -39,12 +38,12 @@ def doctor(options: argparse.Namespace) -> int:
         print(f"{name:10} {text}")
     if absent:
         hint = (
-            "the cache cannot be written: they are compiled in every process"
-            if options.compile
-            else "contfric doctor --compile compiles them now, else who needs one waits for it"
+            "contfric doctor --compile compiles them now, else who needs one waits for it"
+            if writable()
+            else "the cache cannot be written: kernels are compiled in every process, slower"
         )
-        print(f"{'':10} {hint}", file=sys.stderr if options.compile else sys.stdout)
-    return Exit.FAILED if options.compile and absent else Exit.DONE
+        print(f"{'':10} {hint}")
+    return Exit.FAILED if options.compile and absent and writable() else Exit.DONE
 
 
 def _processor() -> str:

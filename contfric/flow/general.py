@@ -19,6 +19,7 @@ from contfric.compiled import (
     allocating_helper,
     field_signature,
     flow_signature,
+    helper,
     hit_signature,
     kernel,
     turning_signature,
@@ -55,10 +56,16 @@ def stepped_turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: ign
     return kinked_turning(motion.clock, piece, c, t0, y0, dt, p, times, values)
 
 
+@helper
+def in_closed_form(motion, mode):  # type: ignore[no-untyped-def]
+    """Tell whether a mode moves by its closed form alone; through kinks that is a method of integration."""
+    return motion.kinks == 0 and motion.closed[mode] != 0
+
+
 @allocating_helper
 def either(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
-    """Move a state in closed form where the mode is affine; through kinks that is a method of integration."""
-    if motion.kinks == 0 and motion.closed[mode] != 0:
+    """Move a state in closed form where the mode is affine, else by integration."""
+    if in_closed_form(motion, mode):
         linear_flow(motion, mode, t0, y0, dt, p, which, y1, jac)
     else:
         kinked_flow(motion, mode, t0, y0, dt, p, which, y1, jac)
@@ -67,7 +74,7 @@ def either(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-unty
 @allocating_helper
 def either_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-untyped-def]
     """Find the first hit along a motion of either kind."""
-    if motion.kinks == 0 and motion.closed[mode] != 0 and motion.seen[c] != 0:
+    if in_closed_form(motion, mode) and motion.seen[c] != 0:
         return linear_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1)
     return stepped_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1)
 
@@ -75,7 +82,7 @@ def either_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ign
 @allocating_helper
 def either_turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
     """Find the stationary points along a motion of either kind."""
-    if motion.kinks == 0 and motion.closed[mode] != 0 and motion.seen[c] != 0:
+    if in_closed_form(motion, mode) and motion.seen[c] != 0:
         return linear_turning(motion, mode, c, t0, y0, dt, p, times, values)
     return stepped_turning(motion, mode, c, t0, y0, dt, p, times, values)
 

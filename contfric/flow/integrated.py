@@ -92,6 +92,12 @@ class Functions:
     idle : pairs (mode, observable) for which the observable keeps its value along the mode
     timed : observables of time alone
     affine : modes in closed form, if there are any; for the explicit method
+
+    Raises
+    ------
+    ValueError
+        For an unknown method; if a mode slides and ``onto`` is missing; if modes are in closed form and the
+        method is not explicit, whose kernels alone know it.
     """
 
     field: Kernel
@@ -111,6 +117,13 @@ class Functions:
     idle: Collection[tuple[int, int]] = ()
     timed: Collection[int] = ()
     affine: AffineModes | None = None
+
+    def __post_init__(self) -> None:
+        method = Method(self.method)
+        if self.slides and self.onto is None:
+            raise ValueError("modes slide: 'onto' has to put a state on their surfaces")
+        if self.affine is not None and method is not Method.EXPLICIT:
+            raise ValueError(f"modes in closed form need the explicit method, not '{method.value}'")
 
     @property
     def kind(self) -> Kind:

@@ -8,7 +8,9 @@ import pytest
 from contfric.ahead import every_kernel, missing
 from contfric.cli import main
 from contfric.compiled import f8, helper, i8, kernel, vector
+from contfric.flow.integrated import AffineModes, Functions
 from contfric.handle import ITSELF, TABLE, Block, Bound, HandleType, with_handle
+from contfric.models import build, load_model
 
 LAYOUT = {"scaled": f8(f8), "table": TABLE, "count": i8, "factor": f8, "other": ITSELF}
 
@@ -79,6 +81,30 @@ def test_a_member_that_a_block_does_not_have_is_an_error_of_the_compiler():
 
     with pytest.raises(Exception, match="Unknown attribute 'scale'"):
         kernel(with_handle(f8(f8), HANDLE))(wrong).dispatcher  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"slides": (0,)}, "'onto' has to put a state"),
+        ({"affine": AffineModes({}, 0, 0, (0,), ()), "method": "automatic"}, "explicit method"),
+        ({"method": "quick"}, "'quick' is not a valid Method"),
+    ],
+)
+def test_functions_that_do_not_fit_are_refused(wrong, message):
+    """Compiled code would call what is not there."""
+    names = ("field", "observe", "rate", "period", "scale")
+    with pytest.raises(ValueError, match=message):
+        Functions(**dict.fromkeys(names, thrice), modes=1, observables=1, **wrong)
+
+
+def test_a_generated_module_is_named_by_what_generates_it(monkeypatch, tmp_path):
+    monkeypatch.setenv("CONTFRIC_CACHE_DIR", str(tmp_path))
+    definition = load_model("belt").definition
+    before = build.module_path.__wrapped__(definition)
+    assert build.module_path.__wrapped__(definition) == before
+    monkeypatch.setattr(build, "_generator", lambda: "another one")
+    assert build.module_path.__wrapped__(definition) != before
 
 
 def test_doctor_says_what_is_compiled(capsys, tmp_path, monkeypatch):

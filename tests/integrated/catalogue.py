@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import math
 
+from lugre_integrated import level
+
 from contfric.compiled import (
     field_signature,
     helper,
     kernel,
-    level_signature,
     observe_signature,
     period_signature,
     rate_signature,
@@ -105,13 +106,6 @@ def period_of(p, which, grad):
 @kernel(scale_signature)
 def scale_of(i, p):
     return p[TOLERANCE]
-
-
-@kernel(level_signature)
-def level(k, p, which, grad):
-    for j in range(grad.shape[0]):
-        grad[j] = 0.0
-    return 0.0
 
 
 #: The scale of the states is the tolerance, so that one block of memory serves all tolerances.

@@ -1,4 +1,4 @@
-"""The Coulomb oscillator as a flow by numerical integration: the seven functions from its fields."""
+"""The Coulomb oscillator as a flow by numerical integration: from its functions."""
 
 from __future__ import annotations
 

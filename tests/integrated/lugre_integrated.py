@@ -21,7 +21,6 @@ from contfric.compiled import (
     scale_signature,
 )
 from contfric.flow.integrated import Functions
-from contfric.flow.interface import CompiledFlow
 
 OMEGA, S, S0, SIGMA0, SIGMA1, C, VS = range(7)
 
@@ -153,9 +152,5 @@ FUNCTIONS = Functions(
 )
 
 
-def compiled_flow() -> CompiledFlow:
-    return FUNCTIONS.flow(level)
-
-
-FLOW = compiled_flow()
+FLOW = FUNCTIONS.flow(level)
 flow, hit, turning, observe, rate = FLOW.flow, FLOW.hit, FLOW.turning, value_of, rate_of

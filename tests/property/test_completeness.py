@@ -106,7 +106,7 @@ def test_a_restart_that_cannot_start_is_told(refused: int, monkeypatch: pytest.M
     assert found.same is (refused == 1)
     assert len(set(asked)) == len(asked) == min(refused + 1, 3)
     if refused == 3:
-        assert "without anything: singular there" in str(found)
+        assert "without any continuation: singular there" in str(found)
 
 
 # ------------------------------------------------------------------------------------ sequences
