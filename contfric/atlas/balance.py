@@ -7,7 +7,7 @@ be says that something is not in the diagram.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -16,11 +16,13 @@ import numpy as np
 from contfric.atlas.matching import same_event
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import is_continuum
-from contfric.continuation.events import ACCURACY, Bifurcation, EndReason, Kind
+from contfric.continuation.events import Bifurcation, EndReason, Kind
+from contfric.continuation.points import settings_of
+from contfric.continuation.side import first_point
 from contfric.continuation.unit import unit_of
 from contfric.errors import ContfricError
 from contfric.orbit.index import index_at_infinity, index_of
-from contfric.orbit.orbit import Orbit
+from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.simulation import simulate
 from contfric.orbit.solve import polish
 
@@ -100,7 +102,7 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
         b = node.bifurcation
         if node.mirrored or b.kind in (Kind.T, Kind.NS) or not b.located:
             continue
-        value, slack = b.params[diagram.parameter], _BESIDE * max(ACCURACY, b.accuracy) * width
+        value, slack = b.params[diagram.parameter], _BESIDE * b.accuracy * width
         if not diagram.range[0] + slack < value < diagram.range[1] - slack:
             continue
         period = unit_of(b.orbit.as_whole()).periods if not b.orbit.model.autonomous else 0
@@ -206,16 +208,44 @@ def _beside(
     if np.any(far):
         k = int(min(np.flatnonzero(far), key=lambda j: abs(branch.arc[j] - position)))
         return int(np.sign(branch.values[k] - value)), branch[k]
-    if following is None or following.orbit.joints.shape != event.orbit.joints.shape:
+    if following is None:
         return None
-    middle = replace(
-        event.orbit,
-        joints=0.5 * (event.orbit.joints + following.orbit.joints),
-        vector=0.5 * (event.orbit.vector + following.orbit.vector),
-    )
-    solved = polish(middle, damped=False)
+    solved = _solved_at(branch, 0.5 * (position + reach))
+    if solved is None:
+        return None
     gap = solved.params[branch.parameter] - value
-    return (int(np.sign(gap)), solved) if solved.converged and abs(gap) > slack else None
+    return (int(np.sign(gap)), solved) if abs(gap) > slack else None
+
+
+def _solved_at(branch: Branch, arc: float) -> Orbit | None:
+    """Return the orbit at a place of a branch: solved normal to the chord, for a fold may be near."""
+    nodes = list(zip(branch.arc, branch.joints, branch.values, strict=True))
+    nodes += [
+        (_position(branch, e), e.orbit.joints, e.params[branch.parameter])
+        for e in branch.bifurcations
+        if e.orbit.system is branch.system
+    ]
+    nodes.sort(key=lambda node: float(node[0]))
+    below = [node for node in nodes if node[0] < arc]
+    above = [node for node in nodes if node[0] >= arc]
+    if not below or not above:
+        return None
+    (a, z_a, w_a), (b, z_b, w_b) = below[-1], above[0]
+    share = (arc - a) / (b - a)
+    vector = branch.vector.copy()
+    vector[branch.model.index_of(branch.parameter)] = w_a + share * (w_b - w_a)
+    guess = Orbit(branch.system, z_a + share * (z_b - z_a), vector, np.inf, Status.NOT_CONVERGED)
+    settings = settings_of(branch[0], branch.parameter, _extent(branch), None, False, 2)
+    point = first_point(guess, settings, (z_b - z_a) / (b - a), (w_b - w_a) / (b - a))
+    active = branch.model.index_of(branch.parameter)
+    return None if point is None else point.orbit(branch.system, vector, active)
+
+
+def _extent(branch: Branch) -> tuple[float, float]:
+    """Return a range around the values of a branch."""
+    low, high = float(branch.values.min()), float(branch.values.max())
+    rounding = 1e-9 * (1.0 + abs(low))
+    return low - rounding, high + rounding
 
 
 def _sum(

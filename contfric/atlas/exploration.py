@@ -105,6 +105,8 @@ class Exploration:
                 event.members.append(bifurcation)
                 if index not in event.branches:
                     event.branches.append(index)
+                if bifurcation.kind in TERMINAL:
+                    self.raise_copies(bifurcation.orbit.periods // bifurcation.outline.periods)
                 return
         event = Event(bifurcation, [index], [bifurcation])
         self.events.append(event)

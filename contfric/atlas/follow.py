@@ -10,6 +10,7 @@ A candidate is accepted when it is solved, and admissible beyond the event in on
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -40,6 +41,7 @@ from contfric.continuation.events import (
 )
 from contfric.continuation.incident import incident_forms
 from contfric.continuation.points import FIRST_STEP, Settings
+from contfric.continuation.side import Side
 from contfric.continuation.switching import (
     NEARER,
     leaps,
@@ -215,10 +217,19 @@ def _never_held(branch: Branch) -> bool:
 
 def _has_no_width(branch: Branch, event: Event, settings: Settings) -> bool:
     """Tell whether a branch begins and ends at one event and is nowhere else: admissible to rounding only."""
-    b, last = event.bifurcation, branch.ends[1].bifurcation
-    if last is None or branch.arc[-1] > _NO_WIDTH:
-        return False
-    return same_place(last, b, settings.parameter, settings.width)
+    return branch.arc[-1] <= _NO_WIDTH and _ends_at(branch.ends[1], event, settings)
+
+
+def _comes_back(side: Side, event: Event, settings: Settings) -> bool:
+    """Tell whether what was traced away from an event has come back to it at once."""
+    return side.length <= _NO_WIDTH and _ends_at(side.end, event, settings)
+
+
+def _ends_at(end: End, event: Event, settings: Settings) -> bool:
+    last = end.bifurcation
+    return last is not None and same_place(
+        last, event.bifurcation, settings.parameter, settings.width
+    )
 
 
 # --------------------------------------------------------------------------- branch points
@@ -265,7 +276,8 @@ def _follow_departure(
     text = "the branch that leaves along the null vector"
     active = orbit.model.index_of(settings.parameter)
     along = direction or Direction(null_vector(orbit), 0.0)
-    for distance in NEARER:
+    leapt: list[float] = []
+    for distance in chain(NEARER, leapt):  # those that leap over something come last
         departure = leave_along(orbit, settings, along, reason.value, distance)
         if departure is None:
             continue
@@ -276,7 +288,13 @@ def _follow_departure(
         if known is not None:
             state.judge(event, text, Verdict.KNOWN, known)
             return
-        if distance != NEARER[-1] and leaps(orbit, settings, departure, distance, along):
+        again = distance in leapt
+        if (
+            not again
+            and distance != NEARER[-1]
+            and leaps(orbit, settings, departure, distance, along)
+        ):
+            leapt.append(distance)
             continue
         side = trace_side(
             orbit,
@@ -285,7 +303,7 @@ def _follow_departure(
             first_step=min(FIRST_STEP, distance / settings.largest),  # no longer than what is known
             progress=state.progress,
         )
-        if went_somewhere(side, event):
+        if went_somewhere(side, event) and not _comes_back(side, event, settings):
             first = first_end(reason, event, side, settings)
             state.judge(event, text, Verdict.ACCEPTED, len(state.branches))
             state.add_from(assemble(orbit, settings, side, first, departure.origin), event)

@@ -39,6 +39,9 @@ _PLANE, _ANGLES = 2, 12
 _NOWHERE = 1e-7
 #: The same for an event that is located to the root of rounding only.
 _NOWHERE_ROUGHLY = 1e-3
+#: The first start beside an event that is singular, in roots of rounding: states are known there to a share
+#: of 1e-5, and what happens nearer changes the parameter by rounding only (by the square of this).
+_KNOWN = 500.0
 #: One that gets this far has left it in the right one. A shorter one may have gone back the way that the
 #: start was beside the event: a touch at the very end of a segment is located to the root of rounding.
 _SURELY_AWAY = 1e-4
@@ -83,7 +86,7 @@ def _leave_beside(
 ) -> Branch | None:
     """Trace away from an event at which the new orbit is singular, from a little beside it."""
     active = orbit.model.index_of(settings.parameter)
-    for distance in NEARER:
+    for distance in _distances(orbit):
         moved = replace(orbit, joints=orbit.joints + distance * orbit.period * away)
         for tangent, slope in directions(moved, active):
             point = first_point(moved, settings, tangent, slope)
@@ -100,6 +103,12 @@ def _leave_beside(
                 first = first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
                 return assemble(there, settings, side, first, origin)
     return None
+
+
+def _distances(orbit: Orbit) -> list[float]:
+    """Return how far beside an event a start is tried: as near as states are known, farther, then nearer."""
+    least = _KNOWN * orbit.model.rounding**0.5
+    return [d for d in reversed(NEARER) if d >= least] + [d for d in NEARER if d < least]
 
 
 def leave_singular(

@@ -26,6 +26,7 @@ from contfric.continuation.events import Bifurcation
 from contfric.continuation.points import LARGEST_STEP
 from contfric.errors import ConvergenceError
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.solve import polish
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
@@ -132,6 +133,8 @@ def verify(diagram: Diagram, restarts: int = 6, step: float = STEP) -> Verificat
 
 # --------------------------------------------------------------------------------- restarts
 
+#: Where a branch is looked for on another one, as shares of its length.
+_INSIDE = (0.5, 0.381966, 0.618034)
 #: Where a branch is restarted, as shares of its points: in its middle unless the equations are singular.
 _SHARES = (0.5, 0.25, 0.75)
 
@@ -154,7 +157,7 @@ def _spread(places: list[int], most: int) -> list[int]:
 def _restart(diagram: Diagram, i: int, step: float) -> Restart:
     branch, refused = diagram.branches[i], ""
     for share in _SHARES:
-        start = branch[int(share * len(branch))]
+        start = _inside(branch, share)
         value = start.params[diagram.parameter]
         try:
             again = _explored(diagram, start, step)
@@ -164,6 +167,14 @@ def _restart(diagram: Diagram, i: int, step: float) -> Restart:
         more, less = tuple(differences(again, diagram)), tuple(differences(diagram, again))
         return Restart(i, value, less, more, again.complete)
     return Restart(i, value, (refused,), (), True)
+
+
+def _inside(branch: Branch, share: float) -> Orbit:
+    """Return an orbit of a branch between its ends."""
+    k = int(share * len(branch))
+    if 0 < k < len(branch) - 1:
+        return branch[k]
+    return polish(branch.between(share * float(branch.arc[-1])), damped=False)
 
 
 def _explored(diagram: Diagram, start: Orbit, step: float) -> Diagram:
@@ -207,7 +218,6 @@ def _covers(known: Branch, branch: Branch) -> bool:
     """Tell whether a branch lies on another one: some point in its middle does."""
     if known.mirrored or known.system.periods != branch.system.periods:
         return False
-    count = len(branch)
-    return any(
-        on_branch(branch[k], known) for k in sorted({count // 2, count // 3, (2 * count) // 3})
-    )
+    last = float(branch.arc[-1])
+    inside = (polish(branch.between(share * last), damped=False) for share in _INSIDE)
+    return any(on_branch(orbit, known) for orbit in inside if orbit.converged)

@@ -37,6 +37,7 @@ from contfric.orbit.monitor import (
     interior_margin,
     joint_margin,
     lasting_margin,
+    regular_margin,
 )
 from contfric.orbit.newton import ALONG, CHECKS, INTEGRATED, MULTIPLIERS
 from contfric.orbit.spectrum import multipliers
@@ -91,6 +92,16 @@ def next_trial(low, high, f_low, f_high, x_old, f_old, x, closest):  # type: ign
 @helper
 def margin_value(functions, layout, index, z, p, room):  # type: ignore[no-untyped-def]
     """Return one margin of a settled point."""
+    value = plain_margin(functions, layout, index, z, p, room)
+    for k in range(layout.doubles.shape[0]):
+        if layout.doubles[k, 0] == index:
+            return regular_margin(layout, k, z, room.equations, value)
+    return value
+
+
+@helper
+def plain_margin(functions, layout, index, z, p, room):  # type: ignore[no-untyped-def]
+    """Return one margin as it is, with its double zero if it has one."""
     first, count = layout.interior.shape[0], z.shape[0]
     if index < first:
         i, c = layout.interior[index, 0], layout.observables[layout.interior[index, 1]]

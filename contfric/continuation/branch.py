@@ -15,7 +15,7 @@ from contfric.continuation.events import Bifurcation, End
 from contfric.errors import ParameterError
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.orbit import Orbit, of_two_halves
+from contfric.orbit.orbit import Orbit, Status, of_two_halves
 from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
 from contfric.orbit.system import IntArray, System, build_system
 from contfric.orbit.words import decode, encode, mirror_pairs
@@ -90,6 +90,17 @@ class Branch:
         vector = self.vector.copy()
         vector[self.model.index_of(self.parameter)] = self.values[index]
         return Orbit(self.system, self.joints[index], vector, 0.0)
+
+    def between(self, arc: float) -> Orbit:
+        """Return what lies at an arclength by interpolation: an orbit that is not solved."""
+        k = int(np.clip(np.searchsorted(self.arc, arc), 1, len(self) - 1))
+        length = self.arc[k] - self.arc[k - 1]
+        share = (arc - self.arc[k - 1]) / length if length > 0.0 else 0.0
+        vector = self.vector.copy()
+        ends = self.values[k - 1 : k + 1]
+        vector[self.model.index_of(self.parameter)] = ends[0] + share * (ends[1] - ends[0])
+        joints = self.joints[k - 1] + share * (self.joints[k] - self.joints[k - 1])
+        return Orbit(self.system, joints, vector, np.inf, Status.NOT_CONVERGED)
 
     def __iter__(self) -> Iterator[Orbit]:
         return (self[i] for i in range(len(self)))

@@ -92,8 +92,8 @@ TERMINAL = frozenset({Kind.CS, Kind.SS, Kind.AS, Kind.GS})
 
 #: A slide behind a hold that is this short has vanished: such an event is located to about 1e-10.
 _VANISHED = 1e-6
-#: Stops of a located event are good to about 1e-10; asymmetry this small is not seen in a diagram.
-_SYMMETRIC_STOPS = 1e-7
+#: The motion at a located event is good to about 1e-10; asymmetry this small is not seen in a diagram.
+_SYMMETRIC = 1e-7
 
 
 class EndReason(str, Enum):
@@ -218,11 +218,9 @@ class Bifurcation:
         """Whether the motion at the event is its own mirror image, whatever the words that meet."""
         if self.orbit.symmetric:
             return True
-        stops = self.orbit.stops
-        if self.orbit.model.symmetry is None or len(stops) % 2:
+        if self.orbit.model.symmetry is None:
             return False
-        gap = np.max(np.abs(np.sort(stops) + np.sort(stops)[::-1]))
-        return bool(gap < max(_SYMMETRIC_STOPS, self.accuracy))
+        return self.outline.apart_from_image < max(_SYMMETRIC, self.accuracy)
 
     @cached_property
     def outline(self) -> Outline:

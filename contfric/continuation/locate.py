@@ -24,6 +24,8 @@ def locate_events(
         smooth = smooth_events(orbit, before, after, settings, after)
         return sorted(smooth, key=lambda pair: pair[1].arc)
     end = sliding[0][1]
+    if end.arc <= before.arc:  # it is at the first point: nothing comes before it
+        return sliding
     smooth = [
         (b, point)
         for b, point in smooth_events(orbit, before, after, settings, end)

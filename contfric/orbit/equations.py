@@ -66,6 +66,7 @@ LayoutType = types.NamedTuple(
         indices,
         indices,
         indices,
+        table,
         matrix,
         f8,
         i8,

@@ -39,6 +39,10 @@ _TOUCH = 2e-15
 #: stationary point is the joint itself: what it misses is the square of it, 1e-12.
 _AT_PIN = 1e-6
 
+#: Duration below which rounding hides what is left of a margin without its double zero: at this one it is
+#: known to 1e-7.
+_CLEAR = 1e-4
+
 
 class Turnings(NamedTuple):
     """Stationary points of one observable along one segment: times after its start, and values."""
@@ -158,6 +162,19 @@ def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-un
     at += layout.lasting.shape[0]
     for k in range(layout.held.shape[0]):
         out[at + k] = held_margin(functions, layout, k, z, p, room, turnings)
+    for k in range(layout.doubles.shape[0]):
+        out[layout.doubles[k, 0]] = regular_margin(layout, k, z, room, out[layout.doubles[k, 0]])
+
+
+@helper
+def regular_margin(layout, k, z, room, value):  # type: ignore[no-untyped-def]
+    """Return a margin without its double zero; infinite where the segment is too short to tell it."""
+    i = layout.doubles[k, 1]
+    after = z[i + 1] if i + 1 < z.shape[0] else room.last
+    lasts = after[0] - z[i, 0]
+    if abs(lasts) < _CLEAR:
+        return np.inf
+    return value / min(1.0, lasts * lasts)
 
 
 @helper

@@ -214,6 +214,9 @@ def correct(  # type: ignore[no-untyped-def]
         ``probe`` is that of :func:`newton_step`.
     """
     before, first, worst = np.inf, 0.0, 0.0
+    rounding = layout.rounding
+    if rounding <= INTEGRATED:  # a closed form knows a phase as well as the time
+        rounding *= 1.0 + abs(z[z.shape[0] - 1, 0])
     share, worst_before, residual_before = 1.0, np.inf, np.inf
     damped, circles = math.isfinite(trust), 0
     for step in range(_MOST_STEPS):
@@ -238,12 +241,12 @@ def correct(  # type: ignore[no-untyped-def]
         move(z, p, which, work.z, work.w, share)
         if step == 0:
             first = size
-        found = verdict(step, size, before, worst, residual_before, floor, layout.rounding)
+        found = verdict(step, size, before, worst, residual_before, floor, rounding)
         if found == CONVERGED or (found == NOT_CONVERGED and not damped):
             return found, step + 1, first, worst
         if size > 0.5 * before:
             circles += 1
-        if floor > ALONG and circles >= _CIRCLES and not is_noise(size, worst, layout.rounding):
+        if floor > ALONG and circles >= _CIRCLES and not is_noise(size, worst, rounding):
             return NOT_CONVERGED, step + 1, first, worst
         residual_before = worst
         before = (

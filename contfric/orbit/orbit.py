@@ -34,7 +34,8 @@ SYMMETRY_TOLERANCE = 1e-9
 #: A multiplier this near to 1 makes the orbit one of a continuum to working precision.
 DEGENERATE = 1e-9
 
-#: A stick of length zero (at an event) has a duration of rounding over the rate of its release.
+#: A stick of length zero (at an event) has a duration of rounding over the rate of its release. Where that
+#: rate vanishes as well (a slide that appears) it is the root of rounding.
 _NO_TIME = 1e-10
 #: A margin that vanishes is rounding of the motion (relative to the size of the orbit's times and states)
 #: times the number of terms that it is made of, about this many.
@@ -286,8 +287,21 @@ class Orbit:
     def admissible(self) -> bool:
         """Whether the orbit obeys every inequality inside every segment."""
         margins, _, fine = self._watched
-        lasting = bool(np.all(self.ends[:, 0] - self.cycle[:, 0] > -_NO_TIME))
+        lasting = bool(np.all(self.ends[:, 0] - self.cycle[:, 0] > -self._no_time(margins)))
         return self.converged and fine and lasting and bool(np.all(margins > self._slack))
+
+    def _no_time(self, margins: FloatArray) -> FloatArray:
+        """Return how much less than nothing a segment may last: its exit is known to no more."""
+        first = self.system.layout.interior.shape[0]
+        exits = np.abs(margins[first : first + self.system.segments])
+        rounding = self._rounding
+        no_time = np.maximum(_NO_TIME, rounding / np.maximum(exits, np.sqrt(rounding)))
+        return np.resize(no_time, len(self.cycle))
+
+    @property
+    def _rounding(self) -> float:
+        """Rounding of a margin."""
+        return _ROUNDING * self.model.rounding * (1.0 + float(np.max(np.abs(self.joints))))
 
     @property
     def _slack(self) -> FloatArray:
@@ -302,7 +316,7 @@ class Orbit:
             t.margin in (Margin.JOINT, Margin.LASTING) or t.segment in held
             for t in self.system.tests
         ]
-        rounding = _ROUNDING * self.model.rounding * (1.0 + float(np.max(np.abs(self.joints))))
+        rounding = self._rounding
         root = np.array([t.margin is Margin.EXIT for t in self.system.tests])
         return np.where(root, -np.sqrt(rounding), np.where(np.array(may), -1e-9, -rounding))
 

@@ -92,6 +92,11 @@ class Outline:
             return np.inf
         return min(_apart(self.starts, there, self.cycle) for there in (other.starts, other.images))
 
+    @property
+    def apart_from_image(self) -> float:
+        """How far the motion is from its symmetry image."""
+        return _apart(self.starts, self.images, self.cycle)
+
 
 def outline_of(orbit: Orbit) -> Outline:
     """Return the outline of an orbit."""

@@ -14,7 +14,8 @@ Crossings of transparent surfaces inside a segment do not matter to the motion; 
 A hold (:mod:`contfric.orbit.holds`) has a pin at its start in the place of the exit surface. Its exit
 margin is the acceleration with which it is left, which must not be negative anywhere on the way (HELD);
 one that follows a stick must last, and so must that stick, whose end is tangential, and a slide that leads
-from one hold to the touch of another (LASTING).
+from one hold to the touch of another (LASTING). Where such a segment shrinks to nothing, other margins have a
+double zero: they are divided by the square of its duration, for what is left of them is their sign.
 
 Everything here derives from the model's definition; nothing knows what moves.
 """
@@ -81,6 +82,7 @@ class Layout(NamedTuple):
     lasting : segments that must last: holds after a stick, and that stick; a slide from a hold to a touch at
         which another begins, shape (k,)
     held : all holds, which could be left at any time, shape (k,)
+    doubles : rows (margin, segment): the margin has a double zero where the segment has no length
     closure : state matrix of the closure, shape (n, n)
     turn : duration of one turn in periods of the excitation; 0 of an autonomous model
     rank : number of independent directions that survive one turn
@@ -98,6 +100,7 @@ class Layout(NamedTuple):
     departs: IntArray
     lasting: IntArray
     held: IntArray
+    doubles: IntArray
     closure: FloatArray
     turn: float
     rank: int
@@ -201,6 +204,7 @@ def build_system(
         departs=departures(model, word, exits, entered, half, held),
         lasting=np.array([i for i, _ in _lasting(word, holds)], dtype=np.int64),
         held=np.array([hold.segment for hold in holds], dtype=np.int64),
+        doubles=_doubles(model, word, half, holds, tests),
         closure=symmetry.array() if half and symmetry else np.eye(n),
         turn=_turn(model, periods, half),
         # a shift in time is no disturbance of an autonomous orbit
@@ -335,6 +339,31 @@ def _lasting(word: Word, holds: tuple[Hold, ...]) -> list[tuple[int, str]]:
         elif hold.pin is None and before in left:
             found.append((before, word[before][1]))
     return found
+
+
+def _doubles(
+    model: Model, word: Word, half: bool, holds: tuple[Hold, ...], tests: tuple[Test, ...]
+) -> IntArray:
+    """Margins with a double zero where a segment that must last has no length, each with that segment.
+
+    The load at the end of a hold after a touch of its limit, the load at the stop before that touch, and the
+    acceleration with which a hold is left into a slide up to the touch of the next one.
+    """
+    pairs: list[tuple[Test, int]] = []
+    left = {(hold.segment + 1) % len(word) for hold in holds}
+    for hold in holds:
+        before = (hold.segment - 1) % len(word)
+        if hold.after_rest:
+            surface = word[before][1]
+            pairs.append((Test(Margin.JOINT, hold.segment, surface), hold.segment))
+            if before == 0 and half and model.symmetry is not None:  # its stop is a mirror image
+                back = {image: name for name, image in model.symmetry.surfaces.items()}
+                surface = back[surface]
+            pairs.append((Test(Margin.JOINT, (before - 1) % len(word), surface), before))
+        elif hold.pin is None and before in left:
+            stopped = next(h for h in holds if (h.segment + 1) % len(word) == before)
+            pairs.append((Test(Margin.EXIT, stopped.segment, stopped.leaves), before))
+    return _rows([(tests.index(test), segment) for test, segment in pairs if test in tests], 2)
 
 
 def _rows(rows: list[tuple[int, ...]], width: int = 3) -> IntArray:
