@@ -99,7 +99,7 @@ def explore(
     bridges, seeds = truth("bridges", bridges), Seeds.given(seeds)
     orbit = shortest(orbit)
     most = MOST_PERIODS if max_periods is None else max_periods
-    again = copies or max_periods or 1
+    again = copies or (max(max_periods, orbit.periods) if max_periods else 1)
     # multipliers are asked for also where the start itself is on a bridge
     settings = replace(settings, stability=stability, copies=again)
     state = Exploration(

@@ -59,11 +59,6 @@ _LONGER, _STANDS = 1.5, 1e-6
 #: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
 _NO_SIZE = 1e-5
 
-#: Where a branch leaves an event with a slope of less than this (a hold at a touch of rest moves nothing to
-#: first order), its slope there is rounding: a fold just behind would be leapt over. So the first step is
-#: this short: the parameter changes by its square.
-_FLAT, _FLAT_STEP = 1e-6, 1e-6
-
 #: A step this short after hundreds of points (arclength) gets nowhere.
 _CRAWLS = 1e-6
 
@@ -163,8 +158,6 @@ def trace_side(
     side = Side.starting(start, orbit.system, End(EndReason.START), settings.stability)
     side.at_event = at_event
     step = first_step * settings.largest
-    if at_event and abs(start.slope) < _FLAT * settings.width:
-        step = min(step, _FLAT_STEP)
     while True:
         try:
             finished, step = _advance(orbit, side, settings, step)
