@@ -22,7 +22,7 @@ from contfric.continuation.side import first_point
 from contfric.continuation.unit import unit_of
 from contfric.errors import ContfricError
 from contfric.orbit.index import index_at_infinity, index_of
-from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.orbit import Orbit
 from contfric.orbit.simulation import simulate
 from contfric.orbit.solve import polish
 
@@ -219,26 +219,17 @@ def _beside(
 
 def _solved_at(branch: Branch, arc: float) -> Orbit | None:
     """Return the orbit at a place of a branch: solved normal to the chord, for a fold may be near."""
-    nodes = list(zip(branch.arc, branch.joints, branch.values, strict=True))
-    nodes += [
-        (_position(branch, e), e.orbit.joints, e.params[branch.parameter])
-        for e in branch.bifurcations
-        if e.orbit.system is branch.system
-    ]
-    nodes.sort(key=lambda node: float(node[0]))
-    below = [node for node in nodes if node[0] < arc]
-    above = [node for node in nodes if node[0] >= arc]
-    if not below or not above:
+    arcs, values, _ = branch.nodes
+    k = int(np.clip(np.searchsorted(arcs, arc), 1, len(arcs) - 1))
+    length = float(arcs[k] - arcs[k - 1])
+    if not length > 0.0:
         return None
-    (a, z_a, w_a), (b, z_b, w_b) = below[-1], above[0]
-    share = (arc - a) / (b - a)
-    vector = branch.vector.copy()
-    vector[branch.model.index_of(branch.parameter)] = w_a + share * (w_b - w_a)
-    guess = Orbit(branch.system, z_a + share * (z_b - z_a), vector, np.inf, Status.NOT_CONVERGED)
+    one, guess, other = (branch.between(float(a)) for a in (arcs[k - 1], arc, arcs[k]))
     settings = settings_of(branch[0], branch.parameter, _extent(branch), None, False, 2)
-    point = first_point(guess, settings, (z_b - z_a) / (b - a), (w_b - w_a) / (b - a))
+    chord = (other.joints - one.joints) / length
+    point = first_point(guess, settings, chord, float(values[k] - values[k - 1]) / length)
     active = branch.model.index_of(branch.parameter)
-    return None if point is None else point.orbit(branch.system, vector, active)
+    return None if point is None else point.orbit(branch.system, branch.vector, active)
 
 
 def _extent(branch: Branch) -> tuple[float, float]:

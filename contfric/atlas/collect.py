@@ -149,7 +149,9 @@ def _renewed(
             ends.append(End(final[id(b)], bifurcation=changed[id(b)]))
         else:
             now = changed.get(id(b), b)
-            reason = end.reason if now.kind is b.kind else EndReason[now.kind.name]
+            reason = end.reason  # a branch that ends where another one turns keeps its own
+            if now.kind is not b.kind and now.kind is not Kind.SN:
+                reason = EndReason[now.kind.name]
             ends.append(replace(end, reason=reason, bifurcation=now))
     found = tuple(changed.get(id(b), b) for b in branch.bifurcations)
     return replace(branch, bifurcations=found, ends=(ends[0], ends[1]))

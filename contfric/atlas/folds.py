@@ -30,6 +30,8 @@ from contfric.continuation.switching import (
 )
 from contfric.continuation.trace import follow_orbit, trace_side
 from contfric.continuation.vertices import symmetrised
+from contfric.models.definition import FloatArray
+from contfric.orbit.linear import null_space
 from contfric.orbit.orbit import Orbit
 
 #: An orbit this much (of its distance from a symmetric one) off its own symmetry image is asymmetric.
@@ -57,7 +59,7 @@ def _try_crossing(state: Exploration, event: Event, orbit: Orbit, reason: str) -
     settings = settings_for(orbit, state.settings)
     active = orbit.model.index_of(settings.parameter)
     for distance in NEARER:
-        for direction in plane_of(orbit, active):
+        for direction in _ways_through(orbit, active):
             moved = replace(orbit, joints=orbit.joints + distance * direction)
             point = first_point(moved, settings, direction, 0.0)
             if point is None:
@@ -71,6 +73,15 @@ def _try_crossing(state: Exploration, event: Event, orbit: Orbit, reason: str) -
                 return
             _add_crossing(state, event, orbit, point, reason)
             return
+
+
+def _ways_through(orbit: Orbit, active: int) -> list[FloatArray]:
+    """Return directions to look for a family in: where it is the only one of its equations, along it."""
+    found = list(plane_of(orbit, active))
+    if found or not orbit.system.half:
+        return found
+    vectors, _ = null_space(orbit.system, orbit.joints, orbit.vector, active)
+    return [vector / np.max(np.abs(vector)) for vector in vectors]
 
 
 def _add_crossing(

@@ -63,6 +63,8 @@ _SHARES = (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6)
 _NOWHERE_ROUGHLY = 1e-3
 #: A branch shorter than this (arclength) that comes back to its event has been nowhere.
 _NO_WIDTH = 1e-3
+#: Where rounding moves an event by this share of the range its orbits hold for every value of the parameter.
+_UNKNOWN = 0.1
 #: A hold shorter than this share of the arclength is rounding: on a bridge joints move as its length does.
 _NO_TIME = 1e-2
 
@@ -86,6 +88,11 @@ def follow(state: Exploration, event: Event) -> None:
 def _follow_sliding(state: Exploration, event: Event) -> None:
     accepted = jumps = False
     orbit = event.bifurcation.orbit
+    if event.bifurcation.accuracy > _UNKNOWN:
+        reason, why = "go on behind the event", EndReason.CONTINUUM.value
+        state.judge(event, reason, Verdict.REFUSED, why=why)
+        event.final = EndReason.CONTINUUM
+        return
     active = orbit.model.index_of(state.settings.parameter)
     edits = bool(orbit.model.resets) or any(
         mode.sliding for mode in orbit.model.modes

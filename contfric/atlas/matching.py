@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,17 +12,19 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, Kind
 from contfric.models.definition import FloatArray
-from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
 from contfric.orbit.words import mirror_pairs
 from contfric.signature import ReducedWord, canonical_word
 
 #: Events whose parameters agree to their accuracy and whose motions agree to this are one.
 SAME_MOTION = 1e-4
-#: Orbits solved at the same parameter are one if their stops agree to this.
+#: Orbits solved at the same parameter are one if their stops agree to this (relative to 1 + their size).
 _SAME_ORBIT = 1e-8
-#: Names of one and the same sliding event, those that say more first.
-_TELLING = {kind: rank for rank, kind in enumerate((Kind.GS, Kind.AS, Kind.SS, Kind.CS, Kind.BP))}
+#: Names of one and the same event, those that say more first.
+_TELLING = {
+    kind: rank for rank, kind in enumerate((Kind.GS, Kind.AS, Kind.SS, Kind.CS, Kind.SN, Kind.BP))
+}
 #: Events this far apart (relative to the range) are two, however badly they are known: how well that is
 #: need not be computed.
 _APART = 0.05
@@ -122,13 +125,26 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
     mirror = orbit.model.symmetry is not None
     if is_continuum(branch):
         return _in_family(orbit, branch, mirror)
-    below = branch.values - value
-    for i in np.flatnonzero(below[:-1] * below[1:] <= 0.0):
-        step = branch.values[i + 1] - branch.values[i]
-        share = 0.0 if step == 0.0 else -below[i] / step
-        joints = branch.joints[i] + share * (branch.joints[i + 1] - branch.joints[i])
-        guess = Orbit(branch.system, joints, orbit.vector, np.inf, Status.NOT_CONVERGED)
+    for guess in _guesses(branch, orbit, value):
         solved = polish(guess, damped=False)
-        if solved.converged and stops_distance(orbit.stops, solved.stops, mirror) < _SAME_ORBIT:
+        same = _SAME_ORBIT * (1.0 + float(np.max(np.abs(orbit.stops), initial=0.0)))
+        if solved.converged and stops_distance(orbit.stops, solved.stops, mirror) < same:
             return True
     return False
+
+
+def _guesses(branch: Branch, orbit: Orbit, value: float) -> Iterator[Orbit]:
+    """Yield guesses for the orbits of a branch at a value, one for each time it takes it.
+
+    By interpolation between its points and the folds between them, beside which it is a parabola.
+    """
+    arc, values, folds = branch.nodes
+    ahead = values - value
+    for k in np.flatnonzero(ahead[:-1] * ahead[1:] <= 0.0):
+        rise = values[k + 1] - values[k]
+        share = 0.0 if rise == 0.0 else -ahead[k] / rise
+        if folds[k + 1] >= 0:
+            share = 1.0 - max(0.0, 1.0 - share) ** 0.5
+        elif folds[k] >= 0:
+            share = max(0.0, share) ** 0.5
+        yield replace(branch.between(arc[k] + share * (arc[k + 1] - arc[k])), vector=orbit.vector)

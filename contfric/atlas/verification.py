@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.atlas.balance import Balance, IndexSum, balances, index_sums
+from contfric.atlas.degenerate import degenerate_events
 from contfric.atlas.matching import on_branch, same_place
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation
@@ -46,6 +47,7 @@ class Restart:
     missing : what the diagram has and the restart has not, in words
     extra : what the restart has and the diagram has not
     complete : whether the restart was run to its end
+    degenerate : events of the restart that rounding may make others of, in words
     """
 
     branch: int
@@ -53,6 +55,7 @@ class Restart:
     missing: tuple[str, ...]
     extra: tuple[str, ...]
     complete: bool = True
+    degenerate: tuple[str, ...] = ()
 
     @property
     def same(self) -> bool:
@@ -76,6 +79,7 @@ class Verification:
     restarts: tuple[Restart, ...]
     balances: tuple[Balance, ...]
     sums: tuple[IndexSum, ...]
+    degenerate: tuple[str, ...] = ()
 
     @property
     def same(self) -> bool:
@@ -94,6 +98,12 @@ class Verification:
         return (*parts, *(f"unbalanced: {b}" for b in self.balances if not b.holds))
 
     @property
+    def degeneracies(self) -> tuple[str, ...]:
+        """Events of the diagram, and of restarts that differ, that rounding may make others of."""
+        others = (text for r in self.restarts if not r.same for text in r.degenerate)
+        return tuple(dict.fromkeys((*self.degenerate, *others)))
+
+    @property
     def missing(self) -> tuple[IndexSum, ...]:
         """Where the orbits of one period are not all: no event joins the others to these.
 
@@ -108,6 +118,8 @@ class Verification:
             f"{'nothing differs' if self.passed else f'{len(self.faults)} faults'}"
         )
         lines = [head, *(f"  {fault}" for fault in self.faults)]
+        if not self.passed:
+            lines += [f"  degenerate: {text}" for text in self.degeneracies]
         if self.missing:
             low, high = self.missing[0].value, self.missing[-1].value
             lines.append(
@@ -128,13 +140,14 @@ def verify(diagram: Diagram, restarts: int = 6, step: float = STEP) -> Verificat
         Largest step of the restarts, in largest steps of the diagram.
     """
     again = tuple(_restart(diagram, i, step) for i in _chosen(diagram, restarts))
-    return Verification(again, tuple(balances(diagram)), tuple(index_sums(diagram)))
+    sums = tuple(balances(diagram)), tuple(index_sums(diagram))
+    return Verification(again, *sums, tuple(degenerate_events(diagram)))
 
 
 # --------------------------------------------------------------------------------- restarts
 
 #: Where a branch is looked for on another one, as shares of its length.
-_INSIDE = (0.5, 0.381966, 0.618034)
+_INSIDE = (0.5, 0.381966, 0.618034, 0.2, 0.8)
 #: Where a branch is restarted, as shares of its points: in its middle unless the equations are singular.
 _SHARES = (0.5, 0.25, 0.75)
 
@@ -165,7 +178,8 @@ def _restart(diagram: Diagram, i: int, step: float) -> Restart:
             refused = refused or f"any continuation: {error}"
             continue
         more, less = tuple(differences(again, diagram)), tuple(differences(diagram, again))
-        return Restart(i, value, less, more, again.complete)
+        degenerate = tuple(degenerate_events(again)) if less or more else ()
+        return Restart(i, value, less, more, again.complete, degenerate)
     return Restart(i, value, (refused,), (), True)
 
 
@@ -218,6 +232,5 @@ def _covers(known: Branch, branch: Branch) -> bool:
     """Tell whether a branch lies on another one: some point in its middle does."""
     if known.mirrored or known.system.periods != branch.system.periods:
         return False
-    last = float(branch.arc[-1])
-    inside = (polish(branch.between(share * last), damped=False) for share in _INSIDE)
+    inside = (_inside(branch, share) for share in _INSIDE)
     return any(on_branch(orbit, known) for orbit in inside if orbit.converged)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.continuation.events import Bifurcation, End
+from contfric.continuation.events import Bifurcation, End, Kind
 from contfric.errors import ParameterError
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
@@ -91,16 +91,40 @@ class Branch:
         vector[self.model.index_of(self.parameter)] = self.values[index]
         return Orbit(self.system, self.joints[index], vector, 0.0)
 
+    @cached_property
+    def nodes(self) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Points and the folds between them: arclength, parameter, and which fold it is (-1 for a point)."""
+        folds = [
+            (b.position, b.params[self.parameter], k)
+            for k, b in enumerate(self.bifurcations)
+            if b.kind is Kind.SN and b.located and b.orbit.system is self.system
+        ]
+        arc = np.concatenate([self.arc, [f[0] for f in folds]])
+        order = np.argsort(arc, kind="stable")
+        values = np.concatenate([self.values, [f[1] for f in folds]])
+        which = np.concatenate([np.full(len(self), -1), np.array([f[2] for f in folds], dtype=int)])
+        return arc[order], values[order], which[order]
+
     def between(self, arc: float) -> Orbit:
         """Return what lies at an arclength by interpolation: an orbit that is not solved."""
-        k = int(np.clip(np.searchsorted(self.arc, arc), 1, len(self) - 1))
-        length = self.arc[k] - self.arc[k - 1]
-        share = (arc - self.arc[k - 1]) / length if length > 0.0 else 0.0
+        arcs, values, folds = self.nodes
+        k = int(np.clip(np.searchsorted(arcs, arc), 1, len(arcs) - 1))
+        length = arcs[k] - arcs[k - 1]
+        share = (arc - arcs[k - 1]) / length if length > 0.0 else 0.0
         vector = self.vector.copy()
-        ends = self.values[k - 1 : k + 1]
-        vector[self.model.index_of(self.parameter)] = ends[0] + share * (ends[1] - ends[0])
-        joints = self.joints[k - 1] + share * (self.joints[k] - self.joints[k - 1])
-        return Orbit(self.system, joints, vector, np.inf, Status.NOT_CONVERGED)
+        vector[self.model.index_of(self.parameter)] = values[k - 1] + share * (
+            values[k] - values[k - 1]
+        )
+        points = k - int(np.sum(folds[:k] >= 0))  # points before this node
+        first, last = (
+            self.joints[points - 1 if side else points]
+            if fold < 0
+            else self.bifurcations[fold].orbit.joints
+            for side, fold in ((1, folds[k - 1]), (0, folds[k]))
+        )
+        return Orbit(
+            self.system, first + share * (last - first), vector, np.inf, Status.NOT_CONVERGED
+        )
 
     def __iter__(self) -> Iterator[Orbit]:
         return (self[i] for i in range(len(self)))

@@ -69,8 +69,7 @@ def test_random_scenes() -> None:
     for index in SHARE:
         tally.index = index
         restarts.one_scene(tally, restarts.scene(7, index), most=1)
-    faults = [f for f in tally.failed if f.kind != "all points admissible"]
-    assert not faults, faults
+    assert not tally.failed, tally.failed
     assert tally.counts["restarts"] > 40
     assert tally.counts["balances"] > len(SHARE) // 2
 

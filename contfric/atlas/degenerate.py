@@ -1,0 +1,44 @@
+"""Events of a diagram that are degenerate as far as rounding can tell: there a diagram has no one answer.
+
+Each test is one on the located events alone. A scene with such an event may give another diagram from another
+start; what differs is told together with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contfric.continuation.events import Bifurcation, Kind
+
+if TYPE_CHECKING:
+    from contfric.atlas.diagram import Diagram
+
+#: Motions this near to each other may be taken for one where their parameters cannot be told apart.
+_ALIKE = 1e-3
+#: A margin this small at a smooth event: the branch that leaves it, along which margins change in proportion
+#: to the distance, ends before its parameter has changed by the rounding of one (the square of this).
+_SECOND = 1e-6
+_SMOOTH = frozenset({Kind.SN, Kind.BP, Kind.PD})
+
+
+def degenerate_events(diagram: Diagram) -> Iterator[str]:
+    """Yield what is degenerate, in words: two events one to their accuracies, two conditions at once."""
+    parameter, width = diagram.parameter, diagram.range[1] - diagram.range[0]
+    values = sorted(
+        (b for b in diagram.bifurcations if b.kind is not Kind.T), key=lambda b: b.params[parameter]
+    )
+    for a, b in pairwise(values):
+        gap = b.params[parameter] - a.params[parameter]
+        if gap <= (a.accuracy + b.accuracy) * width and a.outline.apart(b.outline) < _ALIKE:
+            yield f"{a.label} and {b.label} at {a.params[parameter]:.10g}: nearer than their accuracies"
+    for b in values:
+        if b.kind in _SMOOTH and _least_margin(b) < _SECOND:
+            yield f"{b.label} at {b.params[parameter]:.10g}: a margin vanishes there, too"
+
+
+def _least_margin(event: Bifurcation) -> float:
+    return float(np.min(event.orbit.margins, initial=np.inf))
