@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.continuation.events import Bifurcation, Kind
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
@@ -26,15 +26,16 @@ _SMOOTH = frozenset({Kind.SN, Kind.BP, Kind.PD})
 
 
 def degenerate_events(diagram: Diagram) -> Iterator[str]:
-    """Yield what is degenerate, in words: two events one to their accuracies, two conditions at once."""
+    """Yield what is degenerate, in words: two events in one place, two conditions at once."""
     parameter, width = diagram.parameter, diagram.range[1] - diagram.range[0]
     values = sorted(
         (b for b in diagram.bifurcations if b.kind is not Kind.T), key=lambda b: b.params[parameter]
     )
     for a, b in pairwise(values):
         gap = b.params[parameter] - a.params[parameter]
-        if gap <= (a.accuracy + b.accuracy) * width and a.outline.apart(b.outline) < _ALIKE:
-            yield f"{a.label} and {b.label} at {a.params[parameter]:.10g}: nearer than their accuracies"
+        known = max(ACCURACY, a.accuracy + b.accuracy) * width
+        if gap <= known and a.outline.apart(b.outline) < _ALIKE:
+            yield f"{a.label} and {b.label} at {a.params[parameter]:.10g}: nearer than events can be told apart"
     for b in values:
         if b.kind in _SMOOTH and _least_margin(b) < _SECOND:
             yield f"{b.label} at {b.params[parameter]:.10g}: a margin vanishes there, too"

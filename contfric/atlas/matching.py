@@ -25,6 +25,9 @@ _SAME_ORBIT = 1e-8
 _TELLING = {
     kind: rank for rank, kind in enumerate((Kind.GS, Kind.AS, Kind.SS, Kind.CS, Kind.SN, Kind.BP))
 }
+#: Parameters of one event, relative to the range, that differ by rounding alone; and how many of its own
+#: accuracies (it is known to that on either branch) they may differ by.
+_ROUNDING, _TWICE = 1e-11, 2.0
 #: Events this far apart (relative to the range) are two, however badly they are known: how well that is
 #: need not be computed.
 _APART = 0.05
@@ -67,14 +70,21 @@ def stops_distance(a: FloatArray, b: FloatArray, mirror: bool) -> float:
 
 
 def same_event(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> bool:
-    """Tell whether two branches have met the same event (or its mirror image)."""
-    return same_kind(a, b) and same_place(a, b, parameter, width)
+    """Tell whether two branches have met the same event (or its mirror image), by how well it is known."""
+    return same_kind(a, b) and same_place(a, b, parameter, width, _ROUNDING)
 
 
-def same_place(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> bool:
-    """Tell whether two events have the same parameters and the same motion (or its mirror image)."""
+def same_place(
+    a: Bifurcation, b: Bifurcation, parameter: str, width: float, least: float = ACCURACY
+) -> bool:
+    """Tell whether two events have the same parameters and the same motion (or its mirror image).
+
+    Parameters
+    ----------
+    least : parameters this near (relative to the range) are the same, however well they are known
+    """
     gap = abs(a.params[parameter] - b.params[parameter]) / width
-    if gap > ACCURACY and (gap > _APART or gap > max(a.accuracy, b.accuracy)):
+    if gap > least and (gap > _APART or gap > _TWICE * max(a.accuracy, b.accuracy)):
         return False
     return a.outline.apart(b.outline) < SAME_MOTION
 

@@ -220,10 +220,13 @@ def _is_vertex(here: Orbit, active: int) -> bool:
 def _not_located(
     orbit: Orbit, kind: Kind, before: Point, beyond: Point, settings: Settings
 ) -> tuple[Bifurcation, Point]:
-    """Return an event that is known to lie behind a point, and no better: it is not kept silent."""
+    """Return an event that is known to lie behind a point, and no better: it is not kept silent.
+
+    Its bound is that of an event at the point, and as much again for the way behind it.
+    """
     here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     bifurcation = bifurcation_at(kind, here, before, beyond, before, settings)
-    return replace(bifurcation, located=False), before
+    return replace(bifurcation, located=False, bound=2.0 * bifurcation.accuracy), before
 
 
 def _leapt(
