@@ -35,7 +35,7 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
         gap = b.params[parameter] - a.params[parameter]
         known = max(ACCURACY, a.accuracy + b.accuracy) * width
         if gap <= known and a.outline.apart(b.outline) < _ALIKE:
-            yield f"{a.label} and {b.label} at {a.params[parameter]:.10g}: nearer than events can be told apart"
+            yield f"{a.label} and {b.label} at {a.params[parameter]:.10g}: not to be told apart"
     for b in values:
         if b.kind in _SMOOTH and _least_margin(b) < _SECOND:
             yield f"{b.label} at {b.params[parameter]:.10g}: a margin vanishes there, too"
