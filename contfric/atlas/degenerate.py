@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.atlas.matching import part_distance
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
 
-#: Motions this near to each other may be taken for one where their parameters cannot be told apart.
+#: Motions whose stops are this near to each other (up to a hold that one of them has more) may be taken for one
+#: where their parameters cannot be told apart.
 _ALIKE = 1e-3
 #: A margin this small at a smooth event: the branch that leaves it, along which margins change in proportion
 #: to the distance, ends before its parameter has changed by the rounding of one (the square of this).
@@ -34,7 +36,7 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
     for a, b in pairwise(values):
         gap = b.params[parameter] - a.params[parameter]
         known = max(ACCURACY, a.accuracy + b.accuracy) * width
-        if gap <= known and a.outline.apart(b.outline) < _ALIKE:
+        if gap <= known and part_distance(a.orbit.stops, b.orbit.stops) < _ALIKE:
             yield f"{a.label} and {b.label} at {a.params[parameter]:.10g}: not to be told apart"
     for b in values:
         if b.kind in _SMOOTH and _least_margin(b) < _SECOND:

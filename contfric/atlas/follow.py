@@ -88,10 +88,9 @@ def follow(state: Exploration, event: Event) -> None:
 def _follow_sliding(state: Exploration, event: Event) -> None:
     accepted = jumps = False
     orbit = event.bifurcation.orbit
-    if event.bifurcation.accuracy > _UNKNOWN:
+    if event.bifurcation.accuracy > _UNKNOWN and _begins_continuum(state, orbit, event):
         reason, why = "go on behind the event", EndReason.CONTINUUM.value
         state.judge(event, reason, Verdict.REFUSED, why=why)
-        event.final = EndReason.CONTINUUM
         return
     active = orbit.model.index_of(state.settings.parameter)
     edits = bool(orbit.model.resets) or any(
