@@ -18,8 +18,8 @@ from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
 
-#: Motions whose stops are this near to each other (up to a hold that one of them has more) may be taken for one
-#: where their parameters cannot be told apart.
+#: Motions whose stops are this near to each other (one may have a hold more) may be taken for one where their
+#: parameters cannot be told apart.
 _ALIKE = 1e-3
 #: A margin this small at a smooth event: the branch that leaves it, along which margins change in proportion
 #: to the distance, ends before its parameter has changed by the rounding of one (the square of this).
