@@ -43,6 +43,39 @@ CAUGHT = {
         "S0",
         (0.05235108330322144, 0.10748913795236487),
     ),
+    "a fold just behind a touch of rest was leapt over, a branch of two periods arrived late": (
+        {
+            "Omega": 0.12784125417014755,
+            "S": 0.020945700324858936,
+            "S0": 0.04634510276660679,
+            "h": 0.04157323245145339,
+            "zeta": 0.004829303425705549,
+        },
+        "zeta",
+        (-0.0524787394622068, 0.07329936289463754),
+    ),
+    "the symmetric bridge was not found from the asymmetric one that crosses its fold": (
+        {
+            "Omega": 0.13870175018603437,
+            "S": 0.05997546520205335,
+            "S0": 0.4265967581702046,
+            "h": -0.47423794965322696,
+            "zeta": 0.06418157867620426,
+        },
+        "h",
+        (-0.6142997405765306, -0.41986921609223227),
+    ),
+    "a regular branch of two points between two SS, 3e-8 of the range wide": (
+        {
+            "Omega": 0.456335871020349,
+            "S": 0.018941530492988287,
+            "S0": 0.02293698700719782,
+            "h": 0.35854040045793123,
+            "zeta": 0.07183180275484914,
+        },
+        "Omega",
+        (0.4082753582408252, 0.5198415555197237),
+    ),
     "the stop of a hold depends on its length twice": (
         {"Omega": 0.43, "S": 0.17605, "S0": 0.219291},
         "Omega",
@@ -56,10 +89,10 @@ def test_the_same_from_every_branch(name: str) -> None:
     params, vary, bounds = CAUGHT[name]
     diagram = cf.explore(cf.find_orbit("coulomb", params), vary, bounds)
     assert diagram.verified is None
-    found = diagram.verify(restarts=3)
+    found = diagram.verify(restarts=4)
     assert found.passed, str(found)
     assert diagram.verified
-    assert len(found.restarts) == 3
+    assert len(found.restarts) >= 3
     assert sum(b.below is not None for b in found.balances) >= 2
 
 
