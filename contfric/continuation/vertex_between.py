@@ -14,7 +14,7 @@ import numpy as np
 
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import first_point
-from contfric.continuation.vertices import moved, opening, symmetrised, undoubled
+from contfric.continuation.vertices import joints_like, moved, opening, symmetrised, undoubled
 from contfric.orbit.orbit import Orbit
 
 #: Halvings of a step to the resolution of the parameter.
@@ -33,12 +33,11 @@ def left_at(before: Point, after: Orbit, settings: Settings) -> Point | None:
     found = _at_values(before, after, active) or _along_chord(before, after, settings, active)
     if found is None:
         return None
-    whole = found.as_whole()
-    there = whole if whole.joints.shape == before.joints.shape else found.doubled()
+    there = joints_like(found, before.joints)
     value = float(found.vector[active])
-    gap = there.joints - before.joints
+    gap = there - before.joints
     far = np.sum(gap * gap) / len(gap) + (value - before.value) ** 2 * settings.scale
-    return replace(before, joints=there.joints, value=value, arc=before.arc + float(np.sqrt(far)))
+    return replace(before, joints=there, value=value, arc=before.arc + float(np.sqrt(far)))
 
 
 def _simpler(orbit: Orbit) -> Orbit | None:

@@ -14,6 +14,8 @@ from contfric.continuation.stalls import stalled_at
 from contfric.continuation.vertex_between import left_at
 from contfric.continuation.vertices import at_vertex, passed_vertex
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.repetition import shortest
+from contfric.orbit.sections import is_smooth
 
 #: Beside an event at which Newton fails steps are shortened by this factor, down to this length.
 SHORTER, NEAREST = 8.0, 1e-8
@@ -38,6 +40,7 @@ def leaps_over_vertex(orbit: Orbit, side: Side, settings: Settings, written: int
     first = side.last - written
     rows = side.rows.joints[: side.last + 1]
     passed = passed_vertex(orbit.system, rows, max(0, first))
+    passed = passed or _gone_unseen(orbit, side, settings, max(0, first))
     if passed is None:
         return Leap.NONE
     before, after = side.rows.point(passed[0]), side.rows.point(passed[0] + 1)
@@ -57,6 +60,31 @@ def leaps_over_vertex(orbit: Orbit, side: Side, settings: Settings, written: int
         return Leap.BACK
     end_stalled(orbit, side, settings)
     return Leap.ENDED
+
+
+def _gone_unseen(
+    orbit: Orbit, side: Side, settings: Settings, first: int
+) -> tuple[int, float] | None:
+    """Return the step over which smooth orbits of an even number of periods have become simpler ones.
+
+    Their joints are those of one half only, and say nothing of the other: each orbit has to be run through.
+    """
+    model, system = orbit.model, orbit.system
+    if system.half or system.periods % 2 or model.autonomous or not is_smooth(model, system.word):
+        return None
+    active = model.index_of(settings.parameter)
+
+    def repeats(row: int) -> bool:
+        there = side.rows.point(row).orbit(system, orbit.vector, active)
+        return shortest(there) is not there
+
+    low, high = first, side.last
+    if not repeats(high) or repeats(low):
+        return None
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if repeats(middle) else (middle, high)
+    return low, float(np.inf)
 
 
 def _gone_over(

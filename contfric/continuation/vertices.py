@@ -16,7 +16,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.sections import in_halves
+from contfric.orbit.sections import crossings_near, in_halves, is_smooth
 from contfric.orbit.solve import polish
 from contfric.orbit.system import System, build_system
 from contfric.orbit.words import half_of
@@ -149,12 +149,21 @@ def _image_of_second_half(system: System) -> FloatArray | None:
 
 def at_vertex(point: Point, simple: Orbit, active: int) -> Point:
     """Return the end point of a branch at a vertex, from the simpler orbit that is located there."""
-    whole = simple.as_whole()
-    there = whole if whole.joints.shape == point.joints.shape else simple.doubled()
-    same = there.joints.shape == point.joints.shape
-    if not same or np.max(np.abs(there.joints - point.joints)) > _NEARLY:
+    joints = joints_like(simple, point.joints)
+    same = joints.shape == point.joints.shape
+    if not same or np.max(np.abs(joints - point.joints)) > _NEARLY:
         return point
-    return replace(point, joints=there.joints, value=float(there.vector[active]))
+    return replace(point, joints=joints, value=float(simple.vector[active]))
+
+
+def joints_like(simple: Orbit, joints: FloatArray) -> FloatArray:
+    """Return the joints of a simpler orbit where an orbit beside it, run through once, has its own."""
+    whole = simple.as_whole()
+    if whole.joints.shape != joints.shape:
+        return simple.doubled().joints
+    if not is_smooth(simple.model, whole.word) or simple.model.autonomous:
+        return whole.joints
+    return crossings_near(whole, joints)  # one each way, however long the orbit is
 
 
 def _vertex(orbit: Orbit, active: int) -> Orbit | None:

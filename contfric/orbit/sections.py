@@ -159,6 +159,20 @@ def shortened(whole: Orbit, turns: int) -> Orbit | None:
     return replace(whole, system=build_system(model, found, periods), joints=starts)
 
 
+def crossings_near(whole: Orbit, joints: FloatArray) -> FloatArray:
+    """Return the crossings of a smooth orbit that are nearest to some joints, in any of its periods.
+
+    An orbit of many periods has joints at one crossing each way, which may not be those of a shorter one.
+    """
+    _, every = _every_crossing(whole)
+    found = []
+    for joint in joints:
+        there = every.copy()
+        there[:, 0] += whole.period * np.round((joint[0] - there[:, 0]) / whole.period)
+        found.append(there[int(np.argmin(np.max(np.abs(there - joint), axis=1)))])
+    return np.array(found)
+
+
 def _every_crossing(whole: Orbit) -> tuple[Word, FloatArray]:
     """Return all crossings of its section as the word and the joints of a smooth orbit, in order."""
     model, flow = whole.model, whole.model.flow

@@ -341,3 +341,18 @@ def test_tables_of_the_gallery_are_computed_anew(model, page, params, parameter,
     assert [kind for _, kind in found] == [kind for _, kind in known]
     for (value, _), (shown, _) in zip(found, known, strict=True):
         assert value == pytest.approx(shown, abs=5.5e-10)
+
+
+def test_a_doubled_orbit_ends_where_it_is_one_run_twice(model):
+    """Its joints are those of one half only: that it has become the simpler orbit is seen by running it."""
+    orbit = cf.find_orbit(model, {"Omega": 0.552, "S": 0.32}, periods=2)
+    branch = cf.continue_orbit(orbit, "Omega", (0.5505, 0.556))
+    assert [end.reason.name for end in branch.ends] == ["PD", "PD"]
+    found = sorted(end.bifurcation.params["Omega"] for end in branch.ends)
+    assert found == pytest.approx((0.55144831386, 0.55430837389), abs=1e-9)
+    for point in branch[1:-1:20]:
+        half = 0.5 * point.period
+        there = [point.state(float(joint[0]) + half) - joint[1:] for joint in point.cycle]
+        assert np.max(np.abs(there)) > 1e-6
+    steps = np.linalg.norm(np.diff(branch.joints.reshape(len(branch), -1), axis=0), axis=1)
+    assert np.max(steps) < 1.0  # and the ends are rotated as the points beside them
