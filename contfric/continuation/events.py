@@ -90,8 +90,9 @@ _MEANINGS = {
 TERMINAL = frozenset({Kind.CS, Kind.SS, Kind.AS, Kind.GS})
 
 
-#: A slide behind a hold that is this short has vanished: such an event is located to about 1e-10.
-_VANISHED = 1e-6
+#: A slide behind a hold that is this short has vanished where one of its margins has: they are its length
+#: times a rate of the load, and Newton may fail before they are below 1e-5.
+_VANISHED = 1e-3
 #: The motion at a located event is good to about 1e-10; asymmetry this small is not seen in a diagram.
 _SYMMETRIC = 1e-7
 
@@ -329,7 +330,7 @@ def kind_of_hold(hold: Hold, test: Test) -> Kind:
 
     Unless it touches its limit on the way (AS), or can just not be left there (GS).
     """
-    if test.margin is Margin.INTERIOR:
+    if test.margin is Margin.INTERIOR and test.segment == hold.segment:
         return Kind.AS
     if test.margin is Margin.HELD:
         return Kind.GS
