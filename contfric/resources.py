@@ -13,8 +13,8 @@ from contfric.errors import ContfricError, did_you_mean
 Kind: TypeAlias = Literal["models", "signatures", "studies"]
 
 _PACKAGE = Path(__file__).resolve().parent
-_PLACES: dict[str, tuple[Path, Path]] = {
-    "models": (_PACKAGE / "_data" / "models", _PACKAGE.parent / "models"),
+_PLACES: dict[str, tuple[Path, ...]] = {
+    "models": (_PACKAGE / "models" / "bundled",),
     "signatures": (_PACKAGE / "_data" / "signatures", _PACKAGE.parent / "signatures"),
     "studies": (_PACKAGE / "_data" / "studies", _PACKAGE.parent / "docs" / "studies"),
 }

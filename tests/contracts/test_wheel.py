@@ -55,7 +55,7 @@ def test_wheel_runs_fig05_from_an_empty_folder(installed: Path, tmp_path: Path) 
 
 def test_wheel_ships_models_signatures_and_studies(installed: Path) -> None:
     data = installed / "contfric" / "_data"
-    assert (data / "models" / "belt.yaml").is_file()
+    assert (installed / "contfric" / "models" / "bundled" / "belt.yaml").is_file()
     assert (data / "signatures" / "2s.yaml").is_file()
     for number in ("03", "04", "05", "06", "07", "13"):
         assert (data / "studies" / f"fig{number}.yaml").is_file()
