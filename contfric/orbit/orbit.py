@@ -18,8 +18,9 @@ from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.reading import read_signature
 from contfric.orbit.samples import samples, state_within
+from contfric.orbit.slack import margin_slack, no_time
 from contfric.orbit.stops import displacements, reach_of, stopping_segments, turning_points
-from contfric.orbit.system import Margin, System, Word, build_system
+from contfric.orbit.system import System, Word, build_system
 from contfric.orbit.words import half_of, mirror_pairs, whole_of
 from contfric.signature import Signature
 
@@ -33,13 +34,6 @@ ComplexArray = NDArray[np.complex128]
 SYMMETRY_TOLERANCE = 1e-9
 #: A multiplier this near to 1 makes the orbit one of a continuum to working precision.
 DEGENERATE = 1e-9
-
-#: A stick of length zero (at an event) has a duration of rounding over the rate of its release. Where that
-#: rate vanishes as well (a slide that appears) it is the root of rounding.
-_NO_TIME = 1e-10
-#: A margin that vanishes is rounding of the motion (relative to the size of the orbit's times and states)
-#: times the number of terms that it is made of, about this many.
-_ROUNDING = 10.0
 
 
 class Status(str, Enum):
@@ -287,48 +281,27 @@ class Orbit:
     def admissible(self) -> bool:
         """Whether the orbit obeys every inequality inside every segment."""
         margins, _, fine = self._watched
-        lasting = bool(np.all(self.ends[:, 0] - self.cycle[:, 0] > -self._no_time(margins)))
-        return self.converged and fine and lasting and bool(np.all(margins > self._slack))
-
-    def _no_time(self, margins: FloatArray) -> FloatArray:
-        """Return how much less than nothing a segment may last: its exit is known to no more."""
-        first = self.system.layout.interior.shape[0]
-        exits = np.abs(margins[first : first + self.system.segments])
-        rounding = self._rounding
-        no_time = np.maximum(_NO_TIME, rounding / np.maximum(exits, np.sqrt(rounding)))
-        return np.resize(no_time, len(self.cycle))
-
-    @property
-    def _rounding(self) -> float:
-        """Rounding of a margin."""
-        return _ROUNDING * self.model.rounding * (1.0 + float(np.max(np.abs(self.joints))))
-
-    @property
-    def _slack(self) -> FloatArray:
-        """What a margin may miss zero by: at an event it vanishes, and its sign is rounding.
-
-        A joint that touches a surface, and a hold at its limits, are located to the root of that where two
-        conditions meet. Before an exit with the rate -r its surface is passed by r^2 / 2: r is known to the
-        root of rounding where the exit is tangential.
-        """
-        held = {hold.segment for hold in self.system.holds}
-        may = [
-            t.margin in (Margin.JOINT, Margin.LASTING) or t.segment in held
-            for t in self.system.tests
-        ]
-        rounding = self._rounding
-        root = np.array([t.margin is Margin.EXIT for t in self.system.tests])
-        return np.where(root, -np.sqrt(rounding), np.where(np.array(may), -1e-9, -rounding))
+        lasts, short = (
+            self.ends[:, 0] - self.cycle[:, 0],
+            no_time(self.system, self.joints, margins),
+        )
+        inside = np.all(margins > margin_slack(self.system, self.joints)) and np.all(lasts > -short)
+        return bool(self.converged and fine and inside)
 
     def violations(self) -> list[str]:
         """Return what makes the orbit not admissible, one line each."""
-        return [
-            f"segment {test.segment + 1} ({self.system.word[test.segment][0]}): "
+        word, margins = self.system.word, self.margins
+        slacks = margin_slack(self.system, self.joints)
+        found = [
+            f"segment {test.segment + 1} ({word[test.segment][0]}): "
             f"{test.margin.value} margin at {test.surface} is {margin:.3g}"
-            for test, margin, slack in zip(
-                self.system.tests, self.margins, self._slack, strict=True
-            )
+            for test, margin, slack in zip(self.system.tests, margins, slacks, strict=True)
             if not margin > slack
+        ]
+        lasts = self.ends[:, 0] - self.cycle[:, 0]
+        short = np.flatnonzero(lasts <= -no_time(self.system, self.joints, margins))
+        return found + [
+            f"segment {k + 1} ({self.word[k][0]}): it lasts {lasts[k]:.3g}" for k in short
         ]
 
     # ------------------------------------------------------------------ what is seen

@@ -23,7 +23,6 @@ Everything here derives from the model's definition; nothing knows what moves.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 from functools import cache
 from typing import NamedTuple
 
@@ -33,6 +32,7 @@ from numpy.typing import NDArray
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.begins import PLAIN, RETURNS, departures, entry_rows, first_entry
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN, Hold, holds_of
+from contfric.orbit.margins import Margin, Test, double_zeros, lasting_segments
 from contfric.orbit.structure import (
     exit_domains,
     inside_sign,
@@ -105,27 +105,6 @@ class Layout(NamedTuple):
     turn: float
     rank: int
     rounding: float
-
-
-class Margin(str, Enum):
-    """The kinds of inequality that an orbit obeys."""
-
-    INTERIOR = "interior"
-    EXIT = "exit"
-    JOINT = "joint"
-    ENTRY = "entry"
-    LASTING = "lasting"
-    HELD = "held"
-
-
-@dataclass(frozen=True)
-class Test:
-    """What one margin of a system means: its kind, segment and surface."""
-
-    __test__ = False  # not a test case of pytest
-    margin: Margin
-    segment: int
-    surface: str
 
 
 Word = tuple[tuple[str, str], ...]
@@ -202,9 +181,12 @@ def build_system(
         labels=_label_rows(model, word, half, bool(domains), holds),
         pins=np.array([_pin(held.get(i), surfaces) for i in range(len(word))], dtype=np.int64),
         departs=departures(model, word, exits, entered, half, held),
-        lasting=np.array([i for i, _ in _lasting(word, holds)], dtype=np.int64),
+        lasting=np.array([i for i, _ in lasting_segments(word, holds)], dtype=np.int64),
         held=np.array([hold.segment for hold in holds], dtype=np.int64),
-        doubles=_doubles(model, word, half, holds, tests),
+        doubles=_rows(
+            [(tests.index(t), i) for t, i in double_zeros(model, word, half, holds) if t in tests],
+            2,
+        ),
         closure=symmetry.array() if half and symmetry else np.eye(n),
         turn=_turn(model, periods, half),
         # a shift in time is no disturbance of an autonomous orbit
@@ -317,53 +299,10 @@ def _margins(
         ),
         *(Test(Margin.JOINT, i, names[k]) for i, k, *_ in joint),
         *(Test(Margin.ENTRY, i, names[k]) for i, k, *_ in entries),
-        *(Test(Margin.LASTING, i, surface) for i, surface in _lasting(word, holds)),
+        *(Test(Margin.LASTING, i, surface) for i, surface in lasting_segments(word, holds)),
         *(Test(Margin.HELD, h.segment, h.leaves) for h in holds),
     )
     return _rows(interior), _rows([*joint, *entries], 4), tests
-
-
-def _lasting(word: Word, holds: tuple[Hold, ...]) -> list[tuple[int, str]]:
-    """Segments that no other margin keeps from shrinking through zero, each with the surface that it ends on.
-
-    A hold after a touch of its limit, and the stick up to that touch: where it shrinks to nothing, the
-    margin of the stop before it has a double zero. And the slide from one hold to the touch at which the
-    next begins: where it shrinks to nothing, the acceleration with which the first is left has one.
-    """
-    found: list[tuple[int, str]] = []
-    left = {(hold.segment + 1) % len(word) for hold in holds}
-    for hold in holds:
-        before = (hold.segment - 1) % len(word)
-        if hold.after_rest:
-            found += [(before, word[before][1]), (hold.segment, hold.leaves)]
-        elif hold.pin is None and before in left:
-            found.append((before, word[before][1]))
-    return found
-
-
-def _doubles(
-    model: Model, word: Word, half: bool, holds: tuple[Hold, ...], tests: tuple[Test, ...]
-) -> IntArray:
-    """Margins with a double zero where a segment that must last has no length, each with that segment.
-
-    The load at the end of a hold after a touch of its limit, the load at the stop before that touch, and the
-    acceleration with which a hold is left into a slide up to the touch of the next one.
-    """
-    pairs: list[tuple[Test, int]] = []
-    left = {(hold.segment + 1) % len(word) for hold in holds}
-    for hold in holds:
-        before = (hold.segment - 1) % len(word)
-        if hold.after_rest:
-            surface = word[before][1]
-            pairs.append((Test(Margin.JOINT, hold.segment, surface), hold.segment))
-            if before == 0 and half and model.symmetry is not None:  # its stop is a mirror image
-                back = {image: name for name, image in model.symmetry.surfaces.items()}
-                surface = back[surface]
-            pairs.append((Test(Margin.JOINT, (before - 1) % len(word), surface), before))
-        elif hold.pin is None and before in left:
-            stopped = next(h for h in holds if (h.segment + 1) % len(word) == before)
-            pairs.append((Test(Margin.EXIT, stopped.segment, stopped.leaves), before))
-    return _rows([(tests.index(test), segment) for test, segment in pairs if test in tests], 2)
 
 
 def _rows(rows: list[tuple[int, ...]], width: int = 3) -> IntArray:
