@@ -86,7 +86,7 @@ def _leave_beside(
 ) -> Branch | None:
     """Trace away from an event at which the new orbit is singular, from a little beside it."""
     active = orbit.model.index_of(settings.parameter)
-    for distance in _distances(orbit):
+    for distance in _distances(orbit, event):
         moved = replace(orbit, joints=orbit.joints + distance * orbit.period * away)
         for tangent, slope in directions(moved, active):
             point = first_point(moved, settings, tangent, slope)
@@ -105,9 +105,14 @@ def _leave_beside(
     return None
 
 
-def _distances(orbit: Orbit) -> list[float]:
-    """Return how far beside an event a start is tried: as near as states are known, farther, then nearer."""
+def _distances(orbit: Orbit, event: Event) -> list[float]:
+    """Return how far beside an event a start is tried: as near as states are known, farther, then nearer.
+
+    At an event that is known roughly what is near is rounding.
+    """
     least = _KNOWN * orbit.model.rounding**0.5
+    if event.bifurcation.accuracy > ACCURACY:
+        least = NEARER[0]
     return [d for d in reversed(NEARER) if d >= least] + [d for d in NEARER if d < least]
 
 

@@ -40,8 +40,8 @@ _TOUCH = 2e-15
 _AT_PIN = 1e-6
 
 #: Duration below which rounding hides what is left of a margin without its double zero: at this one it is
-#: known to 1e-7.
-_CLEAR = 1e-4
+#: known to 1e-3, and a curvature of the load is larger.
+_CLEAR = 1e-6
 
 
 class Turnings(NamedTuple):
