@@ -148,7 +148,12 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
     if surface is None:
         departs = orbit.word[(i + 1) % len(orbit.word)][0]
         rate = _departure_rate(orbit, i, departs)
-        time = min(_stationary(orbit, i), key=rate)
+        still = _stationary(orbit, i)
+        if not still:
+            raise NotationError(
+                f"hold {i + 1} could be left anywhere inside: nothing is stationary"
+            )
+        time = min(still, key=rate)
         return joint_within(orbit, i, time)
     k = [s.name for s in model.surfaces].index(surface)
     c = [o.name for o in model.observables].index(model.surfaces[k].observable)
