@@ -131,7 +131,7 @@ def watched_value(functions, layout, kind, index, target, z, p, w, slope, mu, co
     if kind == BY_PARAMETER:
         return w - target
     if kind == BY_LABEL:
-        code, nearest, _ = crossings(functions, layout, index, z, p, room.equations, room.turnings)
+        code, nearest = crossings(functions, layout, index, z, p, room.equations, room.turnings)
         # the distance of the nearest stationary point to a surface vanishes where the label changes;
         # elsewhere a joint may lie on a surface
         return nearest if code == int(target) else -max(nearest, 1e-300)

@@ -259,8 +259,7 @@ def side_of(value, target):  # type: ignore[no-untyped-def]
 def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-untyped-def]
     """Return the surfaces that the segment of row k crosses, as digits of one integer.
 
-    And the distance to the nearest change, of a stationary point or a joint from a surface; and the product of
-    all such distances, which varies smoothly where the nearest is now one and now another.
+    And the distance to the nearest change: of a stationary point or a joint from a surface.
     """
     i, c, on, to = (
         layout.labels[k, 0],
@@ -273,10 +272,10 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
     else:
         found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
     if found < 0:
-        return -1, np.inf, np.inf
+        return -1, np.inf
     value, final = ends_of(functions, layout, k, z, p, room)
     surfaces = layout.observables.shape[0]
-    code, nearest, product, sides = 0, np.inf, 1.0, 0  # two bits of ``sides`` a surface
+    code, nearest, sides = 0, np.inf, 0  # two bits of ``sides`` a surface
     for piece in range(-1, found + 1):
         following = value
         if piece >= 0:
@@ -290,7 +289,6 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
             is_joint = (piece < 0 and surface == on) or (piece == found and surface == to)
             if not is_joint:
                 nearest = min(nearest, abs(following - target))
-                product *= abs(following - target) / (1.0 + abs(target))
             side = side_of(following, target)
             before = (sides >> (2 * surface)) & 3
             if side == 0 or side == before:
@@ -299,19 +297,19 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
             if before != 0:
                 code = code * (surfaces + 1) + surface + 1
         value = following
-    return code, nearest, product
+    return code, nearest
 
 
 @helper
 def watch(functions, layout, z, p, room, turnings, out, labels):  # type: ignore[no-untyped-def]
-    """Fill margins and labels of an orbit, and behind the margins how far labels are from a change.
+    """Fill margins and labels of an orbit, and behind the margins the distances of the labels.
 
     False if something is not finite.
     """
     margins(functions, layout, z, p, room, turnings, out)
     count = count_margins(layout)
     for k in range(layout.labels.shape[0]):
-        labels[k], _, out[count + k] = crossings(functions, layout, k, z, p, room, turnings)
+        labels[k], out[count + k] = crossings(functions, layout, k, z, p, room, turnings)
     for k in range(count):
         if math.isnan(out[k]):
             return False
