@@ -25,12 +25,13 @@ A failure stays on the page with its scene. Those that remain are of two degener
 end, so that its name may depend on the step; and ends at Omega = 1/2, where a stick vanishes just as its
 release becomes tangential and the orbit is one of a continuum.
 
-Of the restarts: a diagram explored again from another of its branches is to have the same events and branches.
-What is excused was fixed before the run: by the scene (S = S0; Omega = 1/n without damping), or by its events
-(`contfric/atlas/degenerate.py`): two in one place with one motion, or a second condition that fails at a smooth one.
-Scenes with more branches than the limit, or that take longer than a minute, are counted as cut. What is left
-failed are, by kind: touches (T) of which a large step sees two or none, orbits beside a continuum at a value of
-Omega that is no 1/n, and events on orbits of many periods that are nearer to each other than 1e-7 of the range.
+Of the restarts: a diagram explored again from another of its branches is to have the same events and
+branches. What is excused was fixed before the run: by the scene (S = S0; Omega = 1/n without damping), or
+by its events (`contfric/atlas/degenerate.py`): two in one place with one motion, or a second condition
+that fails at a smooth one. Scenes with more branches than the limit, or that take longer than a minute,
+are counted as cut. What is left failed are, by kind: touches (T) of which a large step sees two or none,
+orbits beside a continuum at a value of Omega that is no 1/n, and events on orbits of many periods that
+are nearer to each other than 1e-7 of the range.
 
 `make stress` repeats all runs; one of them and the page:
 
