@@ -39,6 +39,11 @@ def finish(process: int) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
 
 
+def ended(results: Path) -> bool:
+    """Tell whether a run was killed after its end: its results are whole, and nothing is left to do."""
+    return (results / "run.json").exists() and not (results / "checkpoint").exists()
+
+
 def killed_runs(folder: Path, rounds: int, seed: int, command: list[str]) -> dict[str, list[int]]:
     """Kill runs at random moments of what a whole run takes; the last one is let be."""
     main([*command, "--out", str(folder / "first")] if command[0] == "run" else command)
@@ -52,9 +57,10 @@ def killed_runs(folder: Path, rounds: int, seed: int, command: list[str]) -> dic
         sizes.append(sum(p.stat().st_size for p in files))
         process = forked(command, folder / "out")
         if k < rounds:
-            time.sleep(took * rng.uniform(0.1, 0.9))
+            time.sleep(took * rng.uniform(0.05, 0.6))
             os.kill(process, (signal.SIGKILL, signal.SIGTERM)[k % 2])
-        codes.append(finish(process))
+        code = finish(process)
+        codes.append(0 if command[0] == "run" and ended(kept) else code)
         if codes[-1] == 0:
             break
     return {"codes": codes, "sizes": sizes}
