@@ -20,10 +20,11 @@ index, compared with a reference that shares nothing with the library but the eq
 counted. An error is compared with what rounding of the arguments alone explains at the condition of the
 problem (a ratio of 1 is the most that is allowed; below 1 the result is as exact as doubles permit).
 
-A failure stays on the page with its scene. Those that remain are touches (T) that a large step does not see, or
-of two degenerate kinds, each a limitation (see [numerics](numerics.md#conditioning)): scenes with S = S0, where several conditions vanish together at an
-end, so that its name may depend on the step; and ends at Omega = 1/2, where a stick vanishes just as its
-release becomes tangential and the orbit is one of a continuum.
+A failure stays on the page with its scene. Those that remain are touches (T) that a large step does not
+see, or of two degenerate kinds, each a limitation (see [numerics](numerics.md#conditioning)): scenes with
+S = S0, where several conditions vanish together at an end, so that its name may depend on the step; and
+ends at Omega = 1/2, where a stick vanishes just as its release becomes tangential and the orbit is one of
+a continuum.
 
 Of the restarts: a diagram explored again from another of its branches is to have the same events and
 branches. What is excused was fixed before the run: by the scene (S = S0; Omega = 1/n without damping), or
