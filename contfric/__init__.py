@@ -188,7 +188,11 @@ def __getattr__(name: str) -> Any:
 
         return version("contfric")
     if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
+        from contfric.interrupts import after_import
+
+        with after_import():
+            home = import_module(_HOMES[name])
+        return getattr(home, name)
     raise AttributeError(f"module 'contfric' has no attribute '{name}'")
 
 

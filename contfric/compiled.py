@@ -39,6 +39,7 @@ from numba.core import config
 from contfric.checked import discard, discard_damaged, list_files
 from contfric.errors import ResultFileError
 from contfric.inlined import part_options
+from contfric.interrupts import after_import, never_lost
 from contfric.resources import user_cache
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -143,13 +144,15 @@ class Kernel:
         """Load the function from its folder, or compile it into that."""
         sound = discard_damaged(folder, _CACHED)
         cached = numba.njit(self.signature, cache=True, **_OPTIONS)
-        try:
-            found = cached(self.__wrapped__)
-        except Exception:  # what unpickling ends in, where the files are of another numba
-            if not sound:
-                raise
-            discard(folder, _CACHED)
-            found = cached(self.__wrapped__)
+        # to load takes an instant and imports more of numba and scipy; to compile takes long
+        with after_import() if sound else never_lost():
+            try:
+                found = cached(self.__wrapped__)
+            except Exception:  # what unpickling ends in, where the files are of another numba
+                if not sound:
+                    raise
+                discard(folder, _CACHED)
+                found = cached(self.__wrapped__)
         if not found.stats.cache_hits:
             list_files(folder, _CACHED)
         return found

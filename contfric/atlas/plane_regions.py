@@ -19,6 +19,7 @@ from contfric.atlas.matching import identity
 from contfric.atlas.plane import Family, Region
 from contfric.curves.curve import Curve
 from contfric.curves.problem import Box
+from contfric.interrupts import after_import
 from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import Word
@@ -59,7 +60,8 @@ def regions_of(
 
     Orbits of more than ``max_periods`` periods, whose curves are not followed, are not listed.
     """
-    from scipy import ndimage
+    with after_import():
+        from scipy import ndimage
 
     passed = [cells_of(box, curve) for curve in curves]
     walls = np.zeros((CELLS, CELLS), dtype=np.int64)
@@ -138,7 +140,8 @@ def _bounds(
     mask: NDArray[np.bool_], passed: Sequence[tuple[NDArray[np.int64], NDArray[np.int64]]]
 ) -> tuple[int, ...]:
     """Return the curves whose cells touch a region."""
-    from scipy import ndimage
+    with after_import():
+        from scipy import ndimage
 
     rim = ndimage.binary_dilation(mask, np.ones((3, 3))) & ~mask
     return tuple(k for k, cells in enumerate(passed) if np.any(rim[cells]))

@@ -84,7 +84,10 @@ def _starts(state: PlaneExploration, orbit: Orbit, fixed: str, value: float) -> 
     for share in (0.5, 0.3, 0.7, 0.1, 0.9):
         with suppress(ContfricError):
             there = {**params, varies: float(low + share * (high - low))}
-            yield find_orbit(orbit.model, there, longest=4000)
+            found = find_orbit(orbit.model, there, longest=4000)
+            # an orbit of more periods would raise max_periods for its whole section
+            if found.periods <= state.max_periods:
+                yield found
     with suppress(ContfricError):
         yield from _continued(orbit, fixed, value)
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
+from contfric.interrupts import after_import
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -66,7 +68,8 @@ def axes_or_new(ax: Axes | None, width: float = 7.0, height: float = 4.3) -> Axe
     """Return the axes given, or those of a new pyplot figure."""
     if ax is not None:
         return ax
-    from matplotlib import pyplot
+    with after_import():
+        from matplotlib import pyplot
 
     fig = pyplot.figure(figsize=(width, height), layout="constrained")
     return fig.add_subplot()
@@ -76,6 +79,7 @@ def figure_or_new(fig: Figure | None, width: float, height: float) -> Figure:
     """Return the figure given, or a new one of pyplot."""
     if fig is not None:
         return fig
-    from matplotlib import pyplot
+    with after_import():
+        from matplotlib import pyplot
 
     return pyplot.figure(figsize=(width, height), layout="constrained")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from contfric.errors import NotationError, did_you_mean
+from contfric.interrupts import after_import
 from contfric.models import Model, ModelSource, load_model
 
 if TYPE_CHECKING:
@@ -26,7 +27,8 @@ def transition_graph(model: ModelSource) -> nx.MultiDiGraph[str]:
     >>> transition_graph(load_model("coulomb")).number_of_edges()
     14
     """
-    import networkx as nx
+    with after_import():
+        import networkx as nx
 
     model = load_model(model)
     graph: nx.MultiDiGraph[str] = nx.MultiDiGraph(model=model.name)

@@ -35,6 +35,19 @@ def plane():
     return cf.explore_plane(orbit, PLANE, RANGES, max_sections=2, max_periods=1, seeds=None)
 
 
+def test_sections_start_from_orbits_of_few_periods() -> None:
+    # at S = 0.015 attractors have 54 periods; explored up to that number, fig11 did not end
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.6, "S0": 0.8})
+    box = {"Omega": (0.1, 0.9), "S": (0.01, 0.8)}
+    sections = {"S": [0.015, 0.02]}
+    plane = cf.explore_plane(orbit, PLANE, box, sections=sections, max_sections=2, max_periods=1)
+    assert len(plane.sections) == 2
+    for section in plane.sections:
+        assert section.settings.max_periods == 1
+        assert not any("raised" in note for note in section.notes)
+        assert all(branch[0].periods == 1 for branch in section.branches)
+
+
 # ------------------------------------------------------------------------------ what is refused
 
 

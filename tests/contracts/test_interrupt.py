@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import ctypes
+import importlib
 import os
 import random
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 
+from contfric.interrupts import after_import, never_lost
+
 #: Time after the signal within which a call has returned (s); on an idle machine it is a tenth of that.
 AT_ONCE = 3.0
 
+#: Time after which the process tells where it is and ends, if a signal was lost (s).
+LOST = 150
+
 SCRIPT = """
+import faulthandler
 import sys
 import numpy as np
 import contfric as cf
@@ -76,7 +85,8 @@ calls = {
     "poincare": (lambda: cf.poincare(model, start, periods=1e7), None),
     "period_adding": (lambda: cf.period_adding(bridge, longest=8) if bridge else None, None),
 }
-for name in sys.argv[2:]:
+faulthandler.dump_traceback_later(float(sys.argv[2]), exit=True)
+for name in sys.argv[3:]:
     call, was_cut = calls[name]
     print("go", name, flush=True)
     try:
@@ -110,7 +120,7 @@ def test_ctrl_c_acts_at_once(model: str) -> None:
     calls = [name for name in (*KEPT, *RAISED) if name not in missing]
     # its own group: a signal for the tests is none for it
     process = subprocess.Popen(
-        [sys.executable, "-c", SCRIPT, model, *calls],
+        [sys.executable, "-c", SCRIPT, model, str(LOST), *calls],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -133,3 +143,74 @@ def test_ctrl_c_acts_at_once(model: str) -> None:
     finally:
         process.kill()
         process.communicate()
+
+
+# ------------------------------------------------------------------- where Python itself loses Ctrl-C
+
+#: A package whose first import takes its time, and which cannot be imported twice (as some of scipy's).
+FRAGILE = """
+import sys, time
+from fragile import part
+if "kept" in vars(sys):
+    del later
+sys.kept = True
+time.sleep(0.2)
+later = 1
+"""
+
+
+def _interrupt_in(seconds: float) -> threading.Timer:
+    timer = threading.Timer(seconds, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    return timer
+
+
+@pytest.mark.parametrize("seconds", [0.02, 0.1, 0.15])
+def test_an_import_is_finished_first(tmp_path, monkeypatch, seconds) -> None:
+    (tmp_path / "fragile").mkdir()
+    (tmp_path / "fragile" / "__init__.py").write_text(FRAGILE, encoding="utf-8")
+    (tmp_path / "fragile" / "part.py").write_text("", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delattr(sys, "kept", raising=False)
+    for name in ("fragile", "fragile.part"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    before = signal.getsignal(signal.SIGINT)
+    timer = _interrupt_in(seconds)
+    with pytest.raises(KeyboardInterrupt), after_import():
+        importlib.import_module("fragile")
+    timer.join()
+    assert sys.modules["fragile"].later == 1
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_what_c_code_swallows_is_raised_again() -> None:
+    def callback() -> int:
+        began = time.monotonic()
+        while time.monotonic() - began < 0.3:
+            pass
+        return 0
+
+    foreign = ctypes.CFUNCTYPE(ctypes.c_int)(callback)
+    timer, seen = _interrupt_in(0.1), []
+    monkey = sys.unraisablehook
+    sys.unraisablehook = lambda found: seen.append(found.exc_type)
+    try:
+        with pytest.raises(KeyboardInterrupt), never_lost():
+            foreign()
+    finally:
+        sys.unraisablehook = monkey
+    timer.join()
+    assert seen == [KeyboardInterrupt]
+
+
+def test_other_threads_have_no_handlers() -> None:
+    found = []
+
+    def block() -> None:
+        with after_import(), never_lost():
+            found.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=block)
+    thread.start()
+    thread.join()
+    assert found == [signal.getsignal(signal.SIGINT)]
