@@ -9,10 +9,14 @@ from __future__ import annotations
 
 import signal
 import threading
+from _thread import interrupt_main
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any
+
+#: Time after which Ctrl-C is raised again where nothing has come of it (s): shorter than anybody notices.
+_AGAIN = 0.2
 
 
 @contextmanager
@@ -36,7 +40,7 @@ def after_import() -> Iterator[None]:
 
 @contextmanager
 def never_lost() -> Iterator[None]:
-    """Let Ctrl-C act at once, and again at the end of the block if C code has swallowed it.
+    """Let Ctrl-C act at once, and again until the block ends if C code swallows it.
 
     Examples
     --------
@@ -44,9 +48,13 @@ def never_lost() -> Iterator[None]:
     ...     pass
     """
     came: list[tuple[int, FrameType | None]] = []
+    again: list[threading.Timer] = []
 
     def noted(number: int, frame: FrameType | None) -> None:
         came.append((number, frame))
+        again.append(threading.Timer(_AGAIN, _raise_in_main, (number,)))
+        again[-1].daemon = True
+        again[-1].start()
         if callable(before):
             before(number, frame)
 
@@ -54,9 +62,20 @@ def never_lost() -> Iterator[None]:
     try:
         yield
     finally:
+        for timer in again:
+            timer.cancel()
         _restore(before)
     if came and callable(before):
         before(*came[-1])
+
+
+def _raise_in_main(number: int) -> None:
+    """Send a signal to the main thread, out of system calls too where there are such signals."""
+    main = threading.main_thread().ident
+    if main is not None and hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(main, number)
+    else:
+        interrupt_main(signal.Signals(number))
 
 
 def _exchanged(handler: Any) -> Any:
