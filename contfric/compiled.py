@@ -27,7 +27,8 @@ import hashlib
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, TypeVar
@@ -35,6 +36,7 @@ from typing import Any, TypeVar
 import numba
 from numba import types
 from numba.core import config
+from numba.core.registry import cpu_target
 
 from contfric.checked import discard, discard_damaged, list_files
 from contfric.errors import ResultFileError
@@ -145,7 +147,7 @@ class Kernel:
         sound = discard_damaged(folder, _CACHED)
         cached = numba.njit(self.signature, cache=True, **_OPTIONS)
         # to load takes an instant and imports more of numba and scipy; to compile takes long
-        with after_import() if sound else never_lost():
+        with after_import() if sound else _compiling():
             try:
                 found = cached(self.__wrapped__)
             except Exception:  # what unpickling ends in, where the files are of another numba
@@ -171,6 +173,28 @@ class Kernel:
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled code."""
         return self._entry(*arguments)
+
+
+@contextmanager
+def _compiling() -> Iterator[None]:
+    """Let Ctrl-C end a compilation, but not while numba reads its registries: half read, they are lost."""
+    contexts = cpu_target.typing_context, cpu_target.target_context
+
+    def whole(refresh: Callable[[], None]) -> Callable[[], None]:
+        def call() -> None:
+            with after_import():
+                refresh()
+
+        return call
+
+    with never_lost():
+        for context in contexts:
+            context.refresh = whole(context.refresh)
+        try:
+            yield
+        finally:
+            for context in contexts:
+                vars(context).pop("refresh", None)
 
 
 #: Processes that compile a kernel into the cache, by its name "module:kernel".

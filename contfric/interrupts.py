@@ -59,14 +59,19 @@ def never_lost() -> Iterator[None]:
             before(number, frame)
 
     before = _exchanged(noted)
+    failure = None
     try:
         yield
+    except Exception as error:  # what became of the callback that was left: Ctrl-C goes first
+        failure = error
     finally:
         for timer in again:
             timer.cancel()
         _restore(before)
     if came and callable(before):
         before(*came[-1])
+    if failure is not None:
+        raise failure
 
 
 def _raise_in_main(number: int) -> None:

@@ -208,6 +208,18 @@ def test_what_c_code_swallows_is_raised_again() -> None:
     assert time.monotonic() - began < AT_ONCE
 
 
+def test_ctrl_c_goes_before_the_error_that_it_causes() -> None:
+    timer = _interrupt_in(0.05)
+    with pytest.raises(KeyboardInterrupt), never_lost():
+        try:
+            time.sleep(10.0)
+        except KeyboardInterrupt:
+            raise RuntimeError("the callback failed") from None
+    timer.join()
+    with pytest.raises(RuntimeError, match="its own"), never_lost():
+        raise RuntimeError("its own")
+
+
 def test_other_threads_have_no_handlers() -> None:
     found = []
 
