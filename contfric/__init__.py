@@ -188,9 +188,9 @@ def __getattr__(name: str) -> Any:
 
         return version("contfric")
     if name in _HOMES:
-        from contfric.interrupts import after_import
+        from contfric.interrupts import held_back
 
-        with after_import():
+        with held_back():
             home = import_module(_HOMES[name])
         return getattr(home, name)
     raise AttributeError(f"module 'contfric' has no attribute '{name}'")

@@ -27,8 +27,7 @@ import hashlib
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, TypeVar
@@ -36,12 +35,12 @@ from typing import Any, TypeVar
 import numba
 from numba import types
 from numba.core import config
-from numba.core.registry import cpu_target
+from numba.core.event import Listener, install_listener
 
 from contfric.checked import discard, discard_damaged, list_files
 from contfric.errors import ResultFileError
 from contfric.inlined import part_options
-from contfric.interrupts import after_import, never_lost
+from contfric.interrupts import held_back
 from contfric.resources import user_cache
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -146,8 +145,10 @@ class Kernel:
         """Load the function from its folder, or compile it into that."""
         sound = discard_damaged(folder, _CACHED)
         cached = numba.njit(self.signature, cache=True, **_OPTIONS)
-        # to load takes an instant and imports more of numba and scipy; to compile takes long
-        with after_import() if sound else _compiling():
+        with (
+            held_back() as raise_now,
+            install_listener("numba:run_pass", _BetweenPasses(raise_now)),
+        ):
             try:
                 found = cached(self.__wrapped__)
             except Exception:  # what unpickling ends in, where the files are of another numba
@@ -175,26 +176,18 @@ class Kernel:
         return self._entry(*arguments)
 
 
-@contextmanager
-def _compiling() -> Iterator[None]:
-    """Let Ctrl-C end a compilation, but not while numba reads its registries: half read, they are lost."""
-    contexts = cpu_target.typing_context, cpu_target.target_context
+class _BetweenPasses(Listener):  # type: ignore[misc]
+    """Lets Ctrl-C through between the passes of numba's compiler, where nothing is half done."""
 
-    def whole(refresh: Callable[[], None]) -> Callable[[], None]:
-        def call() -> None:
-            with after_import():
-                refresh()
+    def __init__(self, raise_now: Callable[[], None]) -> None:
+        self._raise_now = raise_now
 
-        return call
+    def on_start(self, event: Any) -> None:
+        """Raise what has come."""
+        self._raise_now()
 
-    with never_lost():
-        for context in contexts:
-            context.refresh = whole(context.refresh)
-        try:
-            yield
-        finally:
-            for context in contexts:
-                vars(context).pop("refresh", None)
+    def on_end(self, event: Any) -> None:
+        """Let the pass end."""
 
 
 #: Processes that compile a kernel into the cache, by its name "module:kernel".

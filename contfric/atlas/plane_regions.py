@@ -19,7 +19,7 @@ from contfric.atlas.matching import identity
 from contfric.atlas.plane import Family, Region
 from contfric.curves.curve import Curve
 from contfric.curves.problem import Box
-from contfric.interrupts import after_import
+from contfric.interrupts import held_back
 from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import Word
@@ -60,7 +60,7 @@ def regions_of(
 
     Orbits of more than ``max_periods`` periods, whose curves are not followed, are not listed.
     """
-    with after_import():
+    with held_back():
         from scipy import ndimage
 
     passed = [cells_of(box, curve) for curve in curves]
@@ -140,7 +140,7 @@ def _bounds(
     mask: NDArray[np.bool_], passed: Sequence[tuple[NDArray[np.int64], NDArray[np.int64]]]
 ) -> tuple[int, ...]:
     """Return the curves whose cells touch a region."""
-    with after_import():
+    with held_back():
         from scipy import ndimage
 
     rim = ndimage.binary_dilation(mask, np.ones((3, 3))) & ~mask

@@ -25,7 +25,7 @@ from contfric.continuation.gradients import carried, closing, gradient_of, surfa
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.standstill import joint_within, stationary_values
 from contfric.continuation.vertices import opening
-from contfric.interrupts import after_import
+from contfric.interrupts import held_back
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import linearised
 from contfric.orbit.orbit import Orbit
@@ -262,7 +262,7 @@ def _sparse_weights(
     a: FloatArray, b: FloatArray, c: FloatArray, row: FloatArray, wanted: FloatArray
 ) -> FloatArray:
     """Do the same for a long chain."""
-    with after_import():
+    with held_back():
         from scipy.sparse import csc_matrix
         from scipy.sparse.linalg import splu
 

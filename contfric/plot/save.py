@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
-from contfric.interrupts import after_import
+from contfric.interrupts import held_back
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,7 +68,7 @@ def axes_or_new(ax: Axes | None, width: float = 7.0, height: float = 4.3) -> Axe
     """Return the axes given, or those of a new pyplot figure."""
     if ax is not None:
         return ax
-    with after_import():
+    with held_back():
         from matplotlib import pyplot
 
     fig = pyplot.figure(figsize=(width, height), layout="constrained")
@@ -79,7 +79,7 @@ def figure_or_new(fig: Figure | None, width: float, height: float) -> Figure:
     """Return the figure given, or a new one of pyplot."""
     if fig is not None:
         return fig
-    with after_import():
+    with held_back():
         from matplotlib import pyplot
 
     return pyplot.figure(figsize=(width, height), layout="constrained")

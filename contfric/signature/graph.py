@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from contfric.errors import NotationError, did_you_mean
-from contfric.interrupts import after_import
+from contfric.interrupts import held_back
 from contfric.models import Model, ModelSource, load_model
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def transition_graph(model: ModelSource) -> nx.MultiDiGraph[str]:
     >>> transition_graph(load_model("coulomb")).number_of_edges()
     14
     """
-    with after_import():
+    with held_back():
         import networkx as nx
 
     model = load_model(model)
