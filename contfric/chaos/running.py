@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import (
+    FIRST_COMPLETED,
     CancelledError,
     Executor,
     Future,
     ThreadPoolExecutor,
     as_completed,
+    wait,
 )
 from time import monotonic
 from typing import Any, TypeAlias, TypeVar
@@ -114,13 +116,22 @@ def _on_threads(tiles: Mapping[int, T], compute: Compute) -> Iterator[tuple[int,
     try:
         start(count * _AHEAD)
         while running:
-            done = next(as_completed(running))
+            done = _first_done(running)
             number = running.pop(done)
             start(count * _AHEAD)
             yield number, done.result()
     finally:
         stop[0] = 1  # after Ctrl-C nobody waits for what is under way
         pool.shutdown(cancel_futures=True)
+
+
+def _first_done(running: Iterable[Future[Any]]) -> Future[Any]:
+    """Wait for one future that is done.
+
+    (The iterator of ``as_completed``, dropped after its first, would end in the garbage collector, where
+    Ctrl-C is lost.)
+    """
+    return next(iter(wait(running, return_when=FIRST_COMPLETED).done))
 
 
 def _cancel(futures: Iterable[Future[Any]]) -> None:
@@ -160,7 +171,7 @@ def compute_chains(
         for name, task in first.items():
             submit(name, task)
         while running:
-            done = next(as_completed(running))
+            done = _first_done(running)
             name, task = running.pop(done)
             try:
                 rows = done.result()
