@@ -1,29 +1,36 @@
-"""Location of an event on a branch, compiled: a bracket, each trial a solved point of the branch.
+"""Location of an event on a branch or curve, compiled: a bracket, each trial a solved point.
 
 A trial is predicted by the cubic through both ends of the step and their tangents, and corrected
 normal to the tangent between them. Places are chosen by Chandrupatla's method (Adv. Eng. Software 28
 (1997) 145-149): inverse quadratic interpolation where the values are monotone enough for it, bisection
 elsewhere; the bracket shrinks to the resolution of the arithmetic, or of the flow where that is integrated.
-Only the value that is sought is evaluated on the way.
+Along a branch only the value that is sought is evaluated on the way.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 
-from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
+from contfric.compiled import f8, helper, i8, indices, kernel, vector
+from contfric.continuation.geometry import (
+    RowsType,
+    copy_to,
+    copy_vector,
+    interpolate,
+    largest_state,
+)
 from contfric.continuation.steps import (
     AT_EVENT,
     CHI_MINUS,
     CHI_ONE,
     FOLD,
-    copy_to,
-    largest_state,
-    observe_point,
-    settle,
+    Along,
+    correct_branch,
+    observe_branch,
     step_room,
 )
 from contfric.flow.layouts import FlowType
@@ -56,6 +63,8 @@ _COARSEST = 0.01
 #: Share of a step below which it is not narrowed down any further where Newton is lost: the multiplier that
 #: is sought is behind that.
 _LOST = 1e-6
+#: Trials after which a bracket has the width of the arithmetic, whatever the function.
+_MOST_TRIALS = 120
 
 
 @helper
@@ -124,24 +133,41 @@ def plain_margin(functions, layout, index, z, p, room):  # type: ignore[no-untyp
     return held_margin(functions, layout, index, z, p, room.equations, room.turnings)
 
 
+class Sought(NamedTuple):
+    """The value whose change of sign is sought along a branch.
+
+    Attributes
+    ----------
+    kind : BY_TEST, BY_LABEL or BY_PARAMETER
+    number : column of the tests, or row of the labels
+    target : the label before, or the value of the parameter
+    """
+
+    kind: int
+    number: int
+    target: float
+
+
 @helper
-def watched_value(functions, layout, kind, index, target, z, p, w, slope, mu, counts, room):  # type: ignore[no-untyped-def]
-    """Return the function whose change of sign is sought, at a settled point."""
-    margins = count_margins(layout)
-    if kind == BY_PARAMETER:
-        return w - target
-    if kind == BY_LABEL:
+def watched_value(way, sought, points, row):  # type: ignore[no-untyped-def]
+    """Return the value that is sought, at a corrected point."""
+    layout, room, functions, p = way.layout, way.room, way.functions, way.p
+    z, w, mu = points[0][row], points[1][row, 0], points[7][row]
+    margins, index = count_margins(layout), sought.number
+    if sought.kind == BY_PARAMETER:
+        return w - sought.target
+    if sought.kind == BY_LABEL:
         code, nearest = crossings(functions, layout, index, z, p, room.equations, room.turnings)
         # the distance of the nearest stationary point to a surface vanishes where the label changes;
         # elsewhere a joint may lie on a surface
-        return nearest if code == int(target) else -max(nearest, 1e-300)
+        return nearest if code == int(sought.target) else -max(nearest, 1e-300)
     if index < margins:
-        counts[CHECKS] += 1
+        way.counts[CHECKS] += 1
         return margin_value(functions, layout, index, z, p, room)
     column = index - margins - layout.labels.shape[0]
     if column == FOLD:
-        return slope
-    counts[MULTIPLIERS] += 1
+        return points[3][row, 0]
+    way.counts[MULTIPLIERS] += 1
     one, minus = multipliers(layout.rank, room.pencil, room.equations.close, mu, room.spectral)
     if column == CHI_ONE:
         return one
@@ -155,16 +181,104 @@ def limited(value):  # type: ignore[no-untyped-def]
 
 
 @helper
-def between(za, zb, ta, tb, wa, wb, sa, sb, length, x, z, t):  # type: ignore[no-untyped-def]
-    """Write the predicted point and tangent at a share x of a step; return parameter and slope."""
-    y = 1.0 - x
-    ha, hb = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x)
-    ga, gb = x * y * y * length, -x * x * y * length
-    for i in range(za.shape[0]):
-        for j in range(za.shape[1]):
-            z[i, j] = ha * za[i, j] + hb * zb[i, j] + ga * ta[i, j] + gb * tb[i, j]
-            t[i, j] = y * ta[i, j] + x * tb[i, j]
-    return ha * wa + hb * wb + ga * sa + gb * sb, y * sa + x * sb
+def values_at_ends(way, sought, points):  # type: ignore[no-untyped-def]
+    """Return the value that is sought at rows 0 and 1."""
+    ws, tests = points[1], points[5]
+    if sought.kind == BY_TEST:
+        return tests[0, sought.number], tests[1, sought.number]
+    if sought.kind == BY_PARAMETER:
+        return ws[0, 0] - sought.target, ws[1, 0] - sought.target
+    equations = way.room.equations
+    way.p[way.which[0]] = ws[0, 0]
+    close_chain(way.functions, way.layout, points[0][0], way.p, equations.none, equations)
+    first = watched_value(way, sought, points, 0)
+    way.p[way.which[0]] = ws[1, 0]
+    close_chain(way.functions, way.layout, points[0][1], way.p, equations.none, equations)
+    return first, watched_value(way, sought, points, 1)
+
+
+@helper
+def copy_row(points, target, source):  # type: ignore[no-untyped-def]
+    """Copy one row of points to another."""
+    zs, ws, tzs, tws, arc, tests, labels, mu = points
+    copy_to(zs[target], zs[source])
+    copy_to(tzs[target], tzs[source])
+    copy_vector(ws[target], ws[source])
+    copy_vector(tws[target], tws[source])
+    copy_vector(tests[target], tests[source])
+    copy_vector(labels[target], labels[source])
+    copy_vector(mu[target], mu[source])
+    arc[target] = arc[source]
+
+
+def bracketing(correct_at: Any, value_at: Any) -> Any:
+    """Return the bracket of branches or curves, as a helper.
+
+    Parameters
+    ----------
+    correct_at : that of :func:`contfric.continuation.march.marching`
+    value_at : returns the value that is sought, ``(way, sought, points, row)``
+    """
+
+    @helper
+    def bracket(way, sought, points, ends, rules):  # type: ignore[no-untyped-def]
+        """Find where a value changes sign between rows 0 and 1 of the points.
+
+        Parameters
+        ----------
+        way, sought : what the two functions need
+        points : four rows; the third one is for trials, the place is left in the fourth
+        ends : (value at row 0, value at row 1)
+        rules : (accuracy of a trial; whether the value has the sign that it has, or is positive before;
+            value that is rounding; width of a bracket that is as narrow as can be; width below which it is
+            not narrowed down where trials fail)
+
+        Returns
+        -------
+        tuple
+            (position in the step, value there, whether trials fail behind it, whether any did not).
+        """
+        zs, ws, tzs, tws = points[0], points[1], points[2], points[3]
+        accuracy, two_sided, noise, narrowest, given_up = rules
+        sign = -1.0 if two_sided and ends[0] < 0.0 else 1.0
+        f_low, f_high = limited(sign * ends[0]), limited(sign * ends[1])
+        low, high, x, best, best_f = 0.0, 1.0, 0.5, 0.0, f_low
+        x_old, f_old, lost, solved = low, f_low, False, False
+        copy_row(points, 3, 0)
+        if f_low > 0.0 and f_high < 0.0:
+            x = min(0.99, max(0.01, f_low / (f_low - f_high)))
+        for _ in range(_MOST_TRIALS):
+            if f_low <= 0.0 or f_high > 0.0:
+                if f_low > 0.0:
+                    best, best_f = 1.0, f_high
+                    copy_row(points, 3, 1)
+                break
+            interpolate(points, x)
+            fine, _ = correct_at(way, zs[2], ws[2], tzs[2], tws[2], accuracy)
+            f = -1.0
+            if fine:
+                f, solved = limited(sign * value_at(way, sought, points, 2)), True
+                if f >= 0.0:
+                    best, best_f = x, f
+                    copy_row(points, 3, 2)
+            if f > 0.0:
+                x_old, f_old = low, f_low
+                low, f_low = x, f
+            else:
+                x_old, f_old = high, f_high
+                high, f_high = x, f
+                lost = not fine
+            if f == 0.0 or high - low <= narrowest or (f_low <= noise and f_high >= -noise):
+                break
+            if lost and high - low < given_up:
+                break
+            x = next_trial(low, high, f_low, f_high, x_old, f_old, x, 0.25 * narrowest)
+        return best, best_f, lost, solved
+
+    return bracket
+
+
+_bracket = bracketing(correct_branch, watched_value)
 
 
 @kernel(
@@ -172,58 +286,28 @@ def between(za, zb, ta, tb, wa, wb, sa, sb, length, x, z, t):  # type: ignore[no
         FlowType,
         LayoutType,
         vector,
-        i8,
-        f8,
+        indices,
+        vector,
         types.boolean,
         i8,
         i8,
         f8,
-        vector,
-        vector,
-        matrix,
-        matrix,
-        matrix,
-        matrix,
-        vector,
-        vector,
-        indices,
-        types.complex128[::1],
+        types.boolean,
+        RowsType,
         indices,
     )
 )
 def locate(  # type: ignore[no-untyped-def]
-    functions,
-    layout,
-    p,
-    active,
-    scale,
-    stability,
-    kind,
-    index,
-    target,
-    ends,
-    values,
-    za,
-    zb,
-    ta,
-    tb,
-    tests,
-    slope_out,
-    labels,
-    mu,
-    counts,
+    functions, layout, p, which, scale, stability, kind, index, target, kinked, points, counts
 ):
     """Find where a watched value changes sign between two points of a branch.
 
     Parameters
     ----------
-    ends : (parameter, slope, parameter, slope, arclength between) of the first and the second point, and
-        whether the fields have kinks
-    values : the watched value at both
-    za, zb, ta, tb : joints and tangents of both, shape (N, m)
-
-    On return ``za``, ``p``, ``ta`` hold the located point with its tangent (``slope_out[0]`` its
-    p'), and ``tests``, ``labels``, ``mu`` what is watched there.
+    which, scale : index of the parameter that is free, and its weight in the scaled product, shapes (1,)
+    kind, index, target : those of :class:`Sought`
+    kinked : whether the fields have kinks
+    points : four rows: both points, one for trials, and the place with what is watched there
 
     Returns
     -------
@@ -231,93 +315,29 @@ def locate(  # type: ignore[no-untyped-def]
         Position in the step, from 0 to 1; -1 if no trial point could be solved; -2 minus the
         position of the last good point if it is Newton that fails behind it.
     """
-    which = np.empty(1, dtype=np.int64)
-    which[0] = active
-    count, m = za.shape
-    wa, sa, wb, sb, length, kinked = ends
-    room = step_room(count, m, p.shape[0])
-    z, t = np.empty((count, m)), np.empty((count, m))
-    best_z, best_t = np.empty((count, m)), np.empty((count, m))
-    copy_to(best_z, za)
-    copy_to(best_t, ta)
-    best_x, best_w, best_slope = 0.0, wa, sa
-    f_low, f_high = values[0], values[1]
-    if kind == BY_LABEL:
-        for side in range(2):
-            here = za if side == 0 else zb
-            p[active] = wa if side == 0 else wb
-            close_chain(functions, layout, here, p, room.equations.none, room.equations)
-            f = watched_value(
-                functions, layout, kind, index, target, here, p, 0.0, 0.0, mu, counts, room
-            )
-            if side == 0:
-                f_low = f
-            else:
-                f_high = f
-    margins = count_margins(layout)
+    zs, ws, tzs, tws, arc, tests, labels, mu = points
+    room = step_room(zs.shape[1], zs.shape[2], p.shape[0])
+    way = Along(functions, layout, p.copy(), which, scale, stability, counts, room)
+    sought, margins = Sought(kind, index, target), count_margins(layout)
+    ends = values_at_ends(way, sought, points)
     # margins and distances are positive before the event, the others have the sign that they have
     two_sided = kind == BY_PARAMETER or (kind == BY_TEST and index >= margins)
     noise = 0.1 * _NOISE if two_sided else _NOISE  # slopes and products of multipliers have less
     accuracy = AT_EVENT
-    if kinked > 0.0 and kind == BY_TEST and index >= margins:
+    if kinked and kind == BY_TEST and index >= margins:
         # slopes and multipliers are those of the last Jacobian. Beside a touch of a kink it changes with the
         # root of a distance: it must be that of the orbit, not one from which Newton is known to end there
         accuracy = ALONG
-    sign = -1.0 if two_sided and f_low < 0.0 else 1.0
-    f_low, f_high = limited(sign * f_low), limited(sign * f_high)
-    low, high, x = 0.0, 1.0, 0.5
-    x_old, f_old = low, f_low
-    lost, narrowest = False, resolution(layout.rounding, abs(length), largest_state(za))
-    if f_low > 0.0 and f_high < 0.0:
-        x = min(0.99, max(0.01, f_low / (f_low - f_high)))
-    for _ in range(120):
-        if f_low <= 0.0 or f_high > 0.0:
-            best_x = 0.0 if f_low <= 0.0 else 1.0
-            break
-        p[active], slope = between(za, zb, ta, tb, wa, wb, sa, sb, length, x, z, t)
-        fine, slope, _ = settle(
-            functions, layout, z, p, which, t, slope, scale, accuracy, counts, room
-        )
-        f = -1.0
-        if fine:
-            w = p[active]
-            f = limited(
-                sign
-                * watched_value(
-                    functions, layout, kind, index, target, z, p, w, slope, mu, counts, room
-                )
-            )
-            if f >= 0.0:
-                best_x, best_w, best_slope = x, w, slope
-                copy_to(best_z, z)
-                copy_to(best_t, t)
-        if f > 0.0:
-            x_old, f_old = low, f_low
-            low, f_low = x, f
-        else:
-            x_old, f_old = high, f_high
-            high, f_high = x, f
-            lost = not fine
-        if f == 0.0 or high - low <= narrowest or (f_low <= noise and f_high >= -noise):
-            break
-        if lost and two_sided and layout.rounding > INTEGRATED and high - low < _LOST:
-            break
-        x = next_trial(low, high, f_low, f_high, x_old, f_old, x, 0.25 * narrowest)
-    if best_x == 1.0:
-        copy_to(best_z, zb)
-        copy_to(best_t, tb)
-        best_w, best_slope = wb, sb
-    copy_to(za, best_z)
-    copy_to(ta, best_t)
-    slope_out[0] = best_slope
+    narrowest = resolution(layout.rounding, abs(arc[1] - arc[0]), largest_state(zs[0]))
+    given_up = _LOST if two_sided and layout.rounding > INTEGRATED else 0.0
+    rules = accuracy, two_sided, noise, narrowest, given_up
+    best, _, lost, _ = _bracket(way, sought, points, ends, rules)
     # the last Jacobian at the located point, for its rates and multipliers; the point itself stays
-    p[active] = best_w
-    fine, _, _ = settle(
-        functions, layout, best_z, p, which, best_t, best_slope, scale, AT_EVENT, counts, room
-    )
-    p[active] = best_w
+    copy_row(points, 2, 3)
+    fine, _ = correct_branch(way, zs[2], ws[2], tzs[2], tws[2], AT_EVENT)
     if not fine:
         return -1.0
-    close_chain(functions, layout, za, p, room.equations.none, room.equations)
-    observe_point(functions, layout, za, p, best_slope, stability, tests, labels, mu, counts, room)
-    return -2.0 - best_x if lost else best_x
+    way.p[which[0]] = ws[3, 0]
+    close_chain(functions, layout, zs[3], way.p, room.equations.none, room.equations)
+    observe_branch(way, zs[3], ws[3], tws[3], tests[3], labels[3], mu[3])
+    return -2.0 - best if lost else best

@@ -63,6 +63,11 @@ class Settings:
         """Weight of the parameter in the scaled product."""
         return 1.0 / self.width**2
 
+    @property
+    def box(self) -> FloatArray:
+        """Lower limit, upper limit and width, shape (3, 1)."""
+        return np.array([[self.low], [self.high], [self.width]])
+
 
 @dataclass(eq=False)
 class Point:
@@ -89,9 +94,9 @@ class Point:
         full[active] = self.value
         return Orbit(system, self.joints.copy(), full, 0.0)
 
-    def as_start(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return joints, parameter, tangent and slope as the march takes them, each a matrix."""
-        return self.joints, np.array([[self.value]]), self.tangent, np.array([[self.slope]])
+    def as_start(self) -> tuple[FloatArray, FloatArray]:
+        """Return (joints, tangent) and (parameter, slope) as the march takes them."""
+        return np.array([self.joints, self.tangent]), np.array([[self.value], [self.slope]])
 
     def reversed(self) -> Point:
         """Return the same point with the opposite tangent."""

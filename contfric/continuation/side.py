@@ -27,8 +27,8 @@ CHUNK = 512
 #: a few tens where a side comes to an end. Beyond that it gets nowhere.
 _MOST_SOLVES = 50
 
-#: Place of the budget in the options of the march.
-_BUDGET = 6
+#: Step below which none is refused for its angle: where a branch has a sharp bend it goes on in the shortest.
+_GIVES_WAY = 4.0 * SMALLEST_STEP
 #: A column that is full grows by one part in this many; the last rest is given back.
 _GROWTH = 8
 #: Rows that are moved at once: few enough to need no memory to speak of.
@@ -112,7 +112,10 @@ class Rows:
 
     def arrays(self, stop: int) -> tuple[Any, ...]:
         """Return the arrays up to a row, in the order in which the march takes them."""
-        return tuple(a[:stop] for a in vars(self).values())
+        return tuple(
+            a[:stop, None] if name in ("values", "slopes") else a[:stop]
+            for name, a in vars(self).items()
+        )
 
     def first(self, count: int) -> Rows:
         """Return the first rows."""
@@ -235,7 +238,7 @@ class Side:
 
     def march(self, orbit: Orbit, settings: Settings, step: float) -> tuple[int, float]:
         """March on; return (why it stopped, next step)."""
-        from contfric.continuation.march import MORE, march
+        from contfric.continuation.march import BUDGET, MORE, march
 
         if self.last + 1 >= CHUNK:
             self._keep_full_rows()
@@ -243,18 +246,19 @@ class Side:
         options = march_options(settings, step, self.largest)
         why, most = MORE, _MOST_SOLVES * settings.most_points
         while why == MORE and self.solves < most:  # between the calls Ctrl-C is heard
-            options[_BUDGET], before, began = self._pace.budget, int(TALLY[0]), perf_counter()
+            options[BUDGET], before, began = self._pace.budget, int(TALLY[0]), perf_counter()
             why, last, options[0] = march(
                 orbit.system.functions(),
                 orbit.system.layout,
                 orbit.vector,
-                orbit.model.index_of(settings.parameter),
-                options,
-                self.last,
+                np.array([orbit.model.index_of(settings.parameter)]),
                 settings.stability,
-                self.first.as_start(),
+                options,
+                settings.box,
+                self.last,
+                *self.first.as_start(),
                 self.count - 1,
-                *self.rows.arrays(stop),
+                self.rows.arrays(stop),
                 TALLY,
             )
             self.count += last - self.last
@@ -285,8 +289,7 @@ class Side:
 def march_options(settings: Settings, step: float, largest: float = np.inf) -> FloatArray:
     """Return the numbers that steer the march, with room for a single point in its budget."""
     largest = min(largest, settings.largest)
-    steps = [min(step, largest), largest, SMALLEST_STEP]
-    return np.array([*steps, settings.low, settings.high, settings.scale, 1.0, 0.0])
+    return np.array([min(step, largest), largest, SMALLEST_STEP, _GIVES_WAY, 1.0, 0.0])
 
 
 def first_point(
@@ -312,13 +315,14 @@ def first_point(
         orbit.system.functions(),
         orbit.system.layout,
         orbit.vector,
-        active,
-        march_options(settings, 0.0),
-        -1,
+        np.array([active]),
         settings.stability,
-        rows.point(0).as_start(),
+        march_options(settings, 0.0),
+        settings.box,
+        -1,
+        *rows.point(0).as_start(),
         0,
-        *rows.arrays(1),
+        rows.arrays(1),
         TALLY,
     )
     return None if why == BROKEN else rows.point(0)

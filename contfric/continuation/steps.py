@@ -1,23 +1,29 @@
-"""One step of a branch, compiled: the scaled product, the corrector normal to a tangent, the watch.
-
-The product of two directions is ``<a, b> = (1/N) sum a_i b_i + a_p b_p / width^2``, so that neither
-the number of segments nor the unit of the parameter matters.
-"""
+"""One step of a branch, compiled: the corrector normal to a tangent, and what is watched on a point."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from contfric.compiled import allocating_helper, helper
+from contfric.continuation.geometry import anchor, take_tangent
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import Elimination, room_for
 from contfric.orbit.equations import Room, close_chain, equation_room
 from contfric.orbit.monitor import Turnings, turning_room, watch
-from contfric.orbit.newton import CHECKS, CONVERGED, MULTIPLIERS, NOT_FINITE, SOLVES, correct
+from contfric.orbit.newton import (
+    CHECKS,
+    CONVERGED,
+    MULTIPLIERS,
+    NOT_FINITE,
+    SOLVES,
+    correcting,
+    normal_to_tangent,
+)
 from contfric.orbit.spectrum import SpectralRoom, multipliers, spectral_room
+from contfric.orbit.system import IntArray
 
 #: Extra columns of the tests behind the margins and the distances of the labels: slope of the
 #: parameter, products of 1 - mu and of
@@ -64,123 +70,73 @@ def step_room(count, m, parameters):  # type: ignore[no-untyped-def]
     )
 
 
-@helper
-def product(za, wa, zb, wb, scale):  # type: ignore[no-untyped-def]
-    """Return the scaled product of two directions."""
-    total = 0.0
-    for i in range(za.shape[0]):
-        for j in range(za.shape[1]):
-            total += za[i, j] * zb[i, j]
-    return total / za.shape[0] + wa * wb * scale
+class Along(NamedTuple):
+    """What a step along a branch needs beside its points.
 
-
-@helper
-def apart(za, wa, zb, wb, scale):  # type: ignore[no-untyped-def]
-    """Return the distance of two points in the scaled product."""
-    total = 0.0
-    for i in range(za.shape[0]):
-        for j in range(za.shape[1]):
-            total += (za[i, j] - zb[i, j]) ** 2
-    return math.sqrt(total / za.shape[0] + (wa - wb) ** 2 * scale)
-
-
-@helper
-def copy_to(target, source):  # type: ignore[no-untyped-def]
-    """Copy a matrix."""
-    for i in range(source.shape[0]):
-        for j in range(source.shape[1]):
-            target[i, j] = source[i, j]
-
-
-@helper
-def largest_state(z):  # type: ignore[no-untyped-def]
-    """Return the largest component of the states, times left out."""
-    size = 0.0
-    for i in range(z.shape[0]):
-        for j in range(1, z.shape[1]):
-            size = max(size, abs(z[i, j]))
-    return size
-
-
-@helper
-def anchor(room, z, p, tz, tw, scale):  # type: ignore[no-untyped-def]
-    """Set the border row: normal to a tangent through the point (z, p)."""
-    count = tz.shape[0]
-    for i in range(count):
-        for j in range(tz.shape[1]):
-            room.d[0, i, j] = tz[i, j] / count
-            room.z_ref[i, j] = z[i, j]
-    room.e[0, 0] = tw * scale
-    for k in range(p.shape[0]):
-        room.p_ref[k] = p[k]
-
-
-@helper
-def settle(functions, layout, z, p, which, tz, tw, scale, accuracy, counts, room):  # type: ignore[no-untyped-def]
-    """Correct (z, p) normal to the tangent (tz, tw), and replace the tangent.
-
-    Returns
-    -------
-    tuple
-        (converged, new p', everything finite).
+    Attributes
+    ----------
+    functions, layout : the model's flow and the chain
+    p : parameters, those that are free overwritten
+    which, scale : indices of the free parameters, and their weights in the scaled product
+    stability : whether multipliers are evaluated
+    counts, room : what is counted, and what is allocated once
     """
-    anchor(room, z, p, tz, tw, scale)
-    counts[SOLVES] += 1
-    work = room.elimination
-    status, _, _, _ = correct(
-        functions,
-        layout,
-        z,
-        p,
-        which,
-        room.z_ref,
-        room.p_ref,
-        room.d,
-        room.e,
-        room.s,
-        np.inf,
-        accuracy,
-        0.0,
-        room.equations,
-        work,
-        room.pencil,
-    )
-    if status != CONVERGED:
-        return False, tw, status != NOT_FINITE
-    count, m = z.shape
-    total = 0.0
-    for i in range(count):
-        for j in range(m):
-            total += work.z[i, j, 1] ** 2
-    slope = work.w[0, 1]
-    norm = math.sqrt(total / count + slope * slope * scale)
-    if not math.isfinite(norm) or norm == 0.0:
-        return False, tw, False
-    for i in range(count):
-        for j in range(m):
-            tz[i, j] = work.z[i, j, 1] / norm
-    close_chain(functions, layout, z, p, room.equations.none, room.equations)
-    return True, slope / norm, True
+
+    functions: Any
+    layout: Any
+    p: FloatArray
+    which: IntArray
+    scale: FloatArray
+    stability: bool
+    counts: IntArray
+    room: StepRoom
+
+
+_correct = correcting(normal_to_tangent)
 
 
 @helper
-def observe_point(functions, layout, z, p, slope, stability, tests, labels, mu, counts, room):  # type: ignore[no-untyped-def]
-    """Fill everything that is watched on a settled point; False if something is not finite."""
-    counts[CHECKS] += 1
-    finite = watch(functions, layout, z, p, room.equations, room.turnings, tests, labels)
+def correct_branch(way, z, w, tz, tw, accuracy):  # type: ignore[no-untyped-def]
+    """Correct (z, w) normal to the tangent (tz, tw), and replace the tangent; (converged, all is finite)."""
+    functions, layout, p, room = way.functions, way.layout, way.p, way.room
+    p[way.which[0]] = w[0]
+    anchor(room, z, p, way.which, tz, tw, way.scale)
+    way.counts[SOLVES] += 1
+    status, _, _, _ = _correct(functions, layout, z, p, way.which, np.inf, accuracy, 0.0, room, 0)
+    w[0] = p[way.which[0]]
+    if status != CONVERGED:
+        return False, status != NOT_FINITE
+    if not take_tangent(room.elimination, tz, tw, way.scale):
+        return False, False
+    close_chain(functions, layout, z, p, room.equations.none, room.equations)
+    return True, True
+
+
+@helper
+def observe_branch(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped-def]
+    """Fill everything that is watched on a corrected point; False if something is not finite."""
+    room, layout = way.room, way.layout
+    way.p[way.which[0]] = w[0]
+    way.counts[CHECKS] += 1
+    finite = watch(way.functions, layout, z, way.p, room.equations, room.turnings, tests, labels)
     at = tests.shape[0] - EXTRA
-    tests[at + FOLD] = slope
+    tests[at + FOLD] = tw[0]
     tests[at + CHI_ONE] = 1.0
     tests[at + CHI_MINUS] = 1.0
     tests[at + CHI_PAIR] = 1.0
-    if stability:
-        counts[MULTIPLIERS] += 1
+    if way.stability:
+        way.counts[MULTIPLIERS] += 1
         tests[at + CHI_ONE], tests[at + CHI_MINUS] = multipliers(
             layout.rank, room.pencil, room.equations.close, mu, room.spectral
         )
         if layout.rank > 1:
             tests[at + CHI_PAIR] = 1.0 - abs(mu[0]) * abs(mu[1])
     return finite
+
+
+@helper
+def accept_branch(way):  # type: ignore[no-untyped-def]
+    """Take nothing from a point that is accepted."""
 
 
 @helper
@@ -222,14 +178,3 @@ def changed(before, after, labels_before, labels_after):  # type: ignore[no-unty
         if labels_before[j] != labels_after[j]:
             return True
     return False
-
-
-@helper
-def returned(z, w, start_z, start_w, tz, tw, last_z, last_w, scale, step):  # type: ignore[no-untyped-def]
-    """Tell whether a step passes the start of the branch again in the same direction."""
-    if apart(z, w, start_z, start_w, scale) > 1.5 * step:
-        return False
-    start = product(start_z, start_w, tz, tw, scale)
-    behind = product(last_z, last_w, tz, tw, scale)
-    ahead = product(z, w, tz, tw, scale)
-    return behind < start <= ahead

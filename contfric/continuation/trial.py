@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from contfric.continuation.points import Point, Settings
+from contfric.continuation.side import Rows
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
@@ -22,59 +25,27 @@ def locate_change(
     """Locate one change of sign; None if no point could be solved on the way."""
     from contfric.continuation.bracket import BY_TEST, locate
 
-    system = orbit.system
-    active = orbit.model.index_of(settings.parameter)
-    vector = orbit.vector.copy()
-    joints, tangent = before.joints.copy(), before.tangent.copy()
-    tests, labels, mu = before.tests.copy(), before.labels.copy(), before.mu.copy()
-    slope = np.empty(1)
-    length = after.arc - before.arc
-    kinked = float(bool(orbit.model.kinks))
-    ends = np.array([before.value, before.slope, after.value, after.slope, length, kinked])
-    if kind == BY_TEST:
-        values = np.array([before.tests[index], after.tests[index]])
-    else:
-        values = np.array([before.value - target, after.value - target])
+    rows = Rows.room_for(orbit.system, 4)
+    rows.put(0, before)
+    rows.put(1, after)
     at = locate(
-        system.functions(),
-        system.layout,
-        vector,
-        active,
-        settings.scale,
+        orbit.system.functions(),
+        orbit.system.layout,
+        orbit.vector,
+        np.array([orbit.model.index_of(settings.parameter)]),
+        np.array([settings.scale]),
         settings.stability,
         kind,
         index,
         target,
-        ends,
-        values,
-        joints,
-        after.joints,
-        tangent,
-        after.tangent,
-        tests,
-        slope,
-        labels,
-        mu,
+        bool(orbit.model.kinks),
+        rows.arrays(4),
         TALLY,
     )
-    if at < 0.0:
-        if at == -1.0 or kind != BY_TEST:
-            return None
-        # Newton fails behind this point: the last good one, marked as such
-        arc = before.arc - (at + 2.0) * (after.arc - before.arc)
-        return Point(
-            joints,
-            float(vector[active]),
-            tangent,
-            float(slope[0]),
-            tests,
-            labels,
-            mu,
-            arc,
-            lost=True,
-        )
-    arc = before.arc + at * (after.arc - before.arc)
-    return Point(joints, float(vector[active]), tangent, float(slope[0]), tests, labels, mu, arc)
+    # behind -2 Newton fails: the last good point, marked as such
+    if at == -1.0 or (at < 0.0 and kind != BY_TEST):
+        return None
+    return replace(rows.point(3), lost=at < 0.0)
 
 
 def locate_value(

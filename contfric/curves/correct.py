@@ -1,233 +1,120 @@
-"""One point of a curve, compiled: Newton normal to the tangent, the watch, the border vectors.
+"""One point of a curve, compiled: the corrector normal to the tangent, the watch, the border vectors.
 
-The product of two directions is that of a branch with both parameters in it,
-``<a, b> = (1/N) sum a_i b_i + sum_k a_k b_k / width_k^2``.
+As :mod:`contfric.continuation.steps` for a branch; the second border row is the condition's gradient.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from contfric.compiled import helper
-from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, EXTRA, copy_to
+from contfric.continuation.geometry import anchor, copy_to, copy_vector, take_tangent
+from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, EXTRA
 from contfric.curves.bending import DIFFERENCE
-from contfric.curves.conditions import EXIT, JOINT, SPECTRAL, condition_value
+from contfric.curves.conditions import EXIT, JOINT, SPECTRAL, CurveRoom, condition_value
 from contfric.curves.normal_form import cubic_coefficient
-from contfric.orbit.cyclic import finish, next_rows, start_border, take_out
-from contfric.orbit.equations import close_chain, segment_rows
+from contfric.models.definition import FloatArray
+from contfric.orbit.equations import close_chain
 from contfric.orbit.monitor import find_behind, find_turnings, watch
 from contfric.orbit.newton import (
     CHECKS,
     CONVERGED,
-    GOES_ON,
     MULTIPLIERS,
+    NOT_FINITE,
     SOLVES,
-    correction_size,
-    move,
-    verdict,
+    correcting,
+    off_normal,
 )
 from contfric.orbit.spectrum import multipliers
-from contfric.orbit.system import RETURNS
+from contfric.orbit.system import RETURNS, IntArray
 
 #: The extra column that a curve watches where a branch watches the slope of its parameter: the
 #: coefficient of the normal form, or the rate of the load at a stop.
 BEND = 0
 #: A stationary value this near to a surface on which one is pinned is that one: it is solved for.
 _TOUCHES = 1e-9
-#: Newton converges quadratically from the cubic predictor; beyond this the step was too long.
-_MOST_STEPS = 12
 #: Differences that are tried, and how much shorter each is: at the third (6e-10) a derivative that is
 #: good to 1e-12 still leaves three digits, with which Newton converges and tangents are good enough.
 _ATTEMPTS, _SHORTER = 3, 1e-2
 
 
-@helper
-def plane_product(za, wa, zb, wb, scale):  # type: ignore[no-untyped-def]
-    """Return the scaled product of two directions."""
-    total = 0.0
-    for i in range(za.shape[0]):
-        for j in range(za.shape[1]):
-            total += za[i, j] * zb[i, j]
-    total /= za.shape[0]
-    for k in range(wa.shape[0]):
-        total += wa[k] * wb[k] * scale[k]
-    return total
+class AlongCurve(NamedTuple):
+    """What a step along a curve needs beside its points.
 
-
-@helper
-def plane_distance(za, wa, zb, wb, scale):  # type: ignore[no-untyped-def]
-    """Return the distance of two points in the scaled product."""
-    total = 0.0
-    for i in range(za.shape[0]):
-        for j in range(za.shape[1]):
-            total += (za[i, j] - zb[i, j]) ** 2
-    total /= za.shape[0]
-    for k in range(wa.shape[0]):
-        total += (wa[k] - wb[k]) ** 2 * scale[k]
-    return math.sqrt(total)
-
-
-@helper
-def anchor_plane(room, z, p, which, tz, tw, scale):  # type: ignore[no-untyped-def]
-    """Set the first border row: normal to a tangent through the point (z, p)."""
-    count = tz.shape[0]
-    for i in range(count):
-        for j in range(tz.shape[1]):
-            room.d[0, i, j] = tz[i, j] / count
-            room.z_ref[i, j] = z[i, j]
-    for k in range(which.shape[0]):
-        room.e[0, k] = tw[k] * scale[k]
-        room.p_ref[k] = p[which[k]]
-
-
-@helper
-def off_normal(room, z, p, which):  # type: ignore[no-untyped-def]
-    """Return the residual of the first border row."""
-    value = 0.0
-    for i in range(z.shape[0]):
-        for j in range(z.shape[1]):
-            value += room.d[0, i, j] * (z[i, j] - room.z_ref[i, j])
-    for k in range(which.shape[0]):
-        value += room.e[0, k] * (p[which[k]] - room.p_ref[k])
-    return value
-
-
-@helper
-def turn_tangent(work, tz, tw, scale):  # type: ignore[no-untyped-def]
-    """Replace the tangent by the one of the last elimination; False if there is none."""
-    count, m = tz.shape
-    total = 0.0
-    for i in range(count):
-        for j in range(m):
-            total += work.z[i, j, 1] ** 2
-    total /= count
-    for k in range(tw.shape[0]):
-        total += work.w[k, 1] ** 2 * scale[k]
-    norm = math.sqrt(total)
-    if not math.isfinite(norm) or norm == 0.0:
-        return False
-    for i in range(count):
-        for j in range(m):
-            tz[i, j] = work.z[i, j, 1] / norm
-    for k in range(tw.shape[0]):
-        tw[k] = work.w[k, 1] / norm
-    return True
-
-
-@helper
-def add_rate(functions, layout, i, after, p, which, grad, rows):  # type: ignore[no-untyped-def]
-    """Add the rate of the exit to the exit's own row.
-
-    Where both vanish this is no other equation. But the exit's row alone says nothing of the time at which
-    an exit is tangential, and no pivot would be left for it.
+    Attributes
+    ----------
+    functions, second, layout : the model's flow, its second derivatives, and the chain
+    condition, border : what vanishes along the curve, and the vectors b and c, shape (2, N, m), which follow
+        the null vectors
+    p : parameters, those that are free overwritten
+    which, scale : indices of the free parameters, and their weights in the scaled product
+    counts, room : what is counted, and what is allocated once
     """
-    m, free = after.shape[0], which.shape[0]
-    row, c = 2 * m - 1, layout.observables[layout.exits[i]]
-    rate = functions.rate(layout.modes[i], c, after[0], after[1:], p, which, grad)
-    for k in range(m):
-        rows[row, 2 * m + k] += grad[k]
-    for k in range(free):
-        rows[row, 3 * m + k] += grad[m + k]
-    rows[row, 3 * m + free] -= rate
+
+    functions: Any
+    second: Any
+    layout: Any
+    condition: Any
+    border: FloatArray
+    p: FloatArray
+    which: IntArray
+    scale: FloatArray
+    counts: IntArray
+    room: CurveRoom
 
 
 @helper
-def curve_step(functions, layout, condition, z, p, which, room):  # type: ignore[no-untyped-def]
-    """Solve the linearised equations at (z, p); return (solved, largest residual).
+def normal_and_condition(functions, layout, z, p, which, room, way):  # type: ignore[no-untyped-def]
+    """Border a curve with the plane normal to its tangent, and with its condition."""
+    condition, s = way.condition, room.s
+    value = condition_value(functions, way.second, layout, condition, z, p, which, way.border, room)
+    s[0, 0], s[0, 1] = -off_normal(room, z, p, which), 1.0
+    s[1, 0], s[1, 1] = -value, 0.0
+    return value, condition.segment if condition.kind == EXIT else -1
 
-    As :func:`contfric.orbit.newton.newton_step`, for a condition.
-    """
-    count, m = z.shape
-    work, equations = room.elimination, room.equations
-    rows = work.rows
-    start_border(work.border, room.d, room.e, room.s, m)
-    worst = 0.0
-    for i in range(count):
-        if i > 0:
-            next_rows(rows, work.border, room.d, i, m)
-        after = z[i + 1] if i + 1 < count else equations.last
-        at = 0 if i == 0 else m
-        here = segment_rows(functions, layout, i, at, z[i], after, p, which, equations, rows)
-        if here == np.inf:
-            return False, here
-        if condition.kind == EXIT and i == condition.segment:
-            add_rate(functions, layout, i, after, p, which, equations.grad, rows)
-        worst = max(worst, here)
-        if i > 0 and not take_out(work, i, m):
-            return False, worst
-    pencil = room.pencil
-    return finish(work, equations.close, equations.close_w, pencil[0], pencil[1]), worst
+
+_correct = correcting(normal_and_condition)
 
 
 @helper
-def settle_curve(  # type: ignore[no-untyped-def]
-    functions,
-    second,
-    layout,
-    condition,
-    z,
-    p,
-    which,
-    border,
-    tz,
-    tw,
-    scale,
-    accuracy,
-    counts,
-    room,
-):
-    """Correct (z, p) normal to the tangent, and replace the tangent; False if Newton fails.
+def correct_curve(way, z, w, tz, tw, accuracy):  # type: ignore[no-untyped-def]
+    """Correct (z, w) normal to the tangent (tz, tw), and replace the tangent; (converged, all is finite).
 
     Where it fails with second derivatives by differences it is tried again with shorter ones: beside a touch
     of a kink the first derivatives change within less than the difference.
     """
-    anchor_plane(room, z, p, which, tz, tw, scale)
-    counts[SOLVES] += 1
-    difference, fine = room.bordered.difference, False
+    functions, layout, p, which, room = way.functions, way.layout, way.p, way.which, way.room
+    for k in range(which.shape[0]):
+        p[which[k]] = w[k]
+    anchor(room, z, p, which, tz, tw, way.scale)
+    way.counts[SOLVES] += 1
+    difference, status = room.bordered.difference, NOT_FINITE
     for attempt in range(_ATTEMPTS):
         difference[0], difference[1] = DIFFERENCE * _SHORTER**attempt, 0.0
         if attempt > 0:
             copy_to(z, room.z_ref)
-            for k in range(which.shape[0]):
-                p[which[k]] = room.p_ref[k]
-        fine = correct_curve(
-            functions, second, layout, condition, z, p, which, border, accuracy, room
-        )
-        if fine or difference[1] == 0.0:
+            copy_vector(p, room.p_ref)
+        status, _, _, _ = _correct(functions, layout, z, p, which, np.inf, accuracy, 0.0, room, way)
+        if status == CONVERGED or difference[1] == 0.0:
             break
     difference[0] = DIFFERENCE
-    return fine and turn_tangent(room.elimination, tz, tw, scale)
+    for k in range(which.shape[0]):
+        w[k] = p[which[k]]
+    if status != CONVERGED:
+        return False, status != NOT_FINITE
+    close_chain(functions, layout, z, p, which, room.equations)
+    fine = take_tangent(room.elimination, tz, tw, way.scale)
+    return fine, fine
 
 
 @helper
-def correct_curve(functions, second, layout, condition, z, p, which, border, accuracy, room):  # type: ignore[no-untyped-def]
-    """Correct (z, p) on the plane that is anchored in the room; False if Newton fails."""
-    work, equations, s = room.elimination, room.equations, room.s
-    before, worst_before = np.inf, np.inf
-    for step in range(_MOST_STEPS):
-        close_chain(functions, layout, z, p, which, equations)
-        g = condition_value(functions, second, layout, condition, z, p, which, border, room)
-        if not math.isfinite(g):
-            return False
-        s[0, 0], s[0, 1] = -off_normal(room, z, p, which), 1.0
-        s[1, 0], s[1, 1] = -g, 0.0
-        solved, worst = curve_step(functions, layout, condition, z, p, which, room)
-        if not solved:
-            return False
-        size = correction_size(work.z, work.w, z, p, which, 0)
-        if size == np.inf:
-            return False
-        move(z, p, which, work.z, work.w, 1.0)
-        worst = max(worst, abs(g))
-        found = verdict(step, size, before, worst, worst_before, accuracy, layout.rounding)
-        if found == CONVERGED:
-            close_chain(functions, layout, z, p, which, equations)
-        if found != GOES_ON:
-            return found == CONVERGED
-        before, worst_before = size, worst
-    return False
+def accept_curve(way):  # type: ignore[no-untyped-def]
+    """Let the border follow the null vectors of a point that is accepted."""
+    if way.condition.kind == SPECTRAL:
+        follow_border(way.border, way.room)
 
 
 @helper
@@ -291,12 +178,12 @@ def other_touches(functions, layout, row, z, p, room):  # type: ignore[no-untype
 
 
 @helper
-def observe_curve(  # type: ignore[no-untyped-def]
-    functions, second, layout, condition, z, p, which, tests, labels, mu, counts, room
-):
-    """Fill everything that is watched on a settled point; False if something is not finite."""
-    counts[CHECKS] += 1
-    counts[MULTIPLIERS] += 1
+def observe_curve(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped-def]
+    """Fill everything that is watched on a corrected point; False if something is not finite."""
+    functions, second, layout, condition = way.functions, way.second, way.layout, way.condition
+    p, which, room = way.p, way.which, way.room
+    way.counts[CHECKS] += 1
+    way.counts[MULTIPLIERS] += 1
     equations = room.equations
     at = tests.shape[0] - EXTRA
     one, minus = multipliers(layout.rank, room.pencil, equations.close, mu, room.spectral)

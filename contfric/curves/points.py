@@ -20,8 +20,6 @@ from contfric.orbit.system import IntArray
 
 #: Points that are marched at a time: limits of the parameters are looked at after each.
 CHUNK = 128
-#: Place of the budget in the options of the march.
-_BUDGET = 4
 #: How much one call of the march may do; all curves of a process share what was learned.
 _PACE = Pace()
 #: The first point is the orbit of the bifurcation to this: located events are good to about 1e-6 at worst.
@@ -122,15 +120,14 @@ def march_rows(
     accuracy: float,
 ) -> tuple[int, int, float]:
     """March on from row k; return (why it stopped, last row, next step)."""
-    from contfric.continuation.march import MORE
+    from contfric.continuation.march import BUDGET, MORE
     from contfric.curves.march import march_curve
 
     box, why, last = problem.box, MORE, k
-    options = np.array([min(step, largest), largest, SMALLEST_STEP, accuracy, 1.0, 0.0])
-    while (
-        why == MORE
-    ):  # between the calls Ctrl-C is heard; a step that is refused is halved, down to the least
-        options[_BUDGET], before, began = _PACE.budget, int(TALLY[0]), perf_counter()
+    # a step that is refused for its angle is halved, down to the least
+    options = np.array([min(step, largest), largest, SMALLEST_STEP, 0.0, 1.0, 0.0])
+    while why == MORE:  # between the calls Ctrl-C is heard
+        options[BUDGET], before, began = _PACE.budget, int(TALLY[0]), perf_counter()
         taken, k = taken + last - k, last
         why, last, options[0] = march_curve(
             problem.system.functions(),
@@ -139,6 +136,7 @@ def march_rows(
             problem.condition,
             problem.vector,
             problem.which,
+            accuracy,
             options,
             np.array([box.low, box.high, box.widths]),
             k,

@@ -21,15 +21,18 @@ every equation would move it by; where that is more than :data:`_UNDETERMINED` t
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 
 from contfric.compiled import blocks, f8, helper, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
-from contfric.orbit.cyclic import finish, next_rows, room_for, start_border, take_out
+from contfric.models.definition import FloatArray
+from contfric.orbit.cyclic import Elimination, finish, next_rows, room_for, start_border, take_out
 from contfric.orbit.equations import (
     LayoutType,
+    Room,
     close_chain,
     equation_room,
     mismatch,
@@ -76,26 +79,46 @@ _UNDETERMINED = 1e-5
 
 
 @helper
-def newton_step(functions, layout, z, p, which, d, e, s, probe, room, work, pencil):  # type: ignore[no-untyped-def]
+def add_rate(functions, layout, i, after, p, which, grad, rows):  # type: ignore[no-untyped-def]
+    """Add the rate of the exit to the exit's own row.
+
+    Where both vanish this is no other equation. But the exit's row alone says nothing of the time at which
+    an exit is tangential, and no pivot would be left for it.
+    """
+    m, free = after.shape[0], which.shape[0]
+    row, c = 2 * m - 1, layout.observables[layout.exits[i]]
+    rate = functions.rate(layout.modes[i], c, after[0], after[1:], p, which, grad)
+    for k in range(m):
+        rows[row, 2 * m + k] += grad[k]
+    for k in range(free):
+        rows[row, 3 * m + k] += grad[m + k]
+    rows[row, 3 * m + free] -= rate
+
+
+@helper
+def newton_step(functions, layout, z, p, which, tangential, probe, room):  # type: ignore[no-untyped-def]
     """Solve the linearised equations at (z, p); return (solved, largest residual).
 
-    The solution is left in ``work.z`` and ``work.w``, the pencil of one turn in ``pencil``. With a ``probe``
-    above zero the second right-hand side is an error of this relative size in every equation.
+    The closure of the chain and the border rows are in the room. The solution is left in
+    ``room.elimination``, the pencil of one turn in ``room.pencil``. With a ``probe`` above zero the second
+    right-hand side is an error of this relative size in every equation. ``tangential`` is a segment whose
+    exit is one (-1: none).
     """
     count, m = z.shape
-    second = 3 * m + which.shape[0] + 1
-    rows = work.rows
-    close_chain(functions, layout, z, p, which, room)
-    start_border(work.border, d, e, s, m)
+    work, equations = room.elimination, room.equations
+    rows, second = work.rows, 3 * m + which.shape[0] + 1
+    start_border(work.border, room.d, room.e, room.s, m)
     worst = 0.0
     for i in range(count):
         if i > 0:
-            next_rows(rows, work.border, d, i, m)
-        after = z[i + 1] if i + 1 < count else room.last
+            next_rows(rows, work.border, room.d, i, m)
+        after = z[i + 1] if i + 1 < count else equations.last
         at = 0 if i == 0 else m
-        here = segment_rows(functions, layout, i, at, z[i], after, p, which, room, rows)
+        here = segment_rows(functions, layout, i, at, z[i], after, p, which, equations, rows)
         if here == np.inf:
             return False, here
+        if i == tangential:
+            add_rate(functions, layout, i, after, p, which, equations.grad, rows)
         worst = max(worst, here)
         if probe > 0.0:
             for j in range(m):  # signs and sizes without a pattern: no null vector is normal to it
@@ -104,7 +127,8 @@ def newton_step(functions, layout, z, p, which, d, e, s, probe, room, work, penc
                 )
         if i > 0 and not take_out(work, i, m):
             return False, worst
-    return finish(work, room.close, room.close_w, pencil[0], pencil[1]), worst
+    pencil = room.pencil
+    return finish(work, equations.close, equations.close_w, pencil[0], pencil[1]), worst
 
 
 @helper
@@ -126,20 +150,28 @@ def correction_size(dz, dw, z, p, which, column):  # type: ignore[no-untyped-def
 
 
 @helper
-def constraint(z, p, which, z_ref, p_ref, d, e, s):  # type: ignore[no-untyped-def]
-    """Fill the right-hand sides of the border rows ``D (z - z_ref) + E (p - p_ref) = 0``.
-
-    That of the tangent asks for 1 along the first row.
-    """
+def off_normal(room, z, p, which):  # type: ignore[no-untyped-def]
+    """Return how far (z, p) is off the plane of the first border row, through its reference point."""
+    value = 0.0
+    for i in range(z.shape[0]):
+        for j in range(z.shape[1]):
+            value += room.d[0, i, j] * (z[i, j] - room.z_ref[i, j])
     for k in range(which.shape[0]):
-        value = 0.0
-        for i in range(z.shape[0]):
-            for j in range(z.shape[1]):
-                value += d[k, i, j] * (z[i, j] - z_ref[i, j])
-        for j in range(which.shape[0]):
-            value += e[k, j] * (p[which[j]] - p_ref[which[j]])
-        s[k, 0] = -value
-        s[k, 1] = 1.0 if k == 0 else 0.0
+        value += room.e[0, k] * (p[which[k]] - room.p_ref[which[k]])
+    return value
+
+
+@helper
+def no_condition(functions, layout, z, p, which, room, extra):  # type: ignore[no-untyped-def]
+    """Border an orbit at fixed parameters: with nothing. Return (residual, segment of a tangential exit)."""
+    return 0.0, -1
+
+
+@helper
+def normal_to_tangent(functions, layout, z, p, which, room, extra):  # type: ignore[no-untyped-def]
+    """Border a branch with the plane normal to its tangent, along which the tangent asks for 1."""
+    room.s[0, 0], room.s[0, 1] = -off_normal(room, z, p, which), 1.0
+    return 0.0, -1
 
 
 @helper
@@ -198,61 +230,91 @@ def verdict(step, size, before, worst, worst_before, floor, rounding):  # type: 
     return GOES_ON
 
 
-@helper
-def correct(  # type: ignore[no-untyped-def]
-    functions, layout, z, p, which, z_ref, p_ref, d, e, s, trust, floor, probe, room, work, pencil
-):
-    """Solve for the orbit from (z, p) in place, border rows anchored at (z_ref, p_ref).
+def correcting(border: Any) -> Any:
+    """Return the Newton iteration of orbits, branches or curves, as a helper.
 
-    Returns
-    -------
-    tuple
-        (status, steps, size of the first correction, last residual). ``work`` holds the last solution
-        and with it the tangent, ``pencil`` (2, m, m) P and Q, ``room.rates`` the rates: all of the
-        last Jacobian, at a distance below ``floor`` from the orbit. ``trust`` is the longest
-        correction, infinite for the plain method (a number, as a flag would be compiled twice).
-        ``probe`` is that of :func:`newton_step`.
+    Parameters
+    ----------
+    border : fills the border rows of the room at (z, p), as many as parameters are free, and returns their
+        residual and the segment of a tangential exit
     """
-    before, first, worst = np.inf, 0.0, 0.0
-    rounding = layout.rounding
-    if rounding <= INTEGRATED:  # a closed form knows a phase as well as the time
-        rounding *= 1.0 + abs(z[z.shape[0] - 1, 0])
-    share, worst_before, residual_before = 1.0, np.inf, np.inf
-    damped, circles = math.isfinite(trust), 0
-    for step in range(_MOST_STEPS):
-        if damped:
-            worst = mismatch(functions, layout, z, p, room)
-            if worst > 2.0 * worst_before and share > 1e-3:
-                # the last correction went too far: take back half of it
-                share *= 0.5
-                move(z, p, which, work.z, work.w, -share)
-                continue
-            worst_before = worst
-        constraint(z, p, which, z_ref, p_ref, d, e, s)
-        solved, worst = newton_step(
-            functions, layout, z, p, which, d, e, s, probe, room, work, pencil
-        )
-        if not solved:
-            return (SINGULAR if math.isfinite(worst) else NOT_FINITE), step, first, worst
-        size = correction_size(work.z, work.w, z, p, which, 0)
-        if size == np.inf:
-            return NOT_FINITE, step, first, worst
-        share = trust / size if size > trust else 1.0
-        move(z, p, which, work.z, work.w, share)
-        if step == 0:
-            first = size
-        found = verdict(step, size, before, worst, residual_before, floor, rounding)
-        if found == CONVERGED or (found == NOT_CONVERGED and not damped):
-            return found, step + 1, first, worst
-        if size > 0.5 * before:
-            circles += 1
-        if floor > ALONG and circles >= _CIRCLES and not is_noise(size, worst, rounding):
-            return NOT_CONVERGED, step + 1, first, worst
-        residual_before = worst
-        before = (
-            size if share == 1.0 else np.inf
-        )  # a correction that was cut tells nothing of the order
-    return NOT_CONVERGED, _MOST_STEPS, first, worst
+
+    @helper
+    def correct(functions, layout, z, p, which, trust, floor, probe, room, extra):  # type: ignore[no-untyped-def]
+        """Solve for the orbit from (z, p) in place.
+
+        Parameters
+        ----------
+        trust : longest correction, infinite for the plain method (a flag would be compiled twice)
+        floor : size of a correction after which no other is asked for
+        probe : that of :func:`newton_step`
+        room : what is allocated once: the elimination, with the last solution and the tangent; the pencil
+            (2, m, m) P and Q; the rates: all of the last Jacobian, nearer than ``floor`` to the orbit
+        extra : handed on to ``border``
+
+        Returns
+        -------
+        tuple
+            (status, steps, size of the first correction, last residual).
+        """
+        before, first, worst = np.inf, 0.0, 0.0
+        work, rounding = room.elimination, layout.rounding
+        if rounding <= INTEGRATED:  # a closed form knows a phase as well as the time
+            rounding *= 1.0 + abs(z[z.shape[0] - 1, 0])
+        share, worst_before, residual_before = 1.0, np.inf, np.inf
+        damped, circles = math.isfinite(trust), 0
+        for step in range(_MOST_STEPS):
+            if damped:
+                worst = mismatch(functions, layout, z, p, room.equations)
+                if worst > 2.0 * worst_before and share > 1e-3:
+                    # the last correction went too far: take back half of it
+                    share *= 0.5
+                    move(z, p, which, work.z, work.w, -share)
+                    continue
+                worst_before = worst
+            close_chain(functions, layout, z, p, which, room.equations)
+            residual, tangential = border(functions, layout, z, p, which, room, extra)
+            if not math.isfinite(residual):
+                return NOT_FINITE, step, first, residual
+            solved, worst = newton_step(functions, layout, z, p, which, tangential, probe, room)
+            if not solved:
+                return (SINGULAR if math.isfinite(worst) else NOT_FINITE), step, first, worst
+            worst = max(worst, abs(residual))
+            size = correction_size(work.z, work.w, z, p, which, 0)
+            if size == np.inf:
+                return NOT_FINITE, step, first, worst
+            share = trust / size if size > trust else 1.0
+            move(z, p, which, work.z, work.w, share)
+            if step == 0:
+                first = size
+            found = verdict(step, size, before, worst, residual_before, floor, rounding)
+            if found == CONVERGED or (found == NOT_CONVERGED and not damped):
+                return found, step + 1, first, worst
+            if size > 0.5 * before:
+                circles += 1
+            if floor > ALONG and circles >= _CIRCLES and not is_noise(size, worst, rounding):
+                return NOT_CONVERGED, step + 1, first, worst
+            residual_before = worst
+            before = (
+                size if share == 1.0 else np.inf
+            )  # a correction that was cut tells nothing of the order
+        return NOT_CONVERGED, _MOST_STEPS, first, worst
+
+    return correct
+
+
+_correct_orbit = correcting(no_condition)
+
+
+class OrbitRoom(NamedTuple):
+    """Room for one orbit at fixed parameters: what the elimination needs, and no border rows."""
+
+    equations: Room
+    elimination: Elimination
+    pencil: FloatArray
+    d: FloatArray
+    e: FloatArray
+    s: FloatArray
 
 
 @kernel(types.UniTuple(f8, 4)(FlowType, LayoutType, matrix, vector, f8, blocks, indices))
@@ -264,31 +326,17 @@ def solve(functions, layout, z, p, trust, pencil, counts):  # type: ignore[no-un
     counts[SOLVES] += 1
     count, m = z.shape
     free, right = min(count, 0), max(2 - count, 2)  # 0 and 2, but no literals
-    room, work = equation_room(count, m, free), room_for(count, m, free, right)
+    equations, work = equation_room(count, m, free), room_for(count, m, free, right)
     d, e, s = np.empty((0, count, m)), np.empty((0, 0)), np.empty((0, 2))
-    status, steps, first, _ = correct(
-        functions,
-        layout,
-        z,
-        p,
-        room.none,
-        z,
-        p,
-        d,
-        e,
-        s,
-        trust,
-        FLOOR,
-        layout.rounding,
-        room,
-        work,
-        pencil,
+    room, none = OrbitRoom(equations, work, pencil, d, e, s), equations.none
+    status, steps, first, _ = _correct_orbit(
+        functions, layout, z, p, none, trust, FLOOR, layout.rounding, room, 0
     )
     if status == CONVERGED:
-        moved = correction_size(work.z, work.w, z, p, room.none, 1)
+        moved = correction_size(work.z, work.w, z, p, none, 1)
         if moved > _UNDETERMINED:
             status = SINGULAR
-    return float(status), float(steps), first, mismatch(functions, layout, z, p, room)
+    return float(status), float(steps), first, mismatch(functions, layout, z, p, equations)
 
 
 @helper
