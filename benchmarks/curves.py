@@ -10,7 +10,8 @@ from __future__ import annotations
 import time
 
 import contfric as cf
-from contfric.curves.points import CurveRows, first_curve_point, march_rows
+from contfric.continuation.points import Rows
+from contfric.curves.points import first_curve_point, march_rows
 from contfric.curves.problem import box_of, problem_of
 
 PLANE, RANGES = ("Omega", "S"), {"Omega": (0.4, 0.6), "S": (0.05, 0.39)}
@@ -39,7 +40,7 @@ def march_cost(bifurcation, points=60, runs=40):
     start, border = first_curve_point(problem, bifurcation.orbit)
     best = float("inf")
     for _ in range(runs):
-        rows = CurveRows.room_for(problem, points)
+        rows = Rows.empty(problem.system, points, 2)
         rows.put(0, start)
         began = time.process_time()
         _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), STEP, STEP, 3e-13)

@@ -96,7 +96,9 @@ def _add_crossing(
     else:
         if float(np.sum((point.joints - orbit.joints) * point.tangent)) < 0.0:
             point = point.reversed()
-        origin = replace(point, joints=orbit.joints, value=settings_value(orbit, settings), arc=0.0)
+        origin = replace(
+            point, joints=orbit.joints, w=np.array([settings_value(orbit, settings)]), arc=0.0
+        )
         point.arc = float(np.linalg.norm(point.joints - orbit.joints)) / len(orbit.joints) ** 0.5
         side = trace_side(orbit, point, settings, progress=state.progress)
         first = first_end(EndReason.BP, event, side, settings)

@@ -98,7 +98,9 @@ def _leave_beside(
             point.arc = float(np.linalg.norm(there.joints - orbit.joints)) / len(away) ** 0.5
             side = _trace(there, point, settings, state.progress)
             if there.admissible and side.count > 1:
-                origin = replace(point, joints=orbit.joints, value=settings_value(orbit, settings))
+                origin = replace(
+                    point, joints=orbit.joints, w=np.array([settings_value(orbit, settings)])
+                )
                 origin.arc = 0.0
                 first = first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
                 return assemble(there, settings, side, first, origin)

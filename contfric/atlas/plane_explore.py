@@ -20,12 +20,11 @@ from contfric.atlas.plane_sections import section_diagram, sections_of
 from contfric.atlas.plane_state import PlaneExploration, Progress
 from contfric.atlas.seeds import Seeds
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
-from contfric.continuation.points import MOST_POINTS
+from contfric.continuation.points import MOST_POINTS, Point
 from contfric.curves.assembly import join_sides
 from contfric.curves.curve import CurvePart
 from contfric.curves.going_on import Start
 from contfric.curves.leaving import leaving, other_words
-from contfric.curves.points import CurvePoint
 from contfric.curves.problem import Problem, box_of, problem_of
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.curves.trace import (
@@ -306,7 +305,7 @@ def _follow_starts(
     state.add(join_sides(None, sides[0], first), sides)
 
 
-def _inner(side: CurveSide) -> CurvePoint:
+def _inner(side: CurveSide) -> Point:
     """Return a point of a side away from its ends, where curves meet."""
     return side.points[len(side.points) // 2]
 

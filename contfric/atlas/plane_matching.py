@@ -6,8 +6,9 @@ import numpy as np
 
 from contfric.atlas.matching import identity, stops_distance
 from contfric.continuation.events import TERMINAL, Kind
+from contfric.continuation.points import Point
 from contfric.curves.curve import Curve, CurvePart
-from contfric.curves.points import CurvePoint, solve_point
+from contfric.curves.points import solve_point
 from contfric.curves.problem import Problem, border_of
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
@@ -31,7 +32,7 @@ def group_of(kind: Kind, model: Model) -> Kind:
 
 
 def is_known(
-    problem: Problem, point: CurvePoint, curves: list[Curve], same_word: bool = True
+    problem: Problem, point: Point, curves: list[Curve], same_word: bool = True
 ) -> int | None:
     """Return the index of the curve that a point lies on; None if on none.
 
@@ -121,10 +122,10 @@ def twins_of(curves: list[Curve]) -> tuple[int, ...]:
     return tuple(found)
 
 
-def _middle(part: CurvePart) -> CurvePoint:
+def _middle(part: CurvePart) -> Point:
     k = len(part) // 2
     none = np.empty(0)
-    return CurvePoint(
+    return Point(
         part.joints[k],
         part.values[k],
         none,

@@ -230,7 +230,7 @@ def crossing_between(
     near = replace(
         before,
         joints=before.joints + share * (after.joints - before.joints),
-        value=before.value + share * (after.value - before.value),
+        w=before.w + share * (after.w - before.w),
     )
     chord = after.joints - before.joints, after.value - before.value
     square = _product(chord, chord, settings.scale)
@@ -260,9 +260,9 @@ def crossing_point(crossing: Crossing, before: Point, arc: float, settings: Sett
     return replace(
         before,
         joints=orbit.joints,
-        value=float(orbit.vector[orbit.model.index_of(settings.parameter)]),
+        w=orbit.vector[[orbit.model.index_of(settings.parameter)]],
         tangent=direction.joints,
-        slope=direction.slope,
+        direction=np.array([direction.slope]),
         mu=mu,
         arc=before.arc + arc,
         lost=False,

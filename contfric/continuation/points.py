@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,16 +72,22 @@ class Settings:
 
 @dataclass(eq=False)
 class Point:
-    """One solved point with its unit tangent and everything that is watched.
+    """One solved point of a branch or curve with its unit tangent and everything that is watched.
 
-    ``lost`` says that Newton fails behind it before what is sought is reached, ``rough`` that it is reached
-    to the root of rounding only.
+    Attributes
+    ----------
+    joints, w : joints, shape (N, m), and the q parameters that are free: one on a branch, two on a curve
+    tangent, direction : the unit tangent, of the joints and of the parameters
+    tests, labels, mu : what is watched
+    arc : arclength
+    lost : whether Newton fails behind it before what is sought is reached
+    rough : whether that is reached to the root of rounding only
     """
 
     joints: FloatArray
-    value: float
+    w: FloatArray
     tangent: FloatArray
-    slope: float
+    direction: FloatArray
     tests: FloatArray
     labels: IntArray
     mu: NDArray[np.complex128]
@@ -88,30 +95,105 @@ class Point:
     lost: bool = False
     rough: bool = False
 
+    @property
+    def value(self) -> float:
+        """The parameter of a branch."""
+        return float(self.w[0])
+
+    @property
+    def slope(self) -> float:
+        """The rate of the parameter of a branch."""
+        return float(self.direction[0])
+
     def orbit(self, system: System, vector: FloatArray, active: int) -> Orbit:
-        """Return the point as an orbit."""
+        """Return the point of a branch as an orbit."""
         full = vector.copy()
         full[active] = self.value
         return Orbit(system, self.joints.copy(), full, 0.0)
 
     def as_start(self) -> tuple[FloatArray, FloatArray]:
-        """Return (joints, tangent) and (parameter, slope) as the march takes them."""
-        return np.array([self.joints, self.tangent]), np.array([[self.value], [self.slope]])
+        """Return (joints, tangent) and (parameters, direction) as the march takes them."""
+        return np.array([self.joints, self.tangent]), np.array([self.w, self.direction])
 
     def reversed(self) -> Point:
         """Return the same point with the opposite tangent."""
-        tests = self.tests.copy()
-        tests[-EXTRA] *= -1.0
+        tests = self.tests
+        if len(self.w) == 1:  # a branch watches the slope of its parameter
+            tests = tests.copy()
+            tests[-EXTRA] *= -1.0
         return Point(
             self.joints,
-            self.value,
+            self.w,
             -self.tangent,
-            -self.slope,
+            -self.direction,
             tests,
             self.labels,
             self.mu,
             self.arc,
         )
+
+
+@dataclass(eq=False)
+class Rows:
+    """Arrays that the compiled march writes to, a point in each row."""
+
+    joints: FloatArray
+    w: FloatArray
+    tangents: FloatArray
+    directions: FloatArray
+    arc: FloatArray
+    tests: FloatArray
+    labels: IntArray
+    mu: NDArray[np.complex128]
+
+    @classmethod
+    def empty(cls, system: System, count: int, free: int = 1) -> Rows:
+        """Return rows for points of a system with so many free parameters."""
+        shape = (count, system.segments, 1 + len(system.model.states))
+        labels = len(system.layout.labels)
+        return cls(
+            np.empty(shape),
+            np.empty((count, free)),
+            np.empty(shape),
+            np.empty((count, free)),
+            np.zeros(count),
+            np.zeros((count, len(system.tests) + labels + EXTRA)),
+            np.zeros((count, labels), dtype=np.int64),
+            np.zeros((count, len(system.model.states)), dtype=np.complex128),
+        )
+
+    @property
+    def values(self) -> FloatArray:
+        """The parameter of a branch, one value a row."""
+        return self.w[:, 0]
+
+    def arrays(self, stop: int | None = None) -> tuple[Any, ...]:
+        """Return the arrays up to a row, in the order in which the march takes them."""
+        return tuple(a[:stop] for a in vars(self).values())
+
+    def first(self, count: int) -> Rows:
+        """Return the first rows."""
+        return Rows(*(array[:count].copy() for array in vars(self).values()))
+
+    def point(self, k: int) -> Point:
+        """Return one row as a point of its own."""
+        return Point(
+            self.joints[k].copy(),
+            self.w[k].copy(),
+            self.tangents[k].copy(),
+            self.directions[k].copy(),
+            self.tests[k].copy(),
+            self.labels[k].copy(),
+            self.mu[k].copy(),
+            float(self.arc[k]),
+        )
+
+    def put(self, k: int, point: Point) -> None:
+        """Write a point to one row."""
+        self.joints[k], self.w[k] = point.joints, point.w
+        self.tangents[k], self.directions[k] = point.tangent, point.direction
+        self.tests[k], self.labels[k] = point.tests, point.labels
+        self.mu[k], self.arc[k] = point.mu, point.arc
 
 
 def settings_of(

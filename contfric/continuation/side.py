@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.continuation.events import Bifurcation, End
-from contfric.continuation.points import EXTRA, SMALLEST_STEP, Point, Settings
+from contfric.continuation.points import SMALLEST_STEP, Point, Rows, Settings
 from contfric.models.definition import FloatArray
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
@@ -83,66 +83,6 @@ class Columns:
 
 
 @dataclass(eq=False)
-class Rows:
-    """Arrays that the compiled march writes to, a point in each row."""
-
-    joints: FloatArray
-    values: FloatArray
-    tangents: FloatArray
-    slopes: FloatArray
-    arc: FloatArray
-    tests: FloatArray
-    labels: IntArray
-    mu: NDArray[np.complex128]
-
-    @classmethod
-    def room_for(cls, system: System, room: int) -> Rows:
-        """Return empty rows for points of a system."""
-        shape = (system.segments, 1 + len(system.model.states))
-        return cls(
-            np.empty((room, *shape)),
-            np.empty(room),
-            np.empty((room, *shape)),
-            np.empty(room),
-            np.zeros(room),
-            np.zeros((room, len(system.tests) + len(system.layout.labels) + EXTRA)),
-            np.zeros((room, len(system.layout.labels)), dtype=np.int64),
-            np.zeros((room, len(system.model.states)), dtype=np.complex128),
-        )
-
-    def arrays(self, stop: int) -> tuple[Any, ...]:
-        """Return the arrays up to a row, in the order in which the march takes them."""
-        return tuple(
-            a[:stop, None] if name in ("values", "slopes") else a[:stop]
-            for name, a in vars(self).items()
-        )
-
-    def first(self, count: int) -> Rows:
-        """Return the first rows."""
-        return Rows(*(array[:count].copy() for array in vars(self).values()))
-
-    def point(self, k: int) -> Point:
-        """Return one row as a point of its own."""
-        return Point(
-            self.joints[k].copy(),
-            float(self.values[k]),
-            self.tangents[k].copy(),
-            float(self.slopes[k]),
-            self.tests[k].copy(),
-            self.labels[k].copy(),
-            self.mu[k].copy(),
-            float(self.arc[k]),
-        )
-
-    def put(self, k: int, point: Point) -> None:
-        """Write a point to one row."""
-        self.joints[k], self.values[k] = point.joints, point.value
-        self.tangents[k], self.slopes[k] = point.tangent, point.slope
-        self.tests[k], self.labels[k] = point.tests, point.labels
-        self.mu[k], self.arc[k] = point.mu, point.arc
-
-
-@dataclass(eq=False)
 class Side:
     """One side of a branch, from its first point outward.
 
@@ -180,7 +120,7 @@ class Side:
     @classmethod
     def starting(cls, point: Point, system: System, end: End, stability: bool) -> Side:
         """Return a side that consists of its first point."""
-        side = cls(point, end, kept(stability), Rows.room_for(system, CHUNK))
+        side = cls(point, end, kept(stability), Rows.empty(system, CHUNK))
         side.autonomous = system.model.autonomous
         side.rows.put(0, point)
         return side
@@ -308,9 +248,9 @@ def first_point(
 
     active = orbit.model.index_of(settings.parameter)
     direction = np.zeros_like(orbit.joints) if tangent is None else tangent
-    rows = Rows.room_for(orbit.system, 1)
-    rows.joints[0], rows.values[0] = orbit.joints, orbit.vector[active]
-    rows.tangents[0], rows.slopes[0] = direction, slope
+    rows = Rows.empty(orbit.system, 1)
+    rows.joints[0], rows.w[0] = orbit.joints, orbit.vector[active]
+    rows.tangents[0], rows.directions[0] = direction, slope
     why, _, _ = march(
         orbit.system.functions(),
         orbit.system.layout,

@@ -163,7 +163,7 @@ def leapt_vertex(
 ) -> tuple[Bifurcation, Point] | None:
     """Return the vertex between two points on its two sides, if it is one."""
     point = parabola_vertex(before, after, share)
-    point.value = before.value + share * (after.value - before.value)
+    point.w = before.w + share * (after.w - before.w)
     found, place = _fold(orbit, before, after, point, settings)
     if found.kind is Kind.SN:
         return None

@@ -86,7 +86,7 @@ def leave_along(
         point = point.reversed()
     if origin is None:
         origin = replace(point)
-    origin.joints, origin.value = orbit.joints, settings_value(orbit, settings)
+    origin.joints, origin.w = orbit.joints, np.array([settings_value(orbit, settings)])
     point.arc = distance
     return Departure(orbit, point, origin, reason)
 

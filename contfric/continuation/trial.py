@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.continuation.points import Point, Settings
-from contfric.continuation.side import Rows
+from contfric.continuation.points import Point, Rows, Settings
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
@@ -25,7 +24,7 @@ def locate_change(
     """Locate one change of sign; None if no point could be solved on the way."""
     from contfric.continuation.bracket import BY_TEST, locate
 
-    rows = Rows.room_for(orbit.system, 4)
+    rows = Rows.empty(orbit.system, 4)
     rows.put(0, before)
     rows.put(1, after)
     at = locate(
@@ -39,7 +38,7 @@ def locate_change(
         index,
         target,
         bool(orbit.model.kinks),
-        rows.arrays(4),
+        rows.arrays(),
         TALLY,
     )
     # behind -2 Newton fails: the last good point, marked as such
@@ -64,5 +63,5 @@ def locate_value(
     vector[orbit.model.index_of(settings.parameter)] = target
     exact = polish(Orbit(orbit.system, found.joints, vector, np.inf), damped=False)
     if exact.converged and np.max(np.abs(exact.joints - found.joints)) < 1e-6:
-        found.joints, found.value = exact.joints, target
+        found.joints, found.w = exact.joints, np.array([target])
     return found

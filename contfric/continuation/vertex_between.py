@@ -37,7 +37,7 @@ def left_at(before: Point, after: Orbit, settings: Settings) -> Point | None:
     value = float(found.vector[active])
     gap = there - before.joints
     far = np.sum(gap * gap) / len(gap) + (value - before.value) ** 2 * settings.scale
-    return replace(before, joints=there, value=value, arc=before.arc + float(np.sqrt(far)))
+    return replace(before, joints=there, w=np.array([value]), arc=before.arc + float(np.sqrt(far)))
 
 
 def _simpler(orbit: Orbit) -> Orbit | None:

@@ -153,7 +153,7 @@ def at_vertex(point: Point, simple: Orbit, active: int) -> Point:
     same = joints.shape == point.joints.shape
     if not same or np.max(np.abs(joints - point.joints)) > _NEARLY:
         return point
-    return replace(point, joints=joints, value=float(simple.vector[active]))
+    return replace(point, joints=joints, w=simple.vector[[active]])
 
 
 def joints_like(simple: Orbit, joints: FloatArray) -> FloatArray:
@@ -265,7 +265,7 @@ def parabola_vertex(before: Point, after: Point, share: float) -> Point:
     return replace(
         before,
         joints=before.joints + share * (after.joints - before.joints),
-        value=before.value + 0.5 * before.slope * share * step,
-        slope=0.0,
+        w=before.w + 0.5 * before.direction * share * step,
+        direction=np.zeros(1),
         arc=before.arc + share * step,
     )

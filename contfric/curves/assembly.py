@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.continuation.events import Kind, kind_of_margin
+from contfric.continuation.points import Point
 from contfric.curves.curve import Curve, CurvePart
-from contfric.curves.points import CurvePoint
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.models.definition import FloatArray
@@ -67,7 +67,7 @@ def _reversed(piece: CurveSide) -> CurveSide:
 
 
 def _parts(
-    problem: Problem, points: list[CurvePoint], shift: float, special: tuple[SpecialPoint, ...]
+    problem: Problem, points: list[Point], shift: float, special: tuple[SpecialPoint, ...]
 ) -> tuple[CurvePart, ...]:
     """Cut the points where the kind changes; ``shift`` is added to their arclength."""
     arc = np.array([p.arc for p in points]) + shift
@@ -79,7 +79,7 @@ def _parts(
     )
 
 
-def _part(problem: Problem, points: list[CurvePoint], arc: FloatArray) -> CurvePart:
+def _part(problem: Problem, points: list[Point], arc: FloatArray) -> CurvePart:
     kind = problem.kind
     if kind in (Kind.CS, Kind.SS) and problem.test is not None:
         middle = points[len(points) // 2]

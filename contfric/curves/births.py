@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.continuation.events import Kind
+from contfric.continuation.points import Point
 from contfric.continuation.vertices import passed_vertex
 from contfric.curves.locating import locate_zero
-from contfric.curves.points import CurvePoint
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, SpecialPoint
 from contfric.models.definition import FloatArray
 
 
-def birth_among(problem: Problem, chain: list[CurvePoint]) -> int | None:
+def birth_among(problem: Problem, chain: list[Point]) -> int | None:
     """Return the first point of a chain behind which orbits have become their own images."""
     if problem.kind is not Kind.SN or problem.system.half or len(chain) < 2:
         return None
@@ -22,12 +22,12 @@ def birth_among(problem: Problem, chain: list[CurvePoint]) -> int | None:
 
 
 def birth_between(
-    problem: Problem, before: CurvePoint, after: CurvePoint, border: FloatArray
-) -> tuple[CurvePoint, SpecialPoint]:
+    problem: Problem, before: Point, after: Point, border: FloatArray
+) -> tuple[Point, SpecialPoint]:
     """Return the last point of a fold curve between two, and what it is: DBP, or GPD of doubled orbits."""
     reference = _odd_part(problem, before)
 
-    def value(p: CurvePoint) -> float:
+    def value(p: Point) -> float:
         return float(np.sum(_odd_part(problem, p) * reference))
 
     point, fine = locate_zero(problem, before, after, border, value)
@@ -37,7 +37,7 @@ def birth_between(
     return point, SpecialPoint(kind, kind.name, orbit.params, orbit, None, (), point.arc, fine)
 
 
-def _odd_part(problem: Problem, point: CurvePoint) -> FloatArray:
+def _odd_part(problem: Problem, point: Point) -> FloatArray:
     """Return the states of the second half less the image of the first."""
     n = len(problem.system.word) // 2
     symmetry = problem.model.symmetry

@@ -15,9 +15,9 @@ import numpy as np
 
 from contfric.continuation.candidates import candidates
 from contfric.continuation.events import TERMINAL, Bifurcation, Kind, kind_of_margin
-from contfric.continuation.points import EXTRA
+from contfric.continuation.points import EXTRA, Point, Rows
 from contfric.curves.naming import MARGINAL
-from contfric.curves.points import CurvePoint, CurveRows, first_curve_point, march_rows
+from contfric.curves.points import first_curve_point, march_rows
 from contfric.curves.problem import Box, Problem, problem_of, tangency
 from contfric.curves.special import SpecialPoint
 from contfric.errors import ContfricError, ParameterError
@@ -42,7 +42,7 @@ _PROOFS = (0.1, 0.01)
 #: A segment that lasts less than minus this does not exist.
 _NO_TIME = 1e-9
 
-Start = tuple[Problem, CurvePoint, FloatArray]
+Start = tuple[Problem, Point, FloatArray]
 
 
 def place_of(orbit: Orbit, test: Test) -> tuple[float, str]:
@@ -160,21 +160,19 @@ def _tangency_again(test: Test, one: Orbit, other: Orbit) -> Bifurcation | None:
 
 
 @remembered()
-def goes_on(
-    problem: Problem, tip: CurvePoint, special: SpecialPoint, largest: float
-) -> Start | None:
+def goes_on(problem: Problem, tip: Point, special: SpecialPoint, largest: float) -> Start | None:
     """Return where a curve goes on behind a sliding event, in the direction that it has; None if nowhere.
 
     What goes on happens at as many places as before: a curve that is asymmetric does not go on as the
     symmetric one that it has met.
     """
-    ahead = tip.slope / problem.box.widths
+    ahead = tip.direction / problem.box.widths
     for orbit in words_at(special):
         event = again(problem, special, orbit)
         if event is None:
             continue
         for start in starts_of(event, problem.box, largest):
-            forward = float(np.sum(start[1].slope / problem.box.widths * ahead)) > 0.0
+            forward = float(np.sum(start[1].direction / problem.box.widths * ahead)) > 0.0
             if forward and _places(start[0]) == _places(problem):
                 return start
     return None
@@ -207,7 +205,7 @@ def starts_of(event: Bifurcation, box: Box, largest: float) -> Iterator[Start]:
 
 def prove(
     problem: Problem,
-    start: CurvePoint,
+    start: Point,
     border: FloatArray,
     largest: float,
     born: bool = False,
@@ -237,7 +235,7 @@ def prove(
     return None
 
 
-def is_continuum(problem: Problem, point: CurvePoint) -> bool:
+def is_continuum(problem: Problem, point: Point) -> bool:
     """Tell whether orbits are one of a continuum at fixed parameters, as at Omega = 1/2.
 
     There a multiplier is 1, and along a fold or a branch point the normal form vanishes; all that is watched
@@ -255,11 +253,9 @@ def _is_exit(problem: Problem, pinned: IntArray) -> bool:
     return replace(test, margin=Margin.EXIT) in [problem.system.tests[k] for k in pinned]
 
 
-def _step_away(
-    problem: Problem, start: CurvePoint, border: FloatArray, step: float
-) -> CurvePoint | None:
+def _step_away(problem: Problem, start: Point, border: FloatArray, step: float) -> Point | None:
     """Return the point a step away from the first one; None if there is none."""
-    rows = CurveRows.room_for(problem, 2)
+    rows = Rows.empty(problem.system, 2, 2)
     rows.put(0, start)
     _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), step, step, 3e-13)
     return rows.point(1) if last == 1 else None

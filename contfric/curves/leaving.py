@@ -28,10 +28,11 @@ import numpy as np
 from contfric.continuation.candidates import edited_orbit
 from contfric.continuation.events import TERMINAL, Bifurcation, Kind, kind_of_margin
 from contfric.continuation.outcomes import outcome_at
+from contfric.continuation.points import Point
 from contfric.continuation.vertices import symmetric_part, undoubled_part
 from contfric.curves.curve import CurvePart
 from contfric.curves.going_on import Start, prove, starts_of, words_at
-from contfric.curves.points import CurvePoint, solve_point
+from contfric.curves.points import solve_point
 from contfric.curves.problem import Box, Problem, border_of, problem_of
 from contfric.curves.special import CodimTwo, SpecialPoint
 from contfric.errors import ContfricError, NotationError
@@ -159,7 +160,7 @@ def fold_problem(orbit: Orbit, box: Box) -> Problem | None:
 
 def beside(
     problem: Problem, orbit: Orbit, direction: FloatArray, distance: float
-) -> tuple[CurvePoint, FloatArray] | None:
+) -> tuple[Point, FloatArray] | None:
     """Solve for a point of a curve a distance away from an orbit along a direction of its joints."""
     border = border_of(problem, orbit.joints, orbit.vector)
     guess = orbit.joints + distance * direction

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from contfric.curves.points import CurvePoint, CurveRows, solve_point
+from contfric.continuation.points import Point, Rows
+from contfric.curves.points import solve_point
 from contfric.curves.problem import Problem
 from contfric.models.definition import FloatArray
 from contfric.orbit.counts import TALLY
@@ -23,24 +24,22 @@ _MOST_TRIALS = 120
 #: Values below this are rounding: a narrower bracket would follow noise.
 _NOISE = 2e-15
 
-Value = Callable[[CurvePoint], float]
+Value = Callable[[Point], float]
 
 
-def between(
-    a: CurvePoint, b: CurvePoint, x: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def between(a: Point, b: Point, x: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return joints, parameters, tangent and slope at a share of a step, by the cubic through both ends."""
     y, length = 1.0 - x, b.arc - a.arc
     ha, hb = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x)
     ga, gb = x * y * y * length, -x * x * y * length
     joints = ha * a.joints + hb * b.joints + ga * a.tangent + gb * b.tangent
-    w = ha * a.w + hb * b.w + ga * a.slope + gb * b.slope
-    return joints, w, y * a.tangent + x * b.tangent, y * a.slope + x * b.slope
+    w = ha * a.w + hb * b.w + ga * a.direction + gb * b.direction
+    return joints, w, y * a.tangent + x * b.tangent, y * a.direction + x * b.direction
 
 
 def point_between(
-    problem: Problem, a: CurvePoint, b: CurvePoint, x: float, border: FloatArray
-) -> CurvePoint | None:
+    problem: Problem, a: Point, b: Point, x: float, border: FloatArray
+) -> Point | None:
     """Return the solved point at a share of a step."""
     point = solve_point(problem, *between(a, b, x), border.copy())
     if point is not None:
@@ -49,8 +48,8 @@ def point_between(
 
 
 def locate_zero(
-    problem: Problem, a: CurvePoint, b: CurvePoint, border: FloatArray, value: Value
-) -> tuple[CurvePoint, bool]:
+    problem: Problem, a: Point, b: Point, border: FloatArray, value: Value
+) -> tuple[Point, bool]:
     """Return the place where a value changes sign, and whether it is bracketed to its last digits.
 
     By regula falsi with Illinois' halving of the end that stays, and a bisection every fourth trial. A
@@ -102,12 +101,12 @@ class Sought:
 
 
 def locate(
-    problem: Problem, a: CurvePoint, b: CurvePoint, border: FloatArray, sought: Sought
-) -> tuple[CurvePoint, bool]:
+    problem: Problem, a: Point, b: Point, border: FloatArray, sought: Sought
+) -> tuple[Point, bool]:
     """Return the place of a change, and whether it is bracketed to its last digits; compiled."""
     from contfric.curves.bracket import locate_on_curve
 
-    rows = CurveRows.room_for(problem, 4)
+    rows = Rows.empty(problem.system, 4, 2)
     rows.put(0, a)
     rows.put(1, b)
     status, _ = locate_on_curve(

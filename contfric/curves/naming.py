@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from contfric.continuation.events import Kind, kind_of_margin
-from contfric.continuation.points import EXTRA
+from contfric.continuation.points import EXTRA, Point
 from contfric.curves.locating import by_label, by_test, locate
-from contfric.curves.points import CurvePoint
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, SpecialPoint
 from contfric.models.definition import FloatArray
@@ -33,14 +32,12 @@ _BEND, _ONE, _MINUS, _PAIR = range(EXTRA)
 class Crossing:
     """A change between two points of a curve: the located point, and what it is."""
 
-    point: CurvePoint
+    point: Point
     special: SpecialPoint
     terminal: bool
 
 
-def crossings(
-    problem: Problem, before: CurvePoint, after: CurvePoint, border: FloatArray
-) -> list[Crossing]:
+def crossings(problem: Problem, before: Point, after: Point, border: FloatArray) -> list[Crossing]:
     """Return what happens between two points, in order; the first terminal one is the last."""
     found = [
         *_margins(problem, before, after, border),
@@ -55,9 +52,7 @@ def crossings(
     return [c for c in found[: last + 1] if c.terminal or end - c.point.arc > _OF_EVENT]
 
 
-def _margins(
-    problem: Problem, before: CurvePoint, after: CurvePoint, border: FloatArray
-) -> list[Crossing]:
+def _margins(problem: Problem, before: Point, after: Point, border: FloatArray) -> list[Crossing]:
     """Return the first margin that is violated, with its group."""
     tests = problem.system.tests
     located = []
@@ -92,7 +87,7 @@ def _rest(group: tuple[Test, ...], first: Test) -> tuple[Test, ...]:
 
 def _special(
     problem: Problem,
-    point: CurvePoint,
+    point: Point,
     kind: CodimTwo,
     meets: Kind | None = None,
     tests: tuple[Test, ...] = (),
@@ -108,9 +103,7 @@ def _special(
     return SpecialPoint(kind, name, orbit.params, orbit, meets, tests, point.arc, located)
 
 
-def _smooth(
-    problem: Problem, before: CurvePoint, after: CurvePoint, border: FloatArray
-) -> list[Crossing]:
+def _smooth(problem: Problem, before: Point, after: Point, border: FloatArray) -> list[Crossing]:
     """Return what the normal form and the multipliers tell."""
     base = len(before.tests) - EXTRA
     found = []
@@ -132,7 +125,7 @@ def _smooth(
 
 
 def _smooth_kind(
-    problem: Problem, column: int, point: CurvePoint
+    problem: Problem, column: int, point: Point
 ) -> tuple[CodimTwo, Kind | None] | None:
     """Return the kind of a point, and the smooth event that meets the curve there."""
     half, kind = problem.system.half, problem.kind
@@ -159,9 +152,7 @@ def _smooth_kind(
     return (CodimTwo.SN_BP if half else CodimTwo.SN_PD), other_kind
 
 
-def _labels(
-    problem: Problem, before: CurvePoint, after: CurvePoint, border: FloatArray
-) -> list[Crossing]:
+def _labels(problem: Problem, before: Point, after: Point, border: FloatArray) -> list[Crossing]:
     """Return the tangencies that the curve meets: segments are relabelled, and the curve goes on."""
     rows = problem.system.layout.labels
     observables = problem.model.observables

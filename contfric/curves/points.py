@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from time import perf_counter
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from contfric.continuation.points import EXTRA, SMALLEST_STEP
+from contfric.continuation.points import SMALLEST_STEP, Point, Rows
 from contfric.curves.problem import Problem, border_of
 from contfric.models.definition import FloatArray
 from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import assembled
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.pace import Pace
-from contfric.orbit.system import IntArray
 
 #: Points that are marched at a time: limits of the parameters are looked at after each.
 CHUNK = 128
@@ -26,93 +22,11 @@ _PACE = Pace()
 _SAME_ORBIT = 1e-3
 
 
-@dataclass(eq=False)
-class CurvePoint:
-    """One solved point with its unit tangent and everything that is watched."""
-
-    joints: FloatArray
-    w: FloatArray
-    tangent: FloatArray
-    slope: FloatArray
-    tests: FloatArray
-    labels: IntArray
-    mu: NDArray[np.complex128]
-    arc: float = 0.0
-
-    def reversed(self) -> CurvePoint:
-        """Return the same point with the opposite tangent."""
-        return CurvePoint(
-            self.joints,
-            self.w,
-            -self.tangent,
-            -self.slope,
-            self.tests,
-            self.labels,
-            self.mu,
-            self.arc,
-        )
-
-
-@dataclass(eq=False)
-class CurveRows:
-    """Arrays that the compiled march writes to, a point in each row."""
-
-    joints: FloatArray
-    values: FloatArray
-    tangents: FloatArray
-    slopes: FloatArray
-    arc: FloatArray
-    tests: FloatArray
-    labels: IntArray
-    mu: NDArray[np.complex128]
-
-    @classmethod
-    def room_for(cls, problem: Problem, room: int) -> CurveRows:
-        """Return empty rows."""
-        system = problem.system
-        shape = (system.segments, 1 + len(system.model.states))
-        labels = len(system.layout.labels)
-        return cls(
-            np.empty((room, *shape)),
-            np.empty((room, 2)),
-            np.empty((room, *shape)),
-            np.empty((room, 2)),
-            np.zeros(room),
-            np.zeros((room, len(system.tests) + labels + EXTRA)),
-            np.zeros((room, labels), dtype=np.int64),
-            np.zeros((room, len(system.model.states)), dtype=np.complex128),
-        )
-
-    def arrays(self) -> tuple[Any, ...]:
-        """Return the arrays in the order in which the march takes them."""
-        return tuple(vars(self).values())
-
-    def point(self, k: int) -> CurvePoint:
-        """Return one row as a point of its own."""
-        return CurvePoint(
-            self.joints[k].copy(),
-            self.values[k].copy(),
-            self.tangents[k].copy(),
-            self.slopes[k].copy(),
-            self.tests[k].copy(),
-            self.labels[k].copy(),
-            self.mu[k].copy(),
-            float(self.arc[k]),
-        )
-
-    def put(self, k: int, point: CurvePoint) -> None:
-        """Write a point to one row."""
-        self.joints[k], self.values[k] = point.joints, point.w
-        self.tangents[k], self.slopes[k] = point.tangent, point.slope
-        self.tests[k], self.labels[k] = point.tests, point.labels
-        self.mu[k], self.arc[k] = point.mu, point.arc
-
-
 def march_rows(
     problem: Problem,
-    rows: CurveRows,
+    rows: Rows,
     k: int,
-    start: CurvePoint,
+    start: Point,
     taken: int,
     border: FloatArray,
     step: float,
@@ -140,8 +54,7 @@ def march_rows(
             options,
             np.array([box.low, box.high, box.widths]),
             k,
-            np.array([start.joints, start.tangent]),
-            np.array([start.w, start.slope]),
+            *start.as_start(),
             taken,
             border,
             rows.arrays(),
@@ -158,19 +71,19 @@ def solve_point(
     tangent: FloatArray,
     slope: FloatArray,
     border: FloatArray,
-) -> CurvePoint | None:
+) -> Point | None:
     """Solve for one point normal to a direction; ``border`` is made to follow it. None if Newton fails."""
     from contfric.continuation.march import BROKEN
     from contfric.continuation.steps import AT_EVENT
 
-    rows = CurveRows.room_for(problem, 1)
-    rows.joints[0], rows.values[0] = joints, w
-    rows.tangents[0], rows.slopes[0] = tangent, slope
+    rows = Rows.empty(problem.system, 1, 2)
+    rows.joints[0], rows.w[0] = joints, w
+    rows.tangents[0], rows.directions[0] = tangent, slope
     why, _, _ = march_rows(problem, rows, -1, rows.point(0), 0, border, 0.0, 1.0, AT_EVENT)
     return None if why == BROKEN else rows.point(0)
 
 
-def first_curve_point(problem: Problem, orbit: Orbit) -> tuple[CurvePoint, FloatArray] | None:
+def first_curve_point(problem: Problem, orbit: Orbit) -> tuple[Point, FloatArray] | None:
     """Return the first point of a curve with its border, solved with one of the parameters fixed.
 
     Where an exit is tangential the orbit may move although neither parameter does: then the point is

@@ -10,20 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.continuation.events import Bifurcation, Kind
-from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS
+from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS, Point, Rows
 from contfric.curves.assembly import join_sides
 from contfric.curves.births import birth_among, birth_between
 from contfric.curves.curve import Curve
 from contfric.curves.going_on import Start, goes_on, is_continuum, prove
 from contfric.curves.locating import by_place, locate
 from contfric.curves.naming import crossings
-from contfric.curves.points import (
-    CHUNK,
-    CurvePoint,
-    CurveRows,
-    first_curve_point,
-    march_rows,
-)
+from contfric.curves.points import CHUNK, first_curve_point, march_rows
 from contfric.curves.problem import Problem, box_of, problem_of
 from contfric.curves.special import CurveEnd, CurveEndReason, SpecialPoint
 from contfric.errors import ConvergenceError, ParameterError, real_number, whole_number
@@ -61,14 +55,14 @@ class CurveSide:
     """
 
     problem: Problem
-    points: list[CurvePoint]
+    points: list[Point]
     border: FloatArray
     special: list[SpecialPoint] = field(default_factory=list)
     end: CurveEnd = field(default_factory=lambda: CurveEnd(CurveEndReason.POINTS))
     following: CurveSide | None = None
 
     @property
-    def tip(self) -> CurvePoint:
+    def tip(self) -> Point:
         """The last point."""
         return self.points[-1]
 
@@ -194,7 +188,7 @@ def _joints(problem: Problem, bifurcation: Bifurcation) -> FloatArray:
 
 def trace_curve_side(
     problem: Problem,
-    start: CurvePoint,
+    start: Point,
     border: FloatArray,
     largest: float,
     max_points: int,
@@ -232,7 +226,7 @@ def _went_to_its_end(side: CurveSide) -> bool:
 @remembered(finished=_went_to_its_end)
 def _trace_piece(
     problem: Problem,
-    start: CurvePoint,
+    start: Point,
     border: FloatArray,
     largest: float,
     max_points: int,
@@ -267,7 +261,7 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
         side.end = CurveEnd(CurveEndReason.POINTS)
         return True, step
     problem, last = side.problem, min(2, len(side.points))
-    rows = CurveRows.room_for(problem, last + min(CHUNK, most - len(side.points)))
+    rows = Rows.empty(problem.system, last + min(CHUNK, most - len(side.points)), 2)
     for k in range(last):
         rows.put(k, side.points[len(side.points) - last + k])
     border = side.border.copy()
@@ -282,7 +276,7 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
         side.points += fresh[:gone]
         side.end = CurveEnd(CurveEndReason.LOST)
         return True, step
-    limit = _first(problem.within_limits(rows.values[last : k + 1]) < 0.0)
+    limit = _first(problem.within_limits(rows.w[last : k + 1]) < 0.0)
     birth = birth_among(problem, [*side.points[-1:], *fresh]) if fresh else None
     if birth is not None and (limit is None or birth <= limit):
         return _end_at_birth(side, fresh, birth), step
@@ -313,12 +307,12 @@ def _first(flags: NDArray[np.bool_]) -> int | None:
     return int(places[0]) if len(places) else None
 
 
-def _beyond(problem: Problem, point: CurvePoint) -> float:
+def _beyond(problem: Problem, point: Point) -> float:
     """Return the least value of the model's constraints at a point."""
     return float(problem.within_limits(point.w[None, :])[0])
 
 
-def _end_at_birth(side: CurveSide, fresh: list[CurvePoint], at: int) -> bool:
+def _end_at_birth(side: CurveSide, fresh: list[Point], at: int) -> bool:
     """End a fold curve of asymmetric (doubled) orbits where they become symmetric (undoubled)."""
     side.points += fresh[:at]
     point, special = birth_between(side.problem, side.tip, fresh[at], side.border)
@@ -328,7 +322,7 @@ def _end_at_birth(side: CurveSide, fresh: list[CurvePoint], at: int) -> bool:
     return True
 
 
-def _end_at_limit(side: CurveSide, after: CurvePoint) -> bool:
+def _end_at_limit(side: CurveSide, after: Point) -> bool:
     """End a side where the model's parameters end."""
     problem = side.problem
     point, _ = locate(problem, side.tip, after, side.border, by_place(problem.limits))
@@ -338,12 +332,12 @@ def _end_at_limit(side: CurveSide, after: CurvePoint) -> bool:
     return True
 
 
-def _near_limit(problem: Problem, point: CurvePoint) -> CurveEnd | None:
+def _near_limit(problem: Problem, point: Point) -> CurveEnd | None:
     near = _beyond(problem, point) < _NEAR_LIMIT * float(np.min(problem.box.widths))
     return CurveEnd(CurveEndReason.LIMIT) if near else None
 
 
-def _resolve(side: CurveSide, after: CurvePoint, border: FloatArray) -> bool:
+def _resolve(side: CurveSide, after: Point, border: FloatArray) -> bool:
     """Locate what happened over the last step; True if the side ends there."""
     problem, before = side.problem, side.tip
     at_start = len(side.points) == 1
@@ -371,7 +365,7 @@ def _resolve(side: CurveSide, after: CurvePoint, border: FloatArray) -> bool:
     return False
 
 
-def _range_crossed(side: CurveSide, after: CurvePoint) -> CurvePoint | None:
+def _range_crossed(side: CurveSide, after: Point) -> Point | None:
     """Return the point on the edge of the box that the last step has crossed."""
     box, before = side.problem.box, side.tip
     if np.all(after.w >= box.low) and np.all(after.w <= box.high):

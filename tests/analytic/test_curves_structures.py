@@ -18,9 +18,9 @@ from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 
 import contfric as cf
-from contfric.continuation.points import Settings
+from contfric.continuation.points import Rows, Settings
 from contfric.continuation.switching import leave_branch_point
-from contfric.curves.points import CurveRows, first_curve_point, march_rows
+from contfric.curves.points import first_curve_point, march_rows
 from contfric.curves.trace import continue_bifurcation
 from tests.curve_check import miss
 
@@ -464,11 +464,11 @@ def tangent_miss(found: cf.Curve, index: int) -> float:
     start, border = first
     sides = []
     for point in (start, start.reversed()):  # a step of the same length to each side
-        rows = CurveRows.room_for(problem, 2)
+        rows = Rows.empty(problem.system, 2, 2)
         rows.put(0, point)
         _, last, _ = march_rows(problem, rows, 0, point, 0, border.copy(), 1e-4, 1e-4, 3e-13)
         assert last == 1
-        sides.append(np.concatenate([rows.joints[1].ravel(), rows.values[1]]))
+        sides.append(np.concatenate([rows.joints[1].ravel(), rows.w[1]]))
     chord = sides[0] - sides[1]
     tangent = np.concatenate([start.tangent.ravel(), start.slope])
     return float(np.max(np.abs(chord / np.linalg.norm(chord) - tangent / np.linalg.norm(tangent))))

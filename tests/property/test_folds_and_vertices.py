@@ -59,7 +59,15 @@ def point(value: float, multiplier: float) -> Point:
     """Return a point of which only parameter and multipliers matter."""
     nothing = np.zeros((2, 3))
     mu = np.array([multiplier, 0.0], dtype=np.complex128)
-    return Point(nothing, value, nothing, 0.0, np.zeros(4), np.zeros(0, dtype=np.int64), mu)
+    return Point(
+        nothing,
+        np.array([value]),
+        nothing,
+        np.zeros(1),
+        np.zeros(4),
+        np.zeros(0, dtype=np.int64),
+        mu,
+    )
 
 
 @pytest.mark.parametrize(
