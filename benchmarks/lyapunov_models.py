@@ -60,7 +60,7 @@ def many(call: Callable[[], Any]) -> float:
 def parts(model: cf.Model, vector: Any, motion: Trajectory) -> tuple[float, float, float]:
     """Return the mean time of a joint's hits, flow with derivatives and flow without, seconds."""
     table, n = tables(model), len(model.states)
-    room, jac = np.empty(n), np.empty((n, 2 + n))
+    workspace, jac = np.empty(n), np.empty((n, 2 + n))
     hits, full, plain = 0.0, 0.0, 0.0
     period = float(model.flow.period(vector, NONE, EMPTY))
     for k in range(len(motion) - JOINTS - 1, len(motion) - 1):
@@ -71,9 +71,9 @@ def parts(model: cf.Model, vector: Any, motion: Trajectory) -> tuple[float, floa
             model.flow.reset(int(motion.exits[k]), t, before, vector, NONE, y, NOTHING)
         for c in np.flatnonzero(table.bounds[mode]):
             level, on = float(model.flow.level(c, vector, NONE, EMPTY)), bool(c == motion.exits[k])
-            ask = (mode, int(table.observables[c]), level, on, t, y, 1.001 * d, vector, room)
+            ask = (mode, int(table.observables[c]), level, on, t, y, 1.001 * d, vector, workspace)
             hits += many(lambda ask=ask: model.flow.hit(*ask))
-        flow = (mode, t, y, d, vector, NONE, room)
+        flow = (mode, t, y, d, vector, NONE, workspace)
         full += many(lambda flow=flow: model.flow.flow(*flow, jac))
         plain += many(lambda flow=flow: model.flow.flow(*flow, NOTHING))
     return hits / JOINTS, full / JOINTS, plain / JOINTS

@@ -78,9 +78,9 @@ reset_signature = types.void(i8, f8, vector, vector, indices, vector, matrix)
 field_signature = reset_signature
 #: scale(i, p): natural size of state i.
 scale_signature = f8(i8, vector)
-#: second(mode, c, t, y, dt, p, which, direction, jac, room): derivative of flow's ``jac`` in a direction
+#: second(mode, c, t, y, dt, p, which, direction, jac, workspace): derivative of flow's ``jac`` in a direction
 #: (1 + n + 1) of (t0, y0, dt); with c >= 0 that of observable c's gradient in a direction of (t, y), in
-#: the first row of ``jac``. ``room`` holds 8 + n numbers. 0 where a flow has none.
+#: the first row of ``jac``. ``workspace`` holds 8 + n numbers. 0 where a flow has none.
 second_signature = i8(i8, i8, f8, vector, f8, vector, indices, vector, matrix, vector)
 
 #: How an entry point is compiled, and the files that numba caches it in.

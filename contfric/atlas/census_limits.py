@@ -9,7 +9,7 @@ from contfric.atlas.census_orbits import Catalogue
 from contfric.atlas.census_result import SectionSearch
 from contfric.signature.edits import show
 
-#: Orbits within this share of a box leave room for others outside of those found.
+#: Orbits within this share of a box leave workspace for others outside of those found.
 ROOM = 0.75
 
 

@@ -37,7 +37,7 @@ from contfric.orbit.system import IntArray
 from contfric.orbit.trajectory import (
     CARRIED,
     STARTED,
-    StateRoom,
+    StateWorkspace,
     TablesType,
     copy_state,
     follow,
@@ -54,8 +54,8 @@ _ON = 1e-14
 _TANGENT = 1e-12
 
 
-class SectionRoom(NamedTuple):
-    """Room for the conditions of a section: their residuals, gradients and normal equations."""
+class SectionWorkspace(NamedTuple):
+    """Workspace for the conditions of a section: their residuals, gradients and normal equations."""
 
     surfaces: IntArray
     residual: FloatArray
@@ -66,8 +66,8 @@ class SectionRoom(NamedTuple):
 
 
 @allocating_helper
-def section_room(lies_on, exit_, surfaces, n):  # type: ignore[no-untyped-def]
-    """Return the room for a section: the exit first, then the surfaces that the mode moves on."""
+def section_workspace(lies_on, exit_, surfaces, n):  # type: ignore[no-untyped-def]
+    """Return the workspace for a section: the exit first, then the surfaces that the mode moves on."""
     count = 1
     for k in range(surfaces):
         if (lies_on >> k) & 1 == 1 and k != exit_:
@@ -79,7 +79,7 @@ def section_room(lies_on, exit_, surfaces, n):  # type: ignore[no-untyped-def]
         if (lies_on >> k) & 1 == 1 and k != exit_:
             listed[at] = k
             at += 1
-    return SectionRoom(
+    return SectionWorkspace(
         listed,
         np.empty(count),
         np.empty((count, n)),
@@ -111,20 +111,20 @@ def solve_normal(normal):  # type: ignore[no-untyped-def]
 
 
 @helper
-def place(functions, tables, t, y, p, none, empty, room):  # type: ignore[no-untyped-def]
+def place(functions, tables, t, y, p, none, empty, workspace):  # type: ignore[no-untyped-def]
     """Move a state onto a section; whether it could be."""
-    residual, gradients, normal = room.residual, room.gradients, room.normal
+    residual, gradients, normal = workspace.residual, workspace.gradients, workspace.normal
     count, n = gradients.shape
     for _ in range(_MOST_STEPS):
         far = False
         for i in range(count):
-            surface = room.surfaces[i]
-            value = functions.observe(tables.observables[surface], t, y, p, none, room.grad)
+            surface = workspace.surfaces[i]
+            value = functions.observe(tables.observables[surface], t, y, p, none, workspace.grad)
             target = functions.level(surface, p, none, empty)
             residual[i] = value - target
             far = far or not abs(residual[i]) <= _ON * (1.0 + abs(target))
             for j in range(n):
-                gradients[i, j] = room.grad[1 + j]
+                gradients[i, j] = workspace.grad[1 + j]
         if not far:
             return True
         for i in range(count):
@@ -143,15 +143,15 @@ def place(functions, tables, t, y, p, none, empty, room):  # type: ignore[no-unt
 
 
 @helper
-def exit_rate(functions, tables, mode, t, y, p, none, state, room):  # type: ignore[no-untyped-def]
+def exit_rate(functions, tables, mode, t, y, p, none, state, workspace):  # type: ignore[no-untyped-def]
     """Return the rate of the exit's observable along the mode that ends."""
     at_once = t - t
-    functions.flow(mode, t, y, at_once, p, none, state, room.rate)
-    functions.observe(tables.observables[room.surfaces[0]], t, y, p, none, room.grad)
+    functions.flow(mode, t, y, at_once, p, none, state, workspace.rate)
+    functions.observe(tables.observables[workspace.surfaces[0]], t, y, p, none, workspace.grad)
     n = y.shape[0]
-    rate = room.grad[0]
+    rate = workspace.grad[0]
     for j in range(n):
-        rate += room.grad[1 + j] * room.rate[j, 1 + n]
+        rate += workspace.grad[1 + j] * workspace.rate[j, 1 + n]
     return rate
 
 
@@ -208,18 +208,20 @@ def sweep(  # type: ignore[no-untyped-def]
     count, n = starts.shape
     surfaces = tables.observables.shape[0]
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
-    state_room = StateRoom(none, empty, nothing, np.empty(n), np.empty(n))
-    room = section_room(tables.lies_on[mode], exit_, surfaces, n)
+    state_workspace = StateWorkspace(none, empty, nothing, np.empty(n), np.empty(n))
+    workspace = section_workspace(tables.lies_on[mode], exit_, surfaces, n)
     y, carry = np.empty(n), np.zeros(CARRIED)
     budget = _MOST_MET * (1 + joints.shape[1])
     total = 0
     for i in range(count):
         outcome[i, 0], outcome[i, 1], outcome[i, 2] = -1, -1, -1
         copy_state(starts[i], y)
-        if not place(functions, tables, times[i], y, p, none, empty, room):
+        if not place(functions, tables, times[i], y, p, none, empty, workspace):
             continue
         copy_state(y, starts[i])
-        rate = exit_rate(functions, tables, mode, times[i], y, p, none, state_room.after, room)
+        rate = exit_rate(
+            functions, tables, mode, times[i], y, p, none, state_workspace.after, workspace
+        )
         if not sense * rate > 0.0 or not math.isfinite(rate):
             continue
         code = sign_code(functions, tables.observables, exit_, times[i], y, p, none, empty)
@@ -240,7 +242,7 @@ def sweep(  # type: ignore[no-untyped-def]
             rows,
             carry,
             budget,
-            state_room,
+            state_workspace,
         )
         outcome[i, 0], outcome[i, 1], outcome[i, 2] = found[1], found[2], found[0]
         total += found[1]

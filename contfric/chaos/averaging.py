@@ -58,7 +58,7 @@ class Averages(NamedTuple):
 
 @allocating_helper
 def new_averages(n):  # type: ignore[no-untyped-def]
-    """Return the room for the averages of n directions."""
+    """Return the workspace for the averages of n directions."""
     return Averages(
         np.empty((BATCHES, n)),
         np.empty(BATCHES),

@@ -17,11 +17,11 @@ from numba import types
 from contfric.chaos.averaging import Averages, clear, gather, new_averages
 from contfric.chaos.cycle import (
     AT_A_POINT,
-    CycleRoom,
+    CycleWorkspace,
     Memory,
     doubt,
     forget,
-    new_cycle_room,
+    new_cycle_workspace,
     new_memory,
     returned,
     shortest,
@@ -49,13 +49,13 @@ from contfric.chaos.tangent import (
     orthonormalise,
     push,
     seed,
-    state_room,
+    state_workspace,
     to_joint,
 )
 from contfric.compiled import allocating_helper, f8, helper, i8, indices, kernel, matrix
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
-from contfric.orbit.trajectory import QUIET, StateRoom, TablesType
+from contfric.orbit.trajectory import QUIET, StateWorkspace, TablesType
 
 #: A separation that grew by this factor has grown from rounding to the size of the motion: the motion
 #: forgot where it started, which one that only settles never does.
@@ -66,52 +66,52 @@ LimitsType = types.NamedTuple([i8, i8, f8, i8], Limits)
 CellRowsType = types.NamedTuple([matrix, matrix, indices, indices, indices], CellRows)
 
 
-class Rooms(NamedTuple):
-    """All room that the cells of one call share."""
+class CellWorkspaces(NamedTuple):
+    """All workspace that the cells of one call share."""
 
     walk: Walk
-    state: StateRoom
+    state: StateWorkspace
     frame: FloatArray
     growth: FloatArray
     memory: Memory
     averages: Averages
-    cycle: CycleRoom
+    cycle: CycleWorkspace
 
 
 @allocating_helper
-def new_rooms(n):  # type: ignore[no-untyped-def]
-    """Return the room for motions of n states."""
-    return Rooms(
+def new_cell_workspaces(n):  # type: ignore[no-untyped-def]
+    """Return the workspace for motions of n states."""
+    return CellWorkspaces(
         new_walk(n),
-        state_room(n),
+        state_workspace(n),
         np.empty((n, n + 1)),
         np.empty(n),
         new_memory(n),
         new_averages(n),
-        new_cycle_room(n),
+        new_cycle_workspace(n),
     )
 
 
 @helper
-def start_code(functions, observables, t, y, p, room):  # type: ignore[no-untyped-def]
+def start_code(functions, observables, t, y, p, workspace):  # type: ignore[no-untyped-def]
     """Return the row of an initial state in the table of starts: the signs as digits."""
     code, place = 0, 1
     for k in range(observables.shape[0]):
-        value = functions.observe(observables[k], t, y, p, room.none, room.empty)
-        value -= functions.level(k, p, room.none, room.empty)
+        value = functions.observe(observables[k], t, y, p, workspace.none, workspace.empty)
+        value -= functions.level(k, p, workspace.none, workspace.empty)
         code += place * (1 if value == 0.0 else (2 if value > 0.0 else 0))
         place *= 3
     return code
 
 
 @helper
-def start_mode(functions, tables, starting, t, y, p, room):  # type: ignore[no-untyped-def]
+def start_mode(functions, tables, starting, t, y, p, workspace):  # type: ignore[no-untyped-def]
     """Return (mode, surfaces that it leaves as bits) of an initial state; (-1, 0) if it is in no domain.
 
     A state on surfaces that the signs alone do not decide goes to the side that its rates lead to.
     """
     observables, bounds = tables.observables, tables.bounds
-    code = start_code(functions, observables, t, y, p, room)
+    code = start_code(functions, observables, t, y, p, workspace)
     if starting.mode[code] >= 0:
         return starting.mode[code], starting.on[code]
     count = observables.shape[0]
@@ -132,7 +132,9 @@ def start_mode(functions, tables, starting, t, y, p, room):  # type: ignore[no-u
         for k in range(count):
             if rest % 3 == 1 and bounds[mode, k] != 0:
                 sense = 1.0 if (choice >> k) & 1 == 1 else -1.0
-                rate = functions.rate(mode, observables[k], t, y, p, room.none, room.empty)
+                rate = functions.rate(
+                    mode, observables[k], t, y, p, workspace.none, workspace.empty
+                )
                 fits = fits and sense * rate > 0.0
                 on |= 1 << k
             rest //= 3
@@ -143,18 +145,32 @@ def start_mode(functions, tables, starting, t, y, p, room):  # type: ignore[no-u
 
 @helper
 def try_cycle(  # type: ignore[no-untyped-def]
-    functions, tables, ranks, mode, on, key, t, joints, turns, p, period, rise, rooms, rows, cell
+    functions,
+    tables,
+    ranks,
+    mode,
+    on,
+    key,
+    t,
+    joints,
+    turns,
+    p,
+    period,
+    rise,
+    workspaces,
+    rows,
+    cell,
 ):
     """Solve for the cycle that the last joint seems to be on, and write what the motion is if it is."""
-    cycle, walk = rooms.cycle, rooms.walk
+    cycle, walk = workspaces.cycle, workspaces.walk
     n = walk.y.shape[0]
     cycle.z[0] = t
     for j in range(n):
         cycle.z[1 + j] = walk.y[j]
         for k in range(n + 1):
-            cycle.frame[j, k] = rooms.frame[j, k]
+            cycle.frame[j, k] = workspaces.frame[j, k]
     error = solve_cycle(
-        functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, rooms.state
+        functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, workspaces.state
     )
     if error == AT_A_POINT:
         for j in range(n):
@@ -162,7 +178,7 @@ def try_cycle(  # type: ignore[no-untyped-def]
         if write_equilibrium(functions, tables, ranks, mode, t, p, cycle.walk, cycle, rows, cell):
             return True
     if error < 0.0:
-        doubt(rooms.memory)
+        doubt(workspaces.memory)
         return False
     rows.motions[cell] = TRANSIENT if rise > _FORGOTTEN else PERIODIC
     for k in range(n):
@@ -171,13 +187,24 @@ def try_cycle(  # type: ignore[no-untyped-def]
     rows.turns[cell] = 1  # without excitation: a cycle
     if walk.at_once[1] & 1 == 0:
         rows.turns[cell] = shortest(
-            functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, rooms.state
+            functions,
+            tables,
+            ranks,
+            mode,
+            on,
+            key,
+            joints,
+            turns,
+            p,
+            period,
+            cycle,
+            workspaces.state,
         )
     return True
 
 
 @helper
-def carry_on(functions, tables, ranks, mode, on, t, p, period, live, rooms):  # type: ignore[no-untyped-def]
+def carry_on(functions, tables, ranks, mode, on, t, p, period, live, workspaces):  # type: ignore[no-untyped-def]
     """Go on to the next joint, and carry the frame there.
 
     Returns
@@ -185,71 +212,71 @@ def carry_on(functions, tables, ranks, mode, on, t, p, period, live, rooms):  # 
     tuple
         (outcome, surface, mode that follows, duration, periods completed, phase, directions left).
     """
-    walk, room = rooms.walk, rooms.state
+    walk, workspace = workspaces.walk, workspaces.state
     outcome, surface, following, duration, turns, t = to_joint(
-        functions, tables, mode, on, t, p, period, walk, room
+        functions, tables, mode, on, t, p, period, walk, workspace
     )
     if outcome == ARRIVED:
         observable = tables.observables[surface]
-        rate = differentiate(functions, observable, mode, duration, t, p, walk, room.none)
+        rate = differentiate(functions, observable, mode, duration, t, p, walk, workspace.none)
         live = min(live, ranks[mode])
-        push(rooms.frame, live, rate, walk.jac, walk.grad, walk.image)
-        if not orthonormalise(rooms.frame, live, rooms.growth):
+        push(workspaces.frame, live, rate, walk.jac, walk.grad, walk.image)
+        if not orthonormalise(workspaces.frame, live, workspaces.growth):
             outcome = BROKEN
     return outcome, surface, following, duration, turns, t, live
 
 
 @helper
-def carry_behind(functions, tables, ranks, mode, on, t, p, period, live, rooms):  # type: ignore[no-untyped-def]
+def carry_behind(functions, tables, ranks, mode, on, t, p, period, live, workspaces):  # type: ignore[no-untyped-def]
     """Do the same where there are resets or no excitation (apart: it would cost all others a tenth)."""
-    walk, room = rooms.walk, rooms.state
+    walk, workspace = workspaces.walk, workspaces.state
     outcome, surface, following, duration, turns, t = to_joint(
-        functions, tables, mode, on, t, p, period, walk, room
+        functions, tables, mode, on, t, p, period, walk, workspace
     )
     if outcome == ARRIVED:
         observable = tables.observables[surface]
-        rate = differentiate(functions, observable, mode, duration, t, p, walk, room.none)
+        rate = differentiate(functions, observable, mode, duration, t, p, walk, workspace.none)
         live = min(live, ranks[mode])
-        push(rooms.frame, live, rate, walk.jac, walk.grad, walk.image)
+        push(workspaces.frame, live, rate, walk.jac, walk.grad, walk.image)
         reset = tables.bounds[mode, surface] == 2
         if reset or walk.at_once[1] & 1 != 0:
-            behind(functions, surface, t, p, rooms.frame, live, walk, room, reset)
-        if not orthonormalise(rooms.frame, live, rooms.growth):
+            behind(functions, surface, t, p, workspaces.frame, live, walk, workspace, reset)
+        if not orthonormalise(workspaces.frame, live, workspaces.growth):
             outcome = BROKEN
     return outcome, surface, following, duration, turns, t, live
 
 
 @helper
 def follow_cell(  # type: ignore[no-untyped-def]
-    functions, tables, ranks, mode, on, t, p, period, limits, stop, rooms, rows, cell
+    functions, tables, ranks, mode, on, t, p, period, limits, stop, workspaces, rows, cell
 ):
-    """Follow one motion from ``rooms.walk.y`` and write what it is and its exponents."""
-    walk, growth, averages = rooms.walk, rooms.growth, rooms.averages
+    """Follow one motion from ``workspaces.walk.y`` and write what it is and its exponents."""
+    walk, growth, averages = workspaces.walk, workspaces.growth, workspaces.averages
     surfaces, n = tables.observables.shape[0], growth.shape[0]
     live, cycle, joint, walk.at_once[0], walk.at_once[2] = n, 0, 0, 0, 0
     total, lowest, rise = 0.0, 0.0, 0.0
     averaging, done, end = limits.transient == 0, False, limits.periods
-    seed(rooms.frame, 0)
-    forget(rooms.memory)
+    seed(workspaces.frame, 0)
+    forget(workspaces.memory)
     clear(averages)
     while not (done and cycle >= end):
         if stop[0] != 0:
             break
         if walk.at_once[1] == 0:
             outcome, surface, following, duration, turns, t, live = carry_on(
-                functions, tables, ranks, mode, on, t, p, period, live, rooms
+                functions, tables, ranks, mode, on, t, p, period, live, workspaces
             )
         else:
             outcome, surface, following, duration, turns, t, live = carry_behind(
-                functions, tables, ranks, mode, on, t, p, period, live, rooms
+                functions, tables, ranks, mode, on, t, p, period, live, workspaces
             )
         if outcome == QUIET:
-            room = rooms.cycle
-            write_quiet(functions, tables, ranks, mode, t, p, period, walk, room, rows, cell)
+            workspace = workspaces.cycle
+            write_quiet(functions, tables, ranks, mode, t, p, period, walk, workspace, rows, cell)
             break
         if outcome != ARRIVED:
-            room = rooms.cycle
-            write_end(functions, outcome, ranks, mode, t, p, period, walk, room, rows, cell)
+            workspace = workspaces.cycle
+            write_end(functions, outcome, ranks, mode, t, p, period, walk, workspace, rows, cell)
             break
         total += growth[0] if live > 0 else 0.0
         lowest = min(lowest, total)
@@ -258,7 +285,7 @@ def follow_cell(  # type: ignore[no-untyped-def]
         mode, joint, cycle = following, joint + 1, cycle + turns
         key = mode * surfaces + surface
         timeless = walk.at_once[1] & 1 != 0
-        joints, lag = returned(rooms.memory, key, cycle, joint, t, walk.y, period, timeless)
+        joints, lag = returned(workspaces.memory, key, cycle, joint, t, walk.y, period, timeless)
         if joints > 0 and try_cycle(
             functions,
             tables,
@@ -272,7 +299,7 @@ def follow_cell(  # type: ignore[no-untyped-def]
             p,
             period,
             rise,
-            rooms,
+            workspaces,
             rows,
             cell,
         ):
@@ -285,7 +312,7 @@ def follow_cell(  # type: ignore[no-untyped-def]
                 averaging, done, end = False, True, cycle + limits.confirm
         elif not done and cycle >= limits.transient:
             averaging, end = True, cycle + limits.periods
-            seed(rooms.frame, live)  # what only the transient forgot counts again
+            seed(workspaces.frame, live)  # what only the transient forgot counts again
             live = n
     rows.followed[cell] = cycle
 
@@ -312,7 +339,7 @@ def follow_cells(functions, tables, starting, time, vectors, states, limits, sto
     stop : another thread writes a 1 to it when nobody waits for the rows any more
     """
     n = states.shape[1]
-    rooms = new_rooms(n)
+    workspaces = new_cell_workspaces(n)
     walls = 0
     for k in range(tables.observables.shape[0]):
         walls = 1 if tables.bounds[0, k] == 2 else walls
@@ -321,19 +348,25 @@ def follow_cells(functions, tables, starting, time, vectors, states, limits, sto
             break
         p = vectors[cell]
         for j in range(n):
-            rooms.walk.y[j] = states[cell, j]
+            workspaces.walk.y[j] = states[cell, j]
         rows.turns[cell], rows.followed[cell] = 0, 0
-        period = functions.period(p, rooms.state.none, rooms.state.empty)
+        period = functions.period(p, workspaces.state.none, workspaces.state.empty)
         timeless = period <= 0.0
-        rooms.walk.at_once[1] = rooms.cycle.walk.at_once[1] = 2 * walls + (1 if timeless else 0)
+        workspaces.walk.at_once[1] = workspaces.cycle.walk.at_once[1] = 2 * walls + (
+            1 if timeless else 0
+        )
         if timeless:
             period = 1.0  # periods are units of time
-        mode, on = start_mode(functions, tables, starting, time, rooms.walk.y, p, rooms.state)
+        mode, on = start_mode(
+            functions, tables, starting, time, workspaces.walk.y, p, workspaces.state
+        )
         if mode < 0:
-            ranks, cycle = starting.ranks, rooms.cycle
+            ranks, cycle = starting.ranks, workspaces.cycle
             if not (
                 timeless
-                and starts_at_rest(functions, tables, ranks, time, p, rooms.walk, cycle, rows, cell)
+                and starts_at_rest(
+                    functions, tables, ranks, time, p, workspaces.walk, cycle, rows, cell
+                )
             ):
                 write_nothing(NO_MOTION, rows, cell)
             continue
@@ -349,7 +382,7 @@ def follow_cells(functions, tables, starting, time, vectors, states, limits, sto
             period,
             limits,
             stop,
-            rooms,
+            workspaces,
             rows,
             cell,
         )

@@ -80,8 +80,8 @@ class Memory(NamedTuple):
     near: FloatArray
 
 
-class CycleRoom(NamedTuple):
-    """Room for a cycle: its own walk, its joint z, frames, and the algebra of a matrix."""
+class CycleWorkspace(NamedTuple):
+    """Workspace for a cycle: its own walk, its joint z, frames, and the algebra of a matrix."""
 
     walk: Walk
     z: FloatArray
@@ -100,7 +100,7 @@ class CycleRoom(NamedTuple):
 
 @allocating_helper
 def new_memory(n):  # type: ignore[no-untyped-def]
-    """Return room for the joints that are remembered."""
+    """Return workspace for the joints that are remembered."""
     return Memory(
         np.empty(_MEMORIES, dtype=np.int64),
         np.empty(_MEMORIES, dtype=np.int64),
@@ -112,10 +112,10 @@ def new_memory(n):  # type: ignore[no-untyped-def]
 
 
 @allocating_helper
-def new_cycle_room(n):  # type: ignore[no-untyped-def]
-    """Return room for a cycle of n states."""
+def new_cycle_workspace(n):  # type: ignore[no-untyped-def]
+    """Return workspace for a cycle of n states."""
     m = n + 1
-    return CycleRoom(
+    return CycleWorkspace(
         new_walk(n),
         np.empty(m),
         np.empty((m, m)),
@@ -185,7 +185,7 @@ def doubt(memory):  # type: ignore[no-untyped-def]
 
 
 @helper
-def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, room):  # type: ignore[no-untyped-def]
+def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, workspace):  # type: ignore[no-untyped-def]
     """Walk ``joints`` segments from the joint ``cycle.z`` with the tangent map.
 
     Returns
@@ -211,19 +211,19 @@ def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, room)
     key = -1
     for _ in range(joints):
         outcome, surface, following, duration, more, t = to_joint(
-            functions, tables, mode, on, t, p, period, walk, room
+            functions, tables, mode, on, t, p, period, walk, workspace
         )
         if outcome != ARRIVED:
             return -1, rank, turns, t, lasted
         observable = tables.observables[surface]
-        rate = differentiate(functions, observable, mode, duration, t, p, walk, room.none)
+        rate = differentiate(functions, observable, mode, duration, t, p, walk, workspace.none)
         rank = min(rank, ranks[mode])
         push(images, n + 1, rate, walk.jac, walk.grad, walk.image)
         push(frame, rank, rate, walk.jac, walk.grad, walk.image)
         reset = tables.bounds[mode, surface] == 2
         if reset or walk.at_once[1] & 1 != 0:
-            behind(functions, surface, t, p, images, n + 1, walk, room, reset)
-            behind(functions, surface, t, p, frame, rank, walk, room, reset)
+            behind(functions, surface, t, p, images, n + 1, walk, workspace, reset)
+            behind(functions, surface, t, p, frame, rank, walk, workspace, reset)
         lasted += duration
         if not orthonormalise(frame, rank, cycle.growth):
             return -1, rank, turns, t, lasted
@@ -275,18 +275,20 @@ def cycle_rates(cycle, rank, time):  # type: ignore[no-untyped-def]
 
 
 @helper
-def stands_still(functions, mode, p, cycle, room):  # type: ignore[no-untyped-def]
+def stands_still(functions, mode, p, cycle, workspace):  # type: ignore[no-untyped-def]
     """Tell whether hardly anything moves at the joint ``cycle.z``: a motion shrinks to an equilibrium."""
     walk, z, still = cycle.walk, cycle.z, True
     n = walk.y.shape[0]
-    functions.flow(mode, z[0], z[1:], 0.0, p, room.none, walk.end, walk.jac)
+    functions.flow(mode, z[0], z[1:], 0.0, p, workspace.none, walk.end, walk.jac)
     for j in range(n):
         still = still and abs(walk.jac[j, 1 + n]) <= _SLOW * (1.0 + abs(z[1 + j]))
     return still
 
 
 @helper
-def solve_cycle(functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, room):  # type: ignore[no-untyped-def]
+def solve_cycle(  # type: ignore[no-untyped-def]
+    functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, workspace
+):
     """Solve for the cycle through the joint ``cycle.z``.
 
     Returns
@@ -300,10 +302,10 @@ def solve_cycle(functions, tables, ranks, mode, on, key, joints, turns, p, perio
     before, moved, rate_before = np.inf, 0.0, 0.0
     sensitivity, amplified = 0.0, 0.0
     for step in range(_PASSES):
-        if timeless and stands_still(functions, mode, p, cycle, room):
+        if timeless and stands_still(functions, mode, p, cycle, workspace):
             return AT_A_POINT
         last, rank, done, t, lasted = go_round(
-            functions, tables, ranks, mode, on, joints, p, period, cycle, room
+            functions, tables, ranks, mode, on, joints, p, period, cycle, workspace
         )
         if last != key:
             return -1.0
@@ -336,13 +338,13 @@ def solve_cycle(functions, tables, ranks, mode, on, key, joints, turns, p, perio
 
 
 @helper
-def shortest(functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, room):  # type: ignore[no-untyped-def]
+def shortest(functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, workspace):  # type: ignore[no-untyped-def]
     """Return the period of the cycle through ``cycle.z``, which may close before its end."""
     for parts in range(turns, 1, -1):
         if turns % parts != 0 or joints % parts != 0:
             continue
         last, _, done, t, _ = go_round(
-            functions, tables, ranks, mode, on, joints // parts, p, period, cycle, room
+            functions, tables, ranks, mode, on, joints // parts, p, period, cycle, workspace
         )
         gap = abs(t + (done - turns // parts) * period - cycle.z[0])
         for j in range(cycle.walk.y.shape[0]):

@@ -139,7 +139,7 @@ def write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, c
     if not rows.exponents[cell, 0] <= _ATTRACTS:
         return False
     rows.motions[cell] = AT_REST
-    for k in range(n):  # kept, as the room of the other modes is the row itself
+    for k in range(n):  # kept, as the workspace of the other modes is the row itself
         cycle.rates[k] = rows.exponents[cell, k]
     smooth = True
     for other in range(ranks.shape[0]):

@@ -48,7 +48,7 @@ from contfric.orbit.trajectory import (
     QUIET,
     SLIDE_PERIODS,
     TOO_LARGE,
-    StateRoom,
+    StateWorkspace,
     copy_state,
     first_hit,
     sign_code,
@@ -71,7 +71,7 @@ class Walk(NamedTuple):
     ----------
     y, start : state, and start (t, y) of the segment, shapes (n,) and (1 + n,)
     jac, grad : derivatives of the segment's flow and of the observable at its end
-    end, image : room for a state and for the image of a perturbation, shape (n,)
+    end, image : workspace for a state and for the image of a perturbation, shape (n,)
     at_once : number of events in a row that followed each other at once; 1 if the model is autonomous,
         plus 2 if it has resets; whether there was an impact among those events; shape (3,)
     """
@@ -87,7 +87,7 @@ class Walk(NamedTuple):
 
 @allocating_helper
 def new_walk(n):  # type: ignore[no-untyped-def]
-    """Return the room for a walk of n states."""
+    """Return the workspace for a walk of n states."""
     return Walk(
         np.empty(n),
         np.empty(1 + n),
@@ -100,14 +100,14 @@ def new_walk(n):  # type: ignore[no-untyped-def]
 
 
 @allocating_helper
-def state_room(n):  # type: ignore[no-untyped-def]
-    """Return the room that the search of first hits needs."""
+def state_workspace(n):  # type: ignore[no-untyped-def]
+    """Return the workspace that the search of first hits needs."""
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
-    return StateRoom(none, empty, nothing, np.empty(n), np.empty(n))
+    return StateWorkspace(none, empty, nothing, np.empty(n), np.empty(n))
 
 
 @helper
-def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ignore[no-untyped-def]
+def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # type: ignore[no-untyped-def]
     """Go on to the next joint; a surface that is only touched is passed.
 
     Returns
@@ -123,11 +123,11 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
     at_most = NO_FLIGHT if walk.at_once[1] & 2 != 0 else NO_TIME
     longest = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * period
     while True:
-        tau, surface = first_hit(functions, tables, mode, on, t, y, p, longest, period, room)
+        tau, surface = first_hit(functions, tables, mode, on, t, y, p, longest, period, workspace)
         if surface < 0:
             held = tables.sliding[mode] != 0
             return HELD if held else QUIET, surface, mode, duration, turns, t
-        copy_state(room.after, y)
+        copy_state(workspace.after, y)
         t, duration = t + tau, duration + tau
         more, t = whole_turns(t, period)
         turns += more
@@ -135,7 +135,7 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
             if not abs(y[j]) < TOO_LARGE:
                 why = CHATTER  # flights too short to be resolved
                 if walk.at_once[2] == 0:
-                    why = too_large(functions, mode, duration, p, walk, room)
+                    why = too_large(functions, mode, duration, p, walk, workspace)
                 return why, surface, mode, duration, turns, t
         reset = tables.bounds[mode, surface] == 2
         walk.at_once[0] = walk.at_once[0] + 1 if tau <= at_most * period else 0
@@ -144,8 +144,8 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
         if walk.at_once[0] > MOST_AT_ONCE:
             return CHATTER if struck else IMPOSSIBLE, surface, mode, duration, turns, t
         if reset:  # the state before it stays where the hit has left it
-            functions.reset(surface, t, room.after, p, room.none, y, room.nothing)
-        code = sign_code(functions, observables, surface, t, y, p, room.none, room.empty)
+            functions.reset(surface, t, workspace.after, p, workspace.none, y, workspace.nothing)
+        code = sign_code(functions, observables, surface, t, y, p, workspace.none, workspace.empty)
         count = observables.shape[0]
         following = tables.following[(mode * count + surface) * (1 << count) + code]
         if following >= 0:
@@ -156,7 +156,7 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, room):  # type: ig
 
 
 @helper
-def too_large(functions, mode, duration, p, walk, room):  # type: ignore[no-untyped-def]
+def too_large(functions, mode, duration, p, walk, workspace):  # type: ignore[no-untyped-def]
     """Tell a motion that grew beyond all numbers, also in a finite time, from one that breaks off."""
     y, start, size = walk.y, walk.start, 0.0
     for j in range(y.shape[0]):
@@ -167,7 +167,9 @@ def too_large(functions, mode, duration, p, walk, room):  # type: ignore[no-unty
     for _ in range(_HALVINGS):
         middle, finite, here = 0.5 * (low + high), True, 0.0
         time = middle * duration
-        functions.flow(mode, start[0], start[1:], time, p, room.none, walk.end, room.nothing)
+        functions.flow(
+            mode, start[0], start[1:], time, p, workspace.none, walk.end, workspace.nothing
+        )
         for j in range(y.shape[0]):
             finite = finite and abs(walk.end[j]) < TOO_LARGE
             here = max(here, abs(walk.end[j]))
@@ -193,10 +195,10 @@ def differentiate(functions, observable, mode, duration, t, p, walk, none):  # t
 
 
 @helper
-def behind(functions, surface, t, p, frame, count, walk, room, reset):  # type: ignore[no-untyped-def]
+def behind(functions, surface, t, p, frame, count, walk, workspace, reset):  # type: ignore[no-untyped-def]
     """Carry the first rows of a frame behind a joint: over its reset, and without time if there is none."""
     if reset:
-        functions.reset(surface, t, room.after, p, room.none, walk.end, walk.jac)
+        functions.reset(surface, t, workspace.after, p, workspace.none, walk.end, walk.jac)
         leap(frame, count, walk.jac, walk.image)
     if walk.at_once[1] & 1 != 0:
         for i in range(count):

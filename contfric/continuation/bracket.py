@@ -31,7 +31,7 @@ from contfric.continuation.steps import (
     Along,
     correct_branch,
     observe_branch,
-    step_room,
+    step_workspace,
 )
 from contfric.flow.layouts import FlowType
 from contfric.orbit.equations import LayoutType, close_chain
@@ -99,22 +99,22 @@ def next_trial(low, high, f_low, f_high, x_old, f_old, x, closest):  # type: ign
 
 
 @helper
-def margin_value(functions, layout, index, z, p, room):  # type: ignore[no-untyped-def]
+def margin_value(functions, layout, index, z, p, workspace):  # type: ignore[no-untyped-def]
     """Return one margin of a settled point."""
-    value = plain_margin(functions, layout, index, z, p, room)
+    value = plain_margin(functions, layout, index, z, p, workspace)
     for k in range(layout.doubles.shape[0]):
         if layout.doubles[k, 0] == index:
-            return regular_margin(layout, k, z, room.equations, value)
+            return regular_margin(layout, k, z, workspace.equations, value)
     return value
 
 
 @helper
-def plain_margin(functions, layout, index, z, p, room):  # type: ignore[no-untyped-def]
+def plain_margin(functions, layout, index, z, p, workspace):  # type: ignore[no-untyped-def]
     """Return one margin as it is, with its double zero if it has one."""
     first, count = layout.interior.shape[0], z.shape[0]
     if index < first:
         i, c = layout.interior[index, 0], layout.observables[layout.interior[index, 1]]
-        equations, turnings = room.equations, room.turnings
+        equations, turnings = workspace.equations, workspace.turnings
         if layout.departs[i] < RETURNS:
             found = find_behind(functions, layout, i, c, z, p, equations, turnings)
         else:
@@ -122,15 +122,15 @@ def plain_margin(functions, layout, index, z, p, room):  # type: ignore[no-untyp
         return interior_margin(functions, layout, index, found, z, p, equations, turnings)
     if index < first + count:
         sign = layout.exit_signs[index - first]
-        return sign * room.equations.rates[index - first] if sign != 0.0 else np.inf
+        return sign * workspace.equations.rates[index - first] if sign != 0.0 else np.inf
     index -= first + count
     if index < layout.joint.shape[0]:
-        return joint_margin(functions, layout, index, z, p, room.equations)
+        return joint_margin(functions, layout, index, z, p, workspace.equations)
     index -= layout.joint.shape[0]
     if index < layout.lasting.shape[0]:
-        return lasting_margin(layout, index, z, room.equations)
+        return lasting_margin(layout, index, z, workspace.equations)
     index -= layout.lasting.shape[0]
-    return held_margin(functions, layout, index, z, p, room.equations, room.turnings)
+    return held_margin(functions, layout, index, z, p, workspace.equations, workspace.turnings)
 
 
 class Sought(NamedTuple):
@@ -151,24 +151,28 @@ class Sought(NamedTuple):
 @helper
 def watched_value(way, sought, points, row):  # type: ignore[no-untyped-def]
     """Return the value that is sought, at a corrected point."""
-    layout, room, functions, p = way.layout, way.room, way.functions, way.p
+    layout, workspace, functions, p = way.layout, way.workspace, way.functions, way.p
     z, w, mu = points[0][row], points[1][row, 0], points[7][row]
     margins, index = count_margins(layout), sought.number
     if sought.kind == BY_PARAMETER:
         return w - sought.target
     if sought.kind == BY_LABEL:
-        code, nearest = crossings(functions, layout, index, z, p, room.equations, room.turnings)
+        code, nearest = crossings(
+            functions, layout, index, z, p, workspace.equations, workspace.turnings
+        )
         # the distance of the nearest stationary point to a surface vanishes where the label changes;
         # elsewhere a joint may lie on a surface
         return nearest if code == int(sought.target) else -max(nearest, 1e-300)
     if index < margins:
         way.counts[CHECKS] += 1
-        return margin_value(functions, layout, index, z, p, room)
+        return margin_value(functions, layout, index, z, p, workspace)
     column = index - margins - layout.labels.shape[0]
     if column == FOLD:
         return points[3][row, 0]
     way.counts[MULTIPLIERS] += 1
-    one, minus = multipliers(layout.rank, room.pencil, room.equations.close, mu, room.spectral)
+    one, minus = multipliers(
+        layout.rank, workspace.pencil, workspace.equations.close, mu, workspace.spectral
+    )
     if column == CHI_ONE:
         return one
     return minus if column == CHI_MINUS else 1.0 - abs(mu[0]) * abs(mu[1])
@@ -188,7 +192,7 @@ def values_at_ends(way, sought, points):  # type: ignore[no-untyped-def]
         return tests[0, sought.number], tests[1, sought.number]
     if sought.kind == BY_PARAMETER:
         return ws[0, 0] - sought.target, ws[1, 0] - sought.target
-    equations = way.room.equations
+    equations = way.workspace.equations
     way.p[way.which[0]] = ws[0, 0]
     close_chain(way.functions, way.layout, points[0][0], way.p, equations.none, equations)
     first = watched_value(way, sought, points, 0)
@@ -316,8 +320,8 @@ def locate(  # type: ignore[no-untyped-def]
         position of the last good point if it is Newton that fails behind it.
     """
     zs, ws, tzs, tws, arc, tests, labels, mu = points
-    room = step_room(zs.shape[1], zs.shape[2], p.shape[0])
-    way = Along(functions, layout, p.copy(), which, scale, stability, counts, room)
+    workspace = step_workspace(zs.shape[1], zs.shape[2], p.shape[0])
+    way = Along(functions, layout, p.copy(), which, scale, stability, counts, workspace)
     sought, margins = Sought(kind, index, target), count_margins(layout)
     ends = values_at_ends(way, sought, points)
     # margins and distances are positive before the event, the others have the sign that they have
@@ -338,6 +342,6 @@ def locate(  # type: ignore[no-untyped-def]
     if not fine:
         return -1.0
     way.p[which[0]] = ws[3, 0]
-    close_chain(functions, layout, zs[3], way.p, room.equations.none, room.equations)
+    close_chain(functions, layout, zs[3], way.p, workspace.equations.none, workspace.equations)
     observe_branch(way, zs[3], ws[3], tws[3], tests[3], labels[3], mu[3])
     return -2.0 - best if lost else best

@@ -146,16 +146,16 @@ def returned(z, w, start_z, start_w, last_z, last_w, scale, step):  # type: igno
 
 
 @helper
-def anchor(room, z, p, which, tz, tw, scale):  # type: ignore[no-untyped-def]
+def anchor(workspace, z, p, which, tz, tw, scale):  # type: ignore[no-untyped-def]
     """Set the first border row: the plane normal to a tangent through the point (z, p)."""
     count = tz.shape[0]
     for i in range(count):
         for j in range(tz.shape[1]):
-            room.d[0, i, j] = tz[i, j] / count
-            room.z_ref[i, j] = z[i, j]
+            workspace.d[0, i, j] = tz[i, j] / count
+            workspace.z_ref[i, j] = z[i, j]
     for k in range(which.shape[0]):
-        room.e[0, k] = tw[k] * scale[k]
-    copy_vector(room.p_ref, p)
+        workspace.e[0, k] = tw[k] * scale[k]
+    copy_vector(workspace.p_ref, p)
 
 
 @helper

@@ -41,7 +41,7 @@ from contfric.continuation.steps import (
     correct_branch,
     dips,
     observe_branch,
-    step_room,
+    step_workspace,
 )
 from contfric.flow.layouts import FlowType
 from contfric.orbit.equations import LayoutType
@@ -213,8 +213,8 @@ def march(  # type: ignore[no-untyped-def]
         (why it stopped, index of the last row written, next step).
     """
     zs = points[0]
-    room = step_room(zs.shape[1], zs.shape[2], p.shape[0])
-    way = Along(functions, layout, p.copy(), which, 1.0 / box[2] ** 2, stability, counts, room)
+    workspace = step_workspace(zs.shape[1], zs.shape[2], p.shape[0])
+    way = Along(functions, layout, p.copy(), which, 1.0 / box[2] ** 2, stability, counts, workspace)
     integrated = layout.rounding > INTEGRATED
     accuracy = ON_THE_WAY if integrated and k >= 0 else ALONG
     guess = np.empty((zs.shape[1], zs.shape[2])), np.empty(1)

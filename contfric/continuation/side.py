@@ -59,8 +59,10 @@ class Columns:
         for name, new in rows.items():
             array = self.arrays.setdefault(name, np.empty((0, *new.shape[1:]), new.dtype))
             if stop > len(array):
-                room = stop if not self.count else max(stop, self.count + self.count // _GROWTH)
-                array.resize((room, *new.shape[1:]), refcheck=False)
+                workspace = (
+                    stop if not self.count else max(stop, self.count + self.count // _GROWTH)
+                )
+                array.resize((workspace, *new.shape[1:]), refcheck=False)
             array[self.count : stop] = new
         self.count = stop
 
@@ -227,7 +229,7 @@ class Side:
 
 
 def march_options(settings: Settings, step: float, largest: float = np.inf) -> FloatArray:
-    """Return the numbers that steer the march, with room for a single point in its budget."""
+    """Return the numbers that steer the march, with space for a single point in its budget."""
     largest = min(largest, settings.largest)
     return np.array([min(step, largest), largest, SMALLEST_STEP, _GIVES_WAY, 1.0, 0.0])
 

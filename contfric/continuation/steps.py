@@ -10,9 +10,9 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.continuation.geometry import anchor, take_tangent
 from contfric.models.definition import FloatArray
-from contfric.orbit.cyclic import Elimination, room_for
-from contfric.orbit.equations import Room, close_chain, equation_room
-from contfric.orbit.monitor import Turnings, turning_room, watch
+from contfric.orbit.cyclic import Elimination, elimination_workspace
+from contfric.orbit.equations import EquationWorkspace, close_chain, equation_workspace
+from contfric.orbit.monitor import Turnings, stationary_workspace, watch
 from contfric.orbit.newton import (
     CHECKS,
     CONVERGED,
@@ -22,7 +22,7 @@ from contfric.orbit.newton import (
     correcting,
     normal_to_tangent,
 )
-from contfric.orbit.spectrum import SpectralRoom, multipliers, spectral_room
+from contfric.orbit.spectrum import SpectralWorkspace, multipliers, spectral_workspace
 from contfric.orbit.system import IntArray
 
 #: Extra columns of the tests behind the margins and the distances of the labels: slope of the
@@ -37,12 +37,12 @@ AT_EVENT = 3e-15
 _SURE = 0.2
 
 
-class StepRoom(NamedTuple):
-    """Room for the steps of one branch: all that a corrector and the watch need, allocated once."""
+class StepWorkspace(NamedTuple):
+    """Workspace for the steps of one branch: all that a corrector and the watch need, allocated once."""
 
-    equations: Room
+    equations: EquationWorkspace
     elimination: Elimination
-    spectral: SpectralRoom
+    spectral: SpectralWorkspace
     turnings: Turnings
     pencil: FloatArray
     d: FloatArray
@@ -53,14 +53,14 @@ class StepRoom(NamedTuple):
 
 
 @allocating_helper
-def step_room(count, m, parameters):  # type: ignore[no-untyped-def]
-    """Return the room for the branch of a chain."""
+def step_workspace(count, m, parameters):  # type: ignore[no-untyped-def]
+    """Return the workspace for the branch of a chain."""
     free = max(1 - count, 1)  # one parameter, but no literal
-    return StepRoom(
-        equation_room(count, m, free),
-        room_for(count, m, free, free + free),
-        spectral_room(m),
-        turning_room(),
+    return StepWorkspace(
+        equation_workspace(count, m, free),
+        elimination_workspace(count, m, free, free + free),
+        spectral_workspace(m),
+        stationary_workspace(),
         np.empty((2, m, m)),
         np.empty((1, count, m)),
         np.empty((1, 1)),
@@ -79,7 +79,7 @@ class Along(NamedTuple):
     p : parameters, those that are free overwritten
     which, scale : indices of the free parameters, and their weights in the scaled product
     stability : whether multipliers are evaluated
-    counts, room : what is counted, and what is allocated once
+    counts, workspace : what is counted, and what is allocated once
     """
 
     functions: Any
@@ -89,7 +89,7 @@ class Along(NamedTuple):
     scale: FloatArray
     stability: bool
     counts: IntArray
-    room: StepRoom
+    workspace: StepWorkspace
 
 
 _correct = correcting(normal_to_tangent)
@@ -98,27 +98,31 @@ _correct = correcting(normal_to_tangent)
 @helper
 def correct_branch(way, z, w, tz, tw, accuracy):  # type: ignore[no-untyped-def]
     """Correct (z, w) normal to the tangent (tz, tw), and replace the tangent; (converged, all is finite)."""
-    functions, layout, p, room = way.functions, way.layout, way.p, way.room
+    functions, layout, p, workspace = way.functions, way.layout, way.p, way.workspace
     p[way.which[0]] = w[0]
-    anchor(room, z, p, way.which, tz, tw, way.scale)
+    anchor(workspace, z, p, way.which, tz, tw, way.scale)
     way.counts[SOLVES] += 1
-    status, _, _, _ = _correct(functions, layout, z, p, way.which, np.inf, accuracy, 0.0, room, 0)
+    status, _, _, _ = _correct(
+        functions, layout, z, p, way.which, np.inf, accuracy, 0.0, workspace, 0
+    )
     w[0] = p[way.which[0]]
     if status != CONVERGED:
         return False, status != NOT_FINITE
-    if not take_tangent(room.elimination, tz, tw, way.scale):
+    if not take_tangent(workspace.elimination, tz, tw, way.scale):
         return False, False
-    close_chain(functions, layout, z, p, room.equations.none, room.equations)
+    close_chain(functions, layout, z, p, workspace.equations.none, workspace.equations)
     return True, True
 
 
 @helper
 def observe_branch(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped-def]
     """Fill everything that is watched on a corrected point; False if something is not finite."""
-    room, layout = way.room, way.layout
+    workspace, layout = way.workspace, way.layout
     way.p[way.which[0]] = w[0]
     way.counts[CHECKS] += 1
-    finite = watch(way.functions, layout, z, way.p, room.equations, room.turnings, tests, labels)
+    finite = watch(
+        way.functions, layout, z, way.p, workspace.equations, workspace.turnings, tests, labels
+    )
     at = tests.shape[0] - EXTRA
     tests[at + FOLD] = tw[0]
     tests[at + CHI_ONE] = 1.0
@@ -127,7 +131,7 @@ def observe_branch(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped
     if way.stability:
         way.counts[MULTIPLIERS] += 1
         tests[at + CHI_ONE], tests[at + CHI_MINUS] = multipliers(
-            layout.rank, room.pencil, room.equations.close, mu, room.spectral
+            layout.rank, workspace.pencil, workspace.equations.close, mu, workspace.spectral
         )
         if layout.rank > 1:
             tests[at + CHI_PAIR] = 1.0 - abs(mu[0]) * abs(mu[1])

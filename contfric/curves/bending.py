@@ -67,9 +67,9 @@ def bend_flow(  # type: ignore[no-untyped-def]
 
 
 @helper
-def bend_mean_rate(functions, layout, i, start, duration, p, which, along, room):  # type: ignore[no-untyped-def]
+def bend_mean_rate(functions, layout, i, start, duration, p, which, along, workspace):  # type: ignore[no-untyped-def]
     """Write the derivative of a divided exit row in a direction of (t, y, duration)."""
-    bordered, equations, rows = room.bordered, room.equations, room.elimination.rows
+    bordered, equations, rows = workspace.bordered, workspace.equations, workspace.elimination.rows
     m, free, step = start.shape[0], which.shape[0], bordered.difference[0]
     bordered.difference[1] = 1.0
     row, displaced, out = 2 * m - 1, bordered.start, bordered.divided

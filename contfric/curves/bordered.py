@@ -36,7 +36,14 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.curves.bending import DIFFERENCE, bend_flow, bend_mean_rate, bend_observable
 from contfric.models.definition import FloatArray
-from contfric.orbit.cyclic import Elimination, finish, next_rows, room_for, start_border, take_out
+from contfric.orbit.cyclic import (
+    Elimination,
+    elimination_workspace,
+    finish,
+    next_rows,
+    start_border,
+    take_out,
+)
 from contfric.orbit.equations import is_divided, segment_rows
 
 #: Step of the third derivatives along a null vector of size 1: with Richardson's extrapolation its error
@@ -44,8 +51,8 @@ from contfric.orbit.equations import is_divided, segment_rows
 _THIRD = 2e-3
 
 
-class BorderedRoom(NamedTuple):
-    """Room for the bordered solves of one chain; allocated once.
+class BorderedWorkspace(NamedTuple):
+    """Workspace for the bordered solves of one chain; allocated once.
 
     Attributes
     ----------
@@ -84,16 +91,16 @@ class BorderedRoom(NamedTuple):
 
 
 @allocating_helper
-def bordered_room(count, m, free):  # type: ignore[no-untyped-def]
-    """Return the room for chains of ``count`` segments and ``free`` parameters."""
+def bordered_workspace(count, m, free):  # type: ignore[no-untyped-def]
+    """Return the workspace for chains of ``count`` segments and ``free`` parameters."""
     one = max(1 - count, 1)  # 1, but no literal
-    return BorderedRoom(
+    return BorderedWorkspace(
         np.empty((count, m, m)),
         np.empty((count, m, m)),
         np.empty((count, m)),
         np.empty((count, m)),
         np.empty((count, m)),
-        room_for(count, m, one, one),
+        elimination_workspace(count, m, one, one),
         np.empty((1, count, m)),
         np.empty((1, 1)),
         np.empty((1, 1)),
@@ -112,13 +119,15 @@ def bordered_room(count, m, free):  # type: ignore[no-untyped-def]
 
 
 @helper
-def fill_blocks(functions, layout, z, p, which, room):  # type: ignore[no-untyped-def]
+def fill_blocks(functions, layout, z, p, which, workspace):  # type: ignore[no-untyped-def]
     """Write the blocks of the Jacobian on both joints of each segment."""
     count, m = z.shape
-    rows, bordered = room.elimination.rows, room.bordered
+    rows, bordered = workspace.elimination.rows, workspace.bordered
     for i in range(count):
-        after = z[i + 1] if i + 1 < count else room.equations.last
-        worst = segment_rows(functions, layout, i, m, z[i], after, p, which, room.equations, rows)
+        after = z[i + 1] if i + 1 < count else workspace.equations.last
+        worst = segment_rows(
+            functions, layout, i, m, z[i], after, p, which, workspace.equations, rows
+        )
         if worst == np.inf:
             return False
         for j in range(m):
@@ -130,7 +139,7 @@ def fill_blocks(functions, layout, z, p, which, room):  # type: ignore[no-untype
 
 @helper
 def chain_solve(bordered, sign, column, rhs, transposed, close, pencil):  # type: ignore[no-untyped-def]
-    """Solve the chain (its transpose) with one border row, which is in d, e, s of the room.
+    """Solve the chain (its transpose) with one border row, which is in d, e, s of the workspace.
 
     ``column`` stands beside the rows, shape (N, m); ``rhs`` on their right-hand sides. False if singular.
     """
@@ -180,22 +189,22 @@ def set_border(bordered, row, corner, value):  # type: ignore[no-untyped-def]
 
 
 @helper
-def null_vectors(border, sign, room):  # type: ignore[no-untyped-def]
+def null_vectors(border, sign, workspace):  # type: ignore[no-untyped-def]
     """Fill v and u from the blocks; return g, NaN where even the bordered matrix is singular."""
-    bordered = room.bordered
-    v, u, close = bordered.v, bordered.u, room.equations.close
+    bordered = workspace.bordered
+    v, u, close = bordered.v, bordered.u, workspace.equations.close
     count, m = v.shape
     bordered.even[:, :] = 0.0
     set_border(bordered, border[1], 0.0, 1.0)
     plain, turned = count < 0, count > 0  # flags, but no literals
-    if not chain_solve(bordered, sign, border[0], bordered.even, plain, close, room.pencil):
+    if not chain_solve(bordered, sign, border[0], bordered.even, plain, close, workspace.pencil):
         return np.nan
     for i in range(count):
         for j in range(m):
             v[i, j] = bordered.work.z[i, j, 0]
     g = bordered.work.w[0, 0]
     set_border(bordered, border[0], 0.0, 1.0)
-    if not chain_solve(bordered, sign, border[1], bordered.even, turned, close, room.pencil):
+    if not chain_solve(bordered, sign, border[1], bordered.even, turned, close, workspace.pencil):
         return np.nan
     for i in range(count):
         for j in range(m):
@@ -226,10 +235,10 @@ def end_of(vectors, i, sign, close, j):  # type: ignore[no-untyped-def]
 
 
 @helper
-def add_curvature(functions, second, layout, i, sign, z, p, which, room):  # type: ignore[no-untyped-def]
+def add_curvature(functions, second, layout, i, sign, z, p, which, workspace):  # type: ignore[no-untyped-def]
     """Add what segment i contributes to the gradient ``-u^T dJ v``."""
     from_ = z[i]
-    bordered, equations = room.bordered, room.equations
+    bordered, equations = workspace.bordered, workspace.equations
     count, m = z.shape
     n, free = m - 1, which.shape[0]
     after = z[i + 1] if i + 1 < count else equations.last
@@ -242,7 +251,7 @@ def add_curvature(functions, second, layout, i, sign, z, p, which, room):  # typ
     )
     divided = is_divided(layout, i, lasts)
     if divided:
-        bend_mean_rate(functions, layout, i, from_, lasts, p, which, along, room)
+        bend_mean_rate(functions, layout, i, from_, lasts, p, which, along, workspace)
     for k in range(grad.shape[0]):
         grad[k] = 0.0
     for k in range(2 + n + free):
@@ -252,20 +261,20 @@ def add_curvature(functions, second, layout, i, sign, z, p, which, room):  # typ
         if divided:
             value -= u[i, n] * bordered.divided[k]
         if k == 0:
-            room.d[1, i, 0] += value
+            workspace.d[1, i, 0] += value
         elif k < 1 + n:
-            room.d[1, i, k] += value
+            workspace.d[1, i, k] += value
         elif k == 1 + n:
-            room.d[1, i, 0] -= value
+            workspace.d[1, i, 0] -= value
             grad[0] += value
         else:
             grad[m + k - 2 - n] += value
     if divided:
-        spread_end(grad, i, room)
+        spread_end(grad, i, workspace)
         return
     for j in range(m):
         along[j] = end_of(bordered.v, i, sign, equations.close, j)
-    flow_part = bordered.other  # the gradient so far: differences use the room's gradient
+    flow_part = bordered.other  # the gradient so far: differences use the workspace's gradient
     flow_part[0] = grad[0]
     params = bordered.plus[0]
     for k in range(free):
@@ -278,13 +287,18 @@ def add_curvature(functions, second, layout, i, sign, z, p, which, room):  # typ
         grad[k] = (flow_part[0] if k == 0 else 0.0) - u[i, n] * bordered.bent[0, k]
     for k in range(free):
         grad[m + k] = params[k] - u[i, n] * bordered.bent[0, m + k]
-    spread_end(grad, i, room)
+    spread_end(grad, i, workspace)
 
 
 @helper
-def spread_end(grad, i, room):  # type: ignore[no-untyped-def]
+def spread_end(grad, i, workspace):  # type: ignore[no-untyped-def]
     """Add a gradient with respect to the end of segment i and the parameters to the second border row."""
-    d, e, close, close_w = room.d, room.e, room.equations.close, room.equations.close_w
+    d, e, close, close_w = (
+        workspace.d,
+        workspace.e,
+        workspace.equations.close,
+        workspace.equations.close_w,
+    )
     count, m = d.shape[1], d.shape[2]
     free = e.shape[1]
     for j in range(m):
@@ -300,13 +314,13 @@ def spread_end(grad, i, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def spectral_value(functions, second, layout, sign, z, p, which, border, room):  # type: ignore[no-untyped-def]
+def spectral_value(functions, second, layout, sign, z, p, which, border, workspace):  # type: ignore[no-untyped-def]
     """Return g, with its gradient in the second border row (cleared before)."""
-    if not fill_blocks(functions, layout, z, p, which, room):
+    if not fill_blocks(functions, layout, z, p, which, workspace):
         return np.nan
-    g = null_vectors(border, sign, room)
+    g = null_vectors(border, sign, workspace)
     if not math.isfinite(g):
         return np.nan
     for i in range(z.shape[0]):
-        add_curvature(functions, second, layout, i, sign, z, p, which, room)
+        add_curvature(functions, second, layout, i, sign, z, p, which, workspace)
     return g

@@ -14,7 +14,7 @@ from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, v
 from contfric.continuation.bracket import BY_LABEL, BY_PARAMETER, BY_TEST, bracketing
 from contfric.continuation.geometry import RowsType
 from contfric.continuation.steps import AT_EVENT
-from contfric.curves.conditions import ConditionType, curve_room
+from contfric.curves.conditions import ConditionType, curve_workspace
 from contfric.curves.correct import AlongCurve, correct_curve, observe_curve
 from contfric.flow.layouts import FlowType, SecondType
 from contfric.models.definition import FloatArray
@@ -121,9 +121,9 @@ def locate_on_curve(  # type: ignore[no-untyped-def]
     tuple
         (1 if it is bracketed to its last digits, 0 if not, -1 if no trial was solved; the value there).
     """
-    room = curve_room(points[0].shape[1], points[0].shape[2], p.shape[0])
+    workspace = curve_workspace(points[0].shape[1], points[0].shape[2], p.shape[0])
     way = AlongCurve(
-        functions, second, layout, condition, border, p.copy(), which, scale, counts, room
+        functions, second, layout, condition, border, p.copy(), which, scale, counts, workspace
     )
     sought = SoughtOnCurve(kind, index, target, planes)
     ends = value_of(sought, points, 0), value_of(sought, points, 1)

@@ -25,12 +25,17 @@ from numba import types
 
 from contfric.compiled import allocating_helper, f8, helper, i8, indices
 from contfric.curves.bending import segment_jacobian
-from contfric.curves.bordered import BorderedRoom, bordered_room, spectral_value, spread_end
+from contfric.curves.bordered import (
+    BorderedWorkspace,
+    bordered_workspace,
+    spectral_value,
+    spread_end,
+)
 from contfric.models.definition import FloatArray
-from contfric.orbit.cyclic import Elimination, room_for
-from contfric.orbit.equations import Room, equation_room, leap
-from contfric.orbit.monitor import Turnings, find_behind, find_turnings, turning_room
-from contfric.orbit.spectrum import SpectralRoom, spectral_room
+from contfric.orbit.cyclic import Elimination, elimination_workspace
+from contfric.orbit.equations import EquationWorkspace, equation_workspace, leap
+from contfric.orbit.monitor import Turnings, find_behind, find_turnings, stationary_workspace
+from contfric.orbit.spectrum import SpectralWorkspace, spectral_workspace
 from contfric.orbit.system import RETURNS, IntArray
 
 JOINT, START, EXIT, INTERIOR, SPECTRAL = range(5)
@@ -60,17 +65,17 @@ class Condition(NamedTuple):
 ConditionType = types.NamedTuple([i8, i8, i8, f8, i8, indices, indices], Condition)
 
 
-class CurveRoom(NamedTuple):
-    """Room for the points of one curve: all that corrector and watch need, allocated once.
+class CurveWorkspace(NamedTuple):
+    """Workspace for the points of one curve: all that corrector and watch need, allocated once.
 
     ``d`` and ``e`` are border rows on joints and parameters: arclength, and the condition's gradient.
     """
 
-    equations: Room
+    equations: EquationWorkspace
     elimination: Elimination
-    spectral: SpectralRoom
+    spectral: SpectralWorkspace
     turnings: Turnings
-    bordered: BorderedRoom
+    bordered: BorderedWorkspace
     pencil: FloatArray
     d: FloatArray
     e: FloatArray
@@ -80,15 +85,15 @@ class CurveRoom(NamedTuple):
 
 
 @allocating_helper
-def curve_room(count, m, parameters):  # type: ignore[no-untyped-def]
-    """Return the room for a curve of chains of ``count`` segments."""
+def curve_workspace(count, m, parameters):  # type: ignore[no-untyped-def]
+    """Return the workspace for a curve of chains of ``count`` segments."""
     free = max(2 - count, 2)  # two parameters, but no literal
-    return CurveRoom(
-        equation_room(count, m, free),
-        room_for(count, m, free, free),
-        spectral_room(m),
-        turning_room(),
-        bordered_room(count, m, free),
+    return CurveWorkspace(
+        equation_workspace(count, m, free),
+        elimination_workspace(count, m, free, free),
+        spectral_workspace(m),
+        stationary_workspace(),
+        bordered_workspace(count, m, free),
         np.empty((2, m, m)),
         np.empty((2, count, m)),
         np.empty((2, 2)),
@@ -99,9 +104,9 @@ def curve_room(count, m, parameters):  # type: ignore[no-untyped-def]
 
 
 @helper
-def interior_value(functions, layout, condition, z, p, which, room):  # type: ignore[no-untyped-def]
+def interior_value(functions, layout, condition, z, p, which, workspace):  # type: ignore[no-untyped-def]
     """Return the stationary value nearest to the level; NaN if the segment has none."""
-    equations, turnings = room.equations, room.turnings
+    equations, turnings = workspace.equations, workspace.turnings
     i, surface = condition.segment, condition.surface
     c, n = layout.observables[surface], z.shape[1] - 1
     level_grad, grad, jac = equations.level_grad, equations.grad, equations.jac
@@ -119,67 +124,69 @@ def interior_value(functions, layout, condition, z, p, which, room):  # type: ig
     time, state = turnings.times[best], equations.state
     segment_jacobian(functions, layout, i, z[i], time, p, which, jac, equations)
     value = functions.observe(c, z[i, 0] + time, state, p, which, grad) - target
-    room.d[1, i, 0] += grad[0]
+    workspace.d[1, i, 0] += grad[0]
     for a in range(n):
         for k in range(1 + n):
-            room.d[1, i, k] += grad[1 + a] * jac[a, k]
+            workspace.d[1, i, k] += grad[1 + a] * jac[a, k]
         for k in range(which.shape[0]):
-            room.e[1, k] += grad[1 + a] * jac[a, 2 + n + k]
+            workspace.e[1, k] += grad[1 + a] * jac[a, 2 + n + k]
     for k in range(which.shape[0]):
-        room.e[1, k] += grad[1 + n + k] - level_grad[k]
+        workspace.e[1, k] += grad[1 + n + k] - level_grad[k]
     return value
 
 
 @helper
-def start_condition(functions, layout, i, c, target, z, p, which, room):  # type: ignore[no-untyped-def]
+def start_condition(functions, layout, i, c, target, z, p, which, workspace):  # type: ignore[no-untyped-def]
     """Return an observable less a level where segment i begins, and add the gradient to the border row."""
-    equations = room.equations
+    equations = workspace.equations
     grad, behind = equations.grad, equations.behind
     n = z.shape[1] - 1
     if layout.departs[i] >= RETURNS:
         value = functions.observe(c, z[i, 0], z[i, 1:], p, which, grad) - target
         for j in range(1 + n):
-            room.d[1, i, j] += grad[j]
+            workspace.d[1, i, j] += grad[j]
     else:
         leap(functions, layout, i, z[i], p, which, equations)
         value = functions.observe(c, z[i, 0], behind[n, :n], p, which, grad) - target
-        room.d[1, i, 0] += grad[0]
+        workspace.d[1, i, 0] += grad[0]
         for a in range(n):
             for j in range(1 + n):
-                room.d[1, i, j] += grad[1 + a] * behind[a, j]
+                workspace.d[1, i, j] += grad[1 + a] * behind[a, j]
             for k in range(which.shape[0]):
-                room.e[1, k] += grad[1 + a] * behind[a, 1 + n + k]
+                workspace.e[1, k] += grad[1 + a] * behind[a, 1 + n + k]
     for k in range(which.shape[0]):
-        room.e[1, k] += grad[1 + n + k]
+        workspace.e[1, k] += grad[1 + n + k]
     return value
 
 
 @helper
-def condition_value(functions, second, layout, condition, z, p, which, border, room):  # type: ignore[no-untyped-def]
+def condition_value(functions, second, layout, condition, z, p, which, border, workspace):  # type: ignore[no-untyped-def]
     """Return what vanishes along the curve, and write its gradient to the second border row.
 
-    The closure of the chain is in ``room``.
+    The closure of the chain is in ``workspace``.
     """
-    room.d[1, :, :] = 0.0
-    room.e[1, :] = 0.0
+    workspace.d[1, :, :] = 0.0
+    workspace.e[1, :] = 0.0
     if condition.kind == SPECTRAL:
-        return spectral_value(functions, second, layout, condition.sign, z, p, which, border, room)
+        return spectral_value(
+            functions, second, layout, condition.sign, z, p, which, border, workspace
+        )
     if condition.kind == INTERIOR:
-        return interior_value(functions, layout, condition, z, p, which, room)
-    equations = room.equations
+        return interior_value(functions, layout, condition, z, p, which, workspace)
+    equations = workspace.equations
     i, surface, grad = condition.segment, condition.surface, equations.grad
     c = layout.observables[surface]
     after = z[i + 1] if i + 1 < z.shape[0] else equations.last
     if condition.kind == EXIT:
         value = functions.rate(layout.modes[i], c, after[0], after[1:], p, which, grad)
-        spread_end(grad, i, room)
+        spread_end(grad, i, workspace)
         return value
     level_grad = equations.level_grad
     target = functions.level(surface, p, which, level_grad)
     for k in range(which.shape[0]):
-        room.e[1, k] -= level_grad[k]
+        workspace.e[1, k] -= level_grad[k]
     if condition.kind == JOINT:
         value = functions.observe(c, after[0], after[1:], p, which, grad) - target
-        spread_end(grad, i, room)
+        spread_end(grad, i, workspace)
         return value
-    return start_condition(functions, layout, i, c, target, z, p, which, room)
+    return start_condition(functions, layout, i, c, target, z, p, which, workspace)

@@ -14,7 +14,7 @@ from contfric.compiled import helper
 from contfric.continuation.geometry import anchor, copy_to, copy_vector, take_tangent
 from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, EXTRA
 from contfric.curves.bending import DIFFERENCE
-from contfric.curves.conditions import EXIT, JOINT, SPECTRAL, CurveRoom, condition_value
+from contfric.curves.conditions import EXIT, JOINT, SPECTRAL, CurveWorkspace, condition_value
 from contfric.curves.normal_form import cubic_coefficient
 from contfric.models.definition import FloatArray
 from contfric.orbit.equations import close_chain
@@ -51,7 +51,7 @@ class AlongCurve(NamedTuple):
         the null vectors
     p : parameters, those that are free overwritten
     which, scale : indices of the free parameters, and their weights in the scaled product
-    counts, room : what is counted, and what is allocated once
+    counts, workspace : what is counted, and what is allocated once
     """
 
     functions: Any
@@ -63,15 +63,17 @@ class AlongCurve(NamedTuple):
     which: IntArray
     scale: FloatArray
     counts: IntArray
-    room: CurveRoom
+    workspace: CurveWorkspace
 
 
 @helper
-def normal_and_condition(functions, layout, z, p, which, room, way):  # type: ignore[no-untyped-def]
+def normal_and_condition(functions, layout, z, p, which, workspace, way):  # type: ignore[no-untyped-def]
     """Border a curve with the plane normal to its tangent, and with its condition."""
-    condition, s = way.condition, room.s
-    value = condition_value(functions, way.second, layout, condition, z, p, which, way.border, room)
-    s[0, 0], s[0, 1] = -off_normal(room, z, p, which), 1.0
+    condition, s = way.condition, workspace.s
+    value = condition_value(
+        functions, way.second, layout, condition, z, p, which, way.border, workspace
+    )
+    s[0, 0], s[0, 1] = -off_normal(workspace, z, p, which), 1.0
     s[1, 0], s[1, 1] = -value, 0.0
     return value, condition.segment if condition.kind == EXIT else -1
 
@@ -86,18 +88,26 @@ def correct_curve(way, z, w, tz, tw, accuracy):  # type: ignore[no-untyped-def]
     Where it fails with second derivatives by differences it is tried again with shorter ones: beside a touch
     of a kink the first derivatives change within less than the difference.
     """
-    functions, layout, p, which, room = way.functions, way.layout, way.p, way.which, way.room
+    functions, layout, p, which, workspace = (
+        way.functions,
+        way.layout,
+        way.p,
+        way.which,
+        way.workspace,
+    )
     for k in range(which.shape[0]):
         p[which[k]] = w[k]
-    anchor(room, z, p, which, tz, tw, way.scale)
+    anchor(workspace, z, p, which, tz, tw, way.scale)
     way.counts[SOLVES] += 1
-    difference, status = room.bordered.difference, NOT_FINITE
+    difference, status = workspace.bordered.difference, NOT_FINITE
     for attempt in range(_ATTEMPTS):
         difference[0], difference[1] = DIFFERENCE * _SHORTER**attempt, 0.0
         if attempt > 0:
-            copy_to(z, room.z_ref)
-            copy_vector(p, room.p_ref)
-        status, _, _, _ = _correct(functions, layout, z, p, which, np.inf, accuracy, 0.0, room, way)
+            copy_to(z, workspace.z_ref)
+            copy_vector(p, workspace.p_ref)
+        status, _, _, _ = _correct(
+            functions, layout, z, p, which, np.inf, accuracy, 0.0, workspace, way
+        )
         if status == CONVERGED or difference[1] == 0.0:
             break
     difference[0] = DIFFERENCE
@@ -105,8 +115,8 @@ def correct_curve(way, z, w, tz, tw, accuracy):  # type: ignore[no-untyped-def]
         w[k] = p[which[k]]
     if status != CONVERGED:
         return False, status != NOT_FINITE
-    close_chain(functions, layout, z, p, which, room.equations)
-    fine = take_tangent(room.elimination, tz, tw, way.scale)
+    close_chain(functions, layout, z, p, which, workspace.equations)
+    fine = take_tangent(workspace.elimination, tz, tw, way.scale)
     return fine, fine
 
 
@@ -114,13 +124,13 @@ def correct_curve(way, z, w, tz, tw, accuracy):  # type: ignore[no-untyped-def]
 def accept_curve(way):  # type: ignore[no-untyped-def]
     """Let the border follow the null vectors of a point that is accepted."""
     if way.condition.kind == SPECTRAL:
-        follow_border(way.border, way.room)
+        follow_border(way.border, way.workspace)
 
 
 @helper
-def follow_border(border, room):  # type: ignore[no-untyped-def]
+def follow_border(border, workspace):  # type: ignore[no-untyped-def]
     """Make the null vectors of the last point the border of the next one."""
-    bordered = room.bordered
+    bordered = workspace.bordered
     count, m = bordered.v.shape
     for side in range(2):
         source = bordered.u if side == 0 else bordered.v
@@ -135,18 +145,18 @@ def follow_border(border, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def bend_value(functions, second, layout, condition, z, p, which, room):  # type: ignore[no-untyped-def]
+def bend_value(functions, second, layout, condition, z, p, which, workspace):  # type: ignore[no-untyped-def]
     """Return the coefficient or rate whose zero is a point of codimension two; 1 if there is none."""
     if condition.kind == SPECTRAL and condition.sign < 0.0:
-        return cubic_coefficient(functions, second, layout, condition.sign, z, p, which, room)
+        return cubic_coefficient(functions, second, layout, condition.sign, z, p, which, workspace)
     if condition.kind == SPECTRAL:
-        bordered, value = room.bordered, 0.0
+        bordered, value = workspace.bordered, 0.0
         for i in range(z.shape[0]):
             for j in range(z.shape[1]):
-                value += room.d[1, i, j] * bordered.v[i, j]
+                value += workspace.d[1, i, j] * bordered.v[i, j]
         return value
     if condition.kind == JOINT and condition.rest >= 0:
-        i, equations = condition.segment, room.equations
+        i, equations = condition.segment, workspace.equations
         after = z[i + 1] if i + 1 < z.shape[0] else equations.last
         c = layout.observables[condition.surface]
         return functions.rate(
@@ -156,10 +166,14 @@ def bend_value(functions, second, layout, condition, z, p, which, room):  # type
 
 
 @helper
-def other_touches(functions, layout, row, z, p, room):  # type: ignore[no-untyped-def]
+def other_touches(functions, layout, row, z, p, workspace):  # type: ignore[no-untyped-def]
     """Return an interior margin without the one stationary point that lies on the surface."""
     i, surface = layout.interior[row, 0], layout.interior[row, 1]
-    sign, turnings, equations = float(layout.interior[row, 2]), room.turnings, room.equations
+    sign, turnings, equations = (
+        float(layout.interior[row, 2]),
+        workspace.turnings,
+        workspace.equations,
+    )
     c = layout.observables[surface]
     if layout.departs[i] < RETURNS:
         found = find_behind(functions, layout, i, c, z, p, equations, turnings)
@@ -181,19 +195,19 @@ def other_touches(functions, layout, row, z, p, room):  # type: ignore[no-untype
 def observe_curve(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped-def]
     """Fill everything that is watched on a corrected point; False if something is not finite."""
     functions, second, layout, condition = way.functions, way.second, way.layout, way.condition
-    p, which, room = way.p, way.which, way.room
+    p, which, workspace = way.p, way.which, way.workspace
     way.counts[CHECKS] += 1
     way.counts[MULTIPLIERS] += 1
-    equations = room.equations
+    equations = workspace.equations
     at = tests.shape[0] - EXTRA
-    one, minus = multipliers(layout.rank, room.pencil, equations.close, mu, room.spectral)
-    tests[at + BEND] = bend_value(functions, second, layout, condition, z, p, which, room)
-    finite = watch(functions, layout, z, p, equations, room.turnings, tests, labels)
+    one, minus = multipliers(layout.rank, workspace.pencil, equations.close, mu, workspace.spectral)
+    tests[at + BEND] = bend_value(functions, second, layout, condition, z, p, which, workspace)
+    finite = watch(functions, layout, z, p, equations, workspace.turnings, tests, labels)
     for k in range(condition.pinned.shape[0]):
         row = condition.pinned[k]
         tests[row] = 1.0
         if row < layout.interior.shape[0]:
-            tests[row] = other_touches(functions, layout, row, z, p, room)
+            tests[row] = other_touches(functions, layout, row, z, p, workspace)
     distances = at - labels.shape[0]
     for k in range(condition.quiet.shape[0]):
         labels[condition.quiet[k]] = 0

@@ -12,7 +12,7 @@ from numba import types
 from contfric.compiled import blocks, f8, i8, indices, kernel, matrix, vector
 from contfric.continuation.geometry import RowsType
 from contfric.continuation.march import marching
-from contfric.curves.conditions import ConditionType, curve_room
+from contfric.curves.conditions import ConditionType, curve_workspace
 from contfric.curves.correct import AlongCurve, accept_curve, correct_curve, observe_curve
 from contfric.flow.layouts import FlowType, SecondType
 from contfric.orbit.equations import LayoutType
@@ -76,9 +76,9 @@ def march_curve(  # type: ignore[no-untyped-def]
         (why it stopped, index of the last row written, next step).
     """
     zs, scale = points[0], 1.0 / box[2] ** 2
-    room = curve_room(zs.shape[1], zs.shape[2], p.shape[0])
+    workspace = curve_workspace(zs.shape[1], zs.shape[2], p.shape[0])
     way = AlongCurve(
-        functions, second, layout, condition, border, p.copy(), which, scale, counts, room
+        functions, second, layout, condition, border, p.copy(), which, scale, counts, workspace
     )
     guess = np.empty((zs.shape[1], zs.shape[2])), np.empty(2)
     return _march_points(

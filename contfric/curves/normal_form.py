@@ -37,13 +37,26 @@ from contfric.orbit.equations import is_divided
 
 @helper
 def second_order(  # type: ignore[no-untyped-def]
-    functions, second, layout, i, start, after, p, which, sign, others, twist, divided, room, out
+    functions,
+    second,
+    layout,
+    i,
+    start,
+    after,
+    p,
+    which,
+    sign,
+    others,
+    twist,
+    divided,
+    workspace,
+    out,
 ):
     """Write F_i,zz v w (m numbers); w is ``others``, closed by ``twist``.
 
     ``divided`` says whether the exit row is divided by the duration: that of the orbit, beside it as well.
     """
-    bordered, equations = room.bordered, room.equations
+    bordered, equations = workspace.bordered, workspace.equations
     m = start.shape[0]
     n, close, along, other = m - 1, equations.close, bordered.along, bordered.other
     segment_direction(bordered.v, i, sign, close, along)
@@ -58,7 +71,7 @@ def second_order(  # type: ignore[no-untyped-def]
             out[j] += bent[j, k] * other[k]
     out[n] = 0.0
     if divided:
-        bend_mean_rate(functions, layout, i, start, lasts, p, which, along, room)
+        bend_mean_rate(functions, layout, i, start, lasts, p, which, along, workspace)
         for k in range(1 + m):
             out[n] += bordered.divided[k] * other[k]
         return
@@ -73,20 +86,20 @@ def second_order(  # type: ignore[no-untyped-def]
 
 
 @helper
-def divides_exit(layout, i, z, room):  # type: ignore[no-untyped-def]
+def divides_exit(layout, i, z, workspace):  # type: ignore[no-untyped-def]
     """Tell whether the exit row of segment i of an orbit is divided by its duration."""
-    after = z[i + 1] if i + 1 < z.shape[0] else room.equations.last
+    after = z[i + 1] if i + 1 < z.shape[0] else workspace.equations.last
     return is_divided(layout, i, after[0] - z[i, 0])
 
 
 @helper
-def third_order(functions, second, layout, i, z, p, which, sign, room, out):  # type: ignore[no-untyped-def]
+def third_order(functions, second, layout, i, z, p, which, sign, workspace, out):  # type: ignore[no-untyped-def]
     """Return ``u_i^T F_i,zzz v v v``."""
-    bordered, close = room.bordered, room.equations.close
+    bordered, close = workspace.bordered, workspace.equations.close
     v, u = bordered.v, bordered.u
     count, m = z.shape
-    start, after = room.z_ref[i], bordered.after
-    divided = divides_exit(layout, i, z, room)
+    start, after = workspace.z_ref[i], bordered.after
+    divided = divides_exit(layout, i, z, workspace)
     slopes = 0.0
     for level in range(2):
         step = _THIRD if level == 0 else 0.5 * _THIRD
@@ -94,7 +107,7 @@ def third_order(functions, second, layout, i, z, p, which, sign, room, out):  # 
         for side in range(2):
             h = step if side == 0 else -step
             for j in range(m):
-                end = z[i + 1, j] if i + 1 < count else room.equations.last[j]
+                end = z[i + 1, j] if i + 1 < count else workspace.equations.last[j]
                 start[j] = z[i, j] + h * v[i, j]
                 after[j] = end + h * end_of(v, i, sign, close, j)
             second_order(
@@ -110,7 +123,7 @@ def third_order(functions, second, layout, i, z, p, which, sign, room, out):  # 
                 v,
                 sign,
                 divided,
-                room,
+                workspace,
                 out,
             )
             for j in range(m):
@@ -119,32 +132,47 @@ def third_order(functions, second, layout, i, z, p, which, sign, room, out):  # 
 
 
 @helper
-def cubic_coefficient(functions, second, layout, sign, z, p, which, room):  # type: ignore[no-untyped-def]
-    """Return b; the blocks of the Jacobian and the null vectors are in the room."""
-    bordered, equations = room.bordered, room.equations
+def cubic_coefficient(functions, second, layout, sign, z, p, which, workspace):  # type: ignore[no-untyped-def]
+    """Return b; the blocks of the Jacobian and the null vectors are in the workspace."""
+    bordered, equations = workspace.bordered, workspace.equations
     v, u, even = bordered.v, bordered.u, bordered.even
     count, m = z.shape
-    spare = room.pencil[0, 0]
+    spare = workspace.pencil[0, 0]
     total = 0.0
     for i in range(count):
         after = z[i + 1] if i + 1 < count else equations.last
-        divided = divides_exit(layout, i, z, room)
+        divided = divides_exit(layout, i, z, workspace)
         second_order(
-            functions, second, layout, i, z[i], after, p, which, sign, v, sign, divided, room, spare
+            functions,
+            second,
+            layout,
+            i,
+            z[i],
+            after,
+            p,
+            which,
+            sign,
+            v,
+            sign,
+            divided,
+            workspace,
+            spare,
         )
         for j in range(m):
             even[i, j] = -spare[j]
-    room.z_ref[:, :] = 0.0
+    workspace.z_ref[:, :] = 0.0
     set_border(bordered, v, 1.0, 0.0)
     plain, periodic = count < 0, 1.0
-    if not chain_solve(bordered, periodic, room.z_ref, even, plain, equations.close, room.pencil):
+    if not chain_solve(
+        bordered, periodic, workspace.z_ref, even, plain, equations.close, workspace.pencil
+    ):
         return 0.0
     for i in range(count):
         for j in range(m):
             even[i, j] = bordered.work.z[i, j, 0]
     for i in range(count):
         after = z[i + 1] if i + 1 < count else equations.last
-        divided = divides_exit(layout, i, z, room)
+        divided = divides_exit(layout, i, z, workspace)
         second_order(
             functions,
             second,
@@ -158,10 +186,12 @@ def cubic_coefficient(functions, second, layout, sign, z, p, which, room):  # ty
             even,
             periodic,
             divided,
-            room,
+            workspace,
             spare,
         )
         for j in range(m):
             total += 0.5 * u[i, j] * spare[j]
-        total += third_order(functions, second, layout, i, z, p, which, sign, room, spare) / 6.0
+        total += (
+            third_order(functions, second, layout, i, z, p, which, sign, workspace, spare) / 6.0
+        )
     return total

@@ -25,11 +25,11 @@ MOST_PROBES = 2000
 
 
 @helper
-def node(motion, mode, c, target, t, y, f, p, room):  # type: ignore[no-untyped-def]
+def node(motion, mode, c, target, t, y, f, p, workspace):  # type: ignore[no-untyped-def]
     """Return q less the target, q' and q'' at a state with its slope f."""
-    grad, n = room.grad, room.scales.shape[0]
-    q = motion.observe(c, t, y[:n], p, room.none, room.empty) - target
-    q1 = motion.rate(mode, c, t, y[:n], p, room.none, grad)
+    grad, n = workspace.grad, workspace.scales.shape[0]
+    q = motion.observe(c, t, y[:n], p, workspace.none, workspace.empty) - target
+    q1 = motion.rate(mode, c, t, y[:n], p, workspace.none, grad)
     q2 = grad[0]
     for j in range(n):
         q2 += grad[1 + j] * f[j]
@@ -37,16 +37,18 @@ def node(motion, mode, c, target, t, y, f, p, room):  # type: ignore[no-untyped-
 
 
 @helper
-def probed(motion, mode, c, target, t, at, p, room):  # type: ignore[no-untyped-def]
+def probed(motion, mode, c, target, t, at, p, workspace):  # type: ignore[no-untyped-def]
     """Return q less the target, q' and q'' within the last step, which started at time t.
 
-    The state and its slope are left in ``room.trial`` and ``room.stage``.
+    The state and its slope are left in ``workspace.trial`` and ``workspace.stage``.
     """
-    n = room.scales.shape[0]
-    if not motion.probe(motion, mode, c, t, at, p, room.none, room):
+    n = workspace.scales.shape[0]
+    if not motion.probe(motion, mode, c, t, at, p, workspace.none, workspace):
         return math.nan, math.nan, math.nan
-    motion.field(mode, t + at, room.trial[:n], p, room.none, room.stage[:n], room.nothing)
-    return node(motion, mode, c, target, t + at, room.trial, room.stage, p, room)
+    motion.field(
+        mode, t + at, workspace.trial[:n], p, workspace.none, workspace.stage[:n], workspace.nothing
+    )
+    return node(motion, mode, c, target, t + at, workspace.trial, workspace.stage, p, workspace)
 
 
 @helper
@@ -61,18 +63,18 @@ def is_flat(left, right, h):  # type: ignore[no-untyped-def]
 
 
 @helper
-def start_search(motion, mode, c, target, t0, y0, left, p, room):  # type: ignore[no-untyped-def]
+def start_search(motion, mode, c, target, t0, y0, left, p, workspace):  # type: ignore[no-untyped-def]
     """Begin the integration of state and observable; return the node at the start."""
     n = y0.shape[0]
-    begin(motion, y0, p, room.none, room)
-    room.start[n] = motion.observe(c, t0, y0, p, room.none, room.grad)
+    begin(motion, y0, p, workspace.none, workspace)
+    workspace.start[n] = motion.observe(c, t0, y0, p, workspace.none, workspace.grad)
     size = 0.0
     for j in range(n):
-        size += abs(room.grad[1 + j]) * room.scales[j]
+        size += abs(workspace.grad[1 + j]) * workspace.scales[j]
     # what depends on time alone has the scale 1
-    room.allowed[n] = motion.absolute * (size if size > 0.0 else 1.0)
-    first_step(motion, mode, c, t0, left, p, room.none, room)
-    return node(motion, mode, c, target, t0, room.start, room.slopes[0], p, room)
+    workspace.allowed[n] = motion.absolute * (size if size > 0.0 else 1.0)
+    first_step(motion, mode, c, t0, left, p, workspace.none, workspace)
+    return node(motion, mode, c, target, t0, workspace.start, workspace.slopes[0], p, workspace)
 
 
 @helper

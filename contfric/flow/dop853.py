@@ -134,9 +134,9 @@ _ERROR3 = _WEIGHT - _table({0: _THIRD})[0]
 
 
 @helper
-def explicit_step(motion, mode, c, t, h, p, which, room, target):  # type: ignore[no-untyped-def]
-    """Step from ``room.start``, whose slope is in ``room.slopes[0]``; write the end to ``target``."""
-    start, stage, slopes = room.start, room.stage, room.slopes
+def explicit_step(motion, mode, c, t, h, p, which, workspace, target):  # type: ignore[no-untyped-def]
+    """Step from ``workspace.start``, where the slope is ``workspace.slopes[0]``; write to ``target``."""
+    start, stage, slopes = workspace.start, workspace.stage, workspace.slopes
     size = start.shape[0]
     for i in range(1, STAGES):
         for k in range(size):
@@ -146,7 +146,7 @@ def explicit_step(motion, mode, c, t, h, p, which, room, target):  # type: ignor
             if a != 0.0:
                 for k in range(size):
                     stage[k] += a * slopes[j, k]
-        slope(motion, mode, c, t + h * _NODES[i], stage, p, which, room, slopes[i])
+        slope(motion, mode, c, t + h * _NODES[i], stage, p, which, workspace, slopes[i])
     for k in range(size):
         target[k] = start[k]
     for j in range(STAGES):
@@ -157,9 +157,14 @@ def explicit_step(motion, mode, c, t, h, p, which, room, target):  # type: ignor
 
 
 @helper
-def explicit_error(motion, h, room):  # type: ignore[no-untyped-def]
+def explicit_error(motion, h, workspace):  # type: ignore[no-untyped-def]
     """Return the error of the last step, of its worst component, in units of what is allowed."""
-    start, end, slopes, allowed = room.start, room.end, room.slopes, room.allowed
+    start, end, slopes, allowed = (
+        workspace.start,
+        workspace.end,
+        workspace.slopes,
+        workspace.allowed,
+    )
     worst = 0.0
     for k in range(start.shape[0]):
         fifth, third = 0.0, 0.0

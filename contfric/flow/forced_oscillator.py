@@ -88,7 +88,7 @@ def parameter_slope(index, s, p, t0, x0, v0, d):  # type: ignore[no-untyped-def]
 
 @kernel(flow_signature)
 def flow(mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
-    """Advance a state by ``dt`` in one mode, with derivatives where ``jac`` has room for them."""
+    """Advance a state by ``dt`` in one mode, with derivatives where ``jac`` has space for them."""
     if mode == STICK:
         y1[0] = y0[0]
         y1[1] = 0.0
@@ -129,7 +129,7 @@ def flow(mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
 
 @kernel(observe_signature)
 def observe(c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
-    """Return the load u or the velocity v, with the gradient where there is room for it."""
+    """Return the load u or the velocity v, with the gradient where there is space for it."""
     if grad.shape[0] > 0:
         grad[:] = 0.0
     if c == SPEED:

@@ -88,7 +88,7 @@ def either_turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: igno
 
 
 def flow(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
-    """Advance a state by ``dt``, with derivatives where ``jac`` has room (``flow_signature``)."""
+    """Advance a state by ``dt``, with derivatives where ``jac`` has space (``flow_signature``)."""
     if motion.slides[mode] == 0:
         motion.moved(motion, mode, t0, y0, dt, p, which, y1, jac)
         return

@@ -35,11 +35,11 @@ _FLAT = 0.125
 
 
 @helper
-def refine_hit(motion, mode, c, target, sign, t, h, low, high, at, p, room):  # type: ignore[no-untyped-def]
-    """Return the root in a bracket; the state there is in ``room.trial``."""
-    n = room.scales.shape[0]
+def refine_hit(motion, mode, c, target, sign, t, h, low, high, at, p, workspace):  # type: ignore[no-untyped-def]
+    """Return the root in a bracket; the state there is in ``workspace.trial``."""
+    n = workspace.scales.shape[0]
     for _ in range(100):  # bisection alone needs 60
-        q, q1, _ = probed(motion, mode, c, target, t, at, p, room)
+        q, q1, _ = probed(motion, mode, c, target, t, at, p, workspace)
         if math.isnan(q):
             return math.nan
         if sign * q > 0.0:
@@ -52,21 +52,21 @@ def refine_hit(motion, mode, c, target, sign, t, h, low, high, at, p, room):  # 
             if abs(shift) > _LAST * h:
                 return at
             for k in range(n):
-                room.trial[k] += shift * room.stage[k]
+                workspace.trial[k] += shift * workspace.stage[k]
             return following
         at = following if low < following < high else 0.5 * (low + high)
     return at
 
 
 @helper
-def first_in_step(motion, mode, c, target, sign, multiple, t, a, h, left, right, p, room):  # type: ignore[no-untyped-def]
+def first_in_step(motion, mode, c, target, sign, multiple, t, a, h, left, right, p, workspace):  # type: ignore[no-untyped-def]
     """Return the first root in the last step as time after its start; -1 if there is none.
 
     ``left`` and ``right`` are the nodes (q, q', q'') at ``a`` and at the end; the observable starts on
     the side ``sign``, or on a root of order ``multiple``. No number if the search does not come to an
     end.
     """
-    nodes = room.nodes
+    nodes = workspace.nodes
     depth, probes = push(nodes, 0, h, right), 0
     while depth > 0:
         b, after = top(nodes, depth)
@@ -76,17 +76,19 @@ def first_in_step(motion, mode, c, target, sign, multiple, t, a, h, left, right,
         if outcome == ISOLATED:
             at = a + (low + (high - low) * root_of(here)) * length
             low, high = a + low * length, a + high * length
-            return refine_hit(motion, mode, c, target, sign, t, h, low, high, at, p, room)
+            return refine_hit(motion, mode, c, target, sign, t, h, low, high, at, p, workspace)
         if outcome != FREE and length > SHORTEST * h and depth < DEPTH:
             probes += 1
             middle = 0.5 * (a + b)
-            between = probed(motion, mode, c, target, t, middle, p, room)
+            between = probed(motion, mode, c, target, t, middle, p, workspace)
             if math.isnan(between[0]) or probes > MOST_PROBES:
                 return math.nan
             depth = push(nodes, depth, middle, between)
             continue
         if outcome != FREE and sign * after[0] <= 0.0:
-            return refine_hit(motion, mode, c, target, sign, t, h, a, b, 0.5 * (a + b), p, room)
+            return refine_hit(
+                motion, mode, c, target, sign, t, h, a, b, 0.5 * (a + b), p, workspace
+            )
         a, left, multiple = b, after, 0
         depth -= 1
     return -1.0
@@ -117,14 +119,14 @@ def leaving(left, on):  # type: ignore[no-untyped-def]
 
 
 @helper
-def first_hit(motion, mode, c, target, on, t0, y0, dt_max, p, room, y1):  # type: ignore[no-untyped-def]
+def first_hit(motion, mode, c, target, on, t0, y0, dt_max, p, workspace, y1):  # type: ignore[no-untyped-def]
     """Return the first time at which an observable takes a value, with the state there in ``y1``.
 
     Negative if there is none before ``dt_max``. Where the integration breaks down, the time it came to
     with a state that is no number.
     """
     n = y0.shape[0]
-    left = start_search(motion, mode, c, target, t0, y0, dt_max, p, room)
+    left = start_search(motion, mode, c, target, t0, y0, dt_max, p, workspace)
     if on:
         left = (0.0, left[1], left[2])
     elif left[0] == 0.0:
@@ -138,30 +140,30 @@ def first_hit(motion, mode, c, target, on, t0, y0, dt_max, p, room, y1):  # type
     done = 0.0
     while done < dt_max:
         t = t0 + done
-        h = next_step(motion, mode, c, t, dt_max - done, p, room.none, room)
+        h = next_step(motion, mode, c, t, dt_max - done, p, workspace.none, workspace)
         if math.isnan(h):
             break
-        right = node(motion, mode, c, target, t + h, room.end, room.last, p, room)
+        right = node(motion, mode, c, target, t + h, workspace.end, workspace.last, p, workspace)
         if not is_flat(left, right, h):
             begins = 0.0
             if sign == 0.0:
                 begins = _FLAT * h
-                left = probed(motion, mode, c, target, t, begins, p, room)
+                left = probed(motion, mode, c, target, t, begins, p, workspace)
                 sign = 1.0 if left[0] > 0.0 else -1.0
                 if sign * side < 0.0:
                     write(y0, y1)
                     return 0.0
             at = first_in_step(
-                motion, mode, c, target, sign, multiple, t, begins, h, left, right, p, room
+                motion, mode, c, target, sign, multiple, t, begins, h, left, right, p, workspace
             )
             if math.isnan(at):
                 break
             if at >= 0.0:
-                write(room.trial[:n], y1)
+                write(workspace.trial[:n], y1)
                 return done + at
             left, multiple = right, 0
         done = dt_max if h == dt_max - done else done + h
-        settle(room)
+        settle(workspace)
     if done >= dt_max:
         return -1.0
     for k in range(n):

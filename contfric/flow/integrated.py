@@ -2,7 +2,7 @@
 
 To write a model by hand, write its functions as kernels (decorated with
 :func:`contfric.compiled.kernel`). There are n states; ``which`` lists the m parameters that are
-differentiated by; whatever has no room (an array of length 0) is not filled.
+differentiated by; whatever has no space (an array of length 0) is not filled.
 
 1. ``field(mode, t, y, p, which, out, jac)`` (``field_signature``): write dy/dt to ``out`` (n,) and, if
    ``jac`` (n, 1 + n + m) has rows, its derivatives by t, y and ``p[which]``. A mode is one smooth field: it

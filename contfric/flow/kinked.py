@@ -42,31 +42,31 @@ from contfric.flow.stepping import (
     settle,
 )
 from contfric.flow.turnings import all_turnings
-from contfric.flow.variations import begin, make_room, slope
+from contfric.flow.variations import begin, integration_workspace, slope
 
 #: Rates below this, relative to 1 + the next one, vanish at a crossing: the crossing is a stationary point.
 _STATIONARY = 1e-9
 
 
 @helper
-def piece_at(motion, mode, t, y, on, p, room):  # type: ignore[no-untyped-def]
+def piece_at(motion, mode, t, y, on, p, workspace):  # type: ignore[no-untyped-def]
     """Return the piece that a state lies in, or enters if it lies on a kink (on kink ``on`` it does)."""
     bits = 0
     first = mode << motion.kinks
-    n = room.scales.shape[0]
+    n = workspace.scales.shape[0]
     for k in range(motion.kinks):
-        side = motion.observe(motion.kink_of[k], t, y, p, room.none, room.empty)
+        side = motion.observe(motion.kink_of[k], t, y, p, workspace.none, workspace.empty)
         if side == 0.0 or k == on:  # the fields of both sides are the same here
-            motion.field(first, t, y, p, room.none, room.stage[:n], room.nothing)
+            motion.field(first, t, y, p, workspace.none, workspace.stage[:n], workspace.nothing)
             c = motion.kink_of[k]
-            _, side, second = node(motion, first, c, 0.0, t, y, room.stage, p, room)
+            _, side, second = node(motion, first, c, 0.0, t, y, workspace.stage, p, workspace)
             side = second if side == 0.0 else side
         bits |= (1 << k) if side > 0.0 else 0
     return first | bits
 
 
 @helper
-def first_crossing(motion, piece, t, h, on, p, room):  # type: ignore[no-untyped-def]
+def first_crossing(motion, piece, t, h, on, p, workspace):  # type: ignore[no-untyped-def]
     """Return the first crossing of a kink in the last step and which one it is; (-1, -1) if there is none.
 
     ``on`` is the kink that the step starts on, -1 if none. No number if the search does not come to an end.
@@ -74,8 +74,8 @@ def first_crossing(motion, piece, t, h, on, p, room):  # type: ignore[no-untyped
     found, which = -1.0, -1
     for k in range(motion.kinks):
         c = motion.kink_of[k]
-        left = node(motion, piece, c, 0.0, t, room.start, room.slopes[0], p, room)
-        right = node(motion, piece, c, 0.0, t + h, room.end, room.last, p, room)
+        left = node(motion, piece, c, 0.0, t, workspace.start, workspace.slopes[0], p, workspace)
+        right = node(motion, piece, c, 0.0, t + h, workspace.end, workspace.last, p, workspace)
         if is_flat(left, right, h):
             continue
         if on == k:
@@ -84,10 +84,10 @@ def first_crossing(motion, piece, t, h, on, p, room):  # type: ignore[no-untyped
         begins = 0.0
         if sign == 0.0:
             begins = _FLAT * h
-            left = probed(motion, piece, c, 0.0, t, begins, p, room)
+            left = probed(motion, piece, c, 0.0, t, begins, p, workspace)
             sign = 1.0 if left[0] > 0.0 else -1.0
         at = first_in_step(
-            motion, piece, c, 0.0, sign, multiple, t, begins, h, left, right, p, room
+            motion, piece, c, 0.0, sign, multiple, t, begins, h, left, right, p, workspace
         )
         if math.isnan(at):
             return math.nan, k
@@ -97,73 +97,73 @@ def first_crossing(motion, piece, t, h, on, p, room):  # type: ignore[no-untyped
 
 
 @helper
-def hand_back(room, fine, y1, jac):  # type: ignore[no-untyped-def]
+def hand_back(workspace, fine, y1, jac):  # type: ignore[no-untyped-def]
     """Write the state and its derivatives by (t0, y0, dt, parameters)."""
-    n, columns = room.scales.shape[0], room.partial.shape[1]
+    n, columns = workspace.scales.shape[0], workspace.partial.shape[1]
     for i in range(n):
-        y1[i] = room.start[i] if fine else math.nan
+        y1[i] = workspace.start[i] if fine else math.nan
     for i in range(n if columns > 0 else 0):
         row = n + i * columns
         for j in range(columns):
-            jac[i, j if j <= n else j + 1] = room.start[row + j] if fine else math.nan
-        jac[i, 1 + n] = room.slopes[0, i] if fine else math.nan
+            jac[i, j if j <= n else j + 1] = workspace.start[row + j] if fine else math.nan
+        jac[i, 1 + n] = workspace.slopes[0, i] if fine else math.nan
 
 
 @helper
-def restart(motion, piece, t, p, which, room):  # type: ignore[no-untyped-def]
-    """Start again from ``room.trial`` in another piece, with steps as long as they were."""
-    for k in range(room.start.shape[0]):
-        room.start[k] = room.trial[k]
-    slope(motion, piece, -1, t, room.start, p, which, room, room.slopes[0])
-    room.control[FRESH], room.control[REMEMBERED] = 0.0, 0.0
+def restart(motion, piece, t, p, which, workspace):  # type: ignore[no-untyped-def]
+    """Start again from ``workspace.trial`` in another piece, with steps as long as they were."""
+    for k in range(workspace.start.shape[0]):
+        workspace.start[k] = workspace.trial[k]
+    slope(motion, piece, -1, t, workspace.start, p, which, workspace, workspace.slopes[0])
+    workspace.control[FRESH], workspace.control[REMEMBERED] = 0.0, 0.0
 
 
 @helper
-def advance_through(motion, mode, t0, dt, y0, p, which, room):  # type: ignore[no-untyped-def]
+def advance_through(motion, mode, t0, dt, y0, p, which, workspace):  # type: ignore[no-untyped-def]
     """Integrate over ``dt`` through all kinks; return the number of crossings, -1 if that fails.
 
     Backwards in time (which only iterates of Newton's method far from a solution ask for) kinks are not
     looked for.
     """
-    begin(motion, y0, p, which, room)
-    piece = piece_at(motion, mode, t0, y0, -1, p, room)
-    first_step(motion, piece, -1, t0, dt, p, which, room)
+    begin(motion, y0, p, which, workspace)
+    piece = piece_at(motion, mode, t0, y0, -1, p, workspace)
+    first_step(motion, piece, -1, t0, dt, p, which, workspace)
     if not math.isfinite(t0 + dt):
         return -1
     done, on, crossings = 0.0, -1, 0
     while done != dt:
         left, t = dt - done, t0 + done
-        h = next_step(motion, piece, -1, t, left, p, which, room)
+        h = next_step(motion, piece, -1, t, left, p, which, workspace)
         if math.isnan(h):
             return -1
-        at, k = (-1.0, -1) if h < 0.0 else first_crossing(motion, piece, t, h, on, p, room)
+        at, k = (-1.0, -1) if h < 0.0 else first_crossing(motion, piece, t, h, on, p, workspace)
         if math.isnan(at):
             return -1
         on = k
         if k < 0:
             done = dt if h == left else done + h
-            settle(room)
+            settle(workspace)
             continue
-        if not motion.probe(motion, piece, -1, t, at, p, which, room):
+        if not motion.probe(motion, piece, -1, t, at, p, which, workspace):
             return -1
         done = dt if at >= left else done + at
         piece ^= 1 << k
-        restart(motion, piece, t0 + done, p, which, room)
+        restart(motion, piece, t0 + done, p, which, workspace)
         crossings += 1
     return crossings
 
 
 @allocating_helper
 def kinked_flow(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
-    """Advance a state by ``dt`` through all kinks, with derivatives where ``jac`` has room."""
+    """Advance a state by ``dt`` through all kinks, with derivatives where ``jac`` has space."""
     n, free = y0.shape[0], which.shape[0]
     columns = 1 + n + free if jac.shape[0] > 0 else 0
     grad = np.empty(free)
     period = motion.period(p, which, grad)
     cycles = folded(t0, period)
-    room = make_room(n, 0, columns, STAGES, motion.stages)
-    fine = advance_through(motion, mode, t0 - cycles * period, dt, y0, p, which, room) >= 0
-    hand_back(room, fine, y1, jac)
+    workspace = integration_workspace(n, 0, columns, STAGES, motion.stages)
+    fine = advance_through(motion, mode, t0 - cycles * period, dt, y0, p, which, workspace) >= 0
+    hand_back(workspace, fine, y1, jac)
     if columns > 0 and cycles != 0.0:
         for i in range(n):
             for k in range(free):
@@ -171,15 +171,17 @@ def kinked_flow(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no
 
 
 @helper
-def next_kink(motion, piece, t, y, on, left, p, room, behind):  # type: ignore[no-untyped-def]
+def next_kink(motion, piece, t, y, on, left, p, workspace, behind):  # type: ignore[no-untyped-def]
     """Return the time to the next crossing and which kink it is, with the state there in ``behind``."""
     n = y.shape[0]
     found, which = -1.0, -1
     for k in range(motion.kinks):
         c = motion.kink_of[k]
-        at = first_hit(motion, piece, c, 0.0, on == k, t, y, left, p, room, room.stage[:n])
+        at = first_hit(
+            motion, piece, c, 0.0, on == k, t, y, left, p, workspace, workspace.stage[:n]
+        )
         if at >= 0.0 and (which < 0 or at < found):
-            write(room.stage[:n], behind)
+            write(workspace.stage[:n], behind)
             found, which = at, k
     return found, which
 
@@ -190,28 +192,28 @@ def kinked_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ign
     if not dt_max > 0.0:
         return -1.0
     n = y0.shape[0]
-    room = make_room(n, 1, 0, STAGES, motion.stages)
+    workspace = integration_workspace(n, 1, 0, STAGES, motion.stages)
     here, behind = y0.copy(), np.empty(n)
-    period = motion.period(p, room.none, room.empty)
+    period = motion.period(p, workspace.none, workspace.empty)
     phase = t0 - folded(t0, period) * period
     kink = -1
     for k in range(motion.kinks):
         if on and target == 0.0 and c == motion.kink_of[k]:
             kink = k
-    piece = piece_at(motion, mode, phase, here, kink, p, room)
+    piece = piece_at(motion, mode, phase, here, kink, p, workspace)
     done = 0.0
     while done < dt_max:
-        room.control[TRIED] += 1.0  # kinks that are met at once take no step
-        if room.control[TRIED] > MOST_STEPS:
+        workspace.control[TRIED] += 1.0  # kinks that are met at once take no step
+        if workspace.control[TRIED] > MOST_STEPS:
             for i in range(n):
                 y1[i] = math.nan
             return done
         t, left = phase + done, dt_max - done
-        until, k = next_kink(motion, piece, t, here, kink, left, p, room, behind)
+        until, k = next_kink(motion, piece, t, here, kink, left, p, workspace, behind)
         span = left if k < 0 else until
         itself = k >= 0 and c == motion.kink_of[k] and target == 0.0
         if not itself:
-            at = first_hit(motion, piece, c, target, on, t, here, span, p, room, y1)
+            at = first_hit(motion, piece, c, target, on, t, here, span, p, workspace, y1)
             if at >= 0.0:
                 return done + at
         if k < 0:
@@ -230,21 +232,21 @@ def kinked_turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: igno
     if not dt > 0.0:
         return 0
     n = y0.shape[0]
-    room = make_room(n, 1, 0, STAGES, motion.stages)
+    workspace = integration_workspace(n, 1, 0, STAGES, motion.stages)
     here, behind = y0.copy(), np.empty(n)
-    period = motion.period(p, room.none, room.empty)
+    period = motion.period(p, workspace.none, workspace.empty)
     phase = t0 - folded(t0, period) * period
-    piece = piece_at(motion, mode, phase, here, -1, p, room)
+    piece = piece_at(motion, mode, phase, here, -1, p, workspace)
     done, kink, count = 0.0, -1, 0
     while done < dt:
-        room.control[TRIED] += 1.0  # kinks that are met at once take no step
-        if room.control[TRIED] > MOST_STEPS:
+        workspace.control[TRIED] += 1.0  # kinks that are met at once take no step
+        if workspace.control[TRIED] > MOST_STEPS:
             return -1
         t, left = phase + done, dt - done
-        until, k = next_kink(motion, piece, t, here, kink, left, p, room, behind)
+        until, k = next_kink(motion, piece, t, here, kink, left, p, workspace, behind)
         span = left if k < 0 else until
         found = all_turnings(
-            motion, piece, c, t, here, span, p, room, times[count:], values[count:]
+            motion, piece, c, t, here, span, p, workspace, times[count:], values[count:]
         )
         if found < 0 or (k >= 0 and not math.isfinite(behind[0])):
             return -1
@@ -255,8 +257,10 @@ def kinked_turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: igno
             return count
         write(behind, here)
         done, kink, piece = done + until, k, piece ^ (1 << k)
-        motion.field(piece, phase + done, here, p, room.none, room.stage[:n], room.nothing)
-        q, q1, q2 = node(motion, piece, c, 0.0, phase + done, here, room.stage, p, room)
+        motion.field(
+            piece, phase + done, here, p, workspace.none, workspace.stage[:n], workspace.nothing
+        )
+        q, q1, q2 = node(motion, piece, c, 0.0, phase + done, here, workspace.stage, p, workspace)
         if abs(q1) <= _STATIONARY * (1.0 + abs(q2)) and done < dt:
             if count == times.shape[0]:
                 return -1

@@ -66,9 +66,9 @@ def lagrange(j, place):  # type: ignore[no-untyped-def]
 
 
 @helper
-def predict(h, room, remembered, inside):  # type: ignore[no-untyped-def]
+def predict(h, workspace, remembered, inside):  # type: ignore[no-untyped-def]
     """Predict the increments from the polynomial of the last step: after it, or (inside) within it."""
-    z, memory, slopes = room.increments, room.memory, room.slopes
+    z, memory, slopes = workspace.increments, workspace.memory, workspace.slopes
     s, n = z.shape
     known = remembered != 0.0 and abs(h) <= _FARTHEST * abs(remembered)
     for i in range(s):
@@ -85,23 +85,23 @@ def predict(h, room, remembered, inside):  # type: ignore[no-untyped-def]
 
 
 @helper
-def stage_fields(motion, mode, t, h, p, which, room, differentiated):  # type: ignore[no-untyped-def]
+def stage_fields(motion, mode, t, h, p, which, workspace, differentiated):  # type: ignore[no-untyped-def]
     """Evaluate the field at the stages, with its derivatives if they are asked for."""
-    z, stage, start = room.increments, room.stage, room.start
+    z, stage, start = workspace.increments, workspace.stage, workspace.start
     s, n = z.shape
     for i in range(s):
         for k in range(n):
             stage[k] = start[k] + z[i, k]
-        jac = room.stage_partials[i] if differentiated else room.nothing
+        jac = workspace.stage_partials[i] if differentiated else workspace.nothing
         place = t + _NODES[i] * h
-        motion.field(mode, place, stage[:n], p, which, room.stage_slopes[i], jac)
+        motion.field(mode, place, stage[:n], p, which, workspace.stage_slopes[i], jac)
 
 
 @helper
-def factorise(h, room):  # type: ignore[no-untyped-def]
+def factorise(h, workspace):  # type: ignore[no-untyped-def]
     """Write and factorise Newton's matrix; tell whether it is regular."""
-    matrix, partials = room.matrix, room.stage_partials
-    s, n = room.increments.shape
+    matrix, partials = workspace.matrix, workspace.stage_partials
+    s, n = workspace.increments.shape
     for i in range(s):
         for j in range(s):
             a = h * _A[i, j]
@@ -110,13 +110,13 @@ def factorise(h, room):  # type: ignore[no-untyped-def]
                     matrix[i * n + k, j * n + m] = -a * partials[j, k, 1 + m]
         for k in range(n):
             matrix[i * n + k, i * n + k] += 1.0
-    return lu(matrix, room.pivots, s * n)
+    return lu(matrix, workspace.pivots, s * n)
 
 
 @helper
-def correct_stages(motion, h, room):  # type: ignore[no-untyped-def]
+def correct_stages(motion, h, workspace):  # type: ignore[no-untyped-def]
     """Make one correction of Newton's method; return its size in units of the allowed error."""
-    z, right, slopes = room.increments, room.right, room.stage_slopes
+    z, right, slopes = workspace.increments, workspace.right, workspace.stage_slopes
     s, n = z.shape
     for i in range(s):
         for k in range(n):
@@ -124,30 +124,30 @@ def correct_stages(motion, h, room):  # type: ignore[no-untyped-def]
             for j in range(s):
                 value += h * _A[i, j] * slopes[j, k]
             right[i * n + k, 0] = value
-    lu_solve(room.matrix, room.pivots, s * n, right, 1)
+    lu_solve(workspace.matrix, workspace.pivots, s * n, right, 1)
     size = 0.0
     for i in range(s):
         for k in range(n):
             change = right[i * n + k, 0]
             z[i, k] += change
-            here = abs(change) / (room.allowed[k] + motion.relative * abs(room.start[k]))
+            here = abs(change) / (workspace.allowed[k] + motion.relative * abs(workspace.start[k]))
             if not here <= size:
                 size = here
     return size
 
 
 @helper
-def solve_stages(motion, mode, t, h, p, which, room):  # type: ignore[no-untyped-def]
+def solve_stages(motion, mode, t, h, p, which, workspace):  # type: ignore[no-untyped-def]
     """Solve for the increments from their prediction; tell whether the iteration converged."""
     for _ in range(_MATRICES):
-        stage_fields(motion, mode, t, h, p, which, room, True)
-        if not factorise(h, room):
+        stage_fields(motion, mode, t, h, p, which, workspace, True)
+        if not factorise(h, workspace):
             return False
         before = np.inf
         for iteration in range(_ITERATIONS):
             if iteration > 0:
-                stage_fields(motion, mode, t, h, p, which, room, False)
-            size = correct_stages(motion, h, room)
+                stage_fields(motion, mode, t, h, p, which, workspace, False)
+            size = correct_stages(motion, h, workspace)
             if not math.isfinite(size):
                 return False
             share = size / before  # 0 at the first correction
@@ -164,31 +164,31 @@ def solve_stages(motion, mode, t, h, p, which, room):  # type: ignore[no-untyped
 
 
 @helper
-def implicit_step(motion, mode, c, t, h, p, which, room, target, inside):  # type: ignore[no-untyped-def]
-    """Step from ``room.start``; write the end to ``target`` and tell whether there is one."""
-    start, z = room.start, room.increments
+def implicit_step(motion, mode, c, t, h, p, which, workspace, target, inside):  # type: ignore[no-untyped-def]
+    """Step from ``workspace.start``; write the end to ``target`` and tell whether there is one."""
+    start, z = workspace.start, workspace.increments
     s, n = z.shape
-    columns = room.partial.shape[1]
-    predict(h, room, room.control[REMEMBERED], inside)
-    if not solve_stages(motion, mode, t, h, p, which, room):
+    columns = workspace.partial.shape[1]
+    predict(h, workspace, workspace.control[REMEMBERED], inside)
+    if not solve_stages(motion, mode, t, h, p, which, workspace):
         return False
     for k in range(n):
         target[k] = start[k] + z[s - 1, k]
     if c >= 0:
-        target[n] = start[n] + h * mean_rate(motion, mode, c, t, h, p, room, False)
+        target[n] = start[n] + h * mean_rate(motion, mode, c, t, h, p, workspace, False)
     if columns > 0:
-        return vary_stages(motion, mode, t, h, p, which, room, target)
+        return vary_stages(motion, mode, t, h, p, which, workspace, target)
     return True
 
 
 @helper
-def vary_stages(motion, mode, t, h, p, which, room, target):  # type: ignore[no-untyped-def]
-    """Solve the discrete equations of the variations: the increments stay in ``room.right``."""
-    start, right, partials = room.start, room.right, room.stage_partials
-    s, n = room.increments.shape
-    columns = room.partial.shape[1]
-    stage_fields(motion, mode, t, h, p, which, room, True)
-    if not factorise(h, room):
+def vary_stages(motion, mode, t, h, p, which, workspace, target):  # type: ignore[no-untyped-def]
+    """Solve the discrete equations of the variations: the increments stay in ``workspace.right``."""
+    start, right, partials = workspace.start, workspace.right, workspace.stage_partials
+    s, n = workspace.increments.shape
+    columns = workspace.partial.shape[1]
+    stage_fields(motion, mode, t, h, p, which, workspace, True)
+    if not factorise(h, workspace):
         return False
     for i in range(s * n):
         for column in range(columns):
@@ -201,7 +201,7 @@ def vary_stages(motion, mode, t, h, p, which, room, target):  # type: ignore[no-
                     drive += partials[j, k, 1 + a] * start[n + a * columns + column]
                 for i in range(s):
                     right[i * n + k, column] += h * _A[i, j] * drive
-    lu_solve(room.matrix, room.pivots, s * n, right, columns)
+    lu_solve(workspace.matrix, workspace.pivots, s * n, right, columns)
     for k in range(n):
         for column in range(columns):
             at = n + k * columns + column
@@ -210,29 +210,36 @@ def vary_stages(motion, mode, t, h, p, which, room, target):  # type: ignore[no-
 
 
 @helper
-def mean_rate(motion, mode, c, t, h, p, room, at_start):  # type: ignore[no-untyped-def]
+def mean_rate(motion, mode, c, t, h, p, workspace, at_start):  # type: ignore[no-untyped-def]
     """Return the mean rate of the observable over the step, or its polynomial's value at the start."""
-    z, stage = room.increments, room.stage
+    z, stage = workspace.increments, workspace.stage
     s, n = z.shape
     total = 0.0
     for i in range(s):
         for k in range(n):
-            stage[k] = room.start[k] + z[i, k]
-        value = motion.rate(mode, c, t + _NODES[i] * h, stage[:n], p, room.none, room.empty)
+            stage[k] = workspace.start[k] + z[i, k]
+        value = motion.rate(
+            mode, c, t + _NODES[i] * h, stage[:n], p, workspace.none, workspace.empty
+        )
         total += (_LAGRANGE[i] if at_start else _A[s - 1, i]) * value
     return total
 
 
 @helper
-def implicit_error(motion, mode, c, t, h, p, room):  # type: ignore[no-untyped-def]
+def implicit_error(motion, mode, c, t, h, p, workspace):  # type: ignore[no-untyped-def]
     """Return the error of the last step, of its worst component, in units of what is allowed."""
-    z, right, small, slopes = room.increments, room.right, room.small[0], room.slopes
+    z, right, small, slopes = (
+        workspace.increments,
+        workspace.right,
+        workspace.small[0],
+        workspace.slopes,
+    )
     s, n = z.shape
-    columns = room.partial.shape[1]
+    columns = workspace.partial.shape[1]
     for k in range(n):
         for m in range(n):
-            small[k, m] = (1.0 if k == m else 0.0) - h * _REAL * room.local[k, 1 + m]
-    if not lu(small, room.pivots, n):
+            small[k, m] = (1.0 if k == m else 0.0) - h * _REAL * workspace.local[k, 1 + m]
+    if not lu(small, workspace.pivots, n):
         return np.inf
     worst = 0.0
     if columns > 0:
@@ -243,27 +250,29 @@ def implicit_error(motion, mode, c, t, h, p, room):  # type: ignore[no-untyped-d
                 for i in range(s):
                     defect += _DEFECT[i] * right[i * n + k, column]
                 right[k, column] = defect
-        lu_solve(small, room.pivots, n, right, columns)
+        lu_solve(small, workspace.pivots, n, right, columns)
         for k in range(n):
             for column in range(columns):
-                worst = share_of(motion, n + k * columns + column, right[k, column], room, worst)
+                worst = share_of(
+                    motion, n + k * columns + column, right[k, column], workspace, worst
+                )
     for k in range(n):
         defect = h * _REAL * slopes[0, k]
         for i in range(s):
             defect += _DEFECT[i] * z[i, k]
         right[k, 0] = defect
-    lu_solve(small, room.pivots, n, right, 1)
+    lu_solve(small, workspace.pivots, n, right, 1)
     for k in range(n):
-        worst = share_of(motion, k, right[k, 0], room, worst)
+        worst = share_of(motion, k, right[k, 0], workspace, worst)
     if c >= 0:
-        missed = slopes[0, n] - mean_rate(motion, mode, c, t, h, p, room, True)
-        worst = share_of(motion, n, h * _REAL * missed, room, worst)
+        missed = slopes[0, n] - mean_rate(motion, mode, c, t, h, p, workspace, True)
+        worst = share_of(motion, n, h * _REAL * missed, workspace, worst)
     return worst
 
 
 @helper
-def share_of(motion, k, error, room, worst):  # type: ignore[no-untyped-def]
+def share_of(motion, k, error, workspace, worst):  # type: ignore[no-untyped-def]
     """Return the larger of ``worst`` and the error of component k in units of what is allowed."""
-    size = max(abs(room.start[k]), abs(room.end[k]))
-    here = abs(error) / (room.allowed[k] + motion.relative * size)
+    size = max(abs(workspace.start[k]), abs(workspace.end[k]))
+    here = abs(error) / (workspace.allowed[k] + motion.relative * size)
     return worst if here <= worst else here

@@ -112,7 +112,7 @@ def load_variation(t, tau, p, which, row):  # type: ignore[no-untyped-def]
 
 
 @kernel(second_signature)
-def second(mode, c, t0, y0, d, p, which, along, jac, room):  # type: ignore[no-untyped-def]
+def second(mode, c, t0, y0, d, p, which, along, jac, workspace):  # type: ignore[no-untyped-def]
     """Write the derivative, in a direction, of the flow's jacobian or of an observable's gradient."""
     if c >= 0:
         jac[0, :] = 0.0
@@ -122,5 +122,5 @@ def second(mode, c, t0, y0, d, p, which, along, jac, room):  # type: ignore[no-u
         jac[:, :] = 0.0
     else:
         s = direction(mode)
-        slide_variation(s, t0, y0, d, p, which, along, jac, room[0:3], room[3:5])
+        slide_variation(s, t0, y0, d, p, which, along, jac, workspace[0:3], workspace[3:5])
     return 1

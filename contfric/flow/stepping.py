@@ -9,9 +9,9 @@ varied). The start is Hairer's rule (Hairer, Norsett, Wanner, "Solving Ordinary 
 I", section II.4), the control proportional-integral (Hairer, Wanner, "Solving Ordinary Differential
 Equations II", section IV.2).
 
-A *method* is a helper ``motion.attempt(motion, mode, c, t, h, p, which, room)``, which steps from
-``room.start`` to ``room.end`` and returns the error in units of what is allowed (infinite or no number:
-the step failed), together with ``probe(...)``, which steps within the last accepted step.
+A *method* is a helper ``motion.attempt(motion, mode, c, t, h, p, which, workspace)``, which steps from
+``workspace.start`` to ``workspace.end`` and returns the error in units of what is allowed (infinite or no
+number: the step failed), together with ``probe(...)``, which steps within the last accepted step.
 """
 
 from __future__ import annotations
@@ -49,11 +49,16 @@ _ULPS = 16.0 * 2.220446049250313e-16
 
 
 @helper
-def first_step(motion, mode, c, t, left, p, which, room):  # type: ignore[no-untyped-def]
+def first_step(motion, mode, c, t, left, p, which, workspace):  # type: ignore[no-untyped-def]
     """Write the slope at the start and propose the first step (Hairer's rule)."""
-    start, slopes, control, allowed = room.start, room.slopes, room.control, room.allowed
+    start, slopes, control, allowed = (
+        workspace.start,
+        workspace.slopes,
+        workspace.control,
+        workspace.allowed,
+    )
     size = start.shape[0]
-    slope(motion, mode, c, t, start, p, which, room, slopes[0])
+    slope(motion, mode, c, t, start, p, which, workspace, slopes[0])
     d0, d1 = _SIZED / motion.absolute, 0.0
     for k in range(size):
         here = allowed[k] + motion.relative * abs(start[k])
@@ -63,8 +68,8 @@ def first_step(motion, mode, c, t, left, p, which, room):  # type: ignore[no-unt
     h = min(h, abs(left))
     step = math.copysign(h, left)
     for k in range(size):
-        room.stage[k] = start[k] + step * slopes[0, k]
-    slope(motion, mode, c, t + step, room.stage, p, which, room, slopes[1])
+        workspace.stage[k] = start[k] + step * slopes[0, k]
+    slope(motion, mode, c, t + step, workspace.stage, p, which, workspace, slopes[1])
     d2 = 0.0
     for k in range(size):
         here = allowed[k] + motion.relative * abs(start[k])
@@ -86,13 +91,13 @@ def length_of(proposed, left):  # type: ignore[no-untyped-def]
 
 
 @helper
-def next_step(motion, mode, c, t, left, p, which, room):  # type: ignore[no-untyped-def]
+def next_step(motion, mode, c, t, left, p, which, workspace):  # type: ignore[no-untyped-def]
     """Take the next step that is accurate enough, at most ``left`` (of either sign); return it.
 
-    The end and its slope are in ``room.end`` and ``room.last``. No number if there is no such step: too
-    many were tried, or time does not go on.
+    The end and its slope are in ``workspace.end`` and ``workspace.last``. No number if there is no such step:
+    too many were tried, or time does not go on.
     """
-    control = room.control
+    control = workspace.control
     rejected = False
     while True:
         control[TRIED] += 1.0
@@ -101,7 +106,7 @@ def next_step(motion, mode, c, t, left, p, which, room):  # type: ignore[no-unty
         if control[TRIED] > MOST_STEPS or (size < _ULPS * abs(t) and size < abs(left)):
             return math.nan
         h = math.copysign(size, left)
-        error = motion.attempt(motion, mode, c, t, h, p, which, room)
+        error = motion.attempt(motion, mode, c, t, h, p, which, workspace)
         if not math.isfinite(error):
             control[NEXT], rejected = FAILED * size, True
             if size < HOPELESS * abs(left):
@@ -114,29 +119,29 @@ def next_step(motion, mode, c, t, left, p, which, room):  # type: ignore[no-unty
         grown = size / max(factor * control[BEFORE] ** -INTEGRAL, 1.0 / GROW)
         control[NEXT] = min(grown, size) if rejected else grown
         control[BEFORE] = max(error, 1e-4)  # Hairer's floor: a lucky step is no rule
-        slope(motion, mode, c, t + h, room.end, p, which, room, room.last)
+        slope(motion, mode, c, t + h, workspace.end, p, which, workspace, workspace.last)
         return h
 
 
 @helper
-def settle(room):  # type: ignore[no-untyped-def]
+def settle(workspace):  # type: ignore[no-untyped-def]
     """Make the end of a step the start of the next one."""
-    start, end, first, last = room.start, room.end, room.slopes, room.last
+    start, end, first, last = workspace.start, workspace.end, workspace.slopes, workspace.last
     for k in range(start.shape[0]):
         start[k] = end[k]
         first[0, k] = last[k]
-    room.control[FRESH] = 0.0
+    workspace.control[FRESH] = 0.0
 
 
 @helper
-def explicit(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
+def explicit(motion, mode, c, t, h, p, which, workspace):  # type: ignore[no-untyped-def]
     """Return the error of an explicit step (a method)."""
-    explicit_step(motion, mode, c, t, h, p, which, room, room.end)
-    return explicit_error(motion, h, room)
+    explicit_step(motion, mode, c, t, h, p, which, workspace, workspace.end)
+    return explicit_error(motion, h, workspace)
 
 
 @helper
-def explicit_probe(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
-    """Write the vector at t + h, within the last step, to ``room.trial``; tell whether it is known."""
-    explicit_step(motion, mode, c, t, h, p, which, room, room.trial)
+def explicit_probe(motion, mode, c, t, h, p, which, workspace):  # type: ignore[no-untyped-def]
+    """Write the vector at t + h, within the last step, to ``workspace.trial``; tell whether it is known."""
+    explicit_step(motion, mode, c, t, h, p, which, workspace, workspace.trial)
     return True

@@ -43,13 +43,13 @@ _PATIENCE, _LONGER, _TRIALS, _GROWTH = 5.0, 4.0, 4.0, 4.0
 
 
 @helper
-def spectral_radius(room):  # type: ignore[no-untyped-def]
+def spectral_radius(workspace):  # type: ignore[no-untyped-def]
     """Return ``|J^8|^(1/8)`` of the local Jacobian in the scales of the states."""
-    n, scales = room.scales.shape[0], room.scales
-    one, two = room.small[0], room.small[1]
+    n, scales = workspace.scales.shape[0], workspace.scales
+    one, two = workspace.small[0], workspace.small[1]
     for i in range(n):
         for j in range(n):
-            one[i, j] = room.local[i, 1 + j] * scales[j] / scales[i]
+            one[i, j] = workspace.local[i, 1 + j] * scales[j] / scales[i]
     for _ in range(3):
         for i in range(n):
             for j in range(n):
@@ -68,17 +68,19 @@ def spectral_radius(room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def choose(motion, mode, t, h, p, room):  # type: ignore[no-untyped-def]
+def choose(motion, mode, t, h, p, workspace):  # type: ignore[no-untyped-def]
     """Evaluate the Jacobian at the start of a step and choose its method, where there is a choice."""
-    control, n = room.control, room.scales.shape[0]
-    motion.field(mode, t, room.start[:n], p, room.none, room.stage[:n], room.local)
+    control, n = workspace.control, workspace.scales.shape[0]
+    motion.field(
+        mode, t, workspace.start[:n], p, workspace.none, workspace.stage[:n], workspace.local
+    )
     control[FRESH] = 1.0
     if motion.implicit != 0:
         control[KIND], control[FALLS] = 1.0, IMPLICIT_STAGES + 1.0
         return
     if h < 0.0:
         return  # backwards in time what decays grows, and has to be followed
-    radius = spectral_radius(room) / motion.looseness
+    radius = spectral_radius(workspace) / motion.looseness
     stretch = control[NEXT] * radius
     control[SINCE] += 1.0
     if control[KIND] == 0.0:
@@ -94,40 +96,40 @@ def choose(motion, mode, t, h, p, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def implicit_trial(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
+def implicit_trial(motion, mode, c, t, h, p, which, workspace):  # type: ignore[no-untyped-def]
     """Try an implicit step; return its error."""
-    if not implicit_step(motion, mode, c, t, h, p, which, room, room.end, False):
-        room.control[REMEMBERED] = 0.0  # a bad prediction is not used again
+    if not implicit_step(motion, mode, c, t, h, p, which, workspace, workspace.end, False):
+        workspace.control[REMEMBERED] = 0.0  # a bad prediction is not used again
         return float("inf")
-    error = implicit_error(motion, mode, c, t, h, p, room)
+    error = implicit_error(motion, mode, c, t, h, p, workspace)
     if error <= 1.0:
-        s, n = room.increments.shape
+        s, n = workspace.increments.shape
         for i in range(s):
             for k in range(n):
-                room.memory[i, k] = room.increments[i, k]
-        room.control[REMEMBERED] = h
+                workspace.memory[i, k] = workspace.increments[i, k]
+        workspace.control[REMEMBERED] = h
     return error
 
 
 @helper
-def implicit_probe(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
-    """Write the vector at t + h, within the last step, to ``room.trial``; tell whether it is known."""
-    return implicit_step(motion, mode, c, t, h, p, which, room, room.trial, True)
+def implicit_probe(motion, mode, c, t, h, p, which, workspace):  # type: ignore[no-untyped-def]
+    """Write the vector at t + h, within the last step, to ``workspace.trial``; tell whether it is known."""
+    return implicit_step(motion, mode, c, t, h, p, which, workspace, workspace.trial, True)
 
 
 @helper
-def automatic(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
+def automatic(motion, mode, c, t, h, p, which, workspace):  # type: ignore[no-untyped-def]
     """Return the error of a step by the method that suits the place (a method)."""
-    if room.control[FRESH] == 0.0:
-        choose(motion, mode, t, h, p, room)
-    if room.control[KIND] == 0.0:
-        return explicit(motion, mode, c, t, h, p, which, room)
-    return implicit_trial(motion, mode, c, t, h, p, which, room)
+    if workspace.control[FRESH] == 0.0:
+        choose(motion, mode, t, h, p, workspace)
+    if workspace.control[KIND] == 0.0:
+        return explicit(motion, mode, c, t, h, p, which, workspace)
+    return implicit_trial(motion, mode, c, t, h, p, which, workspace)
 
 
 @helper
-def automatic_probe(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
-    """Write the vector at t + h, within the last step, to ``room.trial``; tell whether it is known."""
-    if room.control[KIND] == 0.0:
-        return explicit_probe(motion, mode, c, t, h, p, which, room)
-    return implicit_probe(motion, mode, c, t, h, p, which, room)
+def automatic_probe(motion, mode, c, t, h, p, which, workspace):  # type: ignore[no-untyped-def]
+    """Write the vector at t + h, within the last step, to ``workspace.trial``; tell whether it is known."""
+    if workspace.control[KIND] == 0.0:
+        return explicit_probe(motion, mode, c, t, h, p, which, workspace)
+    return implicit_probe(motion, mode, c, t, h, p, which, workspace)

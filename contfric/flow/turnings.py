@@ -33,11 +33,11 @@ _AT_JOINT = 4e-10
 
 
 @helper
-def refine_turning(motion, mode, c, t, h, low, high, at, p, room):  # type: ignore[no-untyped-def]
+def refine_turning(motion, mode, c, t, h, low, high, at, p, workspace):  # type: ignore[no-untyped-def]
     """Return a stationary point in a bracket, and the observable there."""
     q, rising = 0.0, 0.0
     for _ in range(100):
-        q, q1, q2 = probed(motion, mode, c, 0.0, t, at, p, room)
+        q, q1, q2 = probed(motion, mode, c, 0.0, t, at, p, workspace)
         if math.isnan(q):
             return math.nan, q
         shift = -q1 / q2 if q2 != 0.0 else math.inf
@@ -57,7 +57,7 @@ def refine_turning(motion, mode, c, t, h, low, high, at, p, room):  # type: igno
 
 @helper
 def recorded(at, value, span, count, times, values):  # type: ignore[no-untyped-def]
-    """Append a stationary point if it is inside; return their number, -1 if there is no room or no point."""
+    """Append a stationary point if it is inside; return their number, -1 if there is no space or no point."""
     if math.isnan(at):
         return -1
     if not span[0] < at < span[1]:
@@ -69,9 +69,11 @@ def recorded(at, value, span, count, times, values):  # type: ignore[no-untyped-
 
 
 @helper
-def turnings_in_step(motion, mode, c, t, h, done, span, left, right, p, room, count, times, values):  # type: ignore[no-untyped-def]
+def turnings_in_step(  # type: ignore[no-untyped-def]
+    motion, mode, c, t, h, done, span, left, right, p, workspace, count, times, values
+):
     """Append the stationary points in the last step; return their number, -1 if the search fails."""
-    nodes, a = room.nodes, 0.0
+    nodes, a = workspace.nodes, 0.0
     depth, probes = push(nodes, 0, h, right), 0
     while depth > 0:
         b, after = top(nodes, depth)
@@ -91,7 +93,7 @@ def turnings_in_step(motion, mode, c, t, h, done, span, left, right, p, room, co
         if found:
             at = a + (low + (high - low) * share) * length
             low, high = a + low * length, b if high == 1.0 else a + high * length
-            at, value = refine_turning(motion, mode, c, t, h, low, high, at, p, room)
+            at, value = refine_turning(motion, mode, c, t, h, low, high, at, p, workspace)
             count = recorded(done + at, value, span, count, times, values)
             if count < 0:
                 return -1
@@ -101,7 +103,7 @@ def turnings_in_step(motion, mode, c, t, h, done, span, left, right, p, room, co
             depth -= 1
             continue
         probes += 1
-        between = probed(motion, mode, c, 0.0, t, next_node, p, room)
+        between = probed(motion, mode, c, 0.0, t, next_node, p, workspace)
         if math.isnan(between[0]) or probes > MOST_PROBES:
             return -1
         if found:
@@ -112,25 +114,25 @@ def turnings_in_step(motion, mode, c, t, h, done, span, left, right, p, room, co
 
 
 @helper
-def all_turnings(motion, mode, c, t0, y0, dt, p, room, times, values):  # type: ignore[no-untyped-def]
+def all_turnings(motion, mode, c, t0, y0, dt, p, workspace, times, values):  # type: ignore[no-untyped-def]
     """Write the interior stationary points of an observable; return their number, or -1."""
-    left = start_search(motion, mode, c, 0.0, t0, y0, dt, p, room)
+    left = start_search(motion, mode, c, 0.0, t0, y0, dt, p, workspace)
     near = _AT_JOINT * (1.0 + dt)
     span = (min(near, 0.5 * dt), max(dt - near, 0.5 * dt))
     done, count = 0.0, 0
     while done < dt:
         t = t0 + done
-        h = next_step(motion, mode, c, t, dt - done, p, room.none, room)
+        h = next_step(motion, mode, c, t, dt - done, p, workspace.none, workspace)
         if math.isnan(h):
             return -1
-        right = node(motion, mode, c, 0.0, t + h, room.end, room.last, p, room)
+        right = node(motion, mode, c, 0.0, t + h, workspace.end, workspace.last, p, workspace)
         if not is_flat(left, right, h):
             count = turnings_in_step(
-                motion, mode, c, t, h, done, span, left, right, p, room, count, times, values
+                motion, mode, c, t, h, done, span, left, right, p, workspace, count, times, values
             )
             if count < 0:
                 return -1
         done = dt if h == dt - done else done + h
-        settle(room)
+        settle(workspace)
         left = right
     return count

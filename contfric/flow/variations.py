@@ -25,8 +25,8 @@ from contfric.compiled import allocating_helper, helper
 FloatArray = NDArray[np.float64]
 
 
-class Room(NamedTuple):
-    """Room for an integration over ``size`` numbers; allocated once a call.
+class IntegrationWorkspace(NamedTuple):
+    """Workspace for an integration over ``size`` numbers; allocated once a call.
 
     Attributes
     ----------
@@ -75,13 +75,13 @@ class Room(NamedTuple):
 
 
 @helper
-def slope(motion, mode, c, t, y, p, which, room, out):  # type: ignore[no-untyped-def]
+def slope(motion, mode, c, t, y, p, which, workspace, out):  # type: ignore[no-untyped-def]
     """Write the slope of the whole vector at (t, y)."""
-    n, partial = room.scales.shape[0], room.partial
+    n, partial = workspace.scales.shape[0], workspace.partial
     columns = partial.shape[1]
     motion.field(mode, t, y[:n], p, which, out[:n], partial)
     if c >= 0:
-        out[n] = motion.rate(mode, c, t, y[:n], p, room.none, room.empty)
+        out[n] = motion.rate(mode, c, t, y[:n], p, workspace.none, workspace.empty)
     for i in range(n if columns > 0 else 0):
         row = n + i * columns
         for j in range(columns):
@@ -95,23 +95,23 @@ def slope(motion, mode, c, t, y, p, which, room, out):  # type: ignore[no-untype
 
 
 @helper
-def begin(motion, y0, p, which, room):  # type: ignore[no-untyped-def]
+def begin(motion, y0, p, which, workspace):  # type: ignore[no-untyped-def]
     """Write the start of the variations, and what error each component is allowed."""
-    n, columns, allowed = y0.shape[0], room.partial.shape[1], room.allowed
+    n, columns, allowed = y0.shape[0], workspace.partial.shape[1], workspace.allowed
     for i in range(n):
-        room.start[i] = y0[i]
-        room.scales[i] = motion.scale(i, p)
-        allowed[i] = motion.absolute * room.scales[i]
+        workspace.start[i] = y0[i]
+        workspace.scales[i] = motion.scale(i, p)
+        allowed[i] = motion.absolute * workspace.scales[i]
     for i in range(n if columns > 0 else 0):
         for j in range(columns):
             k = n + i * columns + j
             unit = 1.0
             if 1 <= j <= n:
-                unit = room.scales[j - 1]
+                unit = workspace.scales[j - 1]
             elif j > n:
                 unit = max(1.0, abs(p[which[j - n - 1]]))
-            room.start[k] = 1.0 if j == 1 + i else 0.0
-            allowed[k] = motion.absolute * room.scales[i] / unit
+            workspace.start[k] = 1.0 if j == 1 + i else 0.0
+            allowed[k] = motion.absolute * workspace.scales[i] / unit
 
 
 #: Deepest bisection of a step in the search of roots: down to the resolution of time.
@@ -121,8 +121,8 @@ CONTROLS = 10
 
 
 @allocating_helper
-def make_room(n, observed, columns, stages, implicit):  # type: ignore[no-untyped-def]
-    """Return the room for n states, with 0 or 1 observable and the columns of the variations.
+def integration_workspace(n, observed, columns, stages, implicit):  # type: ignore[no-untyped-def]
+    """Return the workspace for n states, with 0 or 1 observable and the columns of the variations.
 
     ``stages`` is the number of rows for explicit slopes, ``implicit`` that of implicit stages (0: none).
     """
@@ -130,7 +130,7 @@ def make_room(n, observed, columns, stages, implicit):  # type: ignore[no-untype
     unknowns = implicit * n
     rows = n if columns > 0 else 0
     flat = np.empty((6 + stages, size))
-    return Room(
+    return IntegrationWorkspace(
         flat[0],
         flat[1],
         flat[2],

@@ -6,7 +6,7 @@ from contfric.compiled import kernel, second_signature, turning_signature
 
 
 @kernel(second_signature)
-def no_second(mode, c, t0, y0, d, p, which, along, jac, room):  # type: ignore[no-untyped-def]
+def no_second(mode, c, t0, y0, d, p, which, along, jac, workspace):  # type: ignore[no-untyped-def]
     """Say that there are no second derivatives: the engine takes differences of the first ones."""
     return 0
 

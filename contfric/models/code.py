@@ -100,13 +100,17 @@ class Lines:
 
 
 def write_block(
-    code: Lines, outputs: Sequence[Output], room: str, columns: Sequence[str], result: str | None
+    code: Lines,
+    outputs: Sequence[Output],
+    workspace: str,
+    columns: Sequence[str],
+    result: str | None,
 ) -> None:
     """Write a block that computes outputs, and returns.
 
     Parameters
     ----------
-    room : the array of derivatives: they are not wanted if it is empty
+    workspace : the array of derivatives: they are not wanted if it is empty
     columns : assignments ``target[...] = 0`` for one parameter that nothing depends on
     result : name of the value to return, None if there is none
     """
@@ -132,7 +136,7 @@ def write_block(
     if not slopes and not own and not columns:
         code.add(back)
         return
-    code.open(f"if {room}.shape[0] == 0:")
+    code.open(f"if {workspace}.shape[0] == 0:")
     code.add(back)
     code.close()
     code.add(*slopes)

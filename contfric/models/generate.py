@@ -235,7 +235,7 @@ class _Writer:
         head: str,
         index: str | None,
         blocks: list[list[Output]],
-        room: str,
+        workspace: str,
         columns: list[str],
         result: str | None,
     ) -> None:
@@ -248,7 +248,7 @@ class _Writer:
             last = row == len(same) - 1
             if not last:
                 self.code.open("if " + " or ".join(f"{index} == {i}" for i in places) + ":")
-            write_block(self.code, list(block), room, columns, result)
+            write_block(self.code, list(block), workspace, columns, result)
             if not last:
                 self.code.close()
         self.code.close()

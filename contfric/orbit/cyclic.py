@@ -26,7 +26,7 @@ from contfric.models.definition import FloatArray
 
 
 class Elimination(NamedTuple):
-    """Room for the elimination of one chain; allocated once, used for every solve.
+    """Workspace for the elimination of one chain; allocated once, used for every solve.
 
     Attributes
     ----------
@@ -49,8 +49,8 @@ class Elimination(NamedTuple):
 
 
 @allocating_helper
-def room_for(count, m, free, right):  # type: ignore[no-untyped-def]
-    """Return the room for a chain of ``count`` segments with ``free`` parameters."""
+def elimination_workspace(count, m, free, right):  # type: ignore[no-untyped-def]
+    """Return the workspace for a chain of ``count`` segments with ``free`` parameters."""
     width = 3 * m + free + right
     return Elimination(
         np.empty((2 * m, width)),
@@ -171,10 +171,10 @@ def next_rows(rows, border, d, i, m):  # type: ignore[no-untyped-def]
 
 
 @helper
-def take_out(room, i, m):  # type: ignore[no-untyped-def]
+def take_out(workspace, i, m):  # type: ignore[no-untyped-def]
     """Eliminate joint i and keep its rows; False if singular."""
-    rows, kept = room.rows, room.kept
-    if not eliminate_joint(rows, room.border, m):
+    rows, kept = workspace.rows, workspace.kept
+    if not eliminate_joint(rows, workspace.border, m):
         return False
     for j in range(m):
         for k in range(rows.shape[1]):
@@ -183,16 +183,25 @@ def take_out(room, i, m):  # type: ignore[no-untyped-def]
 
 
 @helper
-def finish(room, close, close_w, p, q):  # type: ignore[no-untyped-def]
+def finish(workspace, close, close_w, p, q):  # type: ignore[no-untyped-def]
     """Solve for all unknowns when every joint but the first is out, and fill the pencil (p, q)."""
-    rows, m = room.rows, close.shape[0]
+    rows, m = workspace.rows, close.shape[0]
     for i in range(m):
         for j in range(m):
             p[i, j] = rows[m + i, j]
             q[i, j] = rows[m + i, 2 * m + j]
-    if not solve_ends(rows, room.border, close, close_w, room.small, room.rhs, room.z, room.w):
+    if not solve_ends(
+        rows,
+        workspace.border,
+        close,
+        close_w,
+        workspace.small,
+        workspace.rhs,
+        workspace.z,
+        workspace.w,
+    ):
         return False
-    back_substitute(room.kept, close, close_w, room.z, room.w, room.after)
+    back_substitute(workspace.kept, close, close_w, workspace.z, workspace.w, workspace.after)
     return True
 
 

@@ -76,8 +76,8 @@ LayoutType = types.NamedTuple(
 )
 
 
-class Room(NamedTuple):
-    """Room for the equations of one segment and for the closure; allocated once.
+class EquationWorkspace(NamedTuple):
+    """Workspace for the equations of one segment and for the closure; allocated once.
 
     Attributes
     ----------
@@ -105,10 +105,10 @@ class Room(NamedTuple):
 
 
 @allocating_helper
-def equation_room(count, m, free):  # type: ignore[no-untyped-def]
-    """Return the room for a chain of ``count`` segments with ``free`` parameters."""
+def equation_workspace(count, m, free):  # type: ignore[no-untyped-def]
+    """Return the workspace for a chain of ``count`` segments with ``free`` parameters."""
     n = m - 1
-    return Room(
+    return EquationWorkspace(
         np.empty(n),
         np.empty((n, 2 + n + free)),
         np.empty((n + 1, 1 + n + free)),
@@ -125,9 +125,14 @@ def equation_room(count, m, free):  # type: ignore[no-untyped-def]
 
 
 @helper
-def close_chain(functions, layout, z, p, which, room):  # type: ignore[no-untyped-def]
+def close_chain(functions, layout, z, p, which, workspace):  # type: ignore[no-untyped-def]
     """Write the closure of z_0, and its matrices on z_0 and on the parameters."""
-    last, close, close_w, grad = room.last, room.close, room.close_w, room.level_grad
+    last, close, close_w, grad = (
+        workspace.last,
+        workspace.close,
+        workspace.close_w,
+        workspace.level_grad,
+    )
     n, free = layout.closure.shape[0], which.shape[0]
     for k in range(free):
         for i in range(1 + n):
@@ -149,13 +154,13 @@ def close_chain(functions, layout, z, p, which, room):  # type: ignore[no-untype
 
 
 @helper
-def leap(functions, layout, i, start, p, which, room):  # type: ignore[no-untyped-def]
+def leap(functions, layout, i, start, p, which, workspace):  # type: ignore[no-untyped-def]
     """Write the state in which segment i begins, behind its reset, with the derivatives if any are wanted.
 
     Only for a segment that has one: elsewhere its joint is where it begins.
     """
     n, surface = start.shape[0] - 1, ((PLAIN - layout.departs[i]) >> 1) - 1
-    behind = room.behind
+    behind = workspace.behind
     functions.reset(surface, start[0], start[1:], p, which, behind[n, :n], behind[:n])
 
 
@@ -176,7 +181,7 @@ def behind_reset(jac, reset, row, n):  # type: ignore[no-untyped-def]
 
 @helper
 def pin_value(functions, layout, i, start, p, which, grad):  # type: ignore[no-untyped-def]
-    """Return what vanishes at the start of hold i, with the gradient where there is room for it."""
+    """Return what vanishes at the start of hold i, with the gradient where there is space for it."""
     surface = layout.pins[i]
     if surface == TOUCH_PIN:
         c = layout.observables[layout.exits[i - 1]]
@@ -186,13 +191,15 @@ def pin_value(functions, layout, i, start, p, which, grad):  # type: ignore[no-u
 
 
 @helper
-def pin_row(functions, layout, i, at, start, after, p, which, room, rows):  # type: ignore[no-untyped-def]
+def pin_row(functions, layout, i, at, start, after, p, which, workspace, rows):  # type: ignore[no-untyped-def]
     """Write the last row of hold i, and the rate with which it is left; return the residual."""
-    grad, level_grad = room.grad, room.level_grad
+    grad, level_grad = workspace.grad, workspace.level_grad
     m, free, width = start.shape[0], which.shape[0], rows.shape[1]
     row, left = 2 * m - 1, layout.observables[layout.exits[i]]
-    none, empty = room.none, room.empty
-    room.rates[i] = functions.rate(layout.departs[i], left, after[0], after[1:], p, none, empty)
+    none, empty = workspace.none, workspace.empty
+    workspace.rates[i] = functions.rate(
+        layout.departs[i], left, after[0], after[1:], p, none, empty
+    )
     residual = pin_value(functions, layout, i, start, p, which, grad)
     for k in range(width):
         rows[row, k] = 0.0
@@ -209,9 +216,9 @@ def pin_row(functions, layout, i, at, start, after, p, which, room, rows):  # ty
 
 
 @helper
-def mean_rate_row(functions, layout, i, at, start, duration, p, which, room, rows):  # type: ignore[no-untyped-def]
+def mean_rate_row(functions, layout, i, at, start, duration, p, which, workspace, rows):  # type: ignore[no-untyped-def]
     """Write the exit row of a short segment, divided by its duration; return the residual."""
-    state, jac, grad = room.state, room.jac, room.grad
+    state, jac, grad = workspace.state, workspace.jac, workspace.grad
     n, free = state.shape[0], which.shape[0]
     m = n + 1
     row, mode, c = 2 * m - 1, layout.modes[i], layout.observables[layout.exits[i]]
@@ -222,8 +229,8 @@ def mean_rate_row(functions, layout, i, at, start, duration, p, which, room, row
         share, weight = _NODES[k], _WEIGHTS[k]
         time = share * duration
         if layout.departs[i] < RETURNS:
-            functions.flow(mode, start[0], room.behind[n, :n], time, p, which, state, jac)
-            behind_reset(jac, room.behind, grad, n)
+            functions.flow(mode, start[0], workspace.behind[n, :n], time, p, which, state, jac)
+            behind_reset(jac, workspace.behind, grad, n)
         else:
             functions.flow(mode, start[0], start[1:], time, p, which, state, jac)
         mean += weight * functions.rate(mode, c, start[0] + time, state, p, which, grad)
@@ -255,22 +262,27 @@ def is_divided(layout, i, duration):  # type: ignore[no-untyped-def]
 
 
 @helper
-def segment_rows(functions, layout, i, at, start, after, p, which, room, rows):  # type: ignore[no-untyped-def]
+def segment_rows(functions, layout, i, at, start, after, p, which, workspace, rows):  # type: ignore[no-untyped-def]
     """Write the rows of segment i to the last m of ``rows``; return its residual against scale.
 
     The columns are ``[z_0 | z_i | z_{i+1} | parameters | right-hand sides]``, z_i from ``at``; the
     first right-hand side is minus the residual, the others are zero.
     """
-    state, jac, grad, level_grad = room.state, room.jac, room.grad, room.level_grad
+    state, jac, grad, level_grad = (
+        workspace.state,
+        workspace.jac,
+        workspace.grad,
+        workspace.level_grad,
+    )
     n, free, width = state.shape[0], which.shape[0], rows.shape[1]
     m = n + 1
     begin = start[1:]
     if layout.departs[i] < RETURNS:
-        leap(functions, layout, i, start, p, which, room)
-        begin = room.behind[n, :n]
+        leap(functions, layout, i, start, p, which, workspace)
+        begin = workspace.behind[n, :n]
     functions.flow(layout.modes[i], start[0], begin, after[0] - start[0], p, which, state, jac)
     if layout.departs[i] < RETURNS:
-        behind_reset(jac, room.behind, grad, n)
+        behind_reset(jac, workspace.behind, grad, n)
     worst = 0.0
     for j in range(n):
         row = m + j
@@ -288,7 +300,7 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
         rows[row, 3 * m + free] = -residual
     surface, row = layout.exits[i], m + n
     if layout.pins[i] != NO_PIN:
-        worst += pin_row(functions, layout, i, at, start, after, p, which, room, rows)
+        worst += pin_row(functions, layout, i, at, start, after, p, which, workspace, rows)
         return worst if math.isfinite(worst) else np.inf
     value = functions.observe(layout.observables[surface], after[0], after[1:], p, which, grad)
     residual = value - functions.level(surface, p, which, level_grad)
@@ -296,14 +308,14 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
     rate = grad[0]
     for k in range(n):
         rate += grad[1 + k] * jac[k, 1 + n]
-    room.rates[i] = rate
+    workspace.rates[i] = rate
     for k in range(2 * m):
         rows[row, k] = 0.0
     for k in range(3 * m + free + 1, width):
         rows[row, k] = 0.0
     duration = after[0] - start[0]
     if is_divided(layout, i, duration):
-        worst += mean_rate_row(functions, layout, i, at, start, duration, p, which, room, rows)
+        worst += mean_rate_row(functions, layout, i, at, start, duration, p, which, workspace, rows)
         return worst if math.isfinite(worst) else np.inf
     for k in range(m):
         rows[row, 2 * m + k] = grad[k]
@@ -314,20 +326,20 @@ def segment_rows(functions, layout, i, at, start, after, p, which, room, rows): 
 
 
 @helper
-def mismatch(functions, layout, z, p, room):  # type: ignore[no-untyped-def]
+def mismatch(functions, layout, z, p, workspace):  # type: ignore[no-untyped-def]
     """Return the largest residual of a segment against scale; nothing is differentiated."""
-    none, empty, state = room.none, room.empty, room.state
+    none, empty, state = workspace.none, workspace.empty, workspace.state
     count, m = z.shape
-    close_chain(functions, layout, z, p, none, room)
+    close_chain(functions, layout, z, p, none, workspace)
     worst = 0.0
     for i in range(count):
-        after = z[i + 1] if i + 1 < count else room.last
+        after = z[i + 1] if i + 1 < count else workspace.last
         duration = after[0] - z[i, 0]
         begin = z[i, 1:]
         if layout.departs[i] < RETURNS:
-            leap(functions, layout, i, z[i], p, none, room)
-            begin = room.behind[m - 1, : m - 1]
-        functions.flow(layout.modes[i], z[i, 0], begin, duration, p, none, state, room.nothing)
+            leap(functions, layout, i, z[i], p, none, workspace)
+            begin = workspace.behind[m - 1, : m - 1]
+        functions.flow(layout.modes[i], z[i, 0], begin, duration, p, none, state, workspace.nothing)
         if layout.pins[i] != NO_PIN:
             here = abs(pin_value(functions, layout, i, z[i], p, none, empty))
         else:

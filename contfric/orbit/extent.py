@@ -7,8 +7,8 @@ from numba import types
 
 from contfric.compiled import i8, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
-from contfric.orbit.equations import LayoutType, close_chain, equation_room
-from contfric.orbit.monitor import find_behind, find_turnings, start_value, turning_room
+from contfric.orbit.equations import LayoutType, close_chain, equation_workspace
+from contfric.orbit.monitor import find_behind, find_turnings, start_value, stationary_workspace
 from contfric.orbit.system import RETURNS
 
 
@@ -23,17 +23,17 @@ def extent(functions, layout, c, z, p, out):  # type: ignore[no-untyped-def]
     """
     count, m = z.shape
     free = min(count, 0)  # no parameter, and no literal
-    room, turnings = equation_room(count, m, free), turning_room()
-    close_chain(functions, layout, z, p, room.none, room)
+    workspace, turnings = equation_workspace(count, m, free), stationary_workspace()
+    close_chain(functions, layout, z, p, workspace.none, workspace)
     low, high = np.inf, -np.inf
     for i in range(count):
         low, high = min(low, z[i, 1]), max(high, z[i, 1])
         if layout.departs[i] < RETURNS:
-            found = find_behind(functions, layout, i, c, z, p, room, turnings)
-            begin = start_value(functions, layout, i, c, z, p, room)
+            found = find_behind(functions, layout, i, c, z, p, workspace, turnings)
+            begin = start_value(functions, layout, i, c, z, p, workspace)
             low, high = min(low, begin), max(high, begin)
         else:
-            found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
+            found = find_turnings(functions, layout, i, c, z, p, workspace.last, turnings)
         if found < 0:
             return False
         for k in range(found):

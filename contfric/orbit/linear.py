@@ -31,7 +31,7 @@ def linearised(
     system: System, joints: FloatArray, vector: FloatArray, parameters: bool = True
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the blocks and, as the last one, what is left of every equation, shape (N m,)."""
-    from contfric.orbit.newton import linearise
+    from contfric.orbit.blocks import linearise
 
     count, m = joints.shape
     a, b = np.empty((count, m, m)), np.empty((count, m, m))

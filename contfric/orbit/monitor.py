@@ -19,7 +19,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.equations import (
     LayoutType,
     close_chain,
-    equation_room,
+    equation_workspace,
     leap,
     segment_rows,
 )
@@ -52,8 +52,8 @@ class Turnings(NamedTuple):
 
 
 @allocating_helper
-def turning_room():  # type: ignore[no-untyped-def]
-    """Return the room for the stationary points of one segment."""
+def stationary_workspace():  # type: ignore[no-untyped-def]
+    """Return the workspace for the stationary points of one segment."""
     return Turnings(np.empty(_MOST_TURNINGS), np.empty(_MOST_TURNINGS))
 
 
@@ -70,14 +70,14 @@ def find_turnings(functions, layout, i, c, z, p, last, turnings):  # type: ignor
 
 
 @helper
-def find_behind(functions, layout, i, c, z, p, room, turnings):  # type: ignore[no-untyped-def]
+def find_behind(functions, layout, i, c, z, p, workspace, turnings):  # type: ignore[no-untyped-def]
     """Do the same for a segment behind a reset."""
-    after, n = z[i + 1] if i + 1 < z.shape[0] else room.last, z.shape[1] - 1
+    after, n = z[i + 1] if i + 1 < z.shape[0] else workspace.last, z.shape[1] - 1
     duration = after[0] - z[i, 0]
     if duration <= 0.0:
         return 0
-    leap(functions, layout, i, z[i], p, room.none, room)
-    begin = room.behind[n, :n]
+    leap(functions, layout, i, z[i], p, workspace.none, workspace)
+    begin = workspace.behind[n, :n]
     return functions.turning(
         layout.modes[i], c, z[i, 0], begin, duration, p, turnings.times, turnings.values
     )
@@ -96,47 +96,51 @@ def least_distance(found, sign, target, turnings, first, last):  # type: ignore[
 
 
 @helper
-def interior_margin(functions, layout, k, found, z, p, room, turnings):  # type: ignore[no-untyped-def]
+def interior_margin(functions, layout, k, found, z, p, workspace, turnings):  # type: ignore[no-untyped-def]
     """Return interior margin k from the stationary points of its segment."""
     i, count = layout.interior[k, 0], z.shape[0]
-    after = z[i + 1] if i + 1 < count else room.last
+    after = z[i + 1] if i + 1 < count else workspace.last
     duration = after[0] - z[i, 0]
     first, last = -np.inf, np.inf
     if layout.pins[i] != NO_PIN or layout.pins[i - 1] != NO_PIN:
         first = _AT_PIN * (1.0 + duration)
     if layout.pins[i] != NO_PIN or layout.pins[(i + 1) % count] != NO_PIN:
         last = duration - _AT_PIN * (1.0 + duration)
-    target = functions.level(layout.interior[k, 1], p, room.none, room.empty)
+    target = functions.level(layout.interior[k, 1], p, workspace.none, workspace.empty)
     return least_distance(found, float(layout.interior[k, 2]), target, turnings, first, last)
 
 
 @helper
-def start_value(functions, layout, i, c, z, p, room):  # type: ignore[no-untyped-def]
+def start_value(functions, layout, i, c, z, p, workspace):  # type: ignore[no-untyped-def]
     """Return observable c where segment i begins, behind its reset."""
     n = z.shape[1] - 1
-    leap(functions, layout, i, z[i], p, room.none, room)
-    return functions.observe(c, z[i, 0], room.behind[n, :n], p, room.none, room.empty)
+    leap(functions, layout, i, z[i], p, workspace.none, workspace)
+    return functions.observe(
+        c, z[i, 0], workspace.behind[n, :n], p, workspace.none, workspace.empty
+    )
 
 
 @helper
-def joint_margin(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
+def joint_margin(functions, layout, k, z, p, workspace):  # type: ignore[no-untyped-def]
     """Return joint margin k."""
     i, surface = layout.joint[k, 0], layout.joint[k, 1]
-    after = z[i + 1] if i + 1 < z.shape[0] else room.last
+    after = z[i + 1] if i + 1 < z.shape[0] else workspace.last
     c = layout.observables[surface]
     if layout.joint[k, 3] == 1:  # where the segment begins, behind a reset
-        value = start_value(functions, layout, i, c, z, p, room)
+        value = start_value(functions, layout, i, c, z, p, workspace)
     else:
-        value = functions.observe(c, after[0], after[1:], p, room.none, room.empty)
-    return layout.joint[k, 2] * (value - functions.level(surface, p, room.none, room.empty))
+        value = functions.observe(c, after[0], after[1:], p, workspace.none, workspace.empty)
+    return layout.joint[k, 2] * (
+        value - functions.level(surface, p, workspace.none, workspace.empty)
+    )
 
 
 @helper
-def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-untyped-def]
+def margins(functions, layout, z, p, workspace, turnings, out):  # type: ignore[no-untyped-def]
     """Fill the margins in the order interior, exit, joint, entry, lasting, held.
 
     An interior margin is infinite without stationary points, that of a tangential exit always. The
-    closure and the rates at the exits are in ``room``.
+    closure and the rates at the exits are in ``workspace``.
     """
     interior, observables = layout.interior, layout.observables
     segment, watched, found = -1, -1, 0
@@ -144,33 +148,35 @@ def margins(functions, layout, z, p, room, turnings, out):  # type: ignore[no-un
         i, c = interior[k, 0], observables[interior[k, 1]]
         if i != segment or c != watched:  # surfaces of one observable share its stationary points
             if layout.departs[i] < RETURNS:
-                found = find_behind(functions, layout, i, c, z, p, room, turnings)
+                found = find_behind(functions, layout, i, c, z, p, workspace, turnings)
             else:
-                found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
+                found = find_turnings(functions, layout, i, c, z, p, workspace.last, turnings)
             segment, watched = i, c
-        out[k] = interior_margin(functions, layout, k, found, z, p, room, turnings)
+        out[k] = interior_margin(functions, layout, k, found, z, p, workspace, turnings)
     at = interior.shape[0]
     for i in range(z.shape[0]):
         sign = layout.exit_signs[i]
-        out[at + i] = sign * room.rates[i] if sign != 0.0 else np.inf
+        out[at + i] = sign * workspace.rates[i] if sign != 0.0 else np.inf
     at += z.shape[0]
     for k in range(layout.joint.shape[0]):
-        out[at + k] = joint_margin(functions, layout, k, z, p, room)
+        out[at + k] = joint_margin(functions, layout, k, z, p, workspace)
     at += layout.joint.shape[0]
     for k in range(layout.lasting.shape[0]):
-        out[at + k] = lasting_margin(layout, k, z, room)
+        out[at + k] = lasting_margin(layout, k, z, workspace)
     at += layout.lasting.shape[0]
     for k in range(layout.held.shape[0]):
-        out[at + k] = held_margin(functions, layout, k, z, p, room, turnings)
+        out[at + k] = held_margin(functions, layout, k, z, p, workspace, turnings)
     for k in range(layout.doubles.shape[0]):
-        out[layout.doubles[k, 0]] = regular_margin(layout, k, z, room, out[layout.doubles[k, 0]])
+        out[layout.doubles[k, 0]] = regular_margin(
+            layout, k, z, workspace, out[layout.doubles[k, 0]]
+        )
 
 
 @helper
-def regular_margin(layout, k, z, room, value):  # type: ignore[no-untyped-def]
+def regular_margin(layout, k, z, workspace, value):  # type: ignore[no-untyped-def]
     """Return a margin without its double zero; infinite where the segment is too short to tell it."""
     i = layout.doubles[k, 1]
-    after = z[i + 1] if i + 1 < z.shape[0] else room.last
+    after = z[i + 1] if i + 1 < z.shape[0] else workspace.last
     lasts = after[0] - z[i, 0]
     if abs(lasts) < _CLEAR:
         return np.inf
@@ -178,38 +184,45 @@ def regular_margin(layout, k, z, room, value):  # type: ignore[no-untyped-def]
 
 
 @helper
-def lasting_margin(layout, k, z, room):  # type: ignore[no-untyped-def]
+def lasting_margin(layout, k, z, workspace):  # type: ignore[no-untyped-def]
     """Return the duration of segment k of those that must last."""
     i = layout.lasting[k]
-    after = z[i + 1] if i + 1 < z.shape[0] else room.last
+    after = z[i + 1] if i + 1 < z.shape[0] else workspace.last
     return after[0] - z[i, 0]
 
 
 @helper
-def held_margin(functions, layout, k, z, p, room, turnings):  # type: ignore[no-untyped-def]
+def held_margin(functions, layout, k, z, p, workspace, turnings):  # type: ignore[no-untyped-def]
     """Return the least acceleration with which hold k could be left where an observable is stationary."""
     i = layout.held[k]
     left = layout.observables[layout.exits[i]]
-    after = z[i + 1] if i + 1 < z.shape[0] else room.last
+    after = z[i + 1] if i + 1 < z.shape[0] else workspace.last
     duration = after[0] - z[i, 0]
     first = _AT_PIN * (1.0 + duration)
-    state, least = room.state, np.inf
+    state, least = workspace.state, np.inf
     watched = -1
     for row in range(layout.interior.shape[0]):
         c = layout.observables[layout.interior[row, 1]]
         if layout.interior[row, 0] != i or c == watched:
             continue
         watched = c
-        found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
+        found = find_turnings(functions, layout, i, c, z, p, workspace.last, turnings)
         for j in range(found):
             time = turnings.times[j]
             if time < first or time > duration - first:
                 continue
             functions.flow(
-                layout.modes[i], z[i, 0], z[i, 1:], time, p, room.none, state, room.nothing
+                layout.modes[i],
+                z[i, 0],
+                z[i, 1:],
+                time,
+                p,
+                workspace.none,
+                state,
+                workspace.nothing,
             )
             rate = functions.rate(
-                layout.departs[i], left, z[i, 0] + time, state, p, room.none, room.empty
+                layout.departs[i], left, z[i, 0] + time, state, p, workspace.none, workspace.empty
             )
             least = min(least, layout.exit_signs[i] * rate)
     return least
@@ -228,7 +241,7 @@ def count_margins(layout):  # type: ignore[no-untyped-def]
 
 
 @helper
-def ends_of(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
+def ends_of(functions, layout, k, z, p, workspace):  # type: ignore[no-untyped-def]
     """Return the values of the observable of label row k at both joints of its segment."""
     i, c, on, to = (
         layout.labels[k, 0],
@@ -236,16 +249,16 @@ def ends_of(functions, layout, k, z, p, room):  # type: ignore[no-untyped-def]
         layout.labels[k, 2],
         layout.labels[k, 3],
     )
-    after = z[i + 1] if i + 1 < z.shape[0] else room.last
+    after = z[i + 1] if i + 1 < z.shape[0] else workspace.last
     if on >= 0:
-        first = functions.level(on, p, room.none, room.empty)
+        first = functions.level(on, p, workspace.none, workspace.empty)
     else:
-        first = functions.observe(c, z[i, 0], z[i, 1:], p, room.none, room.empty)
+        first = functions.observe(c, z[i, 0], z[i, 1:], p, workspace.none, workspace.empty)
         if layout.departs[i] < RETURNS:
-            first = start_value(functions, layout, i, c, z, p, room)
+            first = start_value(functions, layout, i, c, z, p, workspace)
     if to >= 0:
-        return first, functions.level(to, p, room.none, room.empty)
-    return first, functions.observe(c, after[0], after[1:], p, room.none, room.empty)
+        return first, functions.level(to, p, workspace.none, workspace.empty)
+    return first, functions.observe(c, after[0], after[1:], p, workspace.none, workspace.empty)
 
 
 @helper
@@ -256,7 +269,7 @@ def side_of(value, target):  # type: ignore[no-untyped-def]
 
 
 @helper
-def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-untyped-def]
+def crossings(functions, layout, k, z, p, workspace, turnings):  # type: ignore[no-untyped-def]
     """Return the surfaces that the segment of row k crosses, as digits of one integer.
 
     And the distance to the nearest change: of a stationary point or a joint from a surface.
@@ -268,12 +281,12 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
         layout.labels[k, 3],
     )
     if layout.departs[i] < RETURNS:
-        found = find_behind(functions, layout, i, c, z, p, room, turnings)
+        found = find_behind(functions, layout, i, c, z, p, workspace, turnings)
     else:
-        found = find_turnings(functions, layout, i, c, z, p, room.last, turnings)
+        found = find_turnings(functions, layout, i, c, z, p, workspace.last, turnings)
     if found < 0:
         return -1, np.inf
-    value, final = ends_of(functions, layout, k, z, p, room)
+    value, final = ends_of(functions, layout, k, z, p, workspace)
     surfaces = layout.observables.shape[0]
     code, nearest, sides = 0, np.inf, 0  # two bits of ``sides`` a surface
     for piece in range(-1, found + 1):
@@ -285,7 +298,7 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
             surface = surfaces - 1 - j if following > value else j
             if layout.observables[surface] != c:
                 continue
-            target = functions.level(surface, p, room.none, room.empty)
+            target = functions.level(surface, p, workspace.none, workspace.empty)
             is_joint = (piece < 0 and surface == on) or (piece == found and surface == to)
             if not is_joint:
                 nearest = min(nearest, abs(following - target))
@@ -301,15 +314,15 @@ def crossings(functions, layout, k, z, p, room, turnings):  # type: ignore[no-un
 
 
 @helper
-def watch(functions, layout, z, p, room, turnings, out, labels):  # type: ignore[no-untyped-def]
+def watch(functions, layout, z, p, workspace, turnings, out, labels):  # type: ignore[no-untyped-def]
     """Fill margins and labels of an orbit, and behind the margins the distances of the labels.
 
     False if something is not finite.
     """
-    margins(functions, layout, z, p, room, turnings, out)
+    margins(functions, layout, z, p, workspace, turnings, out)
     count = count_margins(layout)
     for k in range(layout.labels.shape[0]):
-        labels[k], out[count + k] = crossings(functions, layout, k, z, p, room, turnings)
+        labels[k], out[count + k] = crossings(functions, layout, k, z, p, workspace, turnings)
     for k in range(count):
         if math.isnan(out[k]):
             return False
@@ -321,10 +334,12 @@ def examine(functions, layout, z, p, out, labels, counts):  # type: ignore[no-un
     """Fill margins and labels of a solved orbit; False if something is not finite."""
     counts[CHECKS] += 1
     count, m = z.shape
-    free = min(count, 0)  # no parameter, and no literal: the room would be compiled once for each
-    room, rows = equation_room(count, m, free), np.empty((2 * m, 3 * m + 1))
-    close_chain(functions, layout, z, p, room.none, room)
+    free = min(
+        count, 0
+    )  # no parameter, and no literal: the workspace would be compiled once for each
+    workspace, rows = equation_workspace(count, m, free), np.empty((2 * m, 3 * m + 1))
+    close_chain(functions, layout, z, p, workspace.none, workspace)
     for i in range(count):  # for the rates at the exits
-        after = z[i + 1] if i + 1 < count else room.last
-        segment_rows(functions, layout, i, m, z[i], after, p, room.none, room, rows)
-    return watch(functions, layout, z, p, room, turning_room(), out, labels)
+        after = z[i + 1] if i + 1 < count else workspace.last
+        segment_rows(functions, layout, i, m, z[i], after, p, workspace.none, workspace, rows)
+    return watch(functions, layout, z, p, workspace, stationary_workspace(), out, labels)

@@ -29,16 +29,22 @@ from numba import types
 from contfric.compiled import blocks, f8, helper, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
-from contfric.orbit.cyclic import Elimination, finish, next_rows, room_for, start_border, take_out
+from contfric.orbit.cyclic import (
+    Elimination,
+    elimination_workspace,
+    finish,
+    next_rows,
+    start_border,
+    take_out,
+)
 from contfric.orbit.equations import (
+    EquationWorkspace,
     LayoutType,
-    Room,
     close_chain,
-    equation_room,
+    equation_workspace,
     mismatch,
     segment_rows,
 )
-from contfric.orbit.holds import NO_PIN
 
 #: Places in the array of counts that kernels add to.
 SOLVES, MULTIPLIERS, CHECKS, EVENTS = range(4)
@@ -96,22 +102,22 @@ def add_rate(functions, layout, i, after, p, which, grad, rows):  # type: ignore
 
 
 @helper
-def newton_step(functions, layout, z, p, which, tangential, probe, room):  # type: ignore[no-untyped-def]
+def newton_step(functions, layout, z, p, which, tangential, probe, workspace):  # type: ignore[no-untyped-def]
     """Solve the linearised equations at (z, p); return (solved, largest residual).
 
-    The closure of the chain and the border rows are in the room. The solution is left in
-    ``room.elimination``, the pencil of one turn in ``room.pencil``. With a ``probe`` above zero the second
-    right-hand side is an error of this relative size in every equation. ``tangential`` is a segment whose
-    exit is one (-1: none).
+    The closure of the chain and the border rows are in the workspace. The solution is left in
+    ``workspace.elimination``, the pencil of one turn in ``workspace.pencil``. With a ``probe`` above zero the
+    second right-hand side is an error of this relative size in every equation. ``tangential`` is a segment
+    with a tangential exit (-1: none).
     """
     count, m = z.shape
-    work, equations = room.elimination, room.equations
+    work, equations = workspace.elimination, workspace.equations
     rows, second = work.rows, 3 * m + which.shape[0] + 1
-    start_border(work.border, room.d, room.e, room.s, m)
+    start_border(work.border, workspace.d, workspace.e, workspace.s, m)
     worst = 0.0
     for i in range(count):
         if i > 0:
-            next_rows(rows, work.border, room.d, i, m)
+            next_rows(rows, work.border, workspace.d, i, m)
         after = z[i + 1] if i + 1 < count else equations.last
         at = 0 if i == 0 else m
         here = segment_rows(functions, layout, i, at, z[i], after, p, which, equations, rows)
@@ -127,7 +133,7 @@ def newton_step(functions, layout, z, p, which, tangential, probe, room):  # typ
                 )
         if i > 0 and not take_out(work, i, m):
             return False, worst
-    pencil = room.pencil
+    pencil = workspace.pencil
     return finish(work, equations.close, equations.close_w, pencil[0], pencil[1]), worst
 
 
@@ -150,27 +156,27 @@ def correction_size(dz, dw, z, p, which, column):  # type: ignore[no-untyped-def
 
 
 @helper
-def off_normal(room, z, p, which):  # type: ignore[no-untyped-def]
+def off_normal(workspace, z, p, which):  # type: ignore[no-untyped-def]
     """Return how far (z, p) is off the plane of the first border row, through its reference point."""
     value = 0.0
     for i in range(z.shape[0]):
         for j in range(z.shape[1]):
-            value += room.d[0, i, j] * (z[i, j] - room.z_ref[i, j])
+            value += workspace.d[0, i, j] * (z[i, j] - workspace.z_ref[i, j])
     for k in range(which.shape[0]):
-        value += room.e[0, k] * (p[which[k]] - room.p_ref[which[k]])
+        value += workspace.e[0, k] * (p[which[k]] - workspace.p_ref[which[k]])
     return value
 
 
 @helper
-def no_condition(functions, layout, z, p, which, room, extra):  # type: ignore[no-untyped-def]
+def no_condition(functions, layout, z, p, which, workspace, extra):  # type: ignore[no-untyped-def]
     """Border an orbit at fixed parameters: with nothing. Return (residual, segment of a tangential exit)."""
     return 0.0, -1
 
 
 @helper
-def normal_to_tangent(functions, layout, z, p, which, room, extra):  # type: ignore[no-untyped-def]
+def normal_to_tangent(functions, layout, z, p, which, workspace, extra):  # type: ignore[no-untyped-def]
     """Border a branch with the plane normal to its tangent, along which the tangent asks for 1."""
-    room.s[0, 0], room.s[0, 1] = -off_normal(room, z, p, which), 1.0
+    workspace.s[0, 0], workspace.s[0, 1] = -off_normal(workspace, z, p, which), 1.0
     return 0.0, -1
 
 
@@ -235,12 +241,12 @@ def correcting(border: Any) -> Any:
 
     Parameters
     ----------
-    border : fills the border rows of the room at (z, p), as many as parameters are free, and returns their
-        residual and the segment of a tangential exit
+    border : fills the border rows of the workspace at (z, p), as many as parameters are free, and returns
+        their residual and the segment of a tangential exit
     """
 
     @helper
-    def correct(functions, layout, z, p, which, trust, floor, probe, room, extra):  # type: ignore[no-untyped-def]
+    def correct(functions, layout, z, p, which, trust, floor, probe, workspace, extra):  # type: ignore[no-untyped-def]
         """Solve for the orbit from (z, p) in place.
 
         Parameters
@@ -248,7 +254,7 @@ def correcting(border: Any) -> Any:
         trust : longest correction, infinite for the plain method (a flag would be compiled twice)
         floor : size of a correction after which no other is asked for
         probe : that of :func:`newton_step`
-        room : what is allocated once: the elimination, with the last solution and the tangent; the pencil
+        workspace : allocated once: the elimination, with the last solution and the tangent; the pencil
             (2, m, m) P and Q; the rates: all of the last Jacobian, nearer than ``floor`` to the orbit
         extra : handed on to ``border``
 
@@ -258,25 +264,27 @@ def correcting(border: Any) -> Any:
             (status, steps, size of the first correction, last residual).
         """
         before, first, worst = np.inf, 0.0, 0.0
-        work, rounding = room.elimination, layout.rounding
+        work, rounding = workspace.elimination, layout.rounding
         if rounding <= INTEGRATED:  # a closed form knows a phase as well as the time
             rounding *= 1.0 + abs(z[z.shape[0] - 1, 0])
         share, worst_before, residual_before = 1.0, np.inf, np.inf
         damped, circles = math.isfinite(trust), 0
         for step in range(_MOST_STEPS):
             if damped:
-                worst = mismatch(functions, layout, z, p, room.equations)
+                worst = mismatch(functions, layout, z, p, workspace.equations)
                 if worst > 2.0 * worst_before and share > 1e-3:
                     # the last correction went too far: take back half of it
                     share *= 0.5
                     move(z, p, which, work.z, work.w, -share)
                     continue
                 worst_before = worst
-            close_chain(functions, layout, z, p, which, room.equations)
-            residual, tangential = border(functions, layout, z, p, which, room, extra)
+            close_chain(functions, layout, z, p, which, workspace.equations)
+            residual, tangential = border(functions, layout, z, p, which, workspace, extra)
             if not math.isfinite(residual):
                 return NOT_FINITE, step, first, residual
-            solved, worst = newton_step(functions, layout, z, p, which, tangential, probe, room)
+            solved, worst = newton_step(
+                functions, layout, z, p, which, tangential, probe, workspace
+            )
             if not solved:
                 return (SINGULAR if math.isfinite(worst) else NOT_FINITE), step, first, worst
             worst = max(worst, abs(residual))
@@ -306,10 +314,10 @@ def correcting(border: Any) -> Any:
 _correct_orbit = correcting(no_condition)
 
 
-class OrbitRoom(NamedTuple):
-    """Room for one orbit at fixed parameters: what the elimination needs, and no border rows."""
+class OrbitWorkspace(NamedTuple):
+    """Workspace for one orbit at fixed parameters: what the elimination needs, and no border rows."""
 
-    equations: Room
+    equations: EquationWorkspace
     elimination: Elimination
     pencil: FloatArray
     d: FloatArray
@@ -326,69 +334,17 @@ def solve(functions, layout, z, p, trust, pencil, counts):  # type: ignore[no-un
     counts[SOLVES] += 1
     count, m = z.shape
     free, right = min(count, 0), max(2 - count, 2)  # 0 and 2, but no literals
-    equations, work = equation_room(count, m, free), room_for(count, m, free, right)
+    equations, work = (
+        equation_workspace(count, m, free),
+        elimination_workspace(count, m, free, right),
+    )
     d, e, s = np.empty((0, count, m)), np.empty((0, 0)), np.empty((0, 2))
-    room, none = OrbitRoom(equations, work, pencil, d, e, s), equations.none
+    workspace, none = OrbitWorkspace(equations, work, pencil, d, e, s), equations.none
     status, steps, first, _ = _correct_orbit(
-        functions, layout, z, p, none, trust, FLOOR, layout.rounding, room, 0
+        functions, layout, z, p, none, trust, FLOOR, layout.rounding, workspace, 0
     )
     if status == CONVERGED:
         moved = correction_size(work.z, work.w, z, p, none, 1)
         if moved > _UNDETERMINED:
             status = SINGULAR
     return float(status), float(steps), first, mismatch(functions, layout, z, p, equations)
-
-
-@helper
-def rates_at_joint(functions, layout, i, after, p, which, room, rows):  # type: ignore[no-untyped-def]
-    """Take the rates at the end of segment i at the joint itself, where the exit's condition holds exactly.
-
-    The state that the flow comes to misses it by rounding. Where the exit is tangential, time is divided by
-    that: multipliers would be rounding.
-    """
-    n = after.shape[0] - 1
-    m = n + 1
-    jac = room.jac
-    functions.flow(layout.modes[i], after[0], after[1:], 0.0, p, which, room.state, jac)
-    for j in range(n):
-        change = jac[j, 1 + n] - rows[m + j, 2 * m]
-        rows[m + j, 2 * m] += change
-        rows[m + j, m] -= change
-
-
-@kernel(types.boolean(FlowType, LayoutType, matrix, vector, blocks, blocks, blocks, blocks, matrix))
-def linearise(functions, layout, z, p, a, b, c, r, close):  # type: ignore[no-untyped-def]
-    """Fill the blocks of the full Jacobian for use outside of the engine.
-
-    The first parameters are differentiated by, as many as ``c`` has columns: none or all.
-    """
-    count, m = z.shape
-    free = c.shape[2]
-    which = np.empty(free, dtype=np.int64)
-    for k in range(free):
-        which[k] = k
-    room, rows = equation_room(count, m, free), np.empty((2 * m, 3 * m + free + 1))
-    close_chain(functions, layout, z, p, which, room)
-    for i in range(m):
-        for j in range(m):
-            close[i, j] = room.close[i, j]
-    fine = True
-    for i in range(count):
-        after = z[i + 1] if i + 1 < count else room.last
-        worst = segment_rows(functions, layout, i, m, z[i], after, p, which, room, rows)
-        fine = fine and math.isfinite(worst)
-        if layout.pins[i] == NO_PIN:
-            rates_at_joint(functions, layout, i, after, p, which, room, rows)
-        for j in range(m):
-            for k in range(m):
-                a[i, j, k] = rows[m + j, m + k]
-                b[i, j, k] = rows[m + j, 2 * m + k]
-            for k in range(free):
-                c[i, j, k] = rows[m + j, 3 * m + k]
-            r[i, j, 0] = rows[m + j, 3 * m + free]
-    # the closure's dependence on the parameters is added to the last segment's columns
-    for i in range(m):
-        for k in range(free):
-            for j in range(m):
-                c[count - 1, i, k] += b[count - 1, i, j] * room.close_w[j, k]
-    return fine

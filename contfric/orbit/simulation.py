@@ -57,7 +57,7 @@ class Tables(NamedTuple):
 
 
 class EventRows(NamedTuple):
-    """Room for the events of a trajectory.
+    """Workspace for the events of a trajectory.
 
     Attributes
     ----------

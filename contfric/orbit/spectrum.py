@@ -115,8 +115,8 @@ def spectrum(m, rank, out, e, b, product):  # type: ignore[no-untyped-def]
     return one, minus
 
 
-class SpectralRoom(NamedTuple):
-    """Room for the multipliers of one turn: three matrices and the characteristic polynomial."""
+class SpectralWorkspace(NamedTuple):
+    """Workspace for the multipliers of one turn: three matrices and the characteristic polynomial."""
 
     turn: FloatArray
     left: FloatArray
@@ -125,27 +125,29 @@ class SpectralRoom(NamedTuple):
 
 
 @allocating_helper
-def spectral_room(m):  # type: ignore[no-untyped-def]
-    """Return the room for matrices of one turn, shape (m, m)."""
-    return SpectralRoom(np.empty((m, m)), np.empty((m, m)), np.empty((m, m)), np.empty(m + 1))
+def spectral_workspace(m):  # type: ignore[no-untyped-def]
+    """Return the workspace for matrices of one turn, shape (m, m)."""
+    return SpectralWorkspace(np.empty((m, m)), np.empty((m, m)), np.empty((m, m)), np.empty(m + 1))
 
 
 @helper
-def multipliers(rank, pencil, close, out, room):  # type: ignore[no-untyped-def]
+def multipliers(rank, pencil, close, out, workspace):  # type: ignore[no-untyped-def]
     """Write the multipliers of one turn from its pencil; return (chi(1), chi(-1))."""
     n = out.shape[0]
     timeless = close[0, 0] == 0.0  # autonomous: the closure forgets the time, the turn does not
     close[0, 0] = 1.0
-    solved = turn_map(pencil[0], pencil[1], close, room.left, room.turn)
+    solved = turn_map(pencil[0], pencil[1], close, workspace.left, workspace.turn)
     if timeless:
         close[0, 0] = 0.0
         for k in range(n + 1):
-            room.turn[k, 0] = 0.0
+            workspace.turn[k, 0] = 0.0
     if not solved:
         for k in range(n):
             out[k] = np.inf
         return np.nan, np.nan
-    return spectrum(room.turn, min(rank, n), out, room.symmetric, room.left, room.product)
+    return spectrum(
+        workspace.turn, min(rank, n), out, workspace.symmetric, workspace.left, workspace.product
+    )
 
 
 @kernel(types.UniTuple(f8, 2)(LayoutType, blocks, types.complex128[::1], indices))
@@ -159,4 +161,4 @@ def stability(layout, pencil, mu, counts):  # type: ignore[no-untyped-def]
             inner = i > 0 and j > 0
             close[i, j] = layout.closure[i - 1, j - 1] if inner else 0.0
     close[0, 0] = 0.0 if layout.turn == 0.0 else 1.0
-    return multipliers(layout.rank, pencil, close, mu, spectral_room(m))
+    return multipliers(layout.rank, pencil, close, mu, spectral_workspace(m))

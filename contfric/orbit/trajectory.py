@@ -25,8 +25,8 @@ TablesType = types.NamedTuple([indices, table, indices, indices, indices, indice
 RowsType = types.NamedTuple([table, indices, vector, matrix], EventRows)
 
 
-class StateRoom(NamedTuple):
-    """Room for a state at a hit and on trial, and what is handed over where nothing is wanted."""
+class StateWorkspace(NamedTuple):
+    """Workspace for a state at a hit and on trial, and what is handed over where nothing is wanted."""
 
     none: IntArray
     empty: FloatArray
@@ -82,35 +82,40 @@ def sign_code(functions, observables, surface, t, y, p, none, empty):  # type: i
 
 
 @helper
-def first_hit(functions, tables, mode, on, t, y, p, longest, unit, room):  # type: ignore[no-untyped-def]
+def first_hit(functions, tables, mode, on, t, y, p, longest, unit, workspace):  # type: ignore[no-untyped-def]
     """Return (time, surface) of the first bounding surface that is met; (-1, -1) if none.
 
-    The state there is written to ``room.after``. The search covers a period (``unit``) at first, then longer
-    and longer times: a surface that is never met is searched for no further than another one is.
+    The state there is written to ``workspace.after``. The search covers a period (``unit``) at first, then
+    longer and longer times: a surface that is never met is searched for no further than another one is.
     """
     within = HOLD_PERIODS * unit
     while within < longest:
-        tau, surface = hit_within(functions, tables, mode, on, t, y, p, within, room)
+        tau, surface = hit_within(functions, tables, mode, on, t, y, p, within, workspace)
         if surface >= 0:
             return tau, surface
         within *= _WIDER
-    return hit_within(functions, tables, mode, on, t, y, p, longest, room)
+    return hit_within(functions, tables, mode, on, t, y, p, longest, workspace)
 
 
 @helper
-def hit_within(functions, tables, mode, on, t, y, p, longest, room):  # type: ignore[no-untyped-def]
+def hit_within(functions, tables, mode, on, t, y, p, longest, workspace):  # type: ignore[no-untyped-def]
     """Do the same over one time."""
-    observables, bounds, none, empty = tables.observables, tables.bounds, room.none, room.empty
+    observables, bounds, none, empty = (
+        tables.observables,
+        tables.bounds,
+        workspace.none,
+        workspace.empty,
+    )
     best, which = longest, -1
     for k in range(observables.shape[0]):
         if bounds[mode, k] == 0:
             continue
         target = functions.level(k, p, none, empty)
         started = (on >> k) & 1 == 1
-        tau = functions.hit(mode, observables[k], target, started, t, y, best, p, room.trial)
+        tau = functions.hit(mode, observables[k], target, started, t, y, best, p, workspace.trial)
         if tau >= 0.0 and (which < 0 or tau < best):
             best, which = tau, k
-            copy_state(room.trial, room.after)
+            copy_state(workspace.trial, workspace.after)
     return (best, which) if which >= 0 else (-1.0, -1)
 
 
@@ -133,10 +138,10 @@ def whole_turns(t, period):  # type: ignore[no-untyped-def]
 
 
 @helper
-def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, room):  # type: ignore[no-untyped-def]
+def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, workspace):  # type: ignore[no-untyped-def]
     """Follow a trajectory; see :func:`simulate`."""
     observables, following = tables.observables, tables.following
-    joints, none, empty, after = rows.joints, room.none, room.empty, room.after
+    joints, none, empty, after = rows.joints, workspace.none, workspace.empty, workspace.after
     period = functions.period(p, none, empty)
     unit = period if period > 0.0 else 1.0
     cycle, event, at_most = 0, 0, NO_TIME
@@ -161,12 +166,12 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, r
             left = periods - (t - first_time)
         allowance = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * unit
         tau, surface = first_hit(
-            functions, tables, mode, on, t, y, p, min(left, allowance), unit, room
+            functions, tables, mode, on, t, y, p, min(left, allowance), unit, workspace
         )
         if surface < 0:
             if left > allowance:
                 return never_left(tables, mode), event, mode, cycle, t
-            functions.flow(mode, t, y, left, p, none, after, room.nothing)
+            functions.flow(mode, t, y, left, p, none, after, workspace.nothing)
             copy_state(after, y)
             t += left
             if period > 0.0:
@@ -183,7 +188,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, r
         reset = tables.bounds[mode, surface] == 2
         if reset:  # rows keep the state before it, as the joints of orbits do
             copy_state(y, rows.states[event])
-            functions.reset(surface, t, rows.states[event], p, none, y, room.nothing)
+            functions.reset(surface, t, rows.states[event], p, none, y, workspace.nothing)
         code = sign_code(functions, observables, surface, t, y, p, none, empty)
         target = following[
             (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code
@@ -235,5 +240,5 @@ def simulate(functions, tables, mode, on, t, y, p, periods, rows, carry, budget)
     """
     count = y.shape[0]
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
-    room = StateRoom(none, empty, nothing, np.empty(count), np.empty(count))
-    return follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, room)
+    workspace = StateWorkspace(none, empty, nothing, np.empty(count), np.empty(count))
+    return follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, workspace)

@@ -205,7 +205,7 @@ def _plot_row(
         ax.legend(handles=handles, fontsize=SMALL, frameon=False, **BESIDE)
     settle(ax)
     label_marks(ax, marks)
-    if legend and not outside:  # there is no room for the meaning of the markers
+    if legend and not outside:  # there is no space for the meaning of the markers
         handles = _handles(branches, (), mirrors=mirrors)
         ax.legend(handles=handles, fontsize=SMALL - 1.0, loc="best")
     return ax

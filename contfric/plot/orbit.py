@@ -29,7 +29,7 @@ from contfric.plot.protocols import OrbitLike
 from contfric.plot.save import axes_or_new, figure_or_new
 from contfric.plot.style import BESIDE, SMALL, TEXT, parameter_label
 
-#: Room in a legend (inches, at the small size): an entry with its line, and each letter of its text.
+#: Workspace in a legend (inches, at the small size): an entry with its line, and each letter of its text.
 _ENTRY, _LETTER = 0.45, 0.06
 
 

@@ -12,7 +12,7 @@ import math
 from numba import types
 
 from contfric.chaos.cells import StartingType, start_mode
-from contfric.chaos.tangent import ARRIVED, new_walk, state_room, to_joint
+from contfric.chaos.tangent import ARRIVED, new_walk, state_workspace, to_joint
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.orbit.trajectory import TablesType
@@ -70,8 +70,8 @@ def capture(  # type: ignore[no-untyped-def]
         ``NO_START`` or ``NOT_YET``; periods followed; shape (k,)
     """
     n, surfaces = states.shape[1], tables.observables.shape[0]
-    walk, room = new_walk(n), state_room(n)
-    period = functions.period(p, room.none, room.empty)
+    walk, workspace = new_walk(n), state_workspace(n)
+    period = functions.period(p, workspace.none, workspace.empty)
     timeless, walls = period <= 0.0, 0
     if timeless:
         period = 1.0
@@ -86,12 +86,12 @@ def capture(  # type: ignore[no-untyped-def]
             walk.y[j] = states[cell, j]
         walk.at_once[0] = walk.at_once[2] = 0
         labels[cell], ends[cell], cycle, t = -1, NOT_YET, 0, phase
-        mode, on = start_mode(functions, tables, starting, time, walk.y, p, room)
+        mode, on = start_mode(functions, tables, starting, time, walk.y, p, workspace)
         if mode < 0:
             ends[cell] = NO_START
         while mode >= 0 and cycle < periods and stop[0] == 0:
             outcome, surface, following, _, turns, t = to_joint(
-                functions, tables, mode, on, t, p, period, walk, room
+                functions, tables, mode, on, t, p, period, walk, workspace
             )
             if outcome != ARRIVED:
                 ends[cell] = outcome

@@ -9,7 +9,7 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.models.definition import FloatArray
 from contfric.orbit.system import IntArray
-from contfric.orbit.trajectory import CARRIED, StateRoom, copy_state, whole_turns
+from contfric.orbit.trajectory import CARRIED, StateWorkspace, copy_state, whole_turns
 
 #: Joints that are remembered: one for short cycles, one for long ones.
 MEMORIES = 2
@@ -33,9 +33,9 @@ class Remembered(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """All room that the solutions of one call share; ``strobe`` is the number of the next strobe."""
+    """All workspace that the solutions of one call share; ``strobe`` is the number of the next strobe."""
 
-    state: StateRoom
+    state: StateWorkspace
     segment: Segment
     memory: Remembered
     y: FloatArray
@@ -47,10 +47,10 @@ class Workspace(NamedTuple):
 
 @allocating_helper
 def new_workspace(n):  # type: ignore[no-untyped-def]
-    """Return room for solutions of n states."""
+    """Return workspace for solutions of n states."""
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
     return Workspace(
-        StateRoom(none, empty, nothing, np.empty(n), np.empty(n)),
+        StateWorkspace(none, empty, nothing, np.empty(n), np.empty(n)),
         Segment(np.zeros(3, dtype=np.int64), np.zeros(1), np.empty(n)),
         Remembered(np.empty((MEMORIES, 4), dtype=np.int64), np.empty((MEMORIES, 1 + n))),
         np.empty(n),
@@ -73,11 +73,14 @@ def put(points, cycle, t, y, mode):  # type: ignore[no-untyped-def]
 
 
 @helper
-def has_sense(functions, cut, mode, t, y, p, room):  # type: ignore[no-untyped-def]
+def has_sense(functions, cut, mode, t, y, p, workspace):  # type: ignore[no-untyped-def]
     """Tell whether the section is crossed in the sense asked for."""
     if cut.sense == 0:
         return True
-    return cut.sense * functions.rate(mode, cut.observable, t, y, p, room.none, room.empty) > 0.0
+    return (
+        cut.sense * functions.rate(mode, cut.observable, t, y, p, workspace.none, workspace.empty)
+        > 0.0
+    )
 
 
 @helper
@@ -91,18 +94,24 @@ def set_strobe(cut, period, segment, strobe):  # type: ignore[no-untyped-def]
 @helper
 def cut_inside(functions, cut, duration, p, period, ws, points):  # type: ignore[no-untyped-def]
     """Collect the points of the section inside of a segment."""
-    segment, room = ws.segment, ws.state
+    segment, workspace = ws.segment, ws.state
     mode, cycle, t = segment.at[0], segment.at[2], segment.time[0]
     if cut.phase >= 0.0:
         while True:
             later = (ws.strobe[0] - cycle) * period + (cut.phase * period - t)
             if later > duration:
                 break
-            functions.flow(mode, t, segment.y, later, p, room.none, ws.found, room.nothing)
+            functions.flow(
+                mode, t, segment.y, later, p, workspace.none, ws.found, workspace.nothing
+            )
             put(points, ws.strobe[0], cut.phase * period, ws.found, mode)
             ws.strobe[0] += 1
     elif cut.inside[mode] != 0:
-        level = functions.level(cut.surface, p, room.none, room.empty) if cut.surface >= 0 else 0.0
+        level = (
+            functions.level(cut.surface, p, workspace.none, workspace.empty)
+            if cut.surface >= 0
+            else 0.0
+        )
         started = cut.surface >= 0 and (segment.at[1] >> cut.surface) & 1 == 1
         copy_state(segment.y, ws.work)
         left = duration
@@ -112,7 +121,7 @@ def cut_inside(functions, cut, duration, p, period, ws, points):  # type: ignore
                 break
             turns, t = whole_turns(t + tau, period)
             cycle, left, started = cycle + turns, left - tau, True
-            if has_sense(functions, cut, mode, t, ws.found, p, room):
+            if has_sense(functions, cut, mode, t, ws.found, p, workspace):
                 put(points, cycle, t, ws.found, mode)
             copy_state(ws.found, ws.work)
 

@@ -67,10 +67,10 @@ _FACTOR, _OFFSET = 6364136223846793005, 1442695040888963407
 @helper
 def step_behind(functions, tables, mode, surface, following, cycle, t, y, p, ws):  # type: ignore[no-untyped-def]
     """Begin the next segment behind a joint."""
-    segment, room = ws.segment, ws.state
+    segment, workspace = ws.segment, ws.state
     copy_state(y, ws.found)
     if tables.bounds[mode, surface] == 2:
-        functions.reset(surface, t, ws.found, p, room.none, segment.y, room.nothing)
+        functions.reset(surface, t, ws.found, p, workspace.none, segment.y, workspace.nothing)
     else:
         copy_state(ws.found, segment.y)
     segment.at[0], segment.at[2] = following, cycle
@@ -153,9 +153,16 @@ def finish(functions, cut, end, cycle, t, p, period, unit, first, collecting, ws
         if cut.phase >= 0.0:
             cut_inside(functions, cut, period, p, period, ws, points)
             points.number[0] = min(points.number[0], first + 1)
-        left, room = period - segment.time[0], ws.state
+        left, workspace = period - segment.time[0], ws.state
         functions.flow(
-            segment.at[0], segment.time[0], segment.y, left, p, room.none, ws.y, room.nothing
+            segment.at[0],
+            segment.time[0],
+            segment.y,
+            left,
+            p,
+            workspace.none,
+            ws.y,
+            workspace.nothing,
         )
     elif outcome == APERIODIC and collecting:
         duration = (cycle - segment.at[2]) * unit + (t - segment.time[0])
@@ -258,7 +265,7 @@ def cut_solutions(  # type: ignore[no-untyped-def]
         row counts if each starts where the one before has ended
     modes, ons : mode and surfaces that each lies on, as bits; the mode is -1 where the state decides
     stop : another thread writes a 1 to it to end the call
-    rows, points, ends : room for events, points and what solutions came to
+    rows, points, ends : workspace for events, points and what solutions came to
 
     Returns
     -------
@@ -267,17 +274,17 @@ def cut_solutions(  # type: ignore[no-untyped-def]
     """
     n = states.shape[1]
     ws = new_workspace(n)
-    segment, room = ws.segment, ws.state
+    segment, workspace = ws.segment, ws.state
     for row in range(vectors.shape[0]):
         p, first = vectors[row], points.number[0]
-        period = functions.period(p, room.none, room.empty)
+        period = functions.period(p, workspace.none, workspace.empty)
         t = times[row]
         for j in range(n):
             carried = how.carried != 0 and row > 0
             segment.y[j] = ends.states[row - 1, j] if carried else states[row, j]
         mode, on = modes[row], ons[row]
         if mode < 0:
-            mode, on = start_mode(functions, tables, starting, t, segment.y, p, room)
+            mode, on = start_mode(functions, tables, starting, t, segment.y, p, workspace)
         if period > 0.0:
             t -= math.floor(t / period) * period
         segment.at[0], segment.at[1], segment.at[2], segment.time[0] = mode, on, 0, t

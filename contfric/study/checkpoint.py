@@ -93,7 +93,7 @@ class Checkpoint:
             with keeping(self._journal):
                 yield
         except BaseException as error:
-            # a disk that is full may have room later
+            # a disk that is full may have space later
             if isinstance(error, ContfricError) and not isinstance(error, ResultFileError):
                 self._end(remove=True)
             else:

@@ -150,7 +150,7 @@ def test_what_is_no_number_stays_none():
     assert integrated.turning(0, SPEED, 0.0, broken, 1.0, p, np.empty(9), np.empty(9)) == -1
 
 
-def test_more_stationary_points_than_there_is_room_for():
+def test_more_stationary_points_than_there_is_space_for():
     p, y = np.array([1.0, 0.0, 0.5, 0.0, 0.0]), np.array([0.0, 0.0])
     times, values = np.empty(3), np.empty(3)
     assert integrated.turning(STICK, LOAD, 0.1, y, 30.0, p, times, values) == -1

@@ -63,11 +63,11 @@ def test_slide(sign: int, zeta: float, omega: float) -> None:
     start, along = (2.3, 0.7, 0.4, 3.1), (0.3, -0.8, 0.5, 0.9)
     s, h = 0.21, 0.07
     p = np.array([omega, s, 0.4, h, zeta])
-    jac, room = np.empty((2, 9)), np.empty(10)
+    jac, workspace = np.empty((2, 9)), np.empty(10)
     state = np.array(start[1:3])
     mode = 0 if sign > 0 else 1
     known = MODEL.flow.second(
-        mode, -1, start[0], state, start[3], p, ALL, np.array(along), jac, room
+        mode, -1, start[0], state, start[3], p, ALL, np.array(along), jac, workspace
     )
     assert known == 1
     exact = expected(sign, start, along, (omega, s, h, zeta))
@@ -78,12 +78,12 @@ def test_slide(sign: int, zeta: float, omega: float) -> None:
 
 
 def test_resonance_is_an_ordinary_point() -> None:
-    along, state, room = np.array([0.3, -0.8, 0.5, 0.9]), np.array([0.7, 0.4]), np.empty(10)
+    along, state, workspace = np.array([0.3, -0.8, 0.5, 0.9]), np.array([0.7, 0.4]), np.empty(10)
     found = []
     for omega in (1.0 - 1e-7, 1.0, 1.0 + 1e-7):
         jac = np.empty((2, 9))
         p = np.array([omega, 0.2, 0.4, 0.1, 0.0])
-        MODEL.flow.second(0, -1, 2.3, state, 5.0, p, ALL, along, jac, room)
+        MODEL.flow.second(0, -1, 2.3, state, 5.0, p, ALL, along, jac, workspace)
         found.append(jac)
     np.testing.assert_allclose(found[1], 0.5 * (found[0] + found[2]), rtol=1e-11, atol=1e-11)
 

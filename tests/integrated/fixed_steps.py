@@ -9,7 +9,7 @@ from contfric.flow.dop853 import STAGES, explicit_step
 from contfric.flow.general import Kind, handle_of
 from contfric.flow.radau import IMPLICIT_STAGES, implicit_step
 from contfric.flow.stepping import settle
-from contfric.flow.variations import begin, make_room, slope
+from contfric.flow.variations import begin, integration_workspace, slope
 from contfric.handle import Bound
 
 
@@ -17,19 +17,19 @@ from contfric.handle import Bound
 def march(motion, implicit, mode, y0, dt, steps, p, which, out):
     """Write state and variations after equal steps; what they are integrated with does not matter."""
     n = y0.shape[0]
-    room = make_room(n, 0, 1 + n + which.shape[0], STAGES, IMPLICIT_STAGES)
-    begin(motion, y0, p, which, room)
+    workspace = integration_workspace(n, 0, 1 + n + which.shape[0], STAGES, IMPLICIT_STAGES)
+    begin(motion, y0, p, which, workspace)
     h = dt / steps
     for i in range(steps):
         t = i * h
-        slope(motion, mode, -1, t, room.start, p, which, room, room.slopes[0])
+        slope(motion, mode, -1, t, workspace.start, p, which, workspace, workspace.slopes[0])
         if implicit:
-            implicit_step(motion, mode, -1, t, h, p, which, room, room.end, False)
+            implicit_step(motion, mode, -1, t, h, p, which, workspace, workspace.end, False)
         else:
-            explicit_step(motion, mode, -1, t, h, p, which, room, room.end)
-        settle(room)
+            explicit_step(motion, mode, -1, t, h, p, which, workspace, workspace.end)
+        settle(workspace)
     for k in range(out.shape[0]):
-        out[k] = room.start[k]
+        out[k] = workspace.start[k]
 
 
 @kernel(

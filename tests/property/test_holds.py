@@ -206,13 +206,15 @@ def bridges() -> list[cf.Branch]:
 
 def residuals(orbit: cf.Orbit, joints: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """The equations as the engine has them (its right-hand side is minus the residual)."""
-    from contfric.orbit.newton import linearise
+    from contfric.orbit.blocks import linearise
 
     count, m = joints.shape
-    room = np.empty((count, m, m)), np.empty((count, m, m)), np.empty((count, m, len(vector)))
+    workspace = np.empty((count, m, m)), np.empty((count, m, m)), np.empty((count, m, len(vector)))
     right = np.empty((count, m, 1))
     system = orbit.system
-    linearise(system.functions(), system.layout, joints, vector, *room, right, np.empty((m, m)))
+    linearise(
+        system.functions(), system.layout, joints, vector, *workspace, right, np.empty((m, m))
+    )
     return -right.ravel()
 
 

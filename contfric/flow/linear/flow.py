@@ -66,7 +66,7 @@ def carry_by_product(step, columns, work):  # type: ignore[no-untyped-def]
 
 @inlined_helper
 def advance(motion, piece, t0, dt, rate, spread, y, system):  # type: ignore[no-untyped-def]
-    """Advance a state, and its derivatives where there is room for the exponential."""
+    """Advance a state, and its derivatives where there is space for the exponential."""
     waves, varied, by_start, n = system.waves, system.varied, system.work[5], y.shape[0]
     steps = max(1, math.ceil(rate * abs(dt) / REACH))
     h = dt / steps
@@ -105,10 +105,10 @@ def advance(motion, piece, t0, dt, rate, spread, y, system):  # type: ignore[no-
 
 
 @inlined_helper
-def flow_in(motion, piece, t, y0, dt, p, which, y1, jac, room):  # type: ignore[no-untyped-def]
-    """Advance a state from a folded time, in room that is given."""
+def flow_in(motion, piece, t, y0, dt, p, which, y1, jac, workspace):  # type: ignore[no-untyped-def]
+    """Advance a state from a folded time, in a workspace that is given."""
     n, free = y0.shape[0], which.shape[0]
-    system = system_in(room[0], room[1], room[2], free)
+    system = system_in(workspace[0], workspace[1], workspace[2], free)
     rate, spread = set_up(motion, piece, p, which, system)
     rate = silenced(rate, system)
     fine = rate * abs(dt) < REACH * MOST_STEPS  # not so where it is no number
@@ -133,7 +133,7 @@ def flow_in(motion, piece, t, y0, dt, p, which, y1, jac, room):  # type: ignore[
 
 @allocating_helper
 def linear_flow(motion, piece, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
-    """Advance a state by ``dt``, with derivatives where ``jac`` has room (``flow_signature``).
+    """Advance a state by ``dt``, with derivatives where ``jac`` has space (``flow_signature``).
 
     The phase is folded into one period; the fold depends on the parameters as the period does.
     """
@@ -146,8 +146,8 @@ def linear_flow(motion, piece, t0, y0, dt, p, which, y1, jac):  # type: ignore[n
     grad = np.empty(free)
     period = motion.period(p, wanted, grad)
     cycles = folded(t0, period)
-    room = (coefficients, waves, rows)
-    flow_in(motion, piece, t0 - cycles * period, y0, dt, p, wanted, y1, jac, room)
+    workspace = (coefficients, waves, rows)
+    flow_in(motion, piece, t0 - cycles * period, y0, dt, p, wanted, y1, jac, workspace)
     if cycles != 0.0:
         for i in range(jac.shape[0]):
             for k in range(free):

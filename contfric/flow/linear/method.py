@@ -17,27 +17,32 @@ from contfric.flow.stepping import explicit, explicit_probe
 
 
 @allocating_helper
-def linear_step(motion, mode, c, t, h, p, which, room, end, any_length):  # type: ignore[no-untyped-def]
-    """Write the vector after a step from ``room.start``; return its length against the longest one."""
-    n, size = room.scales.shape[0], room.partial.shape[1]
+def linear_step(motion, mode, c, t, h, p, which, workspace, end, any_length):  # type: ignore[no-untyped-def]
+    """Write the vector after a step from ``workspace.start``; return its length against the longest one."""
+    n, size = workspace.scales.shape[0], workspace.partial.shape[1]
     free = which.shape[0] if size > 0 else 0
     coefficients = np.empty((1 + free, motion.entries_count))
     waves = np.empty((1 + free + WAVES, motion.waves_count))
     rows = np.empty((rows_of(free, 2 * n if size > 0 else 0), n))
     own = (coefficients, waves, rows)
-    return step_in(motion, mode, c, t, h, p, which[:free], room, end, any_length, own)
+    return step_in(motion, mode, c, t, h, p, which[:free], workspace, end, any_length, own)
 
 
 @helper
-def step_in(motion, mode, c, t, h, p, which, room, end, any_length, own):  # type: ignore[no-untyped-def]
-    """Step in room that is given."""
+def step_in(motion, mode, c, t, h, p, which, workspace, end, any_length, own):  # type: ignore[no-untyped-def]
+    """Step in a workspace that is given."""
     system = system_in(own[0], own[1], own[2], which.shape[0])
     rate, spread = set_up(motion, mode, p, which, system)
     rate = silenced(rate, system)
     length = rate * abs(h) / REACH
     if not (length <= 1.0 or (any_length and length < MOST_STEPS)):
         return length
-    n, size, start, maps = room.scales.shape[0], room.partial.shape[1], room.start, system.maps
+    n, size, start, maps = (
+        workspace.scales.shape[0],
+        workspace.partial.shape[1],
+        workspace.start,
+        system.maps,
+    )
     y, first = system.work[4], start.shape[0] - n * size
     for i in range(n):
         y[i] = start[i]
@@ -47,7 +52,7 @@ def step_in(motion, mode, c, t, h, p, which, room, end, any_length, own):  # typ
     for i in range(n):
         end[i] = y[i]
     if first > n:
-        end[n] = motion.observe(c, t + h, end[:n], p, room.none, room.empty)
+        end[n] = motion.observe(c, t + h, end[:n], p, workspace.none, workspace.empty)
     if size == 0:
         return length
     for i in range(n):
@@ -60,30 +65,30 @@ def step_in(motion, mode, c, t, h, p, which, room, end, any_length, own):  # typ
 
 
 @helper
-def linear_attempt(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
-    """Step from ``room.start`` to ``room.end``; return the error in units of what is allowed."""
-    length = linear_step(motion, mode, c, t, h, p, which, room, room.end, False)
+def linear_attempt(motion, mode, c, t, h, p, which, workspace):  # type: ignore[no-untyped-def]
+    """Step from ``workspace.start`` to ``workspace.end``; return the error in units of what is allowed."""
+    length = linear_step(motion, mode, c, t, h, p, which, workspace, workspace.end, False)
     return length**POWER
 
 
 @helper
-def linear_probe(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
-    """Write the vector at t + h, within the last step, to ``room.trial``."""
-    linear_step(motion, mode, c, t, h, p, which, room, room.trial, True)
+def linear_probe(motion, mode, c, t, h, p, which, workspace):  # type: ignore[no-untyped-def]
+    """Write the vector at t + h, within the last step, to ``workspace.trial``."""
+    linear_step(motion, mode, c, t, h, p, which, workspace, workspace.trial, True)
     return True
 
 
 @helper
-def explicit_or_linear(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
+def explicit_or_linear(motion, mode, c, t, h, p, which, workspace):  # type: ignore[no-untyped-def]
     """Step by the closed form where there is one (a method)."""
     if motion.closed[mode] != 0:
-        return linear_attempt(motion, mode, c, t, h, p, which, room)
-    return explicit(motion, mode, c, t, h, p, which, room)
+        return linear_attempt(motion, mode, c, t, h, p, which, workspace)
+    return explicit(motion, mode, c, t, h, p, which, workspace)
 
 
 @helper
-def explicit_or_linear_probe(motion, mode, c, t, h, p, which, room):  # type: ignore[no-untyped-def]
+def explicit_or_linear_probe(motion, mode, c, t, h, p, which, workspace):  # type: ignore[no-untyped-def]
     """Probe by the closed form where there is one."""
     if motion.closed[mode] != 0:
-        return linear_probe(motion, mode, c, t, h, p, which, room)
-    return explicit_probe(motion, mode, c, t, h, p, which, room)
+        return linear_probe(motion, mode, c, t, h, p, which, workspace)
+    return explicit_probe(motion, mode, c, t, h, p, which, workspace)

@@ -253,21 +253,21 @@ def linear_hit(motion, piece, c, target, on, t0, y0, dt_max, p, y1):  # type: ig
     rows, poly = np.empty((rows_of(0, 0), y0.shape[0])), np.empty(TERMS + 2)
     period = motion.period(p, none, poly[:0])
     t = t0 - folded(t0, period) * period
-    room = (coefficients, waves, rows, poly)
-    return search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, room, y1)
+    workspace = (coefficients, waves, rows, poly)
+    return search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, workspace, y1)
 
 
 @inlined_helper
-def search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, room, y1):  # type: ignore[no-untyped-def]
-    """Search the first hit, from a folded time, in room that is given."""
-    system, sight = system_in(room[0][:1], room[1], room[2], 0), room[0][1]
+def search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, workspace, y1):  # type: ignore[no-untyped-def]
+    """Search the first hit, from a folded time, in a workspace that is given."""
+    system, sight = system_in(workspace[0][:1], workspace[1], workspace[2], 0), workspace[0][1]
     rate, spread = begin_search(motion, piece, c, t, y0, dt_max, p, none, system, sight)
     if math.isnan(rate):
         for i in range(y1.shape[0]):
             y1[i] = rate
         return 0.0
     return hit_in(
-        motion, piece, c, target, on, t, dt_max, p, rate, spread, system, sight, room[3], y1
+        motion, piece, c, target, on, t, dt_max, p, rate, spread, system, sight, workspace[3], y1
     )
 
 
@@ -336,15 +336,17 @@ def linear_turning(motion, piece, c, t0, y0, dt, p, times, values):  # type: ign
     rows, poly = np.empty((rows_of(0, 0), y0.shape[0])), np.empty((2, TERMS + 2))
     period = motion.period(p, none, poly[0, :0])
     t = t0 - folded(t0, period) * period
-    room = (coefficients, waves, rows, poly)
-    return search_turnings(motion, piece, c, t, y0, dt, p, none, room, times, values)
+    workspace = (coefficients, waves, rows, poly)
+    return search_turnings(motion, piece, c, t, y0, dt, p, none, workspace, times, values)
 
 
 @inlined_helper
-def search_turnings(motion, piece, c, t, y0, dt, p, none, room, times, values):  # type: ignore[no-untyped-def]
-    """Search all stationary points, from a folded time, in room that is given."""
-    system, sight = system_in(room[0][:1], room[1], room[2], 0), room[0][1]
+def search_turnings(motion, piece, c, t, y0, dt, p, none, workspace, times, values):  # type: ignore[no-untyped-def]
+    """Search all stationary points, from a folded time, in a workspace that is given."""
+    system, sight = system_in(workspace[0][:1], workspace[1], workspace[2], 0), workspace[0][1]
     reach = begin_search(motion, piece, c, t, y0, dt, p, none, system, sight)
     if math.isnan(reach[0]):
         return -1
-    return turnings_in(motion, piece, c, t, dt, p, reach, system, sight, room[3], times, values)
+    return turnings_in(
+        motion, piece, c, t, dt, p, reach, system, sight, workspace[3], times, values
+    )

@@ -1,4 +1,4 @@
-"""The system of an affine mode at some parameters, in room that is allocated once a call.
+"""The system of an affine mode at some parameters, in a workspace that is allocated once a call.
 
 With the cosines and sines of all frequencies as further states the system is linear and autonomous. Its
 coefficients (:mod:`contfric.models.linear_code`) are evaluated once a call; the *rate* of the system, a bound
@@ -49,7 +49,7 @@ _TABLE = np.array([_terms(j / _PARTS) for j in range(int(1.1 * REACH * _PARTS) +
 
 
 class System(NamedTuple):
-    """An affine mode at some parameters, with room for its series.
+    """An affine mode at some parameters, with space for its series.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class System(NamedTuple):
     w, dw : frequencies, (waves,), and their derivatives, (parameters, waves)
     waves : cosines and sines at the start of a step, their derivatives by the frequencies, zeros, whether
         their factors differ from zero, and the derivatives by time, (8, waves)
-    work : room for n numbers, and the derivative by the time of the start, (6, n)
+    work : workspace for n numbers, and the derivative by the time of the start, (6, n)
     series, other : Taylor terms of the state, and of another column, (TERMS + 1, n)
     varied : derivatives by the parameters, (parameters, n)
     maps : exp(A d) of the motion so far, and of a step, transposed, (2 n, n); (0, n) where not wanted
@@ -87,7 +87,7 @@ def rows_of(free, maps):  # type: ignore[no-untyped-def]
 
 @inlined_helper
 def system_in(coefficients, waves, rows, free):  # type: ignore[no-untyped-def]
-    """Return the room for a system with ``free`` parameters, within three arrays.
+    """Return the workspace for a system with ``free`` parameters, within three arrays.
 
     Parameters
     ----------

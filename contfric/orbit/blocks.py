@@ -1,0 +1,73 @@
+"""The blocks of the chain's Jacobian as arrays, compiled: for what is computed outside of the engine."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import types
+
+from contfric.compiled import blocks, helper, kernel, matrix, vector
+from contfric.flow.layouts import FlowType
+from contfric.orbit.equations import (
+    LayoutType,
+    close_chain,
+    equation_workspace,
+    segment_rows,
+)
+from contfric.orbit.holds import NO_PIN
+
+
+@helper
+def rates_at_joint(functions, layout, i, after, p, which, workspace, rows):  # type: ignore[no-untyped-def]
+    """Take the rates at the end of segment i at the joint itself, where the exit's condition holds exactly.
+
+    The state that the flow comes to misses it by rounding. Where the exit is tangential, time is divided by
+    that: multipliers would be rounding.
+    """
+    n = after.shape[0] - 1
+    m = n + 1
+    jac = workspace.jac
+    functions.flow(layout.modes[i], after[0], after[1:], 0.0, p, which, workspace.state, jac)
+    for j in range(n):
+        change = jac[j, 1 + n] - rows[m + j, 2 * m]
+        rows[m + j, 2 * m] += change
+        rows[m + j, m] -= change
+
+
+@kernel(types.boolean(FlowType, LayoutType, matrix, vector, blocks, blocks, blocks, blocks, matrix))
+def linearise(functions, layout, z, p, a, b, c, r, close):  # type: ignore[no-untyped-def]
+    """Fill the blocks of the full Jacobian for use outside of the engine.
+
+    The first parameters are differentiated by, as many as ``c`` has columns: none or all.
+    """
+    count, m = z.shape
+    free = c.shape[2]
+    which = np.empty(free, dtype=np.int64)
+    for k in range(free):
+        which[k] = k
+    workspace, rows = equation_workspace(count, m, free), np.empty((2 * m, 3 * m + free + 1))
+    close_chain(functions, layout, z, p, which, workspace)
+    for i in range(m):
+        for j in range(m):
+            close[i, j] = workspace.close[i, j]
+    fine = True
+    for i in range(count):
+        after = z[i + 1] if i + 1 < count else workspace.last
+        worst = segment_rows(functions, layout, i, m, z[i], after, p, which, workspace, rows)
+        fine = fine and math.isfinite(worst)
+        if layout.pins[i] == NO_PIN:
+            rates_at_joint(functions, layout, i, after, p, which, workspace, rows)
+        for j in range(m):
+            for k in range(m):
+                a[i, j, k] = rows[m + j, m + k]
+                b[i, j, k] = rows[m + j, 2 * m + k]
+            for k in range(free):
+                c[i, j, k] = rows[m + j, 3 * m + k]
+            r[i, j, 0] = rows[m + j, 3 * m + free]
+    # the closure's dependence on the parameters is added to the last segment's columns
+    for i in range(m):
+        for k in range(free):
+            for j in range(m):
+                c[count - 1, i, k] += b[count - 1, i, j] * workspace.close_w[j, k]
+    return fine
