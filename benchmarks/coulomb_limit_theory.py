@@ -157,7 +157,7 @@ class Slide:
 
 
 def amplitudes(law: Law, Omega: float, turns: int, delays: bool = True) -> np.ndarray:
-    """Both amplitudes of the motion that Coulomb's rules settle on, with the delays of a law."""
+    """Both amplitudes of the motion that Coulomb's rules converge to, with the delays of a law."""
     stop, x = 0.0, 1.0  # at rest, without load
     stops: list[float] = []
     for _ in range(turns):

@@ -52,7 +52,7 @@ def curve() -> Callable[[], object]:
 
 
 def branch_in(model: str, parameter: str, bounds: tuple[float, float]) -> Callable[[], object]:
-    """Return a call that continues the orbit that a model settles on."""
+    """Return a call that continues the orbit that a model converges to."""
     orbit = cf.find_orbit(model)
     return lambda: cf.continue_orbit(orbit, parameter, bounds)
 

@@ -74,7 +74,7 @@ def segment_costs(flow: Any) -> list[float]:
     omega = np.array([0])
     return [
         least(lambda: flow.hit(0, 1, 0.0, True, t, y, 30.0, p, y1)),
-        least(lambda: flow.turning(0, 0, t, y, tau, p, times[0], times[1])),
+        least(lambda: flow.stationary(0, 0, t, y, tau, p, times[0], times[1])),
         least(lambda: flow.flow(0, t, y, tau, p, NONE, y1, NOTHING)),
         least(lambda: flow.flow(0, t, y, tau, p, omega, y1, jac)),
     ]
@@ -268,7 +268,7 @@ def period_of_lugre() -> str:
 
 
 def settled_period(p: Any) -> list[tuple[Any, ...]]:
-    """The segments of one period of the motion that a simulation settles on."""
+    """The segments of one period of the motion that a simulation converges to."""
     turn = 2.0 * math.pi / p[0]
     t, y, mode, on, segments = 0.0, np.array([1.2, -0.01, 0.0]), 1, False, []
     end = 21 * turn

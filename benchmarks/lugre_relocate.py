@@ -104,7 +104,7 @@ def touch(orbit: cf.Orbit) -> float:
     c = [o.name for o in model.observables].index("v")
     times, values = np.empty(512), np.empty(512)
     start = whole.joints[0]
-    found = model.flow.turning(
+    found = model.flow.stationary(
         0, c, start[0], start[1:].copy(), whole.period, whole.vector, times, values
     )
     return float(np.min(np.abs(values[:found])))

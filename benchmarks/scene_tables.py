@@ -10,7 +10,7 @@ from typing import Any
 #: Wall seconds that are asked for: the import, a scene with its figure, one without, the first one.
 IMPORT, FIGURE, PLAIN, COLD = 0.15, 2.5, 1.2, 20.0
 #: Functions of the model: the other kernels call them, Python need not.
-OF_MODEL = {"flow", "observe", "level", "period", "hit", "turning"}
+OF_MODEL = {"flow", "observe", "level", "period", "hit", "stationary"}
 #: What no scene of the table asks for, if it is loaded.
 UNASKED = ("scipy", "mpl_toolkits.mplot3d", "matplotlib.pyplot", "networkx", "pandas")
 

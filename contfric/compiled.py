@@ -60,9 +60,9 @@ flow_signature = types.void(i8, f8, vector, f8, vector, indices, vector, matrix)
 observe_signature = f8(i8, f8, vector, vector, indices, vector)
 #: level(k, p, which, grad): level of surface k; ``grad`` (len(which)), not filled if empty.
 level_signature = f8(i8, vector, indices, vector)
-#: turning(mode, c, t0, y0, dt, p, times, values): number of interior stationary points of observable
+#: stationary(mode, c, t0, y0, dt, p, times, values): number of interior stationary points of observable
 #: c; their times after the start, ascending, and its values there are written; -1 if they do not fit.
-turning_signature = i8(i8, i8, f8, vector, f8, vector, vector, vector)
+stationary_signature = i8(i8, i8, f8, vector, f8, vector, vector, vector)
 #: hit(mode, c, level, on, t0, y0, dt_max, p, y1): the first time after the start at which observable c
 #: takes the level (``on``: it starts there), and the state there; negative if not within ``dt_max``.
 hit_signature = f8(i8, i8, f8, types.boolean, f8, vector, f8, vector, vector)

@@ -53,7 +53,7 @@ class ConvergenceError(ContfricError):
 
 
 class AperiodicError(ConvergenceError):
-    """The simulation did not settle on a periodic orbit within its allowance."""
+    """The simulation did not converge to a periodic orbit within its allowance."""
 
 
 def did_you_mean(word: object, valid: Iterable[str]) -> str:

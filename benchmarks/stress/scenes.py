@@ -102,7 +102,7 @@ def start(rng: np.random.Generator) -> tuple[str, Params, cf.Orbit | None, str]:
 def refusal(error: cf.ContfricError) -> str:
     """Return why there is no orbit, without its numbers."""
     text = str(error)
-    for words in ("rest for ever", "grows without bound", "has not settled", "aperiodic"):
+    for words in ("rest for ever", "grows without bound", "has not converged", "aperiodic"):
         if words in text:
             return f"{type(error).__name__}: {words}"
     text = re.sub(r" '[^']*'| at .*", "", text.split(":", maxsplit=1)[0])

@@ -28,8 +28,8 @@ from report import Report, Tally, say
 from segment_cases import Case, draw_flow, draw_graze, draw_root
 from segment_flow import EPS, check_flow, parts_of
 
-from contfric.compiled import turning_signature
-from contfric.flow.forced_oscillator import hit, turning
+from contfric.compiled import stationary_signature
+from contfric.flow.forced_oscillator import hit, stationary
 
 #: A function that is this many roundings from zero has a sign.
 LIMIT_ROOT = 30.0
@@ -124,10 +124,10 @@ def check_hit(case: Case, tally: Tally) -> None:
 def stationary_times(case: Case) -> list[float]:
     """Return contfric's stationary times."""
     # the kernel writes times, and values too if its signature has a place for them
-    places = len(turning_signature.args) - 6
+    places = len(stationary_signature.args) - 6
     out = [np.empty(MOST_STATIONARY) for _ in range(places)]
     y0 = np.array([case.x0, case.v0])
-    count = turning(case.mode, case.c, case.t0, y0, case.d, case.vector(), *out)
+    count = stationary(case.mode, case.c, case.t0, y0, case.d, case.vector(), *out)
     return [float(d) for d in out[0][:count]]
 
 

@@ -39,18 +39,18 @@ from contfric.continuation.events import (
     Kind,
     Verdict,
 )
+from contfric.continuation.from_simulation import walked
 from contfric.continuation.incident import incident_forms
 from contfric.continuation.points import FIRST_STEP, Settings
 from contfric.continuation.side import Side
 from contfric.continuation.switching import (
     NEARER,
-    leaps,
     leave_along,
     null_vector,
+    overshoots,
     settings_value,
 )
 from contfric.continuation.trace import trace_side
-from contfric.continuation.walked import walked
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish
@@ -282,8 +282,8 @@ def _follow_departure(
     text = "the branch that leaves along the null vector"
     active = orbit.model.index_of(settings.parameter)
     along = direction or Direction(null_vector(orbit), 0.0)
-    leapt: list[float] = []
-    for distance in chain(NEARER, leapt):  # those that leap over something come last
+    overshot: list[float] = []
+    for distance in chain(NEARER, overshot):  # those that overshoot something come last
         departure = leave_along(orbit, settings, along, reason.value, distance)
         if departure is None:
             continue
@@ -294,13 +294,13 @@ def _follow_departure(
         if known is not None:
             state.judge(event, text, Verdict.KNOWN, known)
             return
-        again = distance in leapt
+        again = distance in overshot
         if (
             not again
             and distance != NEARER[-1]
-            and leaps(orbit, settings, departure, distance, along)
+            and overshoots(orbit, settings, departure, distance, along)
         ):
-            leapt.append(distance)
+            overshot.append(distance)
             continue
         side = trace_side(
             orbit,

@@ -74,7 +74,7 @@ def section_diagram(
 
 
 def _starts(state: PlaneExploration, orbit: Orbit, fixed: str, value: float) -> Iterator[Orbit]:
-    """Yield orbits on a section: those that simulations settle on, then the plane's own continued to it."""
+    """Yield orbits on a section: those that simulations converge to, then the plane's own continued to it."""
     box = state.box
     varies = next(n for n in box.names if n != fixed)
     k = box.names.index(varies)

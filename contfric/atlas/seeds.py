@@ -1,4 +1,4 @@
-"""Seeds: attractors that simulations settle on, as starts of families that nothing else reaches."""
+"""Seeds: attractors that simulations converge to, as starts of families that nothing else reaches."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.starts import signs_at
 
-#: Periods after which a seed that has not settled is given up: there are many seeds, and attractors that
+#: Periods after which a seed that has not converged is given up: there are many seeds, and attractors that
 #: take longer are nearly marginal.
 _LONGEST = 2000
 
@@ -82,7 +82,7 @@ def attractors(
     max_periods: int,
     progress: Callable[[str], None] | None = None,
 ) -> Iterator[Orbit]:
-    """Yield the periodic orbits that simulations settle on, one for each start that settles.
+    """Yield the periodic orbits that simulations converge to, one for each start that converges.
 
     Parameters
     ----------

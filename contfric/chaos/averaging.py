@@ -34,7 +34,7 @@ _SURE = 3.0
 _DEPARTED = math.log(1e4)
 #: A motion that grows in every batch, by this share in all, and no more slowly in the second half than by
 #: this share of the first, has no bound in sight. (Growth at a resonance without damping is linear, and so
-#: twice as large after twice the time; one that settles slows down.)
+#: twice as large after twice the time; one that converges slows down.)
 _GROWTH, _STEADY = 1.2, 0.8
 
 

@@ -58,7 +58,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.trajectory import QUIET, StateWorkspace, TablesType
 
 #: A separation that grew by this factor has grown from rounding to the size of the motion: the motion
-#: forgot where it started, which one that only settles never does.
+#: forgot where it started, which one that only converges never does.
 _FORGOTTEN = -math.log(np.finfo(np.float64).eps)
 
 StartingType = types.NamedTuple([indices, indices, indices], Starting)

@@ -114,7 +114,7 @@ def lyapunov_map(
     periods : most periods of the excitation to average over
     transient : periods before averaging begins
     tolerance : relative error of the largest exponent at which averaging ends
-    confirm : periods to follow a motion further, after averaging, to see whether it settles after all
+    confirm : periods to follow a motion further, after averaging, to see whether it converges after all
     state : initial state, shape (n,), or several, shape (starts, n), or a function of the parameters
         that returns either; by default displaced from rest
     starts : number of initial states to draw at each point, the first displaced from rest

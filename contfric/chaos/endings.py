@@ -61,7 +61,7 @@ def averaged(averages, live, turns, over, tolerance, rows, cell):  # type: ignor
     filled = close_periods(averages, turns)
     if filled and not over:
         rate, error = mean_rate(averages, 0)
-        # a motion whose exponent is negative may yet settle
+        # a motion whose exponent is negative may yet converge
         over = error <= tolerance * rate and sign_of(averages, rate, error) > 0
     if over:
         write_means(averages, live, rows, cell)

@@ -172,7 +172,7 @@ def lyapunov_exponent(
     periods : most periods of the excitation to average over
     transient : periods before averaging begins
     tolerance : relative error of the largest exponent at which averaging ends
-    confirm : periods to follow a motion further, after averaging, to see whether it settles after all
+    confirm : periods to follow a motion further, after averaging, to see whether it converges after all
 
     Raises
     ------

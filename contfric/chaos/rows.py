@@ -39,7 +39,7 @@ class Limits(NamedTuple):
     ----------
     transient, periods : periods before the growth is averaged, and most periods that it is averaged over
     tolerance : relative error of the largest exponent at which averaging ends
-    confirm : periods that a motion is followed further afterwards, whether it settles
+    confirm : periods that a motion is followed further afterwards, whether it converges
     """
 
     transient: int

@@ -16,8 +16,10 @@ class Motion(str, Enum):
     2
     """
 
-    PERIODIC = "settled on a periodic orbit; the exponents are exact"
-    TRANSIENT = "irregular for a time, then settled on a periodic orbit, whose exponents are given"
+    PERIODIC = "converged to a periodic orbit; the exponents are exact"
+    TRANSIENT = (
+        "irregular for a time, then converged to a periodic orbit, whose exponents are given"
+    )
     CHAOTIC = "no period found, and the largest exponent is positive beyond doubt"
     SETTLING = "not periodic yet, but the largest exponent is negative beyond its error"
     UNDECIDED = "no period found, and the sign of the largest exponent is not certain"
@@ -28,7 +30,7 @@ class Motion(str, Enum):
     MISSING = "not computed: the map was interrupted"
     BROKEN = "the integration of the motion or of its tangent broke off; there are no exponents"
     CHATTER = "impacts follow each other faster and faster, and motion does not go on; no exponents"
-    UNCUT = "the motion meets no surface any more and does not settle: the model needs a section"
+    UNCUT = "the motion meets no surface any more and does not converge: the model needs a section"
 
     @property
     def code(self) -> int:

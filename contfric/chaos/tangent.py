@@ -157,7 +157,7 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
 
 @helper
 def too_large(functions, mode, duration, p, walk, workspace):  # type: ignore[no-untyped-def]
-    """Tell a motion that grew beyond all numbers, also in a finite time, from one that breaks off."""
+    """Tell a solution that diverged, also in a finite time, from one that breaks off."""
     y, start, size = walk.y, walk.start, 0.0
     for j in range(y.shape[0]):
         if abs(y[j]) >= TOO_LARGE:
@@ -199,14 +199,14 @@ def behind(functions, surface, t, p, frame, count, walk, workspace, reset):  # t
     """Carry the first rows of a frame behind a joint: over its reset, and without time if there is none."""
     if reset:
         functions.reset(surface, t, workspace.after, p, workspace.none, walk.end, walk.jac)
-        leap(frame, count, walk.jac, walk.image)
+        apply_reset(frame, count, walk.jac, walk.image)
     if walk.at_once[1] & 1 != 0:
         for i in range(count):
             frame[i, 0] = 0.0
 
 
 @helper
-def leap(frame, count, reset, image):  # type: ignore[no-untyped-def]
+def apply_reset(frame, count, reset, image):  # type: ignore[no-untyped-def]
     """Replace the first rows of a frame by their images under the derivative of a reset."""
     n = image.shape[0]
     for i in range(count):

@@ -239,7 +239,7 @@ def _say_what_settles(
 
     orbit = find_orbit(model, params, state=state, time=time)
     multipliers = ", ".join(f"{value:.6g}" for value in orbit.multipliers)
-    say(f"settles on {orbit.name} over {orbit.periods} period(s): {orbit.signature}")
+    say(f"converges to {orbit.name} over {orbit.periods} period(s): {orbit.signature}")
     say(f"x from {orbit.x_min:.12g} to {orbit.x_max:.12g}, multipliers {multipliers}")
 
 

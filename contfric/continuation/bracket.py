@@ -39,7 +39,7 @@ from contfric.orbit.monitor import (
     count_margins,
     crossings,
     find_behind,
-    find_turnings,
+    find_stationary,
     held_margin,
     interior_margin,
     joint_margin,
@@ -100,7 +100,7 @@ def next_trial(low, high, f_low, f_high, x_old, f_old, x, closest):  # type: ign
 
 @helper
 def margin_value(functions, layout, index, z, p, workspace):  # type: ignore[no-untyped-def]
-    """Return one margin of a settled point."""
+    """Return one margin of a corrected point."""
     value = plain_margin(functions, layout, index, z, p, workspace)
     for k in range(layout.doubles.shape[0]):
         if layout.doubles[k, 0] == index:
@@ -114,12 +114,12 @@ def plain_margin(functions, layout, index, z, p, workspace):  # type: ignore[no-
     first, count = layout.interior.shape[0], z.shape[0]
     if index < first:
         i, c = layout.interior[index, 0], layout.observables[layout.interior[index, 1]]
-        equations, turnings = workspace.equations, workspace.turnings
+        equations, stationary = workspace.equations, workspace.stationary
         if layout.departs[i] < RETURNS:
-            found = find_behind(functions, layout, i, c, z, p, equations, turnings)
+            found = find_behind(functions, layout, i, c, z, p, equations, stationary)
         else:
-            found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
-        return interior_margin(functions, layout, index, found, z, p, equations, turnings)
+            found = find_stationary(functions, layout, i, c, z, p, equations.last, stationary)
+        return interior_margin(functions, layout, index, found, z, p, equations, stationary)
     if index < first + count:
         sign = layout.exit_signs[index - first]
         return sign * workspace.equations.rates[index - first] if sign != 0.0 else np.inf
@@ -130,7 +130,7 @@ def plain_margin(functions, layout, index, z, p, workspace):  # type: ignore[no-
     if index < layout.lasting.shape[0]:
         return lasting_margin(layout, index, z, workspace.equations)
     index -= layout.lasting.shape[0]
-    return held_margin(functions, layout, index, z, p, workspace.equations, workspace.turnings)
+    return held_margin(functions, layout, index, z, p, workspace.equations, workspace.stationary)
 
 
 class Sought(NamedTuple):
@@ -158,7 +158,7 @@ def watched_value(way, sought, points, row):  # type: ignore[no-untyped-def]
         return w - sought.target
     if sought.kind == BY_LABEL:
         code, nearest = crossings(
-            functions, layout, index, z, p, workspace.equations, workspace.turnings
+            functions, layout, index, z, p, workspace.equations, workspace.stationary
         )
         # the distance of the nearest stationary point to a surface vanishes where the label changes;
         # elsewhere a joint may lie on a surface

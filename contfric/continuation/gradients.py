@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contfric.continuation.standstill import touch_of
+from contfric.continuation.zero_acceleration import touch_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from contfric.continuation.events import End, EndReason
+from contfric.continuation.locate_change import locate_value
 from contfric.continuation.points import Point, Settings
-from contfric.continuation.trial import locate_value
 from contfric.orbit.orbit import Orbit
 
 #: Share of the range within which an event cannot be told from a physical limit, where conditions

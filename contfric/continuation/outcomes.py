@@ -27,8 +27,8 @@ Where a stick becomes a hold, the hold lasts to the release, unless before that 
 more: there it ends, with a slide of length zero, and the rest of the stick follows.
 
 Nothing can be held where rest is left without acceleration (static and kinetic limit agree, as in a system
-of Filippov): there, and where nothing else is known, :mod:`contfric.continuation.walked` lets the flow
-itself say what follows.
+of Filippov): there, and where nothing else is known, :mod:`contfric.continuation.from_simulation` lets the
+flow itself say what follows.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from contfric.continuation.events import Bifurcation, Kind, hold_of_test
-from contfric.continuation.standstill import first_standstill, leaving_rate, touch_of
+from contfric.continuation.zero_acceleration import first_zero_acceleration, leaving_rate, touch_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
@@ -213,7 +213,7 @@ def _limit_touched(orbit: Orbit, place: Test) -> Outcome:
     departs = release_mode(model, mode, place.surface)
     _check_held(orbit, mode, departs, touch)
     reason = f"hold behind the touch of {place.surface} in stick {i + 1}"
-    still = first_standstill(orbit, i, touch[0], str(departs))
+    still = first_zero_acceleration(orbit, i, touch[0], str(departs))
     if still is not None:
         left = (str(departs), _leaves(orbit, mode))
         edit = split(i, place.surface, (mode, TOUCH), left, (mode, exit_))
@@ -245,7 +245,7 @@ def _stick_becomes_hold(orbit: Orbit, j: int, hold: str, surface: str | None) ->
     behind = (j + 1) % len(word)
     departs = word[j - 1][0] if surface is None else release_mode(model, mode, surface)
     reason = f"hold instead of stick {j + 1}"
-    still = first_standstill(orbit, j, float(orbit.cycle[j, 0]), str(departs))
+    still = first_zero_acceleration(orbit, j, float(orbit.cycle[j, 0]), str(departs))
     if still is not None:
         left = (str(departs), _leaves(orbit, mode))
         edit = split(j, hold, left, (mode, exit_))

@@ -98,7 +98,7 @@ class Side:
     count : points so far
     at_event : whether the first point is at a sliding event
     autonomous : whether the duration of a turn is one of the unknowns
-    largest : longest step, where the settings' would leap over what is near
+    largest : longest step, where the settings' would overshoot what is near
     solves : points solved for by the march, those among them that it refused
     notes : what changed on it and is no event
     """

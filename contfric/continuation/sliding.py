@@ -13,10 +13,10 @@ from contfric.continuation.events import (
     kind_of_margin,
     rate_along,
 )
+from contfric.continuation.locate_change import locate_change
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import bifurcation_at
 from contfric.continuation.side import first_point
-from contfric.continuation.trial import locate_change
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test
 

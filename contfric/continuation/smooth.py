@@ -9,9 +9,9 @@ import numpy as np
 from contfric.continuation.continuum import LEVEL
 from contfric.continuation.crossing import crossing_between
 from contfric.continuation.events import Bifurcation, Kind
+from contfric.continuation.locate_change import locate_change
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.report import ROUGH, bifurcation_at
-from contfric.continuation.trial import locate_change
 from contfric.continuation.vertices import (
     opens_through,
     parabola_vertex,
@@ -89,7 +89,7 @@ def smooth_events(
                 # a pole is no event: multipliers are infinite where an exit becomes tangential
                 half = orbit.system.half or column == CHI_ONE
                 kind = Kind.NS if column == CHI_PAIR else Kind.BP if half else Kind.PD
-                found.append(_leapt(orbit, kind, before, after, beyond, settings))
+                found.append(_overshot(orbit, kind, before, after, beyond, settings))
             continue
         if column == FOLD:
             folded = True
@@ -158,7 +158,7 @@ def _vertex_of_crossing(
     return found if found is not None and found[1].slope == 0.0 else None
 
 
-def leapt_vertex(
+def overshot_vertex(
     orbit: Orbit, before: Point, after: Point, share: float, settings: Settings
 ) -> tuple[Bifurcation, Point] | None:
     """Return the vertex between two points on its two sides, if it is one."""
@@ -229,7 +229,7 @@ def _not_located(
     return replace(bifurcation, located=False, bound=2.0 * bifurcation.accuracy), before
 
 
-def _leapt(
+def _overshot(
     orbit: Orbit, kind: Kind, before: Point, after: Point, beyond: Point, settings: Settings
 ) -> tuple[Bifurcation, Point]:
     """Return what stands for a step between whose ends no branch is found: it is to be taken back.

@@ -12,7 +12,7 @@ from contfric.continuation.geometry import anchor, take_tangent
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import Elimination, elimination_workspace
 from contfric.orbit.equations import EquationWorkspace, close_chain, equation_workspace
-from contfric.orbit.monitor import Turnings, stationary_workspace, watch
+from contfric.orbit.monitor import StationaryPoints, stationary_workspace, watch
 from contfric.orbit.newton import (
     CHECKS,
     CONVERGED,
@@ -43,7 +43,7 @@ class StepWorkspace(NamedTuple):
     equations: EquationWorkspace
     elimination: Elimination
     spectral: SpectralWorkspace
-    turnings: Turnings
+    stationary: StationaryPoints
     pencil: FloatArray
     d: FloatArray
     e: FloatArray
@@ -121,7 +121,7 @@ def observe_branch(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped
     way.p[way.which[0]] = w[0]
     way.counts[CHECKS] += 1
     finite = watch(
-        way.functions, layout, z, way.p, workspace.equations, workspace.turnings, tests, labels
+        way.functions, layout, z, way.p, workspace.equations, workspace.stationary, tests, labels
     )
     at = tests.shape[0] - EXTRA
     tests[at + FOLD] = tw[0]

@@ -91,7 +91,7 @@ def leave_along(
     return Departure(orbit, point, origin, reason)
 
 
-def leaps(
+def overshoots(
     orbit: Orbit,
     settings: Settings,
     departure: Departure,

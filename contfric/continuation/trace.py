@@ -35,9 +35,9 @@ from contfric.continuation.vertex_ends import (
     CROSSED,
     NEAREST,
     SHORTER,
-    Leap,
+    Overshoot,
     end_stalled,
-    leaps_over_vertex,
+    overshoots_vertex,
 )
 from contfric.continuation.vertices import at_vertex
 from contfric.errors import ConvergenceError, function_of
@@ -182,9 +182,9 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         return True, step
     count = side.count
     why, step = side.march(orbit, settings, step)
-    leap = leaps_over_vertex(orbit, side, settings, side.count - count)
-    if leap is not Leap.NONE:
-        return leap is Leap.ENDED, step
+    leap = overshoots_vertex(orbit, side, settings, side.count - count)
+    if leap is not Overshoot.NONE:
+        return leap is Overshoot.ENDED, step
     if why in (kernels.STEP, kernels.BROKEN) and move_joints(orbit, side, settings):
         return False, FIRST_STEP * settings.largest
     reasons = {

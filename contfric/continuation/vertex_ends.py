@@ -9,7 +9,7 @@ import numpy as np
 from contfric.continuation.events import Bifurcation, End, EndReason
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
-from contfric.continuation.smooth import leapt_vertex, vertex_at
+from contfric.continuation.smooth import overshot_vertex, vertex_at
 from contfric.continuation.stalls import stalled_at
 from contfric.continuation.vertex_between import left_at
 from contfric.continuation.vertices import at_vertex, passed_vertex
@@ -24,7 +24,7 @@ SHORTER, NEAREST = 8.0, 1e-8
 CROSSED = "branch point: the parameter turns there, and another branch crosses"
 
 
-class Leap(Enum):
+class Overshoot(Enum):
     """What became of a side whose last points may have passed a vertex."""
 
     NONE = auto()
@@ -32,7 +32,7 @@ class Leap(Enum):
     ENDED = auto()
 
 
-def leaps_over_vertex(orbit: Orbit, side: Side, settings: Settings, written: int) -> Leap:
+def overshoots_vertex(orbit: Orbit, side: Side, settings: Settings, written: int) -> Overshoot:
     """End a side where its last points have passed a vertex that no fold has shown, or take them back.
 
     Orbits that have become symmetric (undoubled) are those of another branch: no side goes on along them.
@@ -42,24 +42,24 @@ def leaps_over_vertex(orbit: Orbit, side: Side, settings: Settings, written: int
     passed = passed_vertex(orbit.system, rows, max(0, first))
     passed = passed or _gone_unseen(orbit, side, settings, max(0, first))
     if passed is None:
-        return Leap.NONE
+        return Overshoot.NONE
     before, after = side.rows.point(passed[0]), side.rows.point(passed[0] + 1)
     if np.isfinite(passed[1]):
-        found = leapt_vertex(orbit, before, after, passed[1], settings)
+        found = overshot_vertex(orbit, before, after, passed[1], settings)
     else:
         found = _gone_over(orbit, before, after, settings)
     if found is not None:
         side.rewind(passed[0] + 1)
         _end_at_vertex(orbit, side, settings, *found)
-        return Leap.ENDED
+        return Overshoot.ENDED
     if np.isfinite(passed[1]):
-        return Leap.NONE
+        return Overshoot.NONE
     side.rewind(passed[0])
     side.largest = (after.arc - before.arc) / SHORTER
     if side.largest > NEAREST:
-        return Leap.BACK
+        return Overshoot.BACK
     end_stalled(orbit, side, settings)
-    return Leap.ENDED
+    return Overshoot.ENDED
 
 
 def _gone_unseen(

@@ -96,7 +96,7 @@ def passed_vertex(system: System, joints: FloatArray, first: int = 0) -> tuple[i
     """Return the step over which orbits become their own mirror images, or their own second halves.
 
     What is odd about them (the states of one half less their image in the other) changes sign there. A
-    step that leaps over a vertex goes on along the mirror branch, and no fold is seen. Short steps may have
+    step that overshoots a vertex goes on along the mirror branch, and no fold is seen. Short steps may have
     points between whose odd part is not known: its sign is held against the last one that is.
 
     Parameters

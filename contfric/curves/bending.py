@@ -19,7 +19,7 @@ the cross terms do not vanish, and at d = 0 all of it is a quotient of zeros. Of
 from __future__ import annotations
 
 from contfric.compiled import helper
-from contfric.orbit.equations import behind_reset, leap, mean_rate_row
+from contfric.orbit.equations import apply_reset, behind_reset, mean_rate_row
 from contfric.orbit.system import RETURNS
 
 #: Step of the differences where a flow has no second derivatives of its own, against the size of the
@@ -33,7 +33,7 @@ def segment_jacobian(functions, layout, i, start, duration, p, which, out, equat
     mode, state = layout.modes[i], equations.state
     if layout.departs[i] < RETURNS:
         n = state.shape[0]
-        leap(functions, layout, i, start, p, which, equations)
+        apply_reset(functions, layout, i, start, p, which, equations)
         begin = equations.behind[n, :n]
         functions.flow(mode, start[0], begin, duration, p, which, state, out)
         behind_reset(out, equations.behind, equations.grad, n)
@@ -78,7 +78,7 @@ def bend_mean_rate(functions, layout, i, start, duration, p, which, along, works
         for j in range(m):
             displaced[j] = start[j] + h * along[j]
         if layout.departs[i] < RETURNS:
-            leap(functions, layout, i, displaced, p, which, equations)
+            apply_reset(functions, layout, i, displaced, p, which, equations)
         lasts = duration + h * along[m]
         mean_rate_row(functions, layout, i, m, displaced, lasts, p, which, equations, rows)
         for k in range(1 + m + free):

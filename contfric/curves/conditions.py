@@ -33,8 +33,13 @@ from contfric.curves.bordered import (
 )
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import Elimination, elimination_workspace
-from contfric.orbit.equations import EquationWorkspace, equation_workspace, leap
-from contfric.orbit.monitor import Turnings, find_behind, find_turnings, stationary_workspace
+from contfric.orbit.equations import EquationWorkspace, apply_reset, equation_workspace
+from contfric.orbit.monitor import (
+    StationaryPoints,
+    find_behind,
+    find_stationary,
+    stationary_workspace,
+)
 from contfric.orbit.spectrum import SpectralWorkspace, spectral_workspace
 from contfric.orbit.system import RETURNS, IntArray
 
@@ -74,7 +79,7 @@ class CurveWorkspace(NamedTuple):
     equations: EquationWorkspace
     elimination: Elimination
     spectral: SpectralWorkspace
-    turnings: Turnings
+    stationary: StationaryPoints
     bordered: BorderedWorkspace
     pencil: FloatArray
     d: FloatArray
@@ -106,22 +111,22 @@ def curve_workspace(count, m, parameters):  # type: ignore[no-untyped-def]
 @helper
 def interior_value(functions, layout, condition, z, p, which, workspace):  # type: ignore[no-untyped-def]
     """Return the stationary value nearest to the level; NaN if the segment has none."""
-    equations, turnings = workspace.equations, workspace.turnings
+    equations, stationary = workspace.equations, workspace.stationary
     i, surface = condition.segment, condition.surface
     c, n = layout.observables[surface], z.shape[1] - 1
     level_grad, grad, jac = equations.level_grad, equations.grad, equations.jac
     if layout.departs[i] < RETURNS:
-        found = find_behind(functions, layout, i, c, z, p, equations, turnings)
+        found = find_behind(functions, layout, i, c, z, p, equations, stationary)
     else:
-        found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
+        found = find_stationary(functions, layout, i, c, z, p, equations.last, stationary)
     target = functions.level(surface, p, which, level_grad)
     best = -1
     for k in range(found):
-        if best < 0 or abs(turnings.values[k] - target) < abs(turnings.values[best] - target):
+        if best < 0 or abs(stationary.values[k] - target) < abs(stationary.values[best] - target):
             best = k
     if best < 0:
         return np.nan
-    time, state = turnings.times[best], equations.state
+    time, state = stationary.times[best], equations.state
     segment_jacobian(functions, layout, i, z[i], time, p, which, jac, equations)
     value = functions.observe(c, z[i, 0] + time, state, p, which, grad) - target
     workspace.d[1, i, 0] += grad[0]
@@ -146,7 +151,7 @@ def start_condition(functions, layout, i, c, target, z, p, which, workspace):  #
         for j in range(1 + n):
             workspace.d[1, i, j] += grad[j]
     else:
-        leap(functions, layout, i, z[i], p, which, equations)
+        apply_reset(functions, layout, i, z[i], p, which, equations)
         value = functions.observe(c, z[i, 0], behind[n, :n], p, which, grad) - target
         workspace.d[1, i, 0] += grad[0]
         for a in range(n):

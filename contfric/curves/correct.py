@@ -18,7 +18,7 @@ from contfric.curves.conditions import EXIT, JOINT, SPECTRAL, CurveWorkspace, co
 from contfric.curves.normal_form import cubic_coefficient
 from contfric.models.definition import FloatArray
 from contfric.orbit.equations import close_chain
-from contfric.orbit.monitor import find_behind, find_turnings, watch
+from contfric.orbit.monitor import find_behind, find_stationary, watch
 from contfric.orbit.newton import (
     CHECKS,
     CONVERGED,
@@ -169,25 +169,25 @@ def bend_value(functions, second, layout, condition, z, p, which, workspace):  #
 def other_touches(functions, layout, row, z, p, workspace):  # type: ignore[no-untyped-def]
     """Return an interior margin without the one stationary point that lies on the surface."""
     i, surface = layout.interior[row, 0], layout.interior[row, 1]
-    sign, turnings, equations = (
+    sign, stationary, equations = (
         float(layout.interior[row, 2]),
-        workspace.turnings,
+        workspace.stationary,
         workspace.equations,
     )
     c = layout.observables[surface]
     if layout.departs[i] < RETURNS:
-        found = find_behind(functions, layout, i, c, z, p, equations, turnings)
+        found = find_behind(functions, layout, i, c, z, p, equations, stationary)
     else:
-        found = find_turnings(functions, layout, i, c, z, p, equations.last, turnings)
+        found = find_stationary(functions, layout, i, c, z, p, equations.last, stationary)
     target = functions.level(surface, p, equations.none, equations.empty)
     touch, least = -1, np.inf
     for k in range(found):
-        gap = abs(turnings.values[k] - target)
-        if gap < _TOUCHES and (touch < 0 or gap < abs(turnings.values[touch] - target)):
+        gap = abs(stationary.values[k] - target)
+        if gap < _TOUCHES and (touch < 0 or gap < abs(stationary.values[touch] - target)):
             touch = k
     for k in range(found):
         if k != touch:
-            least = min(least, sign * (turnings.values[k] - target))
+            least = min(least, sign * (stationary.values[k] - target))
     return least
 
 
@@ -202,7 +202,7 @@ def observe_curve(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped-
     at = tests.shape[0] - EXTRA
     one, minus = multipliers(layout.rank, workspace.pencil, equations.close, mu, workspace.spectral)
     tests[at + BEND] = bend_value(functions, second, layout, condition, z, p, which, workspace)
-    finite = watch(functions, layout, z, p, equations, workspace.turnings, tests, labels)
+    finite = watch(functions, layout, z, p, equations, workspace.stationary, tests, labels)
     for k in range(condition.pinned.shape[0]):
         row = condition.pinned[k]
         tests[row] = 1.0

@@ -76,7 +76,7 @@ def _touch_time(orbit: Orbit, test: Test) -> float:
     mode = [m.name for m in model.modes].index(orbit.word[i][0])
     times, values = np.empty(256), np.empty(256)
     start = orbit.begins[i]
-    found = model.flow.turning(
+    found = model.flow.stationary(
         mode,
         c,
         float(start[0]),

@@ -317,7 +317,7 @@ def tangency(orbit: Orbit, test: Test) -> tuple[int, int, str]:
     mode = [m.name for m in model.modes].index(orbit.word[segment][0])
     duration = float(end[0] - start[0])
     state = np.ascontiguousarray(start[1:])
-    found = model.flow.turning(
+    found = model.flow.stationary(
         mode, c, float(start[0]), state, duration, orbit.vector, times, values
     )
     reached: list[tuple[float, int, str]] = []

@@ -1,1 +1,1 @@
-"""One smooth segment forward, with derivatives, turning points and first roots."""
+"""One smooth segment forward, with derivatives, stationary points and first roots."""

@@ -27,7 +27,7 @@ from contfric.compiled import (
     observe_signature,
     period_signature,
     rate_signature,
-    turning_signature,
+    stationary_signature,
 )
 from contfric.flow.damping import damping_response
 from contfric.flow.interface import CompiledFlow
@@ -45,7 +45,7 @@ from contfric.flow.motion import (
     point,
 )
 from contfric.flow.response import forced, free
-from contfric.flow.rest import rest_hit, rest_turnings
+from contfric.flow.rest import rest_hit, rest_stationary
 from contfric.flow.roots import interior_of, roots_along
 from contfric.flow.second import second
 
@@ -242,8 +242,8 @@ def hit(mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-untyped-
     return tau
 
 
-@kernel(turning_signature)
-def turning(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
+@kernel(stationary_signature)
+def stationary(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
     """Write the interior stationary points of observable c and return their number."""
     if dt <= 0.0 or (mode == STICK and c == SPEED):
         return 0
@@ -252,11 +252,11 @@ def turning(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-d
     phase = phases(p, t0)
     if mode == STICK and p[H] == 0.0:
         first, last = interior_of(dt)
-        return rest_turnings(y0[0], p[OMEGA], phase, first, last, times, values)
+        return rest_stationary(y0[0], p[OMEGA], phase, first, last, times, values)
     order, on = max(1 - mode, 1), dt < 0.0  # 1 and False, but no literals
     return roots_along(mode, c, order, 0.0, on, 0.0, phase, t0, y0, dt, p, times, values)[0]
 
 
 def compiled_flow() -> CompiledFlow:
     """Return the compiled functions of this flow."""
-    return CompiledFlow(flow, observe, level, turning, hit, period, rate, second=second)
+    return CompiledFlow(flow, observe, level, stationary, hit, period, rate, second=second)

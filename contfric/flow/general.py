@@ -22,13 +22,13 @@ from contfric.compiled import (
     helper,
     hit_signature,
     kernel,
-    turning_signature,
+    stationary_signature,
 )
-from contfric.flow.kinked import kinked_flow, kinked_hit, kinked_turning
+from contfric.flow.kinked import kinked_flow, kinked_hit, kinked_stationary
 from contfric.flow.layouts import MODEL
 from contfric.flow.linear.flow import linear_flow
 from contfric.flow.linear.method import explicit_or_linear, explicit_or_linear_probe
-from contfric.flow.linear.search import linear_hit, linear_turning
+from contfric.flow.linear.search import linear_hit, linear_stationary
 from contfric.flow.radau import IMPLICIT_STAGES
 from contfric.flow.stiffness import automatic, automatic_probe
 from contfric.handle import HandleType, with_handle
@@ -48,12 +48,12 @@ def stepped_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ig
 
 
 @allocating_helper
-def stepped_turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
+def stepped_stationary(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
     """Find the stationary points along an integrated motion."""
     if motion.timed[c] == 0:
-        return kinked_turning(motion, mode, c, t0, y0, dt, p, times, values)
+        return kinked_stationary(motion, mode, c, t0, y0, dt, p, times, values)
     piece = mode << motion.kinks
-    return kinked_turning(motion.clock, piece, c, t0, y0, dt, p, times, values)
+    return kinked_stationary(motion.clock, piece, c, t0, y0, dt, p, times, values)
 
 
 @helper
@@ -80,11 +80,11 @@ def either_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ign
 
 
 @allocating_helper
-def either_turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
+def either_stationary(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
     """Find the stationary points along a motion of either kind."""
     if in_closed_form(motion, mode) and motion.seen[c] != 0:
-        return linear_turning(motion, mode, c, t0, y0, dt, p, times, values)
-    return stepped_turning(motion, mode, c, t0, y0, dt, p, times, values)
+        return linear_stationary(motion, mode, c, t0, y0, dt, p, times, values)
+    return stepped_stationary(motion, mode, c, t0, y0, dt, p, times, values)
 
 
 def flow(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
@@ -115,11 +115,11 @@ def hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-
     return motion.first(motion, mode, c, target, on, t0, y0, dt_max, p, y1)
 
 
-def turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
-    """Write the stationary points of an observable and return their number (``turning_signature``)."""
+def stationary(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
+    """Write the stationary points of an observable and return their number (``stationary_signature``)."""
     if motion.idle[mode * motion.observables + c] != 0:
         return 0
-    return motion.turnings(motion, mode, c, t0, y0, dt, p, times, values)
+    return motion.stationary(motion, mode, c, t0, y0, dt, p, times, values)
 
 
 @kernel(field_signature)
@@ -146,7 +146,7 @@ _MEMBERS: dict[Kind, dict[str, Any]] = {
         "stages": 0,
         "moved": either,
         "first": either_hit,
-        "turnings": either_turning,
+        "stationary": either_stationary,
     },
     Kind.STIFF: {
         "attempt": automatic,
@@ -154,7 +154,7 @@ _MEMBERS: dict[Kind, dict[str, Any]] = {
         "stages": IMPLICIT_STAGES,
         "moved": kinked_flow,
         "first": stepped_hit,
-        "turnings": stepped_turning,
+        "stationary": stepped_stationary,
     },
 }
 
@@ -167,10 +167,10 @@ def handle_of(kind: Kind) -> HandleType:
 
 @cache
 def kernels_of(kind: Kind) -> tuple[Kernel, Kernel, Kernel]:
-    """Return the kernels ``flow``, ``hit`` and ``turning`` of one kind."""
+    """Return the kernels ``flow``, ``hit`` and ``stationary`` of one kind."""
     handle, label = handle_of(kind), f"-{kind.value}"
     return (
         Kernel(flow, with_handle(flow_signature, handle), label),
         Kernel(hit, with_handle(hit_signature, handle), label),
-        Kernel(turning, with_handle(turning_signature, handle), label),
+        Kernel(stationary, with_handle(stationary_signature, handle), label),
     )

@@ -138,9 +138,9 @@ class Functions:
         level : levels of the surfaces
         others : ``rate`` along modes, where that of pieces is another function; ``reset``
         """
-        flow, hit, turning = (Bound(kernel, self.block) for kernel in kernels_of(self.kind))
+        flow, hit, stationary = (Bound(kernel, self.block) for kernel in kernels_of(self.kind))
         rate = others.pop("rate", self.rate)
-        return CompiledFlow(flow, self.observe, level, turning, hit, self.period, rate, **others)
+        return CompiledFlow(flow, self.observe, level, stationary, hit, self.period, rate, **others)
 
     @cached_property
     def block(self) -> Block:

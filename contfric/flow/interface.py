@@ -21,7 +21,7 @@ class CompiledFlow:
     flow : state after a duration in one mode, with its derivatives
     observe : value of an observable, with its gradient
     level : level of a surface, with its gradient
-    turning : interior stationary times of an observable along a segment
+    stationary : interior stationary times of an observable along a segment
     hit : first time at which an observable takes a level
     period : period of the excitation (0 for an autonomous model), with its gradient
     rate : rate of an observable along a mode, with its gradient
@@ -33,7 +33,7 @@ class CompiledFlow:
     flow: Any
     observe: Any
     level: Any
-    turning: Any
+    stationary: Any
     hit: Any
     period: Any
     rate: Any
@@ -45,7 +45,7 @@ class CompiledFlow:
         return self._blocks[0].address  # type: ignore[no-any-return]
 
     def following(self) -> int:
-        """Return the functions for kernels that only follow motions: without ``turning``.
+        """Return the functions for kernels that only follow motions: without ``stationary``.
 
         It is not compiled for them: the orbits ask for it, but neither a simulation nor a Lyapunov exponent.
         """
@@ -58,16 +58,16 @@ class CompiledFlow:
 
     @cached_property
     def _blocks(self) -> tuple[Any, Any, Any]:
-        """The memory behind the handles: all functions, those without ``turning``, second derivatives."""
+        """The memory behind the handles: all functions, those without ``stationary``, second derivatives."""
         from contfric.flow.layouts import FLOW, SECOND
         from contfric.flow.resets import no_reset
-        from contfric.flow.without import no_second, no_turning
+        from contfric.flow.without import no_second, no_stationary
         from contfric.handle import Block
 
         values = {name: getattr(self, name) for name in FLOW}
         values["reset"] = self.reset or no_reset
         return (
             Block(FLOW, values),
-            Block(FLOW, {**values, "turning": no_turning}),
+            Block(FLOW, {**values, "stationary": no_stationary}),
             Block(SECOND, {"second": self.second or no_second}),
         )

@@ -32,6 +32,7 @@ from contfric.flow.dense import is_flat, node, probed, write
 from contfric.flow.dop853 import STAGES
 from contfric.flow.folding import folded
 from contfric.flow.hits import _FLAT, first_hit, first_in_step, leaving
+from contfric.flow.stationary import all_stationary
 from contfric.flow.stepping import (
     FRESH,
     MOST_STEPS,
@@ -41,7 +42,6 @@ from contfric.flow.stepping import (
     next_step,
     settle,
 )
-from contfric.flow.turnings import all_turnings
 from contfric.flow.variations import begin, integration_workspace, slope
 
 #: Rates below this, relative to 1 + the next one, vanish at a crossing: the crossing is a stationary point.
@@ -227,8 +227,8 @@ def kinked_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ign
 
 
 @allocating_helper
-def kinked_turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
-    """Write the stationary points of an observable through all kinks (``turning_signature``)."""
+def kinked_stationary(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
+    """Write the stationary points of an observable through all kinks (``stationary_signature``)."""
     if not dt > 0.0:
         return 0
     n = y0.shape[0]
@@ -245,7 +245,7 @@ def kinked_turning(motion, mode, c, t0, y0, dt, p, times, values):  # type: igno
         t, left = phase + done, dt - done
         until, k = next_kink(motion, piece, t, here, kink, left, p, workspace, behind)
         span = left if k < 0 else until
-        found = all_turnings(
+        found = all_stationary(
             motion, piece, c, t, here, span, p, workspace, times[count:], values[count:]
         )
         if found < 0 or (k >= 0 and not math.isfinite(behind[0])):

@@ -22,7 +22,7 @@ from contfric.compiled import (
     reset_signature,
     scale_signature,
     second_signature,
-    turning_signature,
+    stationary_signature,
     vector,
 )
 from contfric.handle import ITSELF, TABLE, HandleType
@@ -32,7 +32,7 @@ FLOW = {
     "flow": flow_signature,
     "observe": observe_signature,
     "level": level_signature,
-    "turning": turning_signature,
+    "stationary": stationary_signature,
     "hit": hit_signature,
     "period": period_signature,
     "rate": rate_signature,

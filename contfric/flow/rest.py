@@ -33,7 +33,7 @@ def rest_hit(x, target, w, phase):  # type: ignore[no-untyped-def]
 
 
 @helper
-def rest_turnings(x, w, phase, first, last, times, values):  # type: ignore[no-untyped-def]
+def rest_stationary(x, w, phase, first, last, times, values):  # type: ignore[no-untyped-def]
     """Write the stationary points of the load between two times; return their number.
 
     It is -1 if they are too many, or what is given is no motion at rest under an excitation.

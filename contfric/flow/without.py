@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contfric.compiled import kernel, second_signature, turning_signature
+from contfric.compiled import kernel, second_signature, stationary_signature
 
 
 @kernel(second_signature)
@@ -11,7 +11,7 @@ def no_second(mode, c, t0, y0, d, p, which, along, jac, workspace):  # type: ign
     return 0
 
 
-@kernel(turning_signature)
-def no_turning(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
+@kernel(stationary_signature)
+def no_stationary(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
     """Say that the search failed: motion is only followed, and who asks is mistaken."""
     return -1

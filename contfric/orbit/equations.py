@@ -154,7 +154,7 @@ def close_chain(functions, layout, z, p, which, workspace):  # type: ignore[no-u
 
 
 @helper
-def leap(functions, layout, i, start, p, which, workspace):  # type: ignore[no-untyped-def]
+def apply_reset(functions, layout, i, start, p, which, workspace):  # type: ignore[no-untyped-def]
     """Write the state in which segment i begins, behind its reset, with the derivatives if any are wanted.
 
     Only for a segment that has one: elsewhere its joint is where it begins.
@@ -278,7 +278,7 @@ def segment_rows(functions, layout, i, at, start, after, p, which, workspace, ro
     m = n + 1
     begin = start[1:]
     if layout.departs[i] < RETURNS:
-        leap(functions, layout, i, start, p, which, workspace)
+        apply_reset(functions, layout, i, start, p, which, workspace)
         begin = workspace.behind[n, :n]
     functions.flow(layout.modes[i], start[0], begin, after[0] - start[0], p, which, state, jac)
     if layout.departs[i] < RETURNS:
@@ -337,7 +337,7 @@ def mismatch(functions, layout, z, p, workspace):  # type: ignore[no-untyped-def
         duration = after[0] - z[i, 0]
         begin = z[i, 1:]
         if layout.departs[i] < RETURNS:
-            leap(functions, layout, i, z[i], p, none, workspace)
+            apply_reset(functions, layout, i, z[i], p, none, workspace)
             begin = workspace.behind[m - 1, : m - 1]
         functions.flow(layout.modes[i], z[i, 0], begin, duration, p, none, state, workspace.nothing)
         if layout.pins[i] != NO_PIN:

@@ -8,7 +8,7 @@ from numba import types
 from contfric.compiled import i8, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.orbit.equations import LayoutType, close_chain, equation_workspace
-from contfric.orbit.monitor import find_behind, find_turnings, start_value, stationary_workspace
+from contfric.orbit.monitor import find_behind, find_stationary, start_value, stationary_workspace
 from contfric.orbit.system import RETURNS
 
 
@@ -23,20 +23,20 @@ def extent(functions, layout, c, z, p, out):  # type: ignore[no-untyped-def]
     """
     count, m = z.shape
     free = min(count, 0)  # no parameter, and no literal
-    workspace, turnings = equation_workspace(count, m, free), stationary_workspace()
+    workspace, stationary = equation_workspace(count, m, free), stationary_workspace()
     close_chain(functions, layout, z, p, workspace.none, workspace)
     low, high = np.inf, -np.inf
     for i in range(count):
         low, high = min(low, z[i, 1]), max(high, z[i, 1])
         if layout.departs[i] < RETURNS:
-            found = find_behind(functions, layout, i, c, z, p, workspace, turnings)
+            found = find_behind(functions, layout, i, c, z, p, workspace, stationary)
             begin = start_value(functions, layout, i, c, z, p, workspace)
             low, high = min(low, begin), max(high, begin)
         else:
-            found = find_turnings(functions, layout, i, c, z, p, workspace.last, turnings)
+            found = find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
         if found < 0:
             return False
         for k in range(found):
-            low, high = min(low, turnings.values[k]), max(high, turnings.values[k])
+            low, high = min(low, stationary.values[k]), max(high, stationary.values[k])
     out[0], out[1] = low, high
     return True

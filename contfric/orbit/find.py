@@ -31,13 +31,13 @@ _EXACT = 1e-9
 #: A motion whose returns shrink by less than this from one to the next takes hundreds of periods more. Its
 #: series, and the place of its end, are those of the orbit to this share: it is still some way off.
 _SLOW, _SERIES = 0.9, 0.2
-#: A motion that returns this near and still does not settle creeps along a continuum of orbits.
+#: A motion that returns this near and still does not converge creeps along a continuum of orbits.
 _CREEPING = 1e-5
 #: Periods to follow before the first look, and how much longer before each next one.
 _FIRST, _LONGER = 200, 4
 #: Growth over the last stretch (three quarters of the whole simulation) that no settling motion has.
 _GROWTH = 2.0
-#: A settled orbit attracts; beyond rounding its multipliers cannot exceed 1.
+#: An orbit that a motion converges to attracts; beyond rounding its multipliers cannot exceed 1.
 _ATTRACTS = 1.0 + 1e-6
 
 
@@ -85,7 +85,7 @@ def find_orbit(
 def _settled(
     model: Model, params: dict[str, float], state: ArrayLike | None, time: float, longest: int
 ) -> Orbit:
-    """Return the orbit that a motion settles on."""
+    """Return the orbit that a motion converges to."""
     span, done = _FIRST, 0
     y: ArrayLike | None = state
     while True:
@@ -109,7 +109,7 @@ def _settled(
 def _wanted(orbit: Orbit, periods: int | None) -> Orbit:
     if periods is not None and orbit.periods != periods:
         raise ConvergenceError(
-            f"the motion settles on an orbit of {orbit.periods} period(s), not {periods}: "
+            f"the motion converges to an orbit of {orbit.periods} period(s), not {periods}: "
             f"ask for periods={orbit.periods}, or start elsewhere (state=...)",
             orbit,
         )
@@ -127,7 +127,7 @@ def _check_motion(trajectory: Trajectory) -> None:
 def _marginal(trajectory: Trajectory, done: int, turns: int, mismatch: float) -> str:
     where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
     return (
-        f"the motion at {where} has not settled in {done} periods: it still changes by "
+        f"the motion at {where} has not converged in {done} periods: it still changes by "
         f"{mismatch:.1g} in {turns} period(s), more slowly than any exponential. The orbit is "
         "marginally stable (a multiplier is 1), as orbits of a continuum are. Move a parameter a "
         "little, or add damping"
@@ -160,7 +160,7 @@ def _advice(trajectory: Trajectory, done: int) -> str:
 
 
 def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:
-    """Return the orbit that the end of a trajectory has settled on, if it has.
+    """Return the orbit that the end of a trajectory has converged to, if it has.
 
     A return that is not yet exact may belong to an orbit that repels, beside an attractor of longer
     period; longer simulation tells. Only at the final look are multipliers asked instead, and where the

@@ -18,9 +18,9 @@ from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
 from contfric.orbit.equations import (
     LayoutType,
+    apply_reset,
     close_chain,
     equation_workspace,
-    leap,
     segment_rows,
 )
 from contfric.orbit.holds import NO_PIN
@@ -44,7 +44,7 @@ _AT_PIN = 1e-6
 _CLEAR = 1e-6
 
 
-class Turnings(NamedTuple):
+class StationaryPoints(NamedTuple):
     """Stationary points of one observable along one segment: times after its start, and values."""
 
     times: FloatArray
@@ -54,49 +54,49 @@ class Turnings(NamedTuple):
 @allocating_helper
 def stationary_workspace():  # type: ignore[no-untyped-def]
     """Return the workspace for the stationary points of one segment."""
-    return Turnings(np.empty(_MOST_TURNINGS), np.empty(_MOST_TURNINGS))
+    return StationaryPoints(np.empty(_MOST_TURNINGS), np.empty(_MOST_TURNINGS))
 
 
 @helper
-def find_turnings(functions, layout, i, c, z, p, last, turnings):  # type: ignore[no-untyped-def]
+def find_stationary(functions, layout, i, c, z, p, last, stationary):  # type: ignore[no-untyped-def]
     """Fill the stationary points of observable c in segment i; return their number, -1 if too many."""
     after = z[i + 1] if i + 1 < z.shape[0] else last
     duration = after[0] - z[i, 0]
     if duration <= 0.0:
         return 0
-    return functions.turning(
-        layout.modes[i], c, z[i, 0], z[i, 1:], duration, p, turnings.times, turnings.values
+    return functions.stationary(
+        layout.modes[i], c, z[i, 0], z[i, 1:], duration, p, stationary.times, stationary.values
     )
 
 
 @helper
-def find_behind(functions, layout, i, c, z, p, workspace, turnings):  # type: ignore[no-untyped-def]
+def find_behind(functions, layout, i, c, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
     """Do the same for a segment behind a reset."""
     after, n = z[i + 1] if i + 1 < z.shape[0] else workspace.last, z.shape[1] - 1
     duration = after[0] - z[i, 0]
     if duration <= 0.0:
         return 0
-    leap(functions, layout, i, z[i], p, workspace.none, workspace)
+    apply_reset(functions, layout, i, z[i], p, workspace.none, workspace)
     begin = workspace.behind[n, :n]
-    return functions.turning(
-        layout.modes[i], c, z[i, 0], begin, duration, p, turnings.times, turnings.values
+    return functions.stationary(
+        layout.modes[i], c, z[i, 0], begin, duration, p, stationary.times, stationary.values
     )
 
 
 @helper
-def least_distance(found, sign, target, turnings, first, last):  # type: ignore[no-untyped-def]
+def least_distance(found, sign, target, stationary, first, last):  # type: ignore[no-untyped-def]
     """Return the smallest distance of the stationary points from first to last to a level; or inf."""
     if found < 0:
         return np.nan
     least = np.inf  # also of a segment that vanishes: the joint and exit margins watch it
     for k in range(found):
-        if first <= turnings.times[k] <= last:
-            least = min(least, sign * (turnings.values[k] - target))
+        if first <= stationary.times[k] <= last:
+            least = min(least, sign * (stationary.values[k] - target))
     return least
 
 
 @helper
-def interior_margin(functions, layout, k, found, z, p, workspace, turnings):  # type: ignore[no-untyped-def]
+def interior_margin(functions, layout, k, found, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
     """Return interior margin k from the stationary points of its segment."""
     i, count = layout.interior[k, 0], z.shape[0]
     after = z[i + 1] if i + 1 < count else workspace.last
@@ -107,14 +107,14 @@ def interior_margin(functions, layout, k, found, z, p, workspace, turnings):  # 
     if layout.pins[i] != NO_PIN or layout.pins[(i + 1) % count] != NO_PIN:
         last = duration - _AT_PIN * (1.0 + duration)
     target = functions.level(layout.interior[k, 1], p, workspace.none, workspace.empty)
-    return least_distance(found, float(layout.interior[k, 2]), target, turnings, first, last)
+    return least_distance(found, float(layout.interior[k, 2]), target, stationary, first, last)
 
 
 @helper
 def start_value(functions, layout, i, c, z, p, workspace):  # type: ignore[no-untyped-def]
     """Return observable c where segment i begins, behind its reset."""
     n = z.shape[1] - 1
-    leap(functions, layout, i, z[i], p, workspace.none, workspace)
+    apply_reset(functions, layout, i, z[i], p, workspace.none, workspace)
     return functions.observe(
         c, z[i, 0], workspace.behind[n, :n], p, workspace.none, workspace.empty
     )
@@ -136,7 +136,7 @@ def joint_margin(functions, layout, k, z, p, workspace):  # type: ignore[no-unty
 
 
 @helper
-def margins(functions, layout, z, p, workspace, turnings, out):  # type: ignore[no-untyped-def]
+def margins(functions, layout, z, p, workspace, stationary, out):  # type: ignore[no-untyped-def]
     """Fill the margins in the order interior, exit, joint, entry, lasting, held.
 
     An interior margin is infinite without stationary points, that of a tangential exit always. The
@@ -148,11 +148,11 @@ def margins(functions, layout, z, p, workspace, turnings, out):  # type: ignore[
         i, c = interior[k, 0], observables[interior[k, 1]]
         if i != segment or c != watched:  # surfaces of one observable share its stationary points
             if layout.departs[i] < RETURNS:
-                found = find_behind(functions, layout, i, c, z, p, workspace, turnings)
+                found = find_behind(functions, layout, i, c, z, p, workspace, stationary)
             else:
-                found = find_turnings(functions, layout, i, c, z, p, workspace.last, turnings)
+                found = find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
             segment, watched = i, c
-        out[k] = interior_margin(functions, layout, k, found, z, p, workspace, turnings)
+        out[k] = interior_margin(functions, layout, k, found, z, p, workspace, stationary)
     at = interior.shape[0]
     for i in range(z.shape[0]):
         sign = layout.exit_signs[i]
@@ -165,7 +165,7 @@ def margins(functions, layout, z, p, workspace, turnings, out):  # type: ignore[
         out[at + k] = lasting_margin(layout, k, z, workspace)
     at += layout.lasting.shape[0]
     for k in range(layout.held.shape[0]):
-        out[at + k] = held_margin(functions, layout, k, z, p, workspace, turnings)
+        out[at + k] = held_margin(functions, layout, k, z, p, workspace, stationary)
     for k in range(layout.doubles.shape[0]):
         out[layout.doubles[k, 0]] = regular_margin(
             layout, k, z, workspace, out[layout.doubles[k, 0]]
@@ -192,7 +192,7 @@ def lasting_margin(layout, k, z, workspace):  # type: ignore[no-untyped-def]
 
 
 @helper
-def held_margin(functions, layout, k, z, p, workspace, turnings):  # type: ignore[no-untyped-def]
+def held_margin(functions, layout, k, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
     """Return the least acceleration with which hold k could be left where an observable is stationary."""
     i = layout.held[k]
     left = layout.observables[layout.exits[i]]
@@ -206,9 +206,9 @@ def held_margin(functions, layout, k, z, p, workspace, turnings):  # type: ignor
         if layout.interior[row, 0] != i or c == watched:
             continue
         watched = c
-        found = find_turnings(functions, layout, i, c, z, p, workspace.last, turnings)
+        found = find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
         for j in range(found):
-            time = turnings.times[j]
+            time = stationary.times[j]
             if time < first or time > duration - first:
                 continue
             functions.flow(
@@ -269,7 +269,7 @@ def side_of(value, target):  # type: ignore[no-untyped-def]
 
 
 @helper
-def crossings(functions, layout, k, z, p, workspace, turnings):  # type: ignore[no-untyped-def]
+def crossings(functions, layout, k, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
     """Return the surfaces that the segment of row k crosses, as digits of one integer.
 
     And the distance to the nearest change: of a stationary point or a joint from a surface.
@@ -281,9 +281,9 @@ def crossings(functions, layout, k, z, p, workspace, turnings):  # type: ignore[
         layout.labels[k, 3],
     )
     if layout.departs[i] < RETURNS:
-        found = find_behind(functions, layout, i, c, z, p, workspace, turnings)
+        found = find_behind(functions, layout, i, c, z, p, workspace, stationary)
     else:
-        found = find_turnings(functions, layout, i, c, z, p, workspace.last, turnings)
+        found = find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
     if found < 0:
         return -1, np.inf
     value, final = ends_of(functions, layout, k, z, p, workspace)
@@ -292,7 +292,7 @@ def crossings(functions, layout, k, z, p, workspace, turnings):  # type: ignore[
     for piece in range(-1, found + 1):
         following = value
         if piece >= 0:
-            following = turnings.values[piece] if piece < found else final
+            following = stationary.values[piece] if piece < found else final
         for j in range(surfaces):
             # surfaces of an observable are listed from the highest level down
             surface = surfaces - 1 - j if following > value else j
@@ -314,15 +314,15 @@ def crossings(functions, layout, k, z, p, workspace, turnings):  # type: ignore[
 
 
 @helper
-def watch(functions, layout, z, p, workspace, turnings, out, labels):  # type: ignore[no-untyped-def]
+def watch(functions, layout, z, p, workspace, stationary, out, labels):  # type: ignore[no-untyped-def]
     """Fill margins and labels of an orbit, and behind the margins the distances of the labels.
 
     False if something is not finite.
     """
-    margins(functions, layout, z, p, workspace, turnings, out)
+    margins(functions, layout, z, p, workspace, stationary, out)
     count = count_margins(layout)
     for k in range(layout.labels.shape[0]):
-        labels[k], out[count + k] = crossings(functions, layout, k, z, p, workspace, turnings)
+        labels[k], out[count + k] = crossings(functions, layout, k, z, p, workspace, stationary)
     for k in range(count):
         if math.isnan(out[k]):
             return False

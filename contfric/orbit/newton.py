@@ -191,7 +191,7 @@ def move(z, p, which, dz, dw, share):  # type: ignore[no-untyped-def]
 
 
 @helper
-def has_settled(size, before, worst, floor):  # type: ignore[no-untyped-def]
+def has_converged(size, before, worst, floor):  # type: ignore[no-untyped-def]
     """Tell whether the last correction ends the iteration."""
     left = size if not math.isfinite(before) else size * (size / before) ** 2
     if size <= min(floor, ALONG) or (floor <= FLOOR and size < 1e-3 and left <= _TARGET):
@@ -227,7 +227,7 @@ def verdict(step, size, before, worst, worst_before, floor, rounding):  # type: 
     floor : size of a correction after which no other is asked for
     rounding : relative rounding of the flow
     """
-    if has_settled(size, before, worst, floor):
+    if has_converged(size, before, worst, floor):
         return CONVERGED
     if at_floor(size, before, worst, worst_before, rounding):
         return CONVERGED

@@ -19,7 +19,7 @@ from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.reading import read_signature
 from contfric.orbit.samples import samples, state_within
 from contfric.orbit.slack import margin_slack, no_time
-from contfric.orbit.stops import displacements, reach_of, stopping_segments, turning_points
+from contfric.orbit.stops import displacements, reach_of, stationary_points, stopping_segments
 from contfric.orbit.system import System, Word, build_system
 from contfric.orbit.words import half_of, mirror_pairs, whole_of
 from contfric.signature import Signature
@@ -320,7 +320,7 @@ class Orbit:
     def stops(self) -> FloatArray:
         """Displacements at the stops and impacts in the order of the orbit, shape (stops,)."""
         if not self.model.stop_surface:
-            return turning_points(self)
+            return stationary_points(self)
         if not self.model.stops_at_joints:
             return displacements(self, self.model.stop_surface)
         return self.ends[stopping_segments(self.model, self.word), 1]

@@ -28,7 +28,7 @@ class SimulationEnd(str, Enum):
     TIME = "the time asked for was reached"
     HELD = "the mass stays at rest for ever: nothing releases it"
     IMPOSSIBLE = "events follow each other at once, and time does not go on"
-    INFINITE = "the motion grew beyond all numbers"
+    INFINITE = "the solution diverged"
     QUIET = "the motion meets no surface any more: it has come to an equilibrium, or never changes"
     CHATTER = (
         "impacts follow each other faster and faster (chatter): infinitely many in finite time"

@@ -26,7 +26,7 @@ STARTS = 600
 #: Longest Newton correction from a start that may be far: a third of the natural scale of the states.
 TRUST = 0.3
 #: Units of time that a stretch of an autonomous model may take: far more than a cycle, and few enough
-#: where it settles.
+#: where it converges.
 _LONGEST = 300.0
 #: Candidates of the smallest mismatch that are handed to Newton.
 CANDIDATES = 40

@@ -76,7 +76,7 @@ def _apart(found: list[tuple[float, float]], period: float) -> FloatArray:
     return np.array([x for (_, x), known in zip(every, near, strict=True) if not known])
 
 
-def turning_points(orbit: Orbit) -> FloatArray:
+def stationary_points(orbit: Orbit) -> FloatArray:
     """Return the displacement at its local extrema and at impacts, in order, shape (extrema,).
 
     For models that name no surface on which it is stationary.
@@ -92,7 +92,7 @@ def turning_points(orbit: Orbit) -> FloatArray:
         if model.displacement and end[0] > start[0]:
             segment = modes.index(mode), names.index(model.displacement), float(start[0])
             lasts = float(end[0] - start[0])
-            found = flow.turning(*segment, start[1:].copy(), lasts, orbit.vector, times, values)
+            found = flow.stationary(*segment, start[1:].copy(), lasts, orbit.vector, times, values)
         x += [*values[: max(found, 0)].tolist(), float(end[1])]
         struck += [False] * max(found, 0) + [exit_ in model.reset_by_surface]
     before, after = np.roll(x, 1) - x, np.roll(x, -1) - x

@@ -39,7 +39,7 @@ def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
     """Write a text beside each point where it hides as little as possible.
 
     Equal texts at points that cannot be told apart are written once. Call it when everything else
-    is drawn, the limits of the axes are set and the layout has settled (:func:`settle`).
+    is drawn, the limits of the axes are set and the layout has converged (:func:`settle`).
     """
     pixels = _point_size(ax)
     todo = _merged(ax, sorted(anchors, key=lambda a: (a.x, a.y)))

@@ -35,7 +35,7 @@ def compile_continuation() -> None:
 
 
 def find_start(study: Study, say: Say) -> Orbit:
-    """Return the first orbit: saved, solved for, or what a simulation settles on."""
+    """Return the first orbit: saved, solved for, or what a simulation converges to."""
     if study.orbit is not None:
         return study.orbit
     if study.signature is not None:

@@ -91,6 +91,6 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
         else:
             axes = figure.add_subplot()
             plot_transition_graph(orbit.model, ax=axes, signature=orbit.signature)
-    figure.set_layout_engine("none")  # it has settled, for the labels; a second time costs 0.1 s
+    figure.set_layout_engine("none")  # it has converged, for the labels; a second time costs 0.1 s
     with replacing(path) as temporary:
         save_figure(figure, temporary)

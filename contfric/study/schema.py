@@ -73,7 +73,7 @@ _Rows = Annotated[list[Annotated[Row, Field(strict=False)]], Field(min_length=1)
 
 
 class Simulated(_Part):
-    """Start from a simulation: the orbit that the motion settles on."""
+    """Start from a simulation: the orbit that the motion converges to."""
 
     state: list[float] | None = Field(
         None, description="a list of finite numbers, one for each state of the model"

@@ -175,7 +175,7 @@ def least_speed(orbit: cf.Orbit) -> float:
     c = [o.name for o in whole.model.observables].index("v")
     times, values = np.empty(512), np.empty(512)
     start = whole.joints[0]
-    found = whole.model.flow.turning(
+    found = whole.model.flow.stationary(
         0, c, start[0], start[1:].copy(), whole.period, whole.vector, times, values
     )
     return float(np.min(np.abs(values[:found])))
@@ -200,7 +200,7 @@ def special_table(curves: list[cf.Curve]) -> list[str]:
 
 
 def attractors_at(omega: float, s: float) -> list[str]:
-    """Return what simulations from random starts settle on."""
+    """Return what simulations from random starts converge to."""
     model, random = cf.load_model("lugre"), np.random.default_rng(1)
     params = {"Omega": omega, "S": s, "S0": S0}
     width, found = model.spread(model.check_params(params)), set()
@@ -216,12 +216,12 @@ def attractors_at(omega: float, s: float) -> list[str]:
 
 
 def region_table(folder: Path) -> list[str]:
-    """Return what simulations settle on at places of the plane."""
+    """Return what simulations converge to at places of the plane."""
     file = folder / "regions.md"
     if not file.is_file():
         rows = [f"| {o:g} | {s:g} | {'; '.join(attractors_at(o, s))} |" for o, s in PLACES]
         file.write_text("\n".join(rows), encoding="utf-8")
-    head = ["| Omega | S | simulations settle on |", "|---|---|---|"]
+    head = ["| Omega | S | simulations converge to |", "|---|---|---|"]
     return [*head, *file.read_text(encoding="utf-8").splitlines()]
 
 

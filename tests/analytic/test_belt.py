@@ -98,7 +98,7 @@ def test_cycle_ends_where_it_reaches_the_belt_no_more() -> None:
 
 
 def test_jump_of_the_belt_is_bridged() -> None:
-    """Between slip that settles and the cycle lies an unstable one that is held: it goes to V = 0."""
+    """Between slip that converges and the cycle lies an unstable one that is held: it goes to V = 0."""
     diagram = damped()
     assert not diagram.loose_ends
     cycle, held = diagram.branches

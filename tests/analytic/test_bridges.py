@@ -177,7 +177,7 @@ def exact_ends_of_0s_bridge() -> tuple[list[mp.mpf], list[mp.mpf]]:
 def exact_fold() -> mp.mpf:
     """Omega where dOmega/dtau = 0, by the implicit function theorem on the residuals."""
 
-    def turning(*z: mp.mpf) -> list[mp.mpf]:
+    def stationary(*z: mp.mpf) -> list[mp.mpf]:
         # J (t0', x0', Omega') = -dF/dtau has Omega' = 0: the other two columns and dF/dtau are dependent
         columns = [
             [mp.diff(lambda *w, row=row: two_holds(*w)[row], z, orders) for row in range(3)]
@@ -187,7 +187,7 @@ def exact_fold() -> mp.mpf:
 
     with mp.workdps(DIGITS):
         start = [mp.mpf(g) for g in ("14.6", "1.199", "0.4297", "0.45")]
-        found = mp.findroot(turning, start, tol=mp.mpf(10) ** -40)
+        found = mp.findroot(stationary, start, tol=mp.mpf(10) ** -40)
         return found[2]
 
 

@@ -58,8 +58,8 @@ def test_hits_and_turnings(seed):
         if not (on and c == SPEED):  # a slide that starts at v = 0 is below
             compare_hits(mode, c, target, on, t0, y, dt, p)
         times, values = np.empty((2, 200)), np.empty((2, 200))
-        n = integrated.turning(mode, c, t0, y, dt, p, times[0], values[0])
-        assert n == closed.turning(mode, c, t0, y, dt, p, times[1], values[1])
+        n = integrated.stationary(mode, c, t0, y, dt, p, times[0], values[0])
+        assert n == closed.stationary(mode, c, t0, y, dt, p, times[1], values[1])
         assert np.all(np.abs(np.diff(times[:, :n], axis=0)) < 1e-8)
         assert np.all(np.abs(np.diff(values[:, :n], axis=0)) < 1e-11 * (1 + np.abs(values[1, :n])))
 
@@ -119,7 +119,7 @@ def test_no_time_little_time_and_backwards():
         assert np.abs(ja - jb).max() < 1e-11
     y1, times = np.empty(2), np.empty(9)
     assert integrated.hit(0, SPEED, 0.0, False, 0.3, y, -1.0, p, y1) < 0
-    assert integrated.turning(0, SPEED, 0.3, y, -1.0, p, times, times) == 0
+    assert integrated.stationary(0, SPEED, 0.3, y, -1.0, p, times, times) == 0
 
 
 @pytest.mark.parametrize("tiny", [0.0, 1e-300, -1.15e-15, 1e-12])
@@ -147,13 +147,13 @@ def test_what_is_no_number_stays_none():
     broken = np.array([math.nan, 0.0])
     assert integrated.hit(0, SPEED, 0.5, False, 0.0, broken, 1.0, p, y1) >= 0
     assert np.all(np.isnan(y1))
-    assert integrated.turning(0, SPEED, 0.0, broken, 1.0, p, np.empty(9), np.empty(9)) == -1
+    assert integrated.stationary(0, SPEED, 0.0, broken, 1.0, p, np.empty(9), np.empty(9)) == -1
 
 
 def test_more_stationary_points_than_there_is_space_for():
     p, y = np.array([1.0, 0.0, 0.5, 0.0, 0.0]), np.array([0.0, 0.0])
     times, values = np.empty(3), np.empty(3)
-    assert integrated.turning(STICK, LOAD, 0.1, y, 30.0, p, times, values) == -1
+    assert integrated.stationary(STICK, LOAD, 0.1, y, 30.0, p, times, values) == -1
 
 
 @pytest.mark.slow

@@ -37,6 +37,6 @@ def test_segments_agree(seed: int) -> None:
             rate = abs(by_hand.rate(mode, c, t0 + want, b, p, NONE, EMPTY))
             assert max(abs(tau - want), *np.abs(a - b)) * min(rate, 1.0) < 1e-12
         times, values = np.empty((2, 200)), np.empty((2, 200))
-        n = flow.turning(mode, c, t0, y, dt, p, times[0], values[0])
-        assert n == by_hand.turning(mode, c, t0, y, dt, p, times[1], values[1])
+        n = flow.stationary(mode, c, t0, y, dt, p, times[0], values[0])
+        assert n == by_hand.stationary(mode, c, t0, y, dt, p, times[1], values[1])
         assert np.all(np.abs(np.diff(values[:, :n], axis=0)) < 1e-12)

@@ -105,7 +105,9 @@ def test_hits_of_a_kink_follow_each_other(model, orbit):
     times, values = np.empty(64), np.empty(64)
     start = orbit.begins[0]
     span = float(orbit.ends[0, 0] - start[0])
-    found = model.flow.turning(0, c, start[0], start[1:].copy(), span, orbit.vector, times, values)
+    found = model.flow.stationary(
+        0, c, start[0], start[1:].copy(), span, orbit.vector, times, values
+    )
     assert found >= 3
     for tau, value in zip(times[:found], values[:found], strict=True):
         h = 1e-5

@@ -121,4 +121,4 @@ FUNCTIONS = Functions(
     absolute=1.0,
 )
 FLOW = FUNCTIONS.flow(level)
-flow, hit, turning = FLOW.flow, FLOW.hit, FLOW.turning
+flow, hit, stationary = FLOW.flow, FLOW.hit, FLOW.stationary

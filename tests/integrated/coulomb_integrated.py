@@ -180,4 +180,4 @@ def compiled_flow() -> CompiledFlow:
 
 
 FLOW = compiled_flow()
-flow, hit, turning, observe, rate = FLOW.flow, FLOW.hit, FLOW.turning, value_of, rate_of
+flow, hit, stationary, observe, rate = FLOW.flow, FLOW.hit, FLOW.stationary, value_of, rate_of

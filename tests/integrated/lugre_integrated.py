@@ -153,4 +153,4 @@ FUNCTIONS = Functions(
 
 
 FLOW = FUNCTIONS.flow(level)
-flow, hit, turning, observe, rate = FLOW.flow, FLOW.hit, FLOW.turning, value_of, rate_of
+flow, hit, stationary, observe, rate = FLOW.flow, FLOW.hit, FLOW.stationary, value_of, rate_of

@@ -27,7 +27,7 @@ from contfric.compiled import (
     period_signature,
     rate_signature,
     reset_signature,
-    turning_signature,
+    stationary_signature,
 )
 from contfric.flow.interface import CompiledFlow
 from contfric.models.definition import (
@@ -244,8 +244,8 @@ def hit(mode, c, target, on, t0, y0, dt_max, p, y1):
     return found
 
 
-@kernel(turning_signature)
-def turning(mode, c, t0, y0, dt, p, times, values):
+@kernel(stationary_signature)
+def stationary(mode, c, t0, y0, dt, p, times, values):
     rests = mode in (STICK, STICK_BACK)
     if dt <= 0.0 or (rests and (c == 1 or (p[F] == 0.0 and c == 0))):
         return 0
@@ -367,7 +367,7 @@ def _belt_domains() -> tuple[Domain, ...]:
 
 
 def _belt_flow() -> CompiledFlow:
-    return CompiledFlow(flow, observe, belt_level, turning, hit, no_period, rate)
+    return CompiledFlow(flow, observe, belt_level, stationary, hit, no_period, rate)
 
 
 def _impact_flow() -> CompiledFlow:
@@ -430,7 +430,7 @@ def _dead_band_domains() -> tuple[Domain, ...]:
 
 
 def _dead_band_flow() -> CompiledFlow:
-    return CompiledFlow(flow, observe, dead_band_level, turning, hit, no_period, rate)
+    return CompiledFlow(flow, observe, dead_band_level, stationary, hit, no_period, rate)
 
 
 #: Self-excited oscillator with a dead band, ``x'' + 2 zeta x' + x = -S M(x'/V)``, zeta < 0.
@@ -511,13 +511,13 @@ def _hit_wall(mode, c, target, on, t0, y0, dt_max, p, y1):
     return hit_of(mode, c + 1, target, on, t0, y0, dt_max, p, y1)
 
 
-@kernel(turning_signature)
+@kernel(stationary_signature)
 def _turning_wall(mode, c, t0, y0, dt, p, times, values):
-    return turning_of(mode, c + 1, t0, y0, dt, p, times, values)
+    return stationary_of(mode, c + 1, t0, y0, dt, p, times, values)
 
 
 hit_of = helper(hit.__wrapped__)
-turning_of = helper(turning.__wrapped__)
+stationary_of = helper(stationary.__wrapped__)
 
 #: Forced oscillator beside a wall; x' = 0 is the section. With S > 0 it has dry friction as well.
 impact = Model(

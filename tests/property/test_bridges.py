@@ -69,7 +69,7 @@ def random_scene(seed: int) -> Scene:
 
 
 def scenes(seeds: tuple[int, ...]) -> Iterator[tuple[int, cf.Orbit, Scene]]:
-    """The scenes of some seeds; a simulation of each settles on a periodic orbit."""
+    """The scenes of some seeds; a simulation of each converges to a periodic orbit."""
     for seed in seeds:
         scene = random_scene(seed)
         yield seed, cf.find_orbit("coulomb", scene[0], longest=2000), scene

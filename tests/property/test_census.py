@@ -60,7 +60,7 @@ def asked_for(orbit: Orbit) -> bool:
 
 
 def attractors(seed: int) -> Iterator[Orbit]:
-    """Yield what long simulations from random starts settle on."""
+    """Yield what long simulations from random starts converge to."""
     params, rng = scene(seed), np.random.default_rng(seed + 1000)
     for _ in range(8):
         state, time = rng.uniform(-2.0, 2.0, 2), rng.uniform(0.0, 2.0 * np.pi / params["Omega"])
@@ -133,7 +133,7 @@ def test_orbits_are_solved_admissible_and_within_the_limits(seed: int) -> None:
 
 
 def settled_from(orbit: Orbit) -> Orbit:
-    """Return what a long simulation settles on that starts on an orbit, half way along a slide."""
+    """Return what a long simulation converges to that starts on an orbit, half way along a slide."""
     slide = next(i for i, (mode, _) in enumerate(orbit.word) if mode != "stick")
     time = 0.5 * float(orbit.cycle[slide, 0] + orbit.ends[slide, 0])
     return cf.find_orbit("coulomb", orbit.params, state=orbit.state(time), time=time)

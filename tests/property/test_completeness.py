@@ -43,7 +43,7 @@ CAUGHT = {
         "S0",
         (0.05235108330322144, 0.10748913795236487),
     ),
-    "a fold just behind a touch of rest was leapt over, a branch of two periods arrived late": (
+    "a fold just behind a touch of rest was overshot, a branch of two periods arrived late": (
         {
             "Omega": 0.12784125417014755,
             "S": 0.020945700324858936,

@@ -16,7 +16,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq, minimize_scalar
 
-from contfric.flow.forced_oscillator import flow, hit, observe, turning
+from contfric.flow.forced_oscillator import flow, hit, observe
+from contfric.flow.forced_oscillator import stationary as kernel
 
 LOAD, SPEED = range(2)
 STICK = 2
@@ -118,7 +119,7 @@ def first_hit(mode, c, target, on, t0, y0, longest, p):
 def stationary(mode, c, t0, y0, dt, p):
     times, values = np.empty(256), np.empty(256)
     vector = np.array(p, float)
-    count = turning(mode, c, t0, np.array(y0, float), dt, vector, times, values)
+    count = kernel(mode, c, t0, np.array(y0, float), dt, vector, times, values)
     assert count >= 0
     none, empty, after = np.empty(0, dtype=np.int64), np.empty(0), np.empty(2)
     for tau, value in zip(times[:count], values[:count], strict=True):

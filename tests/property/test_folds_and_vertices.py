@@ -17,7 +17,7 @@ from contfric.continuation import events, smooth
 from contfric.continuation.points import Point, settings_of
 from contfric.continuation.side import first_point
 from contfric.continuation.smooth import _is_idle
-from contfric.continuation.switching import LEAVE, leaps, leave_branch_point
+from contfric.continuation.switching import LEAVE, leave_branch_point, overshoots
 from contfric.continuation.trace import trace_side
 from contfric.continuation.vertex_between import left_at
 from contfric.continuation.vertices import moved, opening, passed_vertex, refined_opening
@@ -174,14 +174,14 @@ def test_a_start_behind_a_doubling_leaps() -> None:
     settings = settings_of(orbit, "A", (62.0, 75.0), None, True, 5000)
     # what is integrated rounds to 1e-13: beside the vertex Newton's method has to know that
     start = leave_branch_point(orbit, settings, "BP", LEAVE)
-    assert start is not None and not leaps(orbit, settings, start, LEAVE)
+    assert start is not None and not overshoots(orbit, settings, start, LEAVE)
     side = trace_side(orbit, start.point, settings)
     (doubling, *_) = [b for b in side.bifurcations if b.kind is cf.Kind.PD]
     for k in (20, side.count - 20):
         point = first_point(side.rows.point(k).orbit(orbit.system, orbit.vector, 3), settings)
         assert point is not None
         behind = point.value > doubling.params["A"]
-        assert leaps(orbit, settings, replace(start, point=point), LEAVE) is behind
+        assert overshoots(orbit, settings, replace(start, point=point), LEAVE) is behind
     assert behind
 
 

@@ -23,7 +23,8 @@ import contfric as cf
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "models"))
 
-from catalogue import HARMONICS, REST, hit, turning
+from catalogue import HARMONICS, REST, hit
+from catalogue import stationary as kernel
 from harmonic_sum import definition
 
 SUM = 2
@@ -75,7 +76,7 @@ def search(request, tmp_path_factory):
 
         return (
             lambda a, t0, dt, y1: hit(REST, SUM, 0.0, False, t0, np.zeros(2), dt, at(a), y1),
-            lambda a, t0, dt, *out: turning(REST, SUM, t0, np.zeros(2), dt, at(a), *out),
+            lambda a, t0, dt, *out: kernel(REST, SUM, t0, np.zeros(2), dt, at(a), *out),
         )
     path = tmp_path_factory.mktemp("models") / "harmonic-sum.yaml"
     path.write_text(json.dumps(definition(HARMONICS)))
@@ -86,7 +87,9 @@ def search(request, tmp_path_factory):
         lambda a, t0, dt, y1: flow.hit(
             0, 0, 0.0, False, t0, np.zeros(2), dt, np.array([1.0, *a]), y1
         ),
-        lambda a, t0, dt, *out: flow.turning(0, 0, t0, np.zeros(2), dt, np.array([1.0, *a]), *out),
+        lambda a, t0, dt, *out: flow.stationary(
+            0, 0, t0, np.zeros(2), dt, np.array([1.0, *a]), *out
+        ),
     )
 
 
@@ -113,10 +116,10 @@ def test_first_root_and_stationary_points(search, rest, offset, grazes, which, m
     every = (turn[None, :] + 2.0 * math.pi * np.arange(-1, 4)[:, None]).ravel()
     assume(min(np.abs(every - t0).min(), np.abs(every - t0 - dt).min()) > 1e-6)
     inside = np.sort(every[(every > t0) & (every < t0 + dt)])
-    hit_of, turning_of = search
+    hit_of, stationary_of = search
 
     times, values = np.empty(64), np.empty(64)
-    n = turning_of(a, t0, dt, times, values)
+    n = stationary_of(a, t0, dt, times, values)
     assert n == len(inside)
     assert np.all(np.abs(t0 + times[:n] - inside) < 1e-8)
     assert np.all(np.abs(values[:n] - sums(a, inside)[0]) < UNSURE)

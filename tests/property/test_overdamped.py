@@ -15,7 +15,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import contfric as cf
-from contfric.flow.forced_oscillator import flow, hit, turning
+from contfric.flow.forced_oscillator import flow, hit, stationary
 
 LOAD, SPEED = range(2)
 NONE, NOTHING = np.empty(0, dtype=np.int64), np.empty((0, 0))
@@ -131,7 +131,7 @@ def test_stationary_points_are_all_there_are(slide, size, observable):
         times, values = np.empty(256), np.empty(256)
         mode = 0 if sign > 0 else 1
         start = np.array([x0, v0])
-        count = turning(mode, observable, t0, start, end, p, times, values)
+        count = stationary(mode, observable, t0, start, end, p, times, values)
         assert count >= 0
         near = 8e-10 * (1 + end)
         places = [d for d in samples(p[4], end) if near < d < end - near]
@@ -187,6 +187,6 @@ def test_what_is_no_motion_is_answered_at_once(w, mode):
         (0.0, 1.0, 1e18),
     ):
         for c in (LOAD, SPEED):
-            assert turning(mode, c, t0, np.array([x0, 0.0]), end, p, times, values) <= 256
+            assert stationary(mode, c, t0, np.array([x0, 0.0]), end, p, times, values) <= 256
             hit(mode, c, 0.4, False, t0, np.array([x0, 0.1]), end, p, y)
     assert time.perf_counter() - began < 10.0

@@ -60,7 +60,7 @@ each_case = pytest.mark.parametrize("case", [*SEEDS, *CAUGHT])
 
 @cache
 def scene(case: int | str) -> tuple[cf.Orbit, str, tuple[float, float]]:
-    """A random start that settles on a periodic orbit; aperiodic or stuck ones are drawn again."""
+    """A random start that converges to a periodic orbit; aperiodic or stuck ones are drawn again."""
     if isinstance(case, str):
         params, parameter, bounds = CAUGHT[case]
         return cf.find_orbit("coulomb", params), parameter, bounds

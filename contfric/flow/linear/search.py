@@ -272,7 +272,7 @@ def search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, workspace, 
 
 
 @inlined_helper
-def turnings_in_step(poly, slope, first, terms, sign, done, h, span, count, times, values):  # type: ignore[no-untyped-def]
+def stationary_in_step(poly, slope, first, terms, sign, done, h, span, count, times, values):  # type: ignore[no-untyped-def]
     """Append the zeros of a slope in a step; return their number (-1: it failed) and the last sign."""
     bound, behind = sixth_of(slope, first, terms), 0.0
     while behind < 1.0:
@@ -291,7 +291,7 @@ def turnings_in_step(poly, slope, first, terms, sign, done, h, span, count, time
 
 
 @inlined_helper
-def turnings_in(motion, piece, c, t0, dt, p, reach, system, sight, polys, times, values):  # type: ignore[no-untyped-def]
+def stationary_in(motion, piece, c, t0, dt, p, reach, system, sight, polys, times, values):  # type: ignore[no-untyped-def]
     """Write the interior stationary points of an observable; return their number, or -1."""
     rate, spread = reach
     y, near, poly, slope = system.work[4], _AT_JOINT * (1.0 + dt), polys[0], polys[1]
@@ -316,7 +316,7 @@ def turnings_in(motion, piece, c, t0, dt, p, reach, system, sight, polys, times,
                             return -1
                         times[count], values[count] = done, poly[0]
                         count += 1
-                count, sign = turnings_in_step(
+                count, sign = stationary_in_step(
                     poly, slope, first, terms - 1, sign, done, h, span, count, times, values
                 )
                 if count < 0:
@@ -327,8 +327,8 @@ def turnings_in(motion, piece, c, t0, dt, p, reach, system, sight, polys, times,
 
 
 @allocating_helper
-def linear_turning(motion, piece, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
-    """Write the stationary points of an observable and return their number (``turning_signature``)."""
+def linear_stationary(motion, piece, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
+    """Write the stationary points of an observable and return their number (``stationary_signature``)."""
     if not dt > 0.0:
         return 0
     entries, none = motion.entries_count, np.empty(0, dtype=np.int64)
@@ -337,16 +337,16 @@ def linear_turning(motion, piece, c, t0, y0, dt, p, times, values):  # type: ign
     period = motion.period(p, none, poly[0, :0])
     t = t0 - folded(t0, period) * period
     workspace = (coefficients, waves, rows, poly)
-    return search_turnings(motion, piece, c, t, y0, dt, p, none, workspace, times, values)
+    return search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, values)
 
 
 @inlined_helper
-def search_turnings(motion, piece, c, t, y0, dt, p, none, workspace, times, values):  # type: ignore[no-untyped-def]
+def search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, values):  # type: ignore[no-untyped-def]
     """Search all stationary points, from a folded time, in a workspace that is given."""
     system, sight = system_in(workspace[0][:1], workspace[1], workspace[2], 0), workspace[0][1]
     reach = begin_search(motion, piece, c, t, y0, dt, p, none, system, sight)
     if math.isnan(reach[0]):
         return -1
-    return turnings_in(
+    return stationary_in(
         motion, piece, c, t, dt, p, reach, system, sight, workspace[3], times, values
     )

@@ -26,7 +26,7 @@ _ZERO = 1e-9
 _HALVINGS = 60
 
 
-def first_standstill(orbit: Orbit, i: int, start: float, departs: str) -> FloatArray | None:
+def first_zero_acceleration(orbit: Orbit, i: int, start: float, departs: str) -> FloatArray | None:
     """Return the first joint of a rest after a time at which the departing mode has no acceleration.
 
     Parameters
@@ -112,7 +112,7 @@ def stationary_values(orbit: Orbit, i: int, c: int) -> list[tuple[float, float]]
     modes = [m.name for m in orbit.model.modes]
     start, end = orbit.begins[i], float(orbit.ends[i, 0])
     times, values = np.empty(512), np.empty(512)
-    found = orbit.model.flow.turning(
+    found = orbit.model.flow.stationary(
         modes.index(orbit.word[i][0]),
         c,
         float(start[0]),

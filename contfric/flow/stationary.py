@@ -33,7 +33,7 @@ _AT_JOINT = 4e-10
 
 
 @helper
-def refine_turning(motion, mode, c, t, h, low, high, at, p, workspace):  # type: ignore[no-untyped-def]
+def refine_stationary(motion, mode, c, t, h, low, high, at, p, workspace):  # type: ignore[no-untyped-def]
     """Return a stationary point in a bracket, and the observable there."""
     q, rising = 0.0, 0.0
     for _ in range(100):
@@ -69,7 +69,7 @@ def recorded(at, value, span, count, times, values):  # type: ignore[no-untyped-
 
 
 @helper
-def turnings_in_step(  # type: ignore[no-untyped-def]
+def stationary_in_step(  # type: ignore[no-untyped-def]
     motion, mode, c, t, h, done, span, left, right, p, workspace, count, times, values
 ):
     """Append the stationary points in the last step; return their number, -1 if the search fails."""
@@ -93,7 +93,7 @@ def turnings_in_step(  # type: ignore[no-untyped-def]
         if found:
             at = a + (low + (high - low) * share) * length
             low, high = a + low * length, b if high == 1.0 else a + high * length
-            at, value = refine_turning(motion, mode, c, t, h, low, high, at, p, workspace)
+            at, value = refine_stationary(motion, mode, c, t, h, low, high, at, p, workspace)
             count = recorded(done + at, value, span, count, times, values)
             if count < 0:
                 return -1
@@ -114,7 +114,7 @@ def turnings_in_step(  # type: ignore[no-untyped-def]
 
 
 @helper
-def all_turnings(motion, mode, c, t0, y0, dt, p, workspace, times, values):  # type: ignore[no-untyped-def]
+def all_stationary(motion, mode, c, t0, y0, dt, p, workspace, times, values):  # type: ignore[no-untyped-def]
     """Write the interior stationary points of an observable; return their number, or -1."""
     left = start_search(motion, mode, c, 0.0, t0, y0, dt, p, workspace)
     near = _AT_JOINT * (1.0 + dt)
@@ -127,7 +127,7 @@ def all_turnings(motion, mode, c, t0, y0, dt, p, workspace, times, values):  # t
             return -1
         right = node(motion, mode, c, 0.0, t + h, workspace.end, workspace.last, p, workspace)
         if not is_flat(left, right, h):
-            count = turnings_in_step(
+            count = stationary_in_step(
                 motion, mode, c, t, h, done, span, left, right, p, workspace, count, times, values
             )
             if count < 0:
