@@ -470,7 +470,7 @@ def tangent_miss(found: cf.Curve, index: int) -> float:
         assert last == 1
         sides.append(np.concatenate([rows.joints[1].ravel(), rows.w[1]]))
     chord = sides[0] - sides[1]
-    tangent = np.concatenate([start.tangent.ravel(), start.slope])
+    tangent = np.concatenate([start.tangent.ravel(), start.direction])
     return float(np.max(np.abs(chord / np.linalg.norm(chord) - tangent / np.linalg.norm(tangent))))
 
 
