@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from contfric.atlas.verification import Verification
-    from contfric.plot.protocols_response import SweepLike
+    from contfric.response.sweep import Sweep
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +222,7 @@ class Diagram:
         return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
     def plot(
-        self, ax: Axes | None = None, row: str = "x_max", overlay: SweepLike | None = None
+        self, ax: Axes | None = None, row: str = "x_max", overlay: Sweep | None = None
     ) -> Axes:
         """Draw one quantity of all branches with the bifurcations; behind them the points of a sweep."""
         from contfric.plot.diagram import plot_diagram_row

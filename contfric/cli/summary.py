@@ -85,7 +85,7 @@ def _diagram(record: Record) -> Iterator[str]:
     yield from _bifurcations(record)
     yield ""
     if record["loose_ends"]:
-        yield "loose ends (nothing follows them)"
+        yield "unresolved branch ends (loose ends)"
         yield from (f"  {text}" for text in record["loose_ends"])
     else:
         yield "no loose ends"

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
 from contfric.plot.lyapunov import edges_of
-from contfric.plot.protocols_response import BasinsLike
 from contfric.plot.save import axes_or_new
 from contfric.plot.style import BESIDE, GREY, SMALL, TEXT, branch_colours, lighter
+
+if TYPE_CHECKING:
+    from contfric.response.basins import Basins
 
 #: What converges to no orbit: from black (chaos) to white.
 _OTHERS = ("#222222", "#8A8A8A", "#C8C8C8", "#E6E6E6")
 
 
-def plot_basins(found: BasinsLike, ax: Axes | None = None) -> Axes:
+def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     """Draw basins of attraction.
 
     Parameters
@@ -63,13 +67,13 @@ def plot_basins(found: BasinsLike, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _shown(found: BasinsLike, colours: list[str]) -> list[str]:
+def _shown(found: Basins, colours: list[str]) -> list[str]:
     """Return the colours of the shares, in their order."""
     others = iter(colours[len(found.names) :])
     return [colours[s.orbit] if s.orbit >= 0 else next(others, GREY) for s in found.shares]
 
 
-def _draw_orbits(ax: Axes, found: BasinsLike, first: str, second: str) -> None:
+def _draw_orbits(ax: Axes, found: Basins, first: str, second: str) -> None:
     """Mark where the orbits are at the phase of the starts, once in each period."""
     names = found.model.states
     i, j = names.index(first), names.index(second)

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,7 +21,6 @@ from matplotlib.axes import Axes
 from contfric.plot.events import draw_event
 from contfric.plot.graph import draw_node, frame_nodes
 from contfric.plot.labels import Anchor, place_labels, settle
-from contfric.plot.protocols import BifurcationLike, BranchLike, DiagramLike
 from contfric.plot.save import axes_or_new
 from contfric.plot.style import (
     BRIDGE_COLOUR,
@@ -29,6 +29,11 @@ from contfric.plot.style import (
     event_label,
     parameter_label,
 )
+
+if TYPE_CHECKING:
+    from contfric.atlas.diagram import Diagram
+    from contfric.continuation.branch import Branch
+    from contfric.continuation.events import Bifurcation
 
 #: Relative: bifurcations of one kind this near in the parameter, on the same branches, are mirror images.
 _SAME = 1e-9
@@ -40,12 +45,12 @@ _Place = tuple[float, float]
 class _Joint:
     """A bifurcation and the nodes that it joins."""
 
-    event: BifurcationLike
+    event: Bifurcation
     value: float
     nodes: tuple[int, ...]
 
 
-def plot_branch_graph(diagram: DiagramLike, ax: Axes | None = None) -> Axes:
+def plot_branch_graph(diagram: Diagram, ax: Axes | None = None) -> Axes:
     """Draw how the branches of a diagram are joined by its bifurcations, up to mirror images.
 
     Parameters
@@ -79,9 +84,9 @@ def plot_branch_graph(diagram: DiagramLike, ax: Axes | None = None) -> Axes:
     return new
 
 
-def _nodes(branches: Sequence[BranchLike]) -> tuple[list[BranchLike], list[int]]:
+def _nodes(branches: Sequence[Branch]) -> tuple[list[Branch], list[int]]:
     """Return the branches that are nodes, and the node of each branch: images follow originals."""
-    nodes: list[BranchLike] = []
+    nodes: list[Branch] = []
     node_of: list[int] = []
     for branch in branches:
         if not branch.mirrored:
@@ -90,7 +95,7 @@ def _nodes(branches: Sequence[BranchLike]) -> tuple[list[BranchLike], list[int]]
     return nodes, node_of
 
 
-def _joints(diagram: DiagramLike, node_of: Sequence[int]) -> list[_Joint]:
+def _joints(diagram: Diagram, node_of: Sequence[int]) -> list[_Joint]:
     """Return every bifurcation that joins two nodes or more, each once."""
     found: list[_Joint] = []
     for node in diagram.nodes:

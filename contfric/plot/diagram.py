@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,8 +12,6 @@ from matplotlib.lines import Line2D
 from contfric.errors import either
 from contfric.plot.events import Mark, draw_marks, label_marks, marks_of
 from contfric.plot.labels import settle
-from contfric.plot.protocols import BifurcationLike, BranchLike, DiagramLike
-from contfric.plot.protocols_response import SweepLike
 from contfric.plot.response import draw_overlay
 from contfric.plot.runs import stability_runs
 from contfric.plot.save import axes_or_new, figure_or_new
@@ -42,9 +40,15 @@ from contfric.plot.style import (
     row_of,
 )
 
+if TYPE_CHECKING:
+    from contfric.atlas.diagram import Diagram
+    from contfric.continuation.branch import Branch
+    from contfric.continuation.events import Bifurcation
+    from contfric.response.sweep import Sweep
+
 
 def plot_branches(
-    branches: Sequence[BranchLike],
+    branches: Sequence[Branch],
     row: str = "x_max",
     ax: Axes | None = None,
     *,
@@ -83,12 +87,12 @@ def plot_branches(
 
 
 def plot_diagram_row(
-    diagram: DiagramLike,
+    diagram: Diagram,
     row: str = "x_max",
     ax: Axes | None = None,
     events: bool = True,
     legend: bool = True,
-    overlay: SweepLike | None = None,
+    overlay: Sweep | None = None,
 ) -> Axes:
     """Draw one quantity of all branches of a diagram, with its bifurcations.
 
@@ -121,10 +125,10 @@ def plot_diagram_row(
 
 
 def plot_diagram(
-    diagram: DiagramLike,
+    diagram: Diagram,
     rows: Sequence[str] = ("x_max", "stops", "psi"),
     fig: Figure | None = None,
-    overlay: SweepLike | None = None,
+    overlay: Sweep | None = None,
 ) -> list[Axes]:
     """Draw a diagram in several rows over one parameter axis, as Figs. 4-7 of the reference.
 
@@ -176,7 +180,7 @@ def plot_diagram(
     return axes
 
 
-def fixed_parameters(branches: Sequence[BranchLike]) -> str:
+def fixed_parameters(branches: Sequence[Branch]) -> str:
     """Return the parameters that do not vary and are not zero, for a title."""
     if not branches:
         return ""
@@ -188,8 +192,8 @@ def fixed_parameters(branches: Sequence[BranchLike]) -> str:
 
 def _plot_row(
     ax: Axes,
-    branches: Sequence[BranchLike],
-    events: Sequence[BifurcationLike],
+    branches: Sequence[Branch],
+    events: Sequence[Bifurcation],
     row: str,
     legend: bool,
     *,
@@ -211,7 +215,7 @@ def _plot_row(
     return ax
 
 
-def _draw_row(ax: Axes, branches: Sequence[BranchLike], marks: Sequence[Mark], row: str) -> None:
+def _draw_row(ax: Axes, branches: Sequence[Branch], marks: Sequence[Mark], row: str) -> None:
     colours = _colours(branches)
     twins = {b.name for b in branches if not b.mirrored} if row_of(row).even else set()
     for branch in sorted(branches, key=lambda b: not b.mirrored):
@@ -229,7 +233,7 @@ def _draw_row(ax: Axes, branches: Sequence[BranchLike], marks: Sequence[Mark], r
     ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
 
 
-def _draw_branch(ax: Axes, branch: BranchLike, attribute: str, colour: str) -> None:
+def _draw_branch(ax: Axes, branch: Branch, attribute: str, colour: str) -> None:
     width = MIRROR_WIDTH if branch.mirrored else LINE_WIDTH
     colour = lighter(colour) if branch.mirrored else colour
     for run in stability_runs(branch, attribute):
@@ -247,7 +251,7 @@ def _draw_branch(ax: Axes, branch: BranchLike, attribute: str, colour: str) -> N
             line.set_gid(branch.name)
 
 
-def _draw_bridge(ax: Axes, branch: BranchLike, attribute: str) -> None:
+def _draw_bridge(ax: Axes, branch: Branch, attribute: str) -> None:
     for run in stability_runs(branch, attribute):
         lines = ax.plot(
             run.x,
@@ -261,14 +265,12 @@ def _draw_bridge(ax: Axes, branch: BranchLike, attribute: str) -> None:
             line.set_gid(branch.name)
 
 
-def _colours(branches: Sequence[BranchLike]) -> dict[str, str]:
+def _colours(branches: Sequence[Branch]) -> dict[str, str]:
     """Return a colour for each name; bridges have no colour of their own."""
     return branch_colours(b.name for b in branches if not b.bridge)
 
 
-def _handles(
-    branches: Sequence[BranchLike], marks: Sequence[Mark], *, mirrors: bool
-) -> list[Line2D]:
+def _handles(branches: Sequence[Branch], marks: Sequence[Mark], *, mirrors: bool) -> list[Line2D]:
     """Return the entries of the legend: branches, meaning of the lines, meaning of the markers.
 
     Where all rows are even, ``mirrors`` is false: images lie on their originals.

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from contfric.models.definition import FloatArray
 from contfric.plot.labels import Anchor, near, place_labels
-from contfric.plot.protocols import BifurcationLike, BranchLike, KindLike
 from contfric.plot.runs import quantity
 from contfric.plot.style import MARKERS, OTHER_MARKER, event_label
+
+if TYPE_CHECKING:
+    from contfric.continuation.branch import Branch
+    from contfric.continuation.events import Bifurcation, Kind
 
 #: Relative: events of one kind this near in the parameter are images of one another.
 _SAME = 1e-9
@@ -33,7 +37,7 @@ class Mark:
     ``on_bridges`` tells whether it lies on bridges only, ``meaning`` what the legend says of it.
     """
 
-    kind: KindLike
+    kind: Kind
     label: str
     x: float
     y: FloatArray
@@ -42,8 +46,8 @@ class Mark:
 
 
 def marks_of(
-    events: Sequence[BifurcationLike],
-    branches: Sequence[BranchLike],
+    events: Sequence[Bifurcation],
+    branches: Sequence[Branch],
     attribute: str,
     parameter: str,
 ) -> list[Mark]:
@@ -66,7 +70,7 @@ def marks_of(
     return found
 
 
-def _coincide(a: BifurcationLike, b: BifurcationLike, parameter: str) -> bool:
+def _coincide(a: Bifurcation, b: Bifurcation, parameter: str) -> bool:
     """Tell whether two located events are one, or mirror images of one another."""
     difference = abs(a.params[parameter] - b.params[parameter])
     if a.kind.value != b.kind.value or difference > _SAME * abs(b.params[parameter]):
@@ -102,7 +106,7 @@ def draw_marks(ax: Axes, marks: Sequence[Mark]) -> None:
         line.set_gid(mark.label)
 
 
-def draw_event(ax: Axes, event: BifurcationLike, place: tuple[float, float]) -> None:
+def draw_event(ax: Axes, event: Bifurcation, place: tuple[float, float]) -> None:
     """Mark an event at a place of a graph."""
     look = MARKERS.get(event.kind.value, OTHER_MARKER)
     ax.plot(

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch
 
 from contfric.models import Model
-from contfric.plot.protocols import SignatureLike
 from contfric.plot.save import axes_or_new
 from contfric.plot.style import (
     BLACK,
@@ -21,12 +21,15 @@ from contfric.plot.style import (
     surface_label,
 )
 
+if TYPE_CHECKING:
+    from contfric.signature import Signature
+
 #: Curvature of an edge, and the radius of a node in points.
 _CURVE, _RADIUS = 0.16, 19.0
 
 
 def plot_transition_graph(
-    model: Model, ax: Axes | None = None, signature: SignatureLike | None = None
+    model: Model, ax: Axes | None = None, signature: Signature | None = None
 ) -> Axes:
     """Draw which domain can follow which, and through which surface.
 
@@ -83,7 +86,7 @@ def domain_places(model: Model) -> dict[str, tuple[float, float]]:
     return places
 
 
-def _steps(signature: SignatureLike | None) -> list[tuple[str, str]]:
+def _steps(signature: Signature | None) -> list[tuple[str, str]]:
     if signature is None:
         return []
     walk = list(signature.segments)

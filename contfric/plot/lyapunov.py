@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
 from contfric.models.definition import FloatArray
-from contfric.plot.protocols import LyapunovMapLike
 from contfric.plot.save import axes_or_new
 from contfric.plot.style import GREY, SMALL, TEXT, lighter, parameter_label
+
+if TYPE_CHECKING:
+    from contfric.chaos.map import LyapunovMap
 
 #: Colours of positive exponents: from light to dark, so that the map reads in grey as well.
 _SHADES = "magma_r"
@@ -18,7 +22,7 @@ _SHADES = "magma_r"
 _UNBOUNDED, _MISSING = lighter(GREY, 0.35), lighter(GREY, 0.75)
 
 
-def plot_lyapunov_map(lmap: LyapunovMapLike, ax: Axes | None = None) -> Axes:
+def plot_lyapunov_map(lmap: LyapunovMap, ax: Axes | None = None) -> Axes:
     r"""Draw a Lyapunov map: where the largest exponent is positive beyond its error it is shaded.
 
     White is regular (or not decided); grey is where there is no exponent.
@@ -61,7 +65,7 @@ def plot_lyapunov_map(lmap: LyapunovMapLike, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _draw_ground(ax: Axes, lmap: LyapunovMapLike, edges: tuple[FloatArray, FloatArray]) -> None:
+def _draw_ground(ax: Axes, lmap: LyapunovMap, edges: tuple[FloatArray, FloatArray]) -> None:
     """Mark in grey where there are no exponents, and say why."""
     handles = []
     for missing, colour in ((False, _UNBOUNDED), (True, _MISSING)):

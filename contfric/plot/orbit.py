@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -25,16 +26,18 @@ from contfric.plot.orbit_artists import (
     name_axes,
 )
 from contfric.plot.pieces import pieces_of, rest_bounds
-from contfric.plot.protocols import OrbitLike
 from contfric.plot.save import axes_or_new, figure_or_new
 from contfric.plot.style import BESIDE, SMALL, TEXT, parameter_label
+
+if TYPE_CHECKING:
+    from contfric.orbit.orbit import Orbit
 
 #: Workspace in a legend (inches, at the small size): an entry with its line, and each letter of its text.
 _ENTRY, _LETTER = 0.45, 0.06
 
 
 def plot_orbit(
-    orbit: OrbitLike,
+    orbit: Orbit,
     ax: Axes | None = None,
     *,
     plane: tuple[str, str] | None = None,
@@ -77,7 +80,7 @@ def plot_orbit(
     return new
 
 
-def _draw_plane(new: Axes, orbit: OrbitLike, plane: tuple[str, str] | None) -> list[Anchor]:
+def _draw_plane(new: Axes, orbit: Orbit, plane: tuple[str, str] | None) -> list[Anchor]:
     """Draw an orbit in a plane and return the labels that are to be placed when all is drawn."""
     pieces = pieces_of(orbit)
     across, up = plane or (orbit.model.states[0], orbit.model.states[1])
@@ -93,7 +96,7 @@ def _draw_plane(new: Axes, orbit: OrbitLike, plane: tuple[str, str] | None) -> l
     return named
 
 
-def plot_orbit_in_time(orbit: OrbitLike, axes: Sequence[Axes] | None = None) -> list[Axes]:
+def plot_orbit_in_time(orbit: Orbit, axes: Sequence[Axes] | None = None) -> list[Axes]:
     """Draw the observables of an orbit over one period, with the levels that are surfaces.
 
     Parameters
@@ -141,7 +144,7 @@ def _columns(labels: Sequence[str], width: float) -> int:
     return math.ceil(len(labels) / rows)
 
 
-def plot_orbit_panels(orbit: OrbitLike, fig: Figure | None = None) -> list[Axes]:
+def plot_orbit_panels(orbit: Orbit, fig: Figure | None = None) -> list[Axes]:
     """Draw an orbit in the phase plane, beside the load plane and its observables in time.
 
     Parameters

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,7 +23,6 @@ from contfric.plot.pieces import (
     rest_bounds,
     rest_limits,
 )
-from contfric.plot.protocols import OrbitLike
 from contfric.plot.style import (
     BLACK,
     GREY,
@@ -33,13 +33,16 @@ from contfric.plot.style import (
     surface_label,
 )
 
+if TYPE_CHECKING:
+    from contfric.orbit.orbit import Orbit
+
 #: Colour of where the mass can rest, and width of the line of an orbit.
 BAND = "#E4E4E4"
 _WIDTH = 2.0
 _HELD = (0, (0.6, 0.8))
 
 
-def value_of(orbit: OrbitLike, name: str, time: float, state: FloatArray) -> float:
+def value_of(orbit: Orbit, name: str, time: float, state: FloatArray) -> float:
     """Return a state or an observable at a point of the orbit."""
     states = orbit.model.states
     if name in states:
@@ -51,7 +54,7 @@ def value_of(orbit: OrbitLike, name: str, time: float, state: FloatArray) -> flo
     return observe(orbit, name, time, state)
 
 
-def along(orbit: OrbitLike, pieces: Sequence[Piece], name: str) -> list[FloatArray]:
+def along(orbit: Orbit, pieces: Sequence[Piece], name: str) -> list[FloatArray]:
     """Return a state or an observable along each piece."""
     return [
         np.array([value_of(orbit, name, t, y) for t, y in zip(p.times, p.states, strict=True)])
@@ -80,13 +83,13 @@ def _is_hold(model: Model, piece: Piece) -> bool:
     return piece.exit not in model.surface_by_name
 
 
-def draw_surfaces(ax: Axes, orbit: OrbitLike, across: str, up: str) -> None:
+def draw_surfaces(ax: Axes, orbit: Orbit, across: str, up: str) -> None:
     """Draw the surfaces that are lines in the plane."""
     draw_levels(ax, orbit, across, vertical=True)
     draw_levels(ax, orbit, up, vertical=False)
 
 
-def draw_levels(ax: Axes, orbit: OrbitLike, observable: str, *, vertical: bool) -> None:
+def draw_levels(ax: Axes, orbit: Orbit, observable: str, *, vertical: bool) -> None:
     """Draw the surfaces of one observable as lines across the axes, with their names."""
     for surface in orbit.model.surfaces:
         if surface.observable != observable:
@@ -124,7 +127,7 @@ def _name_level(ax: Axes, text: str, value: float, vertical: bool) -> None:
 
 
 def draw_moving_surfaces(
-    ax: Axes, orbit: OrbitLike, pieces: Sequence[Piece], across: str, up: str
+    ax: Axes, orbit: Orbit, pieces: Sequence[Piece], across: str, up: str
 ) -> list[Anchor]:
     """Draw ticks where the orbit crosses a surface, along the surface as it is at that moment.
 
@@ -152,9 +155,7 @@ def draw_moving_surfaces(
     return anchors
 
 
-def draw_rest_bands(
-    ax: Axes, orbit: OrbitLike, pieces: Sequence[Piece], across: str, up: str
-) -> None:
+def draw_rest_bands(ax: Axes, orbit: Orbit, pieces: Sequence[Piece], across: str, up: str) -> None:
     """Draw where a stick could rest on the axis, at the moment at which it begins."""
     for piece in pieces:
         if not is_sliding(orbit.model, piece.domain):
@@ -185,7 +186,7 @@ def draw_arrow(ax: Axes, across: Sequence[FloatArray], up: Sequence[FloatArray])
     )
 
 
-def draw_stops(ax: Axes, orbit: OrbitLike, across: str, up: str) -> None:
+def draw_stops(ax: Axes, orbit: Orbit, across: str, up: str) -> None:
     """Mark stops: filled where a stick begins, open where the motion reverses."""
     for sticks, joint in _stops(orbit):
         x, y = (value_of(orbit, name, float(joint[0]), joint[1:]) for name in (across, up))
@@ -194,7 +195,7 @@ def draw_stops(ax: Axes, orbit: OrbitLike, across: str, up: str) -> None:
         ax.add_line(marker)
 
 
-def _stops(orbit: OrbitLike) -> Iterator[tuple[bool, FloatArray]]:
+def _stops(orbit: Orbit) -> Iterator[tuple[bool, FloatArray]]:
     """Yield whether a stick follows each stop, and its time and state, shape (1 + n,)."""
     model = orbit.model
     following = [mode for mode, _ in [*orbit.word[1:], orbit.word[0]]]
@@ -224,7 +225,7 @@ def name_axes(ax: Axes, across: str, up: str) -> None:
     ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
 
 
-def legend_handles(orbit: OrbitLike, pieces: Sequence[Piece]) -> list[Line2D | Patch]:
+def legend_handles(orbit: Orbit, pieces: Sequence[Piece]) -> list[Line2D | Patch]:
     """Return the entries of the legend: domains in the order of the orbit, stops, bands."""
     model, colours = orbit.model, domain_colours(orbit.model)
     visited = list(dict.fromkeys(p.domain for p in pieces))

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contfric.models import Model
 from contfric.models.definition import FloatArray, Surface
-from contfric.plot.protocols import OrbitLike
+
+if TYPE_CHECKING:
+    from contfric.orbit.orbit import Orbit
 
 _NONE = np.empty(0, dtype=np.int64)
 _EMPTY = np.empty(0)
@@ -35,14 +38,14 @@ class Piece:
     exit: str
 
 
-def observe(orbit: OrbitLike, name: str, time: float, state: FloatArray) -> float:
+def observe(orbit: Orbit, name: str, time: float, state: FloatArray) -> float:
     """Return the value of an observable."""
     c = [o.name for o in orbit.model.observables].index(name)
     state = np.ascontiguousarray(state)
     return float(orbit.model.flow.observe(c, time, state, orbit.vector, _NONE, _EMPTY))
 
 
-def observe_gradient(orbit: OrbitLike, name: str, time: float, state: FloatArray) -> FloatArray:
+def observe_gradient(orbit: Orbit, name: str, time: float, state: FloatArray) -> FloatArray:
     """Return the derivatives of an observable with respect to the states, shape (n,)."""
     c = [o.name for o in orbit.model.observables].index(name)
     gradient = np.empty(1 + len(orbit.model.states))
@@ -51,13 +54,13 @@ def observe_gradient(orbit: OrbitLike, name: str, time: float, state: FloatArray
     return gradient[1:]
 
 
-def level(orbit: OrbitLike, surface: Surface) -> float:
+def level(orbit: Orbit, surface: Surface) -> float:
     """Return the level of the observable that makes the surface."""
     k = orbit.model.surfaces.index(surface)
     return float(orbit.model.flow.level(k, orbit.vector, _NONE, _EMPTY))
 
 
-def pieces_of(orbit: OrbitLike, points: int = 400) -> list[Piece]:
+def pieces_of(orbit: Orbit, points: int = 400) -> list[Piece]:
     """Cut one period of an orbit at its joints and where it crosses a surface in between."""
     found: list[Piece] = []
     for i, ((mode, exit_), joint, start, end) in enumerate(
@@ -84,7 +87,7 @@ def pieces_of(orbit: OrbitLike, points: int = 400) -> list[Piece]:
     return found
 
 
-def _crossings(orbit: OrbitLike, times: FloatArray, states: FloatArray) -> list[tuple[float, str]]:
+def _crossings(orbit: Orbit, times: FloatArray, states: FloatArray) -> list[tuple[float, str]]:
     """Return times at which transparent surfaces are crossed inside a segment, in order."""
     found: list[tuple[float, str]] = []
     for surface in orbit.model.surfaces:
@@ -103,7 +106,7 @@ def _crossings(orbit: OrbitLike, times: FloatArray, states: FloatArray) -> list[
     return sorted(found)
 
 
-def _crossing(orbit: OrbitLike, observable: str, limit: float, bracket: FloatArray) -> float:
+def _crossing(orbit: Orbit, observable: str, limit: float, bracket: FloatArray) -> float:
     low, high = float(bracket[0]), float(bracket[1])
     sign = np.sign(observe(orbit, observable, low, orbit.state(low)) - limit)
     for _ in range(_BISECTIONS):
@@ -115,7 +118,7 @@ def _crossing(orbit: OrbitLike, observable: str, limit: float, bracket: FloatArr
     return 0.5 * (low + high)
 
 
-def _domain(orbit: OrbitLike, mode: str, time: float) -> str:
+def _domain(orbit: Orbit, mode: str, time: float) -> str:
     """Return the domain of a mode in which the orbit is at a time."""
     state = orbit.state(time)
     model = orbit.model
@@ -134,7 +137,7 @@ def is_sliding(model: Model, domain: str) -> bool:
     return model.mode_by_name[model.domain_by_name[domain].mode].sliding
 
 
-def rest_limits(orbit: OrbitLike, piece: Piece) -> tuple[float, float] | None:
+def rest_limits(orbit: Orbit, piece: Piece) -> tuple[float, float] | None:
     """Return the displacements between which the piece could rest when it begins.
 
     The two surfaces that bound a sliding domain are met along the first state by Newton's method
@@ -158,7 +161,7 @@ def rest_limits(orbit: OrbitLike, piece: Piece) -> tuple[float, float] | None:
     return (min(found), max(found)) if len(found) == 2 else None
 
 
-def rest_bounds(orbit: OrbitLike, observable: str) -> Iterator[tuple[float, float]]:
+def rest_bounds(orbit: Orbit, observable: str) -> Iterator[tuple[float, float]]:
     """Yield the intervals of an observable inside which the model can stay on a surface."""
     model = orbit.model
     drawn = [s for s in model.surfaces if not s.switching and s.name not in model.section_surfaces]

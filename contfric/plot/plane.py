@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +13,6 @@ from matplotlib.lines import Line2D
 from contfric.errors import either
 from contfric.models.definition import FloatArray
 from contfric.plot.labels import Anchor, place_labels, settle
-from contfric.plot.protocols import CurveLike, PlaneLike, SpecialLike
 from contfric.plot.save import axes_or_new
 from contfric.plot.style import (
     BESIDE,
@@ -32,6 +31,11 @@ from contfric.plot.style import (
     event_label,
     parameter_label,
 )
+
+if TYPE_CHECKING:
+    from contfric.atlas.plane import Plane
+    from contfric.curves.curve import Curve
+    from contfric.curves.special import SpecialPoint
 
 #: Colour and width of each kind: what bounds smooth families is strong, where the flow jumps it is fine.
 _LOOKS = {
@@ -59,12 +63,10 @@ _BELOW: Mapping[str, Any] = {
 _RELABELS = "T"
 
 
-def plot_curves(
-    curves: Sequence[CurveLike], ax: Axes | None = None, *, special: bool = True
-) -> Axes:
+def plot_curves(curves: Sequence[Curve], ax: Axes | None = None, *, special: bool = True) -> Axes:
     r"""Draw curves of bifurcations in their plane.
 
-    The colour is that of the kind. A line is solid where stable orbits are bounded, dashed elsewhere.
+    The colour is that of the kind. A line is solid where it bounds a region of stable orbits, else dashed.
 
     Parameters
     ----------
@@ -90,7 +92,7 @@ def plot_curves(
 
 
 def plot_plane(
-    plane: PlaneLike, ax: Axes | None = None, *, special: bool = True, legend_below: bool = False
+    plane: Plane, ax: Axes | None = None, *, special: bool = True, legend_below: bool = False
 ) -> Axes:
     """Draw the curves of a plane, as Figs. 8 to 11 of the reference.
 
@@ -114,9 +116,9 @@ def plot_plane(
 
 def _draw(
     ax: Axes,
-    curves: Sequence[CurveLike],
+    curves: Sequence[Curve],
     twins: Sequence[int],
-    special: Sequence[SpecialLike],
+    special: Sequence[SpecialPoint],
     legend: Mapping[str, Any],
 ) -> Axes:
     for index, curve in enumerate(curves):
@@ -146,7 +148,7 @@ def _draw(
     return ax
 
 
-def _pieces(curve: CurveLike) -> list[tuple[str, FloatArray, bool]]:
+def _pieces(curve: Curve) -> list[tuple[str, FloatArray, bool]]:
     """Return the stretches of one kind and stability; each reaches to the start of the next one."""
     kinds = [kind.value for kind in curve.kinds]
     values, stable = curve.values, curve.stable
@@ -157,11 +159,11 @@ def _pieces(curve: CurveLike) -> list[tuple[str, FloatArray, bool]]:
     return [(kinds[a], values[a : b + 1], bool(stable[a])) for a, b in itertools.pairwise(edges)]
 
 
-def _place(special: SpecialLike, names: tuple[str, str]) -> tuple[float, float]:
+def _place(special: SpecialPoint, names: tuple[str, str]) -> tuple[float, float]:
     return special.params[names[0]], special.params[names[1]]
 
 
-def _mark(ax: Axes, special: Sequence[SpecialLike], names: tuple[str, str]) -> None:
+def _mark(ax: Axes, special: Sequence[SpecialPoint], names: tuple[str, str]) -> None:
     """Mark points of codimension two; small where segments are relabelled only."""
     for point in special:
         relabels = point.name.endswith(_RELABELS)
@@ -178,7 +180,7 @@ def _mark(ax: Axes, special: Sequence[SpecialLike], names: tuple[str, str]) -> N
         line.set_gid(point.name)
 
 
-def _label_of(ax: Axes, curve: CurveLike) -> Anchor | None:
+def _label_of(ax: Axes, curve: Curve) -> Anchor | None:
     """Return the label of a curve at the middle of what is seen of it."""
     values, along = curve.values, _lengths(ax, curve)
     if along[-1] <= 0.0:
@@ -187,7 +189,7 @@ def _label_of(ax: Axes, curve: CurveLike) -> Anchor | None:
     return Anchor(float(values[middle, 0]), float(values[middle, 1]), event_label(curve.label))
 
 
-def _lengths(ax: Axes, curve: CurveLike) -> FloatArray:
+def _lengths(ax: Axes, curve: Curve) -> FloatArray:
     """Return how much of a curve is seen up to each of its points, in sizes of the axes."""
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
     places = (curve.values - (left, low)) / (right - left, high - low)
@@ -197,7 +199,7 @@ def _lengths(ax: Axes, curve: CurveLike) -> FloatArray:
 
 
 def _legend(
-    ax: Axes, curves: Sequence[CurveLike], special: Sequence[SpecialLike], where: Mapping[str, Any]
+    ax: Axes, curves: Sequence[Curve], special: Sequence[SpecialPoint], where: Mapping[str, Any]
 ) -> None:
     """Say what colours and dashes mean."""
     kinds: dict[str, str] = {}
@@ -209,7 +211,10 @@ def _legend(
         for name, (colour, width) in _LOOKS.items()
         if name in kinds
     ]
-    styles: dict[str, Any] = {"stable orbits are bounded": STABLE, "unstable ones only": UNSTABLE}
+    styles: dict[str, Any] = {
+        "boundary of stable orbits": STABLE,
+        "of unstable ones only": UNSTABLE,
+    }
     for meaning, style in styles.items():
         handles.append(Line2D([], [], color=GREY, linestyle=style, label=meaning))
     if special:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray
-from contfric.plot.protocols_response import SweepLike
 from contfric.plot.save import axes_or_new
 from contfric.plot.style import GREY, SMALL, TEXT, lighter, parameter_label
+
+if TYPE_CHECKING:
+    from contfric.response.sweep import Sweep
 
 #: Colours of the directions: both read in grey.
 _COLOURS = {"up": "#1F4E79", "down": "#C04F15"}
@@ -18,7 +21,7 @@ _COLOURS = {"up": "#1F4E79", "down": "#C04F15"}
 _POINT = 1.2
 
 
-def plot_sweep(sweep: SweepLike, ax: Axes | None = None, state: str | None = None) -> Axes:
+def plot_sweep(sweep: Sweep, ax: Axes | None = None, state: str | None = None) -> Axes:
     r"""Draw one state of the points of a sweep against its parameter.
 
     Parameters
@@ -51,7 +54,7 @@ def plot_sweep(sweep: SweepLike, ax: Axes | None = None, state: str | None = Non
 
 
 def draw_overlay(
-    axes: Sequence[Axes], rows: Sequence[str], parameter: str, overlay: SweepLike | None
+    axes: Sequence[Axes], rows: Sequence[str], parameter: str, overlay: Sweep | None
 ) -> None:
     """Draw the points of a sweep behind the rows of a diagram; nothing if there is none.
 

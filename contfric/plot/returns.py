@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.axes import Axes
 
 from contfric.models.definition import FloatArray
-from contfric.plot.protocols_response import ReleaseMapLike, ReturnsLike
 from contfric.plot.save import axes_or_new
 from contfric.plot.style import GREY, LINE_WIDTH, SMALL, TEXT, branch_colours, lighter
+
+if TYPE_CHECKING:
+    from contfric.response.returns import ReleaseMap, Returns
 
 #: Size of a point: a thousand of them are told apart.
 _POINT = 2.0
 
 
 def plot_returns(
-    found: ReturnsLike, ax: Axes | None = None, coordinate: str | None = None, step: int = 1
+    found: Returns, ax: Axes | None = None, coordinate: str | None = None, step: int = 1
 ) -> Axes:
     """Draw one coordinate of the points of a section against that of the point some returns before.
 
@@ -47,7 +51,7 @@ def plot_returns(
 
 
 def plot_release_map(
-    found: ReleaseMapLike, ax: Axes | None = None, start: float | None = None, count: int = 50
+    found: ReleaseMap, ax: Axes | None = None, start: float | None = None, count: int = 50
 ) -> Axes:
     """Draw the branches of a release map, and the cobweb of a start.
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contfric.models.definition import FloatArray
-from contfric.plot.protocols import BifurcationLike, BranchLike
+
+if TYPE_CHECKING:
+    from contfric.continuation.branch import Branch
+    from contfric.continuation.events import Bifurcation
 
 #: In units of the length of the branch: a point this near to an event is the event.
 _SAME = 1e-9
@@ -42,7 +46,7 @@ def quantity(source: object, attribute: str) -> FloatArray:
     return np.atleast_1d(values)
 
 
-def stability_runs(branch: BranchLike, attribute: str) -> list[Run]:
+def stability_runs(branch: Branch, attribute: str) -> list[Run]:
     """Cut a branch where its stability changes.
 
     Consecutive runs share the point of change, which is the located bifurcation. A branch whose
@@ -62,7 +66,7 @@ def stability_runs(branch: BranchLike, attribute: str) -> list[Run]:
     return runs
 
 
-def _vertices(branch: BranchLike, attribute: str) -> list[_Vertex]:
+def _vertices(branch: Branch, attribute: str) -> list[_Vertex]:
     """Return points and located events in the order of the branch."""
     columns = quantity(branch, attribute)
     tolerance = _SAME * max(float(np.ptp(branch.arc)), 1e-300)
@@ -72,7 +76,7 @@ def _vertices(branch: BranchLike, attribute: str) -> list[_Vertex]:
     return sorted([*events, *points], key=lambda v: v.arc)
 
 
-def _points(branch: BranchLike, columns: FloatArray) -> Iterator[_Vertex]:
+def _points(branch: Branch, columns: FloatArray) -> Iterator[_Vertex]:
     stable = branch.stable
     positions = np.array([_position(branch, b) for b in branch.bifurcations])
     for k, (arc, x) in enumerate(zip(branch.arc, branch.values, strict=True)):
@@ -85,7 +89,7 @@ def _points(branch: BranchLike, columns: FloatArray) -> Iterator[_Vertex]:
             yield _change(branch, columns, k)
 
 
-def _change(branch: BranchLike, columns: FloatArray, k: int) -> _Vertex:
+def _change(branch: Branch, columns: FloatArray, k: int) -> _Vertex:
     """Return the change between two points that no event explains, by linear interpolation."""
     assert branch.stable is not None and branch.turn_multipliers is not None
     size = np.abs(branch.turn_multipliers[k : k + 2]).max(axis=1) - 1.0
@@ -96,7 +100,7 @@ def _change(branch: BranchLike, columns: FloatArray, k: int) -> _Vertex:
 
 
 def _event_vertex(
-    branch: BranchLike, event: BifurcationLike, columns: FloatArray, attribute: str
+    branch: Branch, event: Bifurcation, columns: FloatArray, attribute: str
 ) -> _Vertex:
     arc = _position(branch, event)
     near = np.array([np.interp(arc, branch.arc, column) for column in columns.T])
@@ -108,13 +112,13 @@ def _event_vertex(
     return _Vertex(arc, x, y, *sides, True)
 
 
-def _falls(branch: BranchLike, arc: float) -> bool:
+def _falls(branch: Branch, arc: float) -> bool:
     """Tell whether the parameter falls along a branch at an arclength."""
     k = int(np.clip(np.searchsorted(branch.arc, arc), 1, len(branch.arc) - 1))
     return bool(branch.values[k] < branch.values[k - 1])
 
 
-def _position(branch: BranchLike, event: BifurcationLike) -> float:
+def _position(branch: Branch, event: Bifurcation) -> float:
     """Return the arclength of an event; one that ends the branch may come from another branch."""
     for side, end in enumerate(branch.ends):
         if end.bifurcation is event:

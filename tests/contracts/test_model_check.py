@@ -186,7 +186,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "checked.yaml"
     path.write_text(GOOD, encoding="utf-8")
     assert main(["check", str(path)]) == 0
-    assert capsys.readouterr().out.endswith("fine\n")
+    assert capsys.readouterr().out.endswith("ok\n")
     path.write_text(GOOD.replace("Omega > 0]", "Omega > 1]"), encoding="utf-8")
     assert main(["check", str(path), "--json"]) == 2
     found = json.loads(capsys.readouterr().out)

@@ -22,5 +22,5 @@ def test_page_runs(
         exec(compile(block, str(PAGE), "exec"), scope)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "model my_block"
-    assert "fine" in lines
+    assert "ok" in lines
     assert lines[-1] == "True True"

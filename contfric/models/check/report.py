@@ -110,13 +110,13 @@ class ModelReport:
         for topic, count in self.counts.items():
             own = [f for f in self.findings if f.topic is topic]
             bad = any(f.severity is Severity.ERROR for f in own)
-            look = any(f.severity is not Severity.NOTE for f in own)
-            mark = "WRONG" if bad else "look" if look else "fine" if count else "-"
+            warned = any(f.severity is not Severity.NOTE for f in own)
+            mark = "error" if bad else "warning" if warned else "ok" if count else "-"
             note = f" ({count} comparisons)" if count else " (does not apply)"
-            lines.append(f"  {mark:5}  {topic.value}{note}")
-            lines.extend(f"           {f}" for f in own)
+            lines.append(f"  {mark:7}  {topic.value}{note}")
+            lines.extend(f"             {f}" for f in own)
         if self.closed:
             lines.append(f"  closed form: {', '.join(self.closed)}")
         lines.extend(f"  integrated: {mode} ({why})" for mode, why in self.integrated.items())
-        lines.append("fine" if self.ok else "not fine: results of this model would be wrong")
+        lines.append("ok" if self.ok else "error: results of this model would be wrong")
         return "\n".join(lines)
