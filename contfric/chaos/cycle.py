@@ -92,7 +92,7 @@ class CycleWorkspace(NamedTuple):
     left: FloatArray
     right: FloatArray
     mu: NDArray[np.complex128]
-    symmetric: FloatArray
+    real: FloatArray
     work: FloatArray
     product: FloatArray
     rates: FloatArray
@@ -255,7 +255,7 @@ def correction(cycle):  # type: ignore[no-untyped-def]
 def cycle_rates(cycle, rank, time):  # type: ignore[no-untyped-def]
     """Write the exponents of a cycle, largest first; return the largest modulus of a multiplier."""
     n = cycle.rates.shape[0]
-    spectrum(cycle.images, rank, cycle.mu, cycle.symmetric, cycle.work, cycle.product)
+    spectrum(cycle.images, rank, cycle.mu, cycle.real, cycle.work, cycle.product)
     total = 0.0
     for k in range(rank):
         total += cycle.logs[k]

@@ -78,7 +78,7 @@ def flow_spectrum(functions, rank, mode, t, p, time, walk, cycle, rows):  # type
     for i in range(n):
         for j in range(n):
             cycle.work[i, j] = walk.jac[i, 1 + j]
-    spectrum(cycle.work[:n, :n], rank, cycle.mu, cycle.symmetric, cycle.left, cycle.product)
+    spectrum(cycle.work[:n, :n], rank, cycle.mu, cycle.real, cycle.left, cycle.product)
 
 
 @helper

@@ -2,7 +2,7 @@
 
 They are the eigenvalues of the linear map M of one turn on ``z_0 = (t_0, y_0)``. It has one eigenvalue
 0 for the direction off the section, and one more for each direction that a stick takes away; those
-are exactly zero, and the characteristic polynomial of the others is cut off there.
+are exactly zero. One or two others are the roots of a quadratic in closed form, more of them LAPACK's.
 
 Of an autonomous model a shift in time is mapped to itself: M is block triangular with a 1 for dt_0, the
 trivial multiplier, and the map of the states in the section. Its first column is made zero, which takes
@@ -23,105 +23,134 @@ from contfric.orbit.cyclic import turn_map
 from contfric.orbit.equations import LayoutType
 from contfric.orbit.newton import MULTIPLIERS
 
+#: LAPACK's dgeev, by numba's own wrapper (that of ``numpy.linalg.eigvals`` in compiled code): it allocates
+#: its own workspace and returns 0, so that helpers can call it. (kind, jobvl, jobvr, n, a, lda, wr, wi, vl,
+#: ldvl, vr, ldvr); scipy's library is loaded at the first call.
+_geev = types.ExternalFunction(
+    "numba_ez_rgeev",
+    types.intc(
+        *(types.char, types.char, types.char, types.intp, types.CPointer(f8), types.intp),
+        *(types.CPointer(f8), types.CPointer(f8), types.CPointer(f8), types.intp),
+        *(types.CPointer(f8), types.intp),
+    ),
+)
+_DOUBLE, _NO = ord("d"), ord("N")
+
 
 @helper
-def characteristic(m, rank, e, b, product):  # type: ignore[no-untyped-def]
-    """Fill e[k], k <= rank, with the elementary symmetric functions of the eigenvalues of m.
-
-    Faddeev and LeVerrier: ``k e_k = tr(m b_k)``, ``b_1 = 1``, ``b_{k+1} = e_k - m b_k``; a matrix
-    of rank r has no others.
-    """
+def largest_of(m, rank, out, real, imaginary, copy):  # type: ignore[no-untyped-def]
+    """Write the ``rank`` largest eigenvalues of m by LAPACK, largest first; the others of a turn are zero."""
     size = m.shape[0]
     for i in range(size):
         for j in range(size):
-            b[i, j] = 1.0 if i == j else 0.0
-    e[0] = 1.0
-    for k in range(1, rank + 1):
-        trace = 0.0
-        for i in range(size):
-            for j in range(size):
-                value = 0.0
-                for n in range(size):
-                    value += m[i, n] * b[n, j]
-                product[i, j] = value
-            trace += product[i, i]
-        e[k] = trace / k
-        for i in range(size):
-            for j in range(size):
-                b[i, j] = (e[k] if i == j else 0.0) - product[i, j]
+            if not math.isfinite(m[i, j]):
+                out[:] = np.inf
+                return
+            copy[i, j] = m[i, j]  # the eigenvalues of the transpose are the same
+    failed = _geev(
+        _DOUBLE,
+        _NO,
+        _NO,
+        size,
+        copy.ctypes,
+        copy.shape[1],
+        real.ctypes,
+        imaginary.ctypes,
+        real.ctypes,
+        1,
+        real.ctypes,
+        1,
+    )
+    if failed != 0:
+        out[:] = np.inf
+        return
+    for k in range(rank):
+        best = -1
+        for j in range(size):
+            if real[j] != np.inf and (
+                best < 0
+                or math.hypot(real[j], imaginary[j])
+                > math.hypot(real[best], imaginary[best]) * (1.0 + 1e-14)
+            ):
+                best = j
+        out[k] = complex(real[best], imaginary[best])
+        real[best] = np.inf
 
 
 @helper
-def polynomial_roots(e, rank, out):  # type: ignore[no-untyped-def]
-    """Write the roots of ``z^r - e_1 z^{r-1} + e_2 z^{r-2} - ..``, by the iteration of Aberth."""
+def determinant(m, sign, copy):  # type: ignore[no-untyped-def]
+    """Return det(1 + sign m), by elimination with row exchanges."""
+    size, value = m.shape[0], 1.0
+    for i in range(size):
+        for j in range(size):
+            copy[i, j] = sign * m[i, j] + (1.0 if i == j else 0.0)
+    for k in range(size):
+        best = k
+        for i in range(k + 1, size):
+            if abs(copy[i, k]) > abs(copy[best, k]):
+                best = i
+        if copy[best, k] == 0.0:
+            return 0.0
+        if best != k:
+            value = -value
+            for j in range(k, size):
+                copy[k, j], copy[best, j] = copy[best, j], copy[k, j]
+        value *= copy[k, k]
+        for i in range(k + 1, size):
+            factor = copy[i, k] / copy[k, k]
+            for j in range(k + 1, size):
+                copy[i, j] -= factor * copy[k, j]
+    return value
+
+
+@helper
+def of_rank_two(m, rank, out):  # type: ignore[no-untyped-def]
+    """Write the eigenvalues of m in closed form, from its trace and the sum of its minors."""
+    trace, minors = 0.0, 0.0
+    for i in range(m.shape[0]):
+        trace += m[i, i]
+        for j in range(i):
+            minors += m[i, i] * m[j, j] - m[i, j] * m[j, i]
+    if rank < 2:
+        minors = 0.0
     if rank == 1:
-        out[0] = e[1]
-        return
-    if rank == 2:
-        half = 0.5 * e[1]
-        disc = half * half - e[2]
+        out[0] = trace
+    elif rank == 2:
+        half = 0.5 * trace
+        disc = half * half - minors
         if disc >= 0.0:
             big = half + math.copysign(math.sqrt(disc), half)
             out[0] = big
-            out[1] = e[2] / big if big != 0.0 else 0.0
+            out[1] = minors / big if big != 0.0 else 0.0
         else:
             out[0] = complex(half, math.sqrt(-disc))
             out[1] = complex(half, -math.sqrt(-disc))
-        return
-    radius = 0.0
-    for k in range(1, rank + 1):
-        radius = max(radius, abs(e[k]) ** (1.0 / k))
-    for k in range(rank):
-        angle = 0.4 + 2.0 * math.pi * k / rank  # off the real axis, where real roots would stall
-        out[k] = radius * complex(math.cos(angle), math.sin(angle))
-    for _ in range(60):
-        largest = 0.0
-        for k in range(rank):
-            value, slope = complex(1.0, 0.0), complex(0.0, 0.0)
-            for j in range(1, rank + 1):
-                slope = slope * out[k] + value
-                value = value * out[k] + (e[j] if j % 2 == 0 else -e[j])
-            if value == 0.0:
-                continue
-            others = complex(0.0, 0.0)
-            for j in range(rank):
-                if j != k and out[j] != out[k]:
-                    others += 1.0 / (out[k] - out[j])
-            step = value / (slope - value * others)
-            out[k] -= step
-            largest = max(largest, abs(step))
-        if largest <= 1e-16 * radius:
-            return
+    if rank == 0:
+        trace = 0.0
+    return 1.0 - trace + minors, 1.0 + trace + minors
 
 
 @helper
-def spectrum(m, rank, out, e, b, product):  # type: ignore[no-untyped-def]
-    """Write the n eigenvalues of one turn; return (chi(1), chi(-1)).
+def spectrum(m, rank, out, real, copy, other):  # type: ignore[no-untyped-def]
+    """Write the n eigenvalues of one turn, those that are zero exactly so; return (chi(1), chi(-1)).
 
-    ``chi(s)`` is the product of ``1 - s mu`` over the multipliers mu.
+    ``chi(s)`` is the product of ``1 - s mu`` over the multipliers mu: the determinant of ``1 - s m``.
     """
-    characteristic(m, rank, e, b, product)
     for k in range(out.shape[0]):
         out[k] = 0.0
-    polynomial_roots(e, rank, out)
-    for i in range(1, rank):  # largest first
-        for j in range(i, 0, -1):
-            if abs(out[j]) > abs(out[j - 1]) * (1.0 + 1e-14):
-                out[j], out[j - 1] = out[j - 1], out[j]
-    one, minus = 0.0, 0.0
-    for k in range(rank + 1):
-        one += e[k] if k % 2 == 0 else -e[k]
-        minus += e[k]
-    return one, minus
+    if rank <= 2:
+        return of_rank_two(m, rank, out)
+    largest_of(m, rank, out, real, other[0], copy)
+    return determinant(m, -1.0, copy), determinant(m, 1.0, copy)
 
 
 class SpectralWorkspace(NamedTuple):
-    """Workspace for the multipliers of one turn: three matrices and the characteristic polynomial."""
+    """Workspace for the multipliers of one turn: three matrices and the real parts."""
 
     turn: FloatArray
     left: FloatArray
     product: FloatArray
-    symmetric: FloatArray
+    real: FloatArray
 
 
 @allocating_helper
@@ -146,7 +175,7 @@ def multipliers(rank, pencil, close, out, workspace):  # type: ignore[no-untyped
             out[k] = np.inf
         return np.nan, np.nan
     return spectrum(
-        workspace.turn, min(rank, n), out, workspace.symmetric, workspace.left, workspace.product
+        workspace.turn, min(rank, n), out, workspace.real, workspace.left, workspace.product
     )
 
 
