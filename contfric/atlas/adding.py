@@ -228,7 +228,7 @@ def _settled(orbit: Orbit) -> Orbit:
     for _ in range(_ROUNDS):
         for i in range(len(joints)):
             joints[i] = end
-            after = _next_joint(orbit, layout.modes[i], layout.exits[i], layout.exit_signs[i], end)
+            after = _next_joint(orbit, *orbit.system.word[i], layout.exit_signs[i], end)
             if after is None:
                 return orbit
             end = after
@@ -237,20 +237,18 @@ def _settled(orbit: Orbit) -> Orbit:
 
 
 def _next_joint(
-    orbit: Orbit, mode: int, surface: int, sign: float, joint: FloatArray
+    orbit: Orbit, mode: str, surface: str, sign: float, joint: FloatArray
 ) -> FloatArray | None:
     """Return where a segment meets its exit with the right sign of the rate; None if it does not."""
-    flow, p, none, empty = orbit.model.flow, orbit.vector, np.empty(0, dtype=np.int64), np.empty(0)
-    c = int(orbit.system.layout.observables[surface])
-    level = flow.level(surface, p, none, empty)
-    time, state, after = float(joint[0]), joint[1:].copy(), np.empty(len(joint) - 1)
-    on = abs(flow.observe(c, time, state, p, none, empty) - level) < _ON_SURFACE
+    flow, observable = orbit.flow, orbit.model.surface_by_name[surface].observable
+    time, state, level = float(joint[0]), joint[1:], flow.level(surface)
+    on = abs(flow.observe(observable, time, state) - level) < _ON_SURFACE
     for _ in range(_PASSES):
-        duration = flow.hit(mode, c, level, on, time, state, orbit.period, p, after)
-        if duration < 0.0:
+        hit = flow.first(mode, observable, level, time, state, orbit.period, on=on)
+        if hit is None:
             return None
-        time, state, on = time + duration, after.copy(), True
-        if flow.rate(mode, c, time, state, p, none, empty) * sign > 0.0:
+        time, state, on = time + hit[0], hit[1], True
+        if flow.rate(mode, observable, time, state) * sign > 0.0:
             return np.array([time, *state])
     return None
 

@@ -66,9 +66,7 @@ class Section:
 
 def joint_indices(model: Model, pair: ReducedPair, after: str) -> tuple[int, int, int]:
     """Return a segment's mode, exit and the mode behind it as the engine numbers them."""
-    modes = [mode.name for mode in model.modes]
-    surfaces = [surface.name for surface in model.surfaces]
-    return modes.index(pair[0]), surfaces.index(pair[1]), modes.index(after)
+    return model.mode_index[pair[0]], model.surface_index[pair[1]], model.mode_index[after]
 
 
 def dimension_of(model: Model, pair: ReducedPair) -> int:
@@ -126,17 +124,15 @@ def _free_directions(
     held = [
         k for k in range(len(model.surfaces)) if k == exit_ or int(table.lies_on[mode]) >> k & 1
     ]
-    none, grad, rows = np.empty(0, dtype=np.int64), np.empty(1 + n), []
-    for k in held:
-        model.flow.observe(int(table.observables[k]), 0.0, np.zeros(n), vector, none, grad)
-        rows.append(grad[1:].copy())
+    flow = model.view(vector)
+    rows = [flow.gradient(model.surfaces[k].observable, 0.0, np.zeros(n))[1:] for k in held]
     free = np.linalg.svd(np.array(rows))[2][len(held) :].T
     return np.ascontiguousarray(free[:, : dimension - 1])
 
 
 def period_of(model: Model, vector: FloatArray) -> float:
     """Return the period of the excitation, 0 without one."""
-    return float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0)))
+    return model.view(vector).period
 
 
 @dataclass(frozen=True)

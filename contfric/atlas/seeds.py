@@ -101,7 +101,7 @@ def attractors(
         if progress is not None:
             progress(f"seeds at {parameter} = {params[parameter]:.6g}")
         spread = model.spread(params)
-        period = float(model.flow.period(model.vector(params), np.empty(0, np.int64), np.empty(0)))
+        period = model.view(model.vector(params)).period
         for j in range(seeds.states):
             state = None if j == 0 else rng.uniform(-1.0, 1.0, spread.shape) * spread
             time = 0.0 if j == 0 else float(rng.uniform(0.0, period or 1.0))

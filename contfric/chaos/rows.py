@@ -75,7 +75,6 @@ def empty_rows(cells: int, n: int) -> CellRows:
 def starting(model: Model) -> Starting:
     """Return the table of starts of a model."""
     surfaces = [s.name for s in model.surfaces]
-    modes = [m.name for m in model.modes]
     bounds = cut_bounds(model)
     mode = np.full(3 ** len(surfaces), -1, dtype=np.int64)
     on = np.zeros(3 ** len(surfaces), dtype=np.int64)
@@ -86,8 +85,8 @@ def starting(model: Model) -> Starting:
         if domain is None:
             continue
         name = model.domain_by_name[domain].own_mode
-        mode[code] = modes.index(name)
-        on[code] = sum(1 << surfaces.index(k) for k in bounds[name] if named[k] == 0)
+        mode[code] = model.mode_index[name]
+        on[code] = sum(1 << model.surface_index[k] for k in bounds[name] if named[k] == 0)
     # a shift in time is no disturbance of an autonomous motion
     ranks = [m.rank - int(model.autonomous) for m in model.modes]
     return Starting(mode, on, np.array(ranks, dtype=np.int64))
@@ -163,8 +162,7 @@ def check_excited(model: Model, vector: FloatArray) -> None:
     ParameterError
         If the model is autonomous.
     """
-    period = model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0))
-    if not period > 0.0:
+    if not model.view(vector).period > 0.0:
         raise ParameterError(
             f"model '{model.name}' has no period of excitation: two motions are compared for models "
             "that are excited periodically (lyapunov_exponent takes any model)"

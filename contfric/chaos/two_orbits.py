@@ -51,7 +51,7 @@ class _Rider:
 
     def ride(self, until: float, period: float) -> None:
         """Follow the motion to an instant."""
-        mode = [m.name for m in self.model.modes].index(self.mode)
+        mode = self.model.mode_index[self.mode]
         periods = (until - self.time) / period
         # from within a segment: it lies on no surface that it could leave
         found = run(self.model, self.vector, mode, 0, self.time, self.y, periods, 1_000_000)
@@ -101,7 +101,7 @@ def two_orbit_estimate(
     check_excited(model, model.vector(params or {}))
     begun = simulate(model, dict(params or {}), state=state, time=time, periods=transient)
     vector = model.vector(params or {})
-    period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0)))
+    period = model.view(vector).period
     start = time + transient * period
     first = _Rider(model, vector, start, begun.last[2], begun.last[3])
     steps = _rates(first, distance, period, periods)

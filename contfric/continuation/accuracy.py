@@ -139,11 +139,10 @@ def _touch(here: Orbit, test: Test, active: int) -> _Condition | None:
 def _gap_gradient(orbit: Orbit, test: Test, k: int, active: int) -> tuple[FloatArray, float]:
     """Return the gradient of one of the distances of :func:`_gaps`."""
     model, i, count = orbit.model, test.segment, orbit.system.segments
-    c = [o.name for o in model.observables].index(test.surface)
+    c = model.observable_index[test.surface]
     own = [surface.name for surface in model.surfaces if surface.observable == test.surface]
     row = next(r for r in orbit.system.layout.labels if r[0] == i and r[1] == c)
-    names = [surface.name for surface in model.surfaces]
-    times = [time for time, _ in stationary_values(orbit, i, c)]
+    times = [time for time, _ in stationary_values(orbit, i, test.surface)]
     gradient, slope = np.zeros((count + 1, orbit.joints.shape[1])), 0.0
     whole = orbit.as_whole()
     if k < len(times) * len(own):
@@ -153,7 +152,7 @@ def _gap_gradient(orbit: Orbit, test: Test, k: int, active: int) -> tuple[FloatA
         return gradient, slope + moves
     k -= len(times) * len(own)
     for at, lies_on in ((i, row[2]), (i + 1, row[3])):
-        beside = [name for name in own if names.index(name) != lies_on]
+        beside = [name for name in own if model.surface_index[name] != lies_on]
         if k < len(beside):
             joint = whole.begins[i] if at == i else whole.ends[i]
             gradient[at], slope = surface_gradient(whole, beside[k], joint, active)
@@ -165,16 +164,14 @@ def _gap_gradient(orbit: Orbit, test: Test, k: int, active: int) -> tuple[FloatA
 def _gaps(orbit: Orbit, test: Test) -> FloatArray:
     """Return the distances of an observable to its surfaces, at its stationary points and both joints."""
     model, i = orbit.model, test.segment
-    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
-    c = [o.name for o in model.observables].index(test.surface)
+    c = model.observable_index[test.surface]
     row = next(r for r in orbit.system.layout.labels if r[0] == i and r[1] == c)
     own = [k for k, surface in enumerate(model.surfaces) if surface.observable == test.surface]
-    levels = np.array([model.flow.level(k, orbit.vector, none, empty) for k in own])
-    values = np.array([value for _, value in stationary_values(orbit, i, c)])
+    levels = np.array([orbit.flow.level(model.surfaces[k].name) for k in own])
+    values = np.array([value for _, value in stationary_values(orbit, i, test.surface)])
     gaps = [np.subtract.outer(values, levels).ravel()]
     for joint, lies_on in ((orbit.begins[i], row[2]), (orbit.ends[i], row[3])):
-        state = np.ascontiguousarray(joint[1:])
-        there = model.flow.observe(c, float(joint[0]), state, orbit.vector, none, empty)
+        there = orbit.flow.observe(test.surface, float(joint[0]), joint[1:])
         gaps.append((there - levels)[[k != lies_on for k in own]])
     return np.asarray(np.concatenate(gaps), dtype=np.float64)
 

@@ -360,24 +360,16 @@ def outward_rate(system: System, test: Test, orbit: Orbit) -> float:
 
     Infinite where there is no rest.
     """
-    model = system.model
     resting = resting_domain(system, test)
     if resting is None:
         return np.inf
     end = orbit.ends[test.segment]
-    rest_mode = [m.name for m in model.modes].index(resting.mode)
-    return -resting.signs[test.surface] * rate_along(orbit, rest_mode, test.surface, end)
+    return -resting.signs[test.surface] * rate_along(orbit, resting.mode, test.surface, end)
 
 
-def rate_along(orbit: Orbit, mode: int, surface: str, joint: np.ndarray) -> float:
+def rate_along(orbit: Orbit, mode: str, surface: str, joint: np.ndarray) -> float:
     """Rate of a surface's observable along a mode at a joint (t, y)."""
-    model = orbit.model
-    n = len(model.states)
-    none = np.empty(0, dtype=np.int64)
-    names = [o.name for o in model.observables]
-    grad, jac, y = np.empty(1 + n), np.empty((n, 2 + n)), np.empty(n)
-    time, state = float(joint[0]), np.ascontiguousarray(joint[1:])
-    model.flow.flow(mode, time, state, 0.0, orbit.vector, none, y, jac)
-    c = names.index(model.surface_by_name[surface].observable)
-    model.flow.observe(c, time, state, orbit.vector, none, grad)
-    return float(grad[0] + grad[1:] @ jac[:, 1 + n])
+    observable = orbit.model.surface_by_name[surface].observable
+    time, n = float(joint[0]), len(joint) - 1
+    grad = orbit.flow.gradient(observable, time, joint[1:])
+    return float(grad[0] + grad[1:] @ orbit.flow.jacobian(mode, time, joint[1:], 0.0)[:, 1 + n])

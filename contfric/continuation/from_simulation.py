@@ -77,8 +77,7 @@ def _one_turn(orbit: Orbit, vector: FloatArray, state: FloatArray) -> Orbit | No
     """Follow a motion for one turn; return the orbit that it nearly is, None if it breaks off."""
     model = orbit.model
     i, time = _middle(orbit)
-    modes = [m.name for m in model.modes]
-    mode = modes.index(_declared(orbit, i, time, state))
+    mode = model.mode_index[_declared(orbit, i, time, state)]
     unit = 1.0 if model.autonomous else orbit.period / orbit.periods
     trajectory = run(model, vector, mode, 0, time, state, _LONGER * orbit.period / unit, 10_000)
     stop = _end_of_turn(orbit, trajectory, time, unit)

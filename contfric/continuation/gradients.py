@@ -59,7 +59,7 @@ def _sign(orbit: Orbit, place: Test) -> float:
     layout, i = orbit.system.layout, place.segment
     if place.margin is Margin.EXIT:
         return float(layout.exit_signs[i])
-    k = [s.name for s in orbit.model.surfaces].index(place.surface)
+    k = orbit.model.surface_index[place.surface]
     rows = layout.joint if place.margin is Margin.JOINT else layout.interior
     return float(next((row[2] for row in rows if row[0] == i and row[1] == k), 0.0))
 
@@ -73,26 +73,17 @@ def surface_gradient(
 ) -> tuple[FloatArray, float]:
     """Return the gradient of an observable less the level of a surface on (t, y), and on the parameter."""
     model, m = orbit.model, len(joint)
-    k = [s.name for s in model.surfaces].index(surface)
-    c = [o.name for o in model.observables].index(model.surfaces[k].observable)
-    grad, level = np.empty(m + 1), np.empty(1)
-    time, y = float(joint[0]), np.ascontiguousarray(joint[1:])
-    model.flow.observe(c, time, y, orbit.vector, _which(active), grad)
-    model.flow.level(k, orbit.vector, _which(active), level)
-    return grad[:m], float(grad[m] - level[0])
+    observable = model.surface_by_name[surface].observable
+    grad = orbit.flow.gradient(observable, float(joint[0]), joint[1:], active)
+    return grad[:m], float(grad[m] - orbit.flow.level_slope(surface, active))
 
 
 def _rate_gradient(
     orbit: Orbit, mode: str, surface: str, joint: FloatArray, active: int
 ) -> tuple[FloatArray, float]:
     """Return the gradient of the rate of a surface's observable along a mode."""
-    model, m = orbit.model, len(joint)
-    number = [mo.name for mo in model.modes].index(mode)
-    observable = model.surface_by_name[surface].observable
-    c = [o.name for o in model.observables].index(observable)
-    grad = np.empty(m + 1)
-    time, y = float(joint[0]), np.ascontiguousarray(joint[1:])
-    model.flow.rate(number, c, time, y, orbit.vector, _which(active), grad)
+    m, observable = len(joint), orbit.model.surface_by_name[surface].observable
+    grad = orbit.flow.rate_gradient(mode, observable, float(joint[0]), joint[1:], active)
     return grad[:m], float(grad[m])
 
 
@@ -103,12 +94,10 @@ def carried(
 
     The time of the touch is stationary: it does not move the value.
     """
-    model, m = orbit.model, len(touch)
-    start, n = orbit.begins[i], len(touch) - 1
-    jac, out = np.empty((n, 3 + n)), np.empty(n)
-    number = [mo.name for mo in model.modes].index(orbit.word[i][0])
-    time, y = float(start[0]), np.ascontiguousarray(start[1:])
-    model.flow.flow(number, time, y, float(touch[0]) - time, orbit.vector, _which(active), out, jac)
+    m, n, start = len(touch), len(touch) - 1, orbit.begins[i]
+    time = float(start[0])
+    mode, lasts = orbit.word[i][0], float(touch[0]) - time
+    jac = orbit.flow.jacobian(mode, time, start[1:], lasts, active)
     gradient = np.empty(m)
     gradient[0] = there[1:] @ (jac[:, 0] - jac[:, 1 + n])
     gradient[1:] = there[1:] @ jac[:, 1 : 1 + n]

@@ -182,8 +182,7 @@ def _grazed_stop(here: Orbit, point: Point, first: int) -> int:
     i = test.segment
     if here.ends[i, 0] - here.cycle[i, 0] <= _VANISHED * here.period:
         return first
-    modes = [mode.name for mode in here.model.modes]
-    at_start = rate_along(here, modes.index(here.word[i][0]), here.word[i][1], here.begins[i])
+    at_start = rate_along(here, *here.word[i], here.begins[i])
     if abs(at_start) < _NEARLY_REACHED:
         return first
     for k, other in enumerate(tests):

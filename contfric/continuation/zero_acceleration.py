@@ -15,8 +15,6 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import inside_sign, mode_domains
 
-_NONE = np.empty(0, dtype=np.int64)
-_EMPTY = np.empty(0)
 #: Pieces of a rest between two stationary points of its observables: where the acceleration that it
 #: would be left with depends on them monotonically, as in every model of a load, one would do.
 _PIECES = 8
@@ -84,53 +82,29 @@ def leaving_rate(orbit: Orbit, mode: str, departs: str, joint: FloatArray) -> fl
     rest = next(d for d in model.domains if d.mode == mode)
     leaves = next(name for name, sign in rest.signs.items() if sign == 0)
     sign = model.domain_by_name[mode_domains(model, departs)[0]].signs[leaves]
-    number = [m.name for m in model.modes].index(departs)
-    c = [o.name for o in model.observables].index(model.surface_by_name[leaves].observable)
-    time, y = float(joint[0]), np.array(joint[1:])
-    return sign * float(model.flow.rate(number, c, time, y, orbit.vector, _NONE, _EMPTY))
+    observable = model.surface_by_name[leaves].observable
+    return sign * orbit.flow.rate(departs, observable, float(joint[0]), joint[1:])
 
 
 def joint_within(orbit: Orbit, i: int, time: float) -> FloatArray:
     """Return the joint (t, y) of a segment of the whole orbit at a time inside it."""
-    modes = [m.name for m in orbit.model.modes]
-    start, out = orbit.begins[i], np.empty(len(orbit.model.states))
-    orbit.model.flow.flow(
-        modes.index(orbit.word[i][0]),
-        float(start[0]),
-        start[1:].copy(),
-        time - float(start[0]),
-        orbit.vector,
-        _NONE,
-        out,
-        np.empty((0, 0)),
-    )
-    return np.array([time, *out])
+    start = orbit.begins[i]
+    begin = float(start[0])
+    return np.array([time, *orbit.flow.state(orbit.word[i][0], begin, start[1:], time - begin)])
 
 
-def stationary_values(orbit: Orbit, i: int, c: int) -> list[tuple[float, float]]:
-    """Return times and values of the stationary points of observable c along a segment."""
-    modes = [m.name for m in orbit.model.modes]
-    start, end = orbit.begins[i], float(orbit.ends[i, 0])
-    times, values = np.empty(512), np.empty(512)
-    found = orbit.model.flow.stationary(
-        modes.index(orbit.word[i][0]),
-        c,
-        float(start[0]),
-        start[1:].copy(),
-        end - float(start[0]),
-        orbit.vector,
-        times,
-        values,
-    )
-    return [
-        (float(start[0] + t), float(v)) for t, v in zip(times[:found], values[:found], strict=True)
-    ]
+def stationary_values(orbit: Orbit, i: int, observable: str) -> list[tuple[float, float]]:
+    """Return times and values of the stationary points of an observable along a segment."""
+    start = orbit.begins[i]
+    begin, lasts = float(start[0]), float(orbit.ends[i, 0] - start[0])
+    times, values = orbit.flow.stationary(orbit.word[i][0], observable, begin, start[1:], lasts)
+    return [(begin + float(t), float(v)) for t, v in zip(times, values, strict=True)]
 
 
 def _stationary(orbit: Orbit, i: int) -> list[float]:
     """Return the stationary times of all observables along a segment."""
     return sorted(
-        t for c in range(len(orbit.model.observables)) for t, _ in stationary_values(orbit, i, c)
+        t for c in orbit.model.observables for t, _ in stationary_values(orbit, i, c.name)
     )
 
 
@@ -155,11 +129,9 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
             )
         time = min(still, key=rate)
         return joint_within(orbit, i, time)
-    k = [s.name for s in model.surfaces].index(surface)
-    c = [o.name for o in model.observables].index(model.surfaces[k].observable)
-    level = model.flow.level(k, orbit.vector, _NONE, _EMPTY)
+    level = orbit.flow.level(surface)
     sign = inside_sign(model, orbit.word[i][0], surface)
-    found = stationary_values(orbit, i, c)
+    found = stationary_values(orbit, i, model.surface_by_name[surface].observable)
     if not found:
         raise NotationError(f"segment {i + 1} touches {surface} nowhere inside")
     time = min(found, key=lambda pair: sign * (pair[1] - level))[0]

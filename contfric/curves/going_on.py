@@ -70,27 +70,14 @@ def _tangent_at(orbit: Orbit, test: Test) -> Test:
 
 def _touch_time(orbit: Orbit, test: Test) -> float:
     """Return the time at which an observable is stationary nearest to a surface inside a segment."""
-    model, i = orbit.model, test.segment
-    surface = model.surface_by_name[test.surface]
-    c = [o.name for o in model.observables].index(surface.observable)
-    mode = [m.name for m in model.modes].index(orbit.word[i][0])
-    times, values = np.empty(256), np.empty(256)
+    i, observable = test.segment, orbit.model.surface_by_name[test.surface].observable
     start = orbit.begins[i]
-    found = model.flow.stationary(
-        mode,
-        c,
-        float(start[0]),
-        np.ascontiguousarray(start[1:]),
-        float(orbit.ends[i, 0] - start[0]),
-        orbit.vector,
-        times,
-        values,
-    )
-    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
-    level = model.flow.level(model.surfaces.index(surface), orbit.vector, none, empty)
-    if found < 1:
+    begin, lasts = float(start[0]), float(orbit.ends[i, 0] - start[0])
+    times, values = orbit.flow.stationary(orbit.word[i][0], observable, begin, start[1:], lasts)
+    if len(times) == 0:
         return float("nan")
-    return float(start[0] + times[int(np.argmin(np.abs(values[:found] - level)))])
+    level = orbit.flow.level(test.surface)
+    return float(begin + times[int(np.argmin(np.abs(values - level)))])
 
 
 def same_place(one: Orbit, a: Test, other: Orbit, b: Test) -> bool:

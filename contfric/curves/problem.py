@@ -219,7 +219,6 @@ def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Proble
     kind, system, model = bifurcation.kind, orbit.system, orbit.model
     if not bifurcation.tests:
         raise ParameterError(f"{bifurcation!r} does not say which margin vanishes")
-    surfaces = [s.name for s in model.surfaces]
     test = _chosen(bifurcation)
     if kind is Kind.T:
         place, segment, surface = tangency(orbit, test)
@@ -245,7 +244,7 @@ def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Proble
     condition = Condition(
         place,
         segment,
-        surfaces.index(surface),
+        model.surface_index[surface],
         1.0,
         rest,
         np.array(pinned, dtype=np.int64),
@@ -292,7 +291,7 @@ def _rest_mode(system: System, test: Test) -> int:
     resting = resting_domain(system, test)
     if resting is None:
         return -1
-    return [mode.name for mode in system.model.modes].index(resting.mode)
+    return system.model.mode_index[resting.mode]
 
 
 def _quiet(system: System, kind: Kind, segment: int, pinned: list[Test]) -> IntArray:
@@ -311,27 +310,18 @@ def tangency(orbit: Orbit, test: Test) -> tuple[int, int, str]:
 
     model, segment = orbit.model, test.segment
     named = [s for s in model.surfaces if s.observable == test.surface]
-    c = [o.name for o in model.observables].index(test.surface)
     start, end = orbit.begins[segment], orbit.ends[segment]
-    times, values = np.empty(256), np.empty(256)
-    mode = [m.name for m in model.modes].index(orbit.word[segment][0])
-    duration = float(end[0] - start[0])
-    state = np.ascontiguousarray(start[1:])
-    found = model.flow.stationary(
-        mode, c, float(start[0]), state, duration, orbit.vector, times, values
-    )
+    mode, duration = orbit.word[segment][0], float(end[0] - start[0])
+    _, values = orbit.flow.stationary(mode, test.surface, float(start[0]), start[1:], duration)
     reached: list[tuple[float, int, str]] = []
-    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
     entry, exit_ = orbit.word[segment - 1][1], orbit.word[segment][1]
     ends = {START: (start, entry), JOINT: (end, exit_)}
     for surface in named:
-        k = model.surfaces.index(surface)
-        level = model.flow.level(k, orbit.vector, none, empty)
-        reached += [(abs(v - level), INTERIOR, surface.name) for v in values[: max(found, 0)]]
+        level = orbit.flow.level(surface.name)
+        reached += [(abs(v - level), INTERIOR, surface.name) for v in values]
         for place, (joint, on) in ends.items():
             if on != surface.name:
-                y = np.ascontiguousarray(joint[1:])
-                value = model.flow.observe(c, float(joint[0]), y, orbit.vector, none, empty)
+                value = orbit.flow.observe(test.surface, float(joint[0]), joint[1:])
                 reached.append((abs(value - level), place, surface.name))
     gap, place, name = min(reached)
     if gap > _VANISHES:

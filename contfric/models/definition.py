@@ -34,6 +34,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contfric.errors import ParameterError, did_you_mean, mapping_of, shown
+from contfric.models.lookup import Lookup
 from contfric.models.parts import (
     Constraint,
     Departure,
@@ -51,6 +52,7 @@ from contfric.stored import given
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
+    from contfric.models.view import FlowView
 
 __all__ = [
     "Constraint",
@@ -68,7 +70,7 @@ __all__ = [
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Model(SectionMaps):
+class Model(Lookup, SectionMaps):
     """A piecewise-smooth oscillator: its definition, and a factory of its compiled flow.
 
     Attributes
@@ -175,6 +177,12 @@ class Model(SectionMaps):
         """The compiled flow of this model (loads numba at first use)."""
         return self.flow_factory()
 
+    def view(self, vector: FloatArray) -> FlowView:
+        """Return the flow at some parameters, to be asked by names."""
+        from contfric.models.view import FlowView
+
+        return FlowView(self, vector)
+
     @property
     def directions(self) -> int:
         """Number of multipliers of an orbit: one less than states without excitation (a shift in time)."""
@@ -184,31 +192,6 @@ class Model(SectionMaps):
     def defaults(self) -> dict[str, float]:
         """A fresh mapping of every parameter to its default value."""
         return {p.name: p.default for p in self.parameters}
-
-    @cached_property
-    def parameter_names(self) -> tuple[str, ...]:
-        """Names of the parameters in the order of the engine's vectors."""
-        return tuple(p.name for p in self.parameters)
-
-    @cached_property
-    def domain_by_name(self) -> dict[str, Domain]:
-        """Domains by their names."""
-        return {d.name: d for d in self.domains}
-
-    @cached_property
-    def mode_by_name(self) -> dict[str, Mode]:
-        """Modes by their names."""
-        return {m.name: m for m in self.modes}
-
-    @cached_property
-    def surface_by_name(self) -> dict[str, Surface]:
-        """Surfaces by their names."""
-        return {s.name: s for s in self.surfaces}
-
-    @cached_property
-    def reset_by_surface(self) -> dict[str, Reset]:
-        """Resets by the names of their surfaces."""
-        return {r.surface: r for r in self.resets}
 
     def cuts(self, surface: str) -> bool:
         """Return whether motion is cut at a surface: it is switching, or has a reset."""

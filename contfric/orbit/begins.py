@@ -33,7 +33,6 @@ def departures(
     held: dict[int, Hold],
 ) -> NDArray[np.int64]:
     """How holds are left, and other segments begin, as a layout has it."""
-    names = [mode.name for mode in model.modes]
     modes = [mode for mode, _ in word]
     before = [mirror_mode(model)[modes[-1]] if half else modes[-1], *modes[:-1]]
     resets = {
@@ -42,7 +41,7 @@ def departures(
     rows = zip(modes, before, exits, entered, strict=True)
     found = [PLAIN - 2 * resets.get(row[3], 0) - _returns(model, *row) for row in rows]
     for i, hold in held.items():
-        found[i] = names.index(hold.departs)
+        found[i] = model.mode_index[hold.departs]
     return np.array(found, dtype=np.int64)
 
 

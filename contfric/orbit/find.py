@@ -224,7 +224,7 @@ def recurrences(trajectory: Trajectory) -> Iterator[tuple[int, int, float]]:
     if count < 2:
         return
     vector = model.vector(trajectory.params)
-    period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0)))
+    period = model.view(vector).period
     joints = np.column_stack([trajectory.modes, trajectory.exits])
     for lag in range(1, count // 2):
         turns = int(trajectory.cycles[-1] - trajectory.cycles[-1 - lag])
@@ -248,7 +248,7 @@ def _orbit_of_lag(trajectory: Trajectory, lag: int, turns: int) -> Orbit | None:
     """Return the last ``lag`` events as an unsolved orbit."""
     model = trajectory.model
     vector = model.vector(trajectory.params)
-    period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0)))
+    period = model.view(vector).period
     first = len(trajectory) - 1 - lag
     cycles = trajectory.cycles[first:-1] - trajectory.cycles[first]
     joints = np.column_stack(

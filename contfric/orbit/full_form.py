@@ -74,14 +74,8 @@ def _crossing_point(
     orbit: Orbit, mode: str, surface: str, place: FloatArray, entry: str
 ) -> FloatArray:
     """Return time and state of the first crossing of a surface after a place in a mode."""
-    model, flow = orbit.model, orbit.model.flow
-    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
-    number = [m.name for m in model.modes].index(mode)
-    k = [s.name for s in model.surfaces].index(surface)
-    c = [o.name for o in model.observables].index(model.surfaces[k].observable)
-    target = flow.level(k, orbit.vector, none, empty)
-    start, state = float(place[0]), np.ascontiguousarray(place[1:])
-    on = entry == surface
-    after = np.empty(len(model.states))
-    tau = flow.hit(number, c, target, on, start, state, orbit.period, orbit.vector, after)
-    return np.array([start + tau, *after])
+    start, observable = float(place[0]), orbit.model.surface_by_name[surface].observable
+    level, on = orbit.flow.level(surface), entry == surface
+    found = orbit.flow.first(mode, observable, level, start, place[1:], orbit.period, on=on)
+    assert found is not None
+    return np.array([start + found[0], *found[1]])

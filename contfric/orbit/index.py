@@ -141,16 +141,13 @@ def index_at_infinity(model: Model, vector: FloatArray) -> int | None:
     """
     if model.autonomous or model.resets:
         return None
-    n, which = len(model.states), np.empty(0, dtype=np.int64)
-    period = float(model.flow.period(vector, which, np.empty(0)))
+    n, flow = len(model.states), model.view(vector)
     found: list[FloatArray] = []
-    moving = [k for k, mode in enumerate(model.modes) if not mode.sliding]
+    moving = [mode.name for mode in model.modes if not mode.sliding]
     for mode in moving:
         for size in (1.0, 17.0):
-            out, jac = np.empty(n), np.empty((n, 2 + n))
             start = size * np.cos(np.arange(1.0, n + 1.0))
-            model.flow.flow(mode, 0.0, start, period, vector, which, out, jac)
-            found.append(jac[:, 1 : 1 + n].copy())
+            found.append(flow.jacobian(mode, 0.0, start, flow.period)[:, 1 : 1 + n])
     if any(
         np.max(np.abs(f - found[0])) > _LINEAR * (1.0 + np.max(np.abs(found[0]))) for f in found
     ):

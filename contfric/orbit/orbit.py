@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from contfric.models.view import FlowView
+
 ComplexArray = NDArray[np.complex128]
 #: Relative to the orbit's size: an orbit nearer than this to its mirror image is symmetric. Between
 #: rounding (1e-15) and what a branch point still resolves (the square root of it).
@@ -103,13 +105,16 @@ class Orbit:
         return self.status is Status.CONVERGED
 
     @cached_property
+    def flow(self) -> FlowView:
+        """The model's flow at the orbit's parameters, to be asked by names."""
+        return self.model.view(self.vector)
+
+    @cached_property
     def turn(self) -> float:
         """Duration of one turn (half the orbit if it is solved on its half)."""
         if self.model.autonomous:  # a turn ends at time 0
             return -float(self.joints[0, 0])
-        none = np.empty(0, dtype=np.int64)
-        period = self.model.flow.period(self.vector, none, np.empty(0))
-        return float(self.system.layout.turn * period)
+        return self.system.layout.turn * self.flow.period
 
     @property
     def period(self) -> float:
@@ -146,17 +151,14 @@ class Orbit:
 
         Shape (segments, 1 + n).
         """
-        resets, names = self.model.reset_by_surface, [s.name for s in self.model.surfaces]
+        resets = self.model.reset_by_surface
         if not resets:
             return self.cycle
         begins = self.cycle.copy()
-        none, nothing = np.empty(0, dtype=np.int64), np.empty((0, 0))
-        for i, (time, *state) in enumerate(self.cycle):
-            entry, out = self.word[i - 1][1], np.empty(len(state))
+        for i, joint in enumerate(self.cycle):
+            entry = self.word[i - 1][1]
             if entry in resets:
-                at = names.index(entry), float(time), np.array(state)
-                self.model.flow.reset(*at, self.vector, none, out, nothing)
-                begins[i, 1:] = out
+                begins[i, 1:] = self.flow.reset(entry, float(joint[0]), joint[1:])
         return begins
 
     def as_whole(self) -> Orbit:

@@ -21,19 +21,8 @@ _MOST_SAMPLES = 10_000_000
 
 def state_within(orbit: Orbit, i: int, duration: float) -> FloatArray:
     """Return the state in a segment of the whole orbit, a duration behind its start, shape (n,)."""
-    modes = [m.name for m in orbit.model.modes]
-    out = np.empty(len(orbit.model.states))
-    orbit.model.flow.flow(
-        modes.index(orbit.word[i][0]),
-        float(orbit.cycle[i, 0]),
-        orbit.begins[i, 1:].copy(),
-        duration,
-        orbit.vector,
-        np.empty(0, dtype=np.int64),
-        out,
-        np.empty((0, 0)),
-    )
-    return out
+    start = orbit.begins[i]
+    return orbit.flow.state(orbit.word[i][0], float(start[0]), start[1:], duration)
 
 
 def samples(

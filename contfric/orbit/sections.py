@@ -175,29 +175,22 @@ def crossings_near(whole: Orbit, joints: FloatArray) -> FloatArray:
 
 def _every_crossing(whole: Orbit) -> tuple[Word, FloatArray]:
     """Return all crossings of its section as the word and the joints of a smooth orbit, in order."""
-    model, flow = whole.model, whole.model.flow
-    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
-    surface = whole.word[0][1]
-    k = [s.name for s in model.surfaces].index(surface)
-    c = [o.name for o in model.observables].index(model.surfaces[k].observable)
-    level = flow.level(k, whole.vector, none, empty)
-    mode = [m.name for m in model.modes].index(whole.word[0][0])
+    model, flow = whole.model, whole.flow
+    mode, surface = whole.word[0]
+    observable, level = model.surface_by_name[surface].observable, flow.level(surface)
     pairs = {side: pair for pair, side in model.section_sides.items() if pair[1] == surface}
     found: list[FloatArray] = []
     for joint, end in zip(whole.cycle, whole.ends, strict=True):
         found.append(joint)
         for _ in range(_MOST):
-            time, state, out = float(found[-1][0]), found[-1][1:].copy(), np.empty(len(joint) - 1)
+            time, state = float(found[-1][0]), found[-1][1:]
             left = float(end[0]) - time
-            tau = flow.hit(mode, c, level, True, time, state, left, whole.vector, out)
-            if tau < 0.0 or left - tau < _AT_JOINT:
+            hit = flow.first(mode, observable, level, time, state, left, on=True)
+            if hit is None or left - hit[0] < _AT_JOINT:
                 break
-            found.append(np.array([time + tau, *out]))
+            found.append(np.array([time + hit[0], *hit[1]]))
     joints = np.array(found)
-    rates = [
-        float(flow.rate(mode, c, float(z[0]), z[1:].copy(), whole.vector, none, empty))
-        for z in joints
-    ]
+    rates = [flow.rate(mode, observable, float(z[0]), z[1:]) for z in joints]
     # the segment that begins at a joint ends at the next one, on the side that this one leads to
     word = tuple(pairs[1 if rate > 0.0 else -1] for rate in rates)
     return word, joints
@@ -277,7 +270,5 @@ def _fastest(
 
 
 def _rate(model: Model, pair: tuple[str, str], at: FloatArray, vector: FloatArray) -> float:
-    c = [o.name for o in model.observables].index(model.surface_by_name[pair[1]].observable)
-    mode = [m.name for m in model.modes].index(pair[0])
-    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
-    return abs(float(model.flow.rate(mode, c, float(at[0]), at[1:].copy(), vector, none, empty)))
+    observable = model.surface_by_name[pair[1]].observable
+    return abs(model.view(vector).rate(pair[0], observable, float(at[0]), at[1:]))

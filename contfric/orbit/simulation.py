@@ -128,33 +128,37 @@ def tables(model: Model) -> Tables:
     """Return the transition tables of a model, in modes as they were declared: sections are events, too."""
     surfaces = [s.name for s in model.surfaces]
     modes = [m.name for m in model.modes]
-    observables = [o.name for o in model.observables]
     bounds = np.zeros((len(modes), len(surfaces)), dtype=np.int64)
     for mode, names in cut_bounds(model).items():
         for name in names:
-            bounds[modes.index(mode), surfaces.index(name)] = 1 + (name in model.reset_by_surface)
+            bounds[model.mode_index[mode], model.surface_index[name]] = 1 + (
+                name in model.reset_by_surface
+            )
     codes = 1 << len(surfaces)
     following = np.full(len(modes) * len(surfaces) * codes, -1, dtype=np.int64)
     for (name, surface), target in model.transitions.items():
         domain = model.domain_by_name[name]
-        k = surfaces.index(surface)
+        k = model.surface_index[surface]
         for code in range(codes):
             if code >> k & 1 or not _matches(domain.signs, surfaces, k, code):
                 continue
-            row = (modes.index(domain.own_mode) * len(surfaces) + k) * codes + code
-            following[row] = modes.index(model.domain_by_name[target].own_mode)
+            row = (model.mode_index[domain.own_mode] * len(surfaces) + k) * codes + code
+            following[row] = model.mode_index[model.domain_by_name[target].own_mode]
     for (name, surface), targets in model.targets.items():
         if surface not in model.reset_by_surface:
             continue
-        k, source = surfaces.index(surface), modes.index(model.domain_by_name[name].own_mode)
+        k, source = (
+            model.surface_index[surface],
+            model.mode_index[model.domain_by_name[name].own_mode],
+        )
         for code in range(codes):
             for behind in map(model.domain_by_name.__getitem__, targets):
                 # behind a reset the signs of the mapped state tell the domain
                 if not code >> k & 1 and _matches(behind.signs, surfaces, k, code):
                     row = (source * len(surfaces) + k) * codes + code
-                    following[row] = modes.index(behind.own_mode)
+                    following[row] = model.mode_index[behind.own_mode]
     return Tables(
-        np.array([observables.index(s.observable) for s in model.surfaces], dtype=np.int64),
+        np.array([model.observable_index[s.observable] for s in model.surfaces], dtype=np.int64),
         bounds,
         following,
         np.array(

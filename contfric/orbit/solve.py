@@ -159,7 +159,7 @@ def _matching_stretches(
     model = system.model
     rng = np.random.default_rng(seed)
     spread = model.spread(model.mapping(vector))
-    period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0))) or 10.0
+    period = model.view(vector).period or 10.0
     turn = system.layout.turn
     length, events = 2.0 + 2.0 * turn, 40 * (1 + int(turn))
     if model.autonomous:

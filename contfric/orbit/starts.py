@@ -20,12 +20,9 @@ def signs_at(
     model: Model, t: float, y: FloatArray, vector: FloatArray, within: float = 0.0
 ) -> dict[str, int]:
     """Return the sign of (observable - level) for every surface at a state; 0 within a distance."""
-    flow, none, empty = model.flow, np.empty(0, dtype=np.int64), np.empty(0)
-    names = [o.name for o in model.observables]
-    signs = {}
-    for k, surface in enumerate(model.surfaces):
-        value = flow.observe(names.index(surface.observable), t, y, vector, none, empty)
-        apart = value - flow.level(k, vector, none, empty)
+    flow, signs = model.view(vector), {}
+    for surface in model.surfaces:
+        apart = flow.height(surface.name, t, y)
         signs[surface.name] = 0 if abs(apart) <= within else int(np.sign(apart))
     return signs
 
@@ -44,9 +41,8 @@ def start_of(
     if name is None:
         raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
     mode = model.domain_by_name[name].own_mode
-    surfaces = [s.name for s in model.surfaces]
-    on = sum(1 << surfaces.index(k) for k in cut_bounds(model)[mode] if signs[k] == 0)
-    return [m.name for m in model.modes].index(mode), on
+    on = sum(1 << model.surface_index[k] for k in cut_bounds(model)[mode] if signs[k] == 0)
+    return model.mode_index[mode], on
 
 
 def _side_of_rates(
@@ -56,8 +52,7 @@ def _side_of_rates(
 
     Any side of a transparent surface will do.
     """
-    flow, none, empty = model.flow, np.empty(0, dtype=np.int64), np.empty(0)
-    observables, modes = [o.name for o in model.observables], [m.name for m in model.modes]
+    flow = model.view(vector)
 
     def ends(domain: Domain, surface: Surface) -> bool:
         own = {d.signs[surface.name] for d in model.domains if d.own_mode == domain.own_mode}
@@ -66,8 +61,7 @@ def _side_of_rates(
     def enters(domain: Domain, surface: Surface) -> bool:
         if signs[surface.name] != 0 or not ends(domain, surface):
             return True
-        c, mode = observables.index(surface.observable), modes.index(domain.mode)
-        rate = float(flow.rate(mode, c, t, y, vector, none, empty))
+        rate = flow.rate(domain.mode, surface.observable, t, y)
         return domain.signs[surface.name] * rate > 0.0
 
     beside = [

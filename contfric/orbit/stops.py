@@ -31,15 +31,10 @@ def displacements(orbit: Orbit, surface: str) -> FloatArray:
     Inside its segments and at its joints, impacts among them; by the first roots of the flow. For models
     whose motion is not cut at its stops.
     """
-    model, flow = orbit.model, orbit.model.flow
-    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
+    model, flow = orbit.model, orbit.flow
     observable, level = surface, 0.0
     if surface in model.surface_by_name:
-        k = [s.name for s in model.surfaces].index(surface)
-        observable = model.surfaces[k].observable
-        level = flow.level(k, orbit.vector, none, empty)
-    c = [o.name for o in model.observables].index(observable)
-    modes = [m.name for m in model.modes]
+        observable, level = model.surface_by_name[surface].observable, flow.level(surface)
     found: list[tuple[float, float]] = []
     for i, (mode, exit_) in enumerate(orbit.word):
         if model.mode_by_name[mode].sliding and exit_ in model.surface_by_name:
@@ -47,17 +42,15 @@ def displacements(orbit: Orbit, surface: str) -> FloatArray:
             if lies == {0}:
                 continue  # it rests there
         start, end = float(orbit.begins[i, 0]), float(orbit.ends[i, 0])
-        state, out, on = orbit.begins[i, 1:].copy(), np.empty(len(model.states)), False
+        state, on = orbit.begins[i, 1:], False
         for _ in range(_MOST):
-            tau = flow.hit(
-                modes.index(mode), c, level, on, start, state, end - start, orbit.vector, out
-            )
-            if tau < 0.0:
+            hit = flow.first(mode, observable, level, start, state, end - start, on=on)
+            if hit is None:
                 break
-            found.append((start + tau, float(out[0])))
-            start, state, on = start + tau, out.copy(), True
-        state = orbit.ends[i, 1:].copy()
-        apart = flow.observe(c, end, state, orbit.vector, none, empty) - level
+            start, state, on = start + hit[0], hit[1], True
+            found.append((start, float(state[0])))
+        state = orbit.ends[i, 1:]
+        apart = flow.observe(observable, end, state) - level
         if exit_ in model.reset_by_surface or abs(apart) < _AT_JOINT:
             found.append((end, float(state[0])))
     return _apart(found, orbit.period)
@@ -81,20 +74,18 @@ def stationary_points(orbit: Orbit) -> FloatArray:
 
     For models that name no surface on which it is stationary.
     """
-    model, flow = orbit.model, orbit.model.flow
-    modes, names = [m.name for m in model.modes], [o.name for o in model.observables]
-    times, values = np.empty(_MOST), np.empty(_MOST)
+    model = orbit.model
     x: list[float] = []
     struck: list[bool] = []
     for i, (mode, exit_) in enumerate(orbit.word):
         start, end = orbit.begins[i], orbit.ends[i]
-        found = 0
+        values = np.empty(0)
         if model.displacement and end[0] > start[0]:
-            segment = modes.index(mode), names.index(model.displacement), float(start[0])
             lasts = float(end[0] - start[0])
-            found = flow.stationary(*segment, start[1:].copy(), lasts, orbit.vector, times, values)
-        x += [*values[: max(found, 0)].tolist(), float(end[1])]
-        struck += [False] * max(found, 0) + [exit_ in model.reset_by_surface]
+            segment = mode, model.displacement, float(start[0]), start[1:], lasts
+            _, values = orbit.flow.stationary(*segment)
+        x += [*values.tolist(), float(end[1])]
+        struck += [False] * len(values) + [exit_ in model.reset_by_surface]
     before, after = np.roll(x, 1) - x, np.roll(x, -1) - x
     return np.asarray(np.array(x)[(before * after > 0.0) | np.array(struck)])
 
@@ -106,7 +97,7 @@ def reach_of(orbit: Orbit) -> tuple[float, float]:
     if model.displacement:
         from contfric.orbit.extent import extent
 
-        c, out = [o.name for o in model.observables].index(model.displacement), np.empty(2)
+        c, out = model.observable_index[model.displacement], np.empty(2)
         system, joints = whole.system, np.ascontiguousarray(whole.joints)
         if not extent(system.functions(), system.layout, c, joints, orbit.vector, out):
             out[:] = np.nan

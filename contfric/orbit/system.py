@@ -155,7 +155,6 @@ def build_system(
         reduced and each segment spans its whole mode.
     """
     following = [mode for mode, _ in word[1:]] + [_mode_after(model, word, half)]
-    names = [mode.name for mode in model.modes]
     surfaces = [s.name for s in model.surfaces]
     holds = holds_of(model, word)
     inside = [
@@ -170,8 +169,8 @@ def build_system(
     symmetry = model.symmetry
     n = len(model.states)
     layout = Layout(
-        modes=np.array([names.index(mode) for mode, _ in word], dtype=np.int64),
-        exits=np.array([surfaces.index(exit_) for exit_ in exits], dtype=np.int64),
+        modes=np.array([model.mode_index[mode] for mode, _ in word], dtype=np.int64),
+        exits=np.array([model.surface_index[exit_] for exit_ in exits], dtype=np.int64),
         observables=_surface_observables(model),
         exit_signs=np.array(
             [_exit_sign(model, i, inside[i], exit_, holds) for i, exit_ in enumerate(exits)]
@@ -260,8 +259,7 @@ def _exit_sign(
 
 
 def _surface_observables(model: Model) -> IntArray:
-    names = [o.name for o in model.observables]
-    return np.array([names.index(s.observable) for s in model.surfaces], dtype=np.int64)
+    return np.array([model.observable_index[s.observable] for s in model.surfaces], dtype=np.int64)
 
 
 def _margins(
@@ -283,14 +281,14 @@ def _margins(
                 else inside_sign(model, mode, surface)
             )
             if sign != 0:
-                interior.append((i, names.index(surface), sign))
+                interior.append((i, model.surface_index[surface], sign))
         for surface in names:
             signs = {model.domain_by_name[d].signs[surface] for d in inside[i]}
             pinned = any(h.segment == i + 1 and h.pin == surface for h in holds)
             if surface == exit_ or pinned or len(signs) != 1:
                 continue
             if (sign := signs.pop()) != 0:
-                joint.append((i, names.index(surface), sign, 0))
+                joint.append((i, model.surface_index[surface], sign, 0))
     tests = (
         *(Test(Margin.INTERIOR, i, names[k]) for i, k, _ in interior),
         *(

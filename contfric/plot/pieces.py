@@ -17,8 +17,6 @@ from contfric.models.definition import FloatArray, Surface
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
 
-_NONE = np.empty(0, dtype=np.int64)
-_EMPTY = np.empty(0)
 #: Bisections of a crossing: to the resolution of any drawing.
 _BISECTIONS = 45
 
@@ -40,24 +38,17 @@ class Piece:
 
 def observe(orbit: Orbit, name: str, time: float, state: FloatArray) -> float:
     """Return the value of an observable."""
-    c = [o.name for o in orbit.model.observables].index(name)
-    state = np.ascontiguousarray(state)
-    return float(orbit.model.flow.observe(c, time, state, orbit.vector, _NONE, _EMPTY))
+    return orbit.flow.observe(name, time, state)
 
 
 def observe_gradient(orbit: Orbit, name: str, time: float, state: FloatArray) -> FloatArray:
     """Return the derivatives of an observable with respect to the states, shape (n,)."""
-    c = [o.name for o in orbit.model.observables].index(name)
-    gradient = np.empty(1 + len(orbit.model.states))
-    state = np.ascontiguousarray(state)
-    orbit.model.flow.observe(c, time, state, orbit.vector, _NONE, gradient)
-    return gradient[1:]
+    return orbit.flow.gradient(name, time, state)[1:]
 
 
 def level(orbit: Orbit, surface: Surface) -> float:
     """Return the level of the observable that makes the surface."""
-    k = orbit.model.surfaces.index(surface)
-    return float(orbit.model.flow.level(k, orbit.vector, _NONE, _EMPTY))
+    return orbit.flow.level(surface.name)
 
 
 def pieces_of(orbit: Orbit, points: int = 400) -> list[Piece]:

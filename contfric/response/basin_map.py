@@ -123,7 +123,7 @@ def basins(
     periods, tile = whole_number("periods", periods, least=1), whole_number("tile", tile, least=1)
     shape = tuple(len(values) for values in axes.values())
     _check_size(model, axes)
-    period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0)))
+    period = model.view(vector).period
     states = _states(model, axes, fixed)
     job = _Job(model, vector, fixed[PHASE] * period, states, periods, tile, executor, progress)
     attractors = Attractors(model, vector)

@@ -137,7 +137,7 @@ def release_map(
     count = whole_number("count", count, least=2)
     must_fit(f"a map of {count} releases", _BYTES * count)
     release, rest = _release_of(model, surface)
-    period = float(model.flow.period(vector, np.empty(0, dtype=np.int64), np.empty(0)))
+    period = model.view(vector).period
     times: FloatArray = np.arange(count, dtype=np.float64) * (period / count)
     states: FloatArray = np.array(
         [_state_at(model, vector, release, rest, float(t)) for t in times]
@@ -174,7 +174,7 @@ def _release_of(model: Model, surface: str | None) -> tuple[_Release, str]:
             f"releases of '{model.name}' are not told by their phase: that takes two states, rest and a "
             "period of excitation (cf.poincare(..., section='releases') takes more)"
         )
-    surfaces, modes = [s.name for s in model.surfaces], [m.name for m in model.modes]
+    surfaces = [s.name for s in model.surfaces]
     ways = {
         exit_: (domain, target)
         for (domain, exit_), target in model.transitions.items()
@@ -188,9 +188,9 @@ def _release_of(model: Model, surface: str | None) -> tuple[_Release, str]:
         )
     domain, target = (model.domain_by_name[name] for name in ways[surface])
     rests = next((n for n, sign in domain.signs.items() if sign == 0), surface)
-    mode, k, found = modes.index(domain.mode), surfaces.index(surface), tables(model)
+    mode, k, found = model.mode_index[domain.mode], model.surface_index[surface], tables(model)
     on = (1 << k) | int(found.lies_on[mode] & found.kept[k])
-    return _Release(mode, k, modes.index(target.mode), on), rests
+    return _Release(mode, k, model.mode_index[target.mode], on), rests
 
 
 def _image_of(model: Model, release: _Release) -> tuple[int, int] | None:
@@ -202,19 +202,15 @@ def _image_of(model: Model, release: _Release) -> tuple[int, int] | None:
     mode = mirror_mode(model)[model.modes[release.mode].name]
     if image == name:
         return None
-    modes, surfaces = [m.name for m in model.modes], [s.name for s in model.surfaces]
-    return modes.index(mode), surfaces.index(image)
+    return model.mode_index[mode], model.surface_index[image]
 
 
 def _gap(
     model: Model, vector: FloatArray, surface: int, t: float, y: FloatArray
 ) -> tuple[float, FloatArray]:
     """Return how far a state is from a surface, and its derivatives with respect to the state."""
-    none, grad = np.empty(0, dtype=np.int64), np.empty(1 + len(y))
-    names = [o.name for o in model.observables]
-    observable = names.index(model.surfaces[surface].observable)
-    value = model.flow.observe(observable, t, y, vector, none, grad)
-    return float(value - model.flow.level(surface, vector, none, np.empty(0))), grad[1:]
+    flow, there = model.view(vector), model.surfaces[surface]
+    return flow.height(there.name, t, y), flow.gradient(there.observable, t, y)[1:]
 
 
 def _state_at(
@@ -222,7 +218,7 @@ def _state_at(
 ) -> FloatArray:
     """Return the state at a release at a time: on both surfaces, by Newton's method; nan if there is none."""
     y = np.zeros(len(model.states))
-    pair = release.surface, [s.name for s in model.surfaces].index(rests)
+    pair = release.surface, model.surface_index[rests]
     for _ in range(_STEPS):
         gaps = [_gap(model, vector, k, t, y) for k in pair]
         missed, slopes = np.array([g[0] for g in gaps]), np.array([g[1] for g in gaps])
@@ -241,9 +237,7 @@ def _leaves(model: Model, vector: FloatArray, release: _Release, t: float, y: Fl
         return False
     surface = model.surfaces[release.surface]
     domain = next(d for d in model.domains if d.mode == model.modes[release.mode].name)
-    observable = [o.name for o in model.observables].index(surface.observable)
-    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
-    rate = float(model.flow.rate(release.mode, observable, t, y, vector, none, empty))
+    rate = model.view(vector).rate(domain.mode, surface.observable, t, y)
     return -domain.signs[surface.name] * rate > 0.0
 
 

@@ -67,7 +67,6 @@ def _at_phase(model: Model, section: Real) -> Cut:
 
 def _on_surface(model: Model, section: str, sense: int) -> Cut:
     joints, inside = _none(model)
-    observables = [o.name for o in model.observables]
     surfaces = [s.name for s in model.surfaces]
     if section == RELEASES:
         joints[[k for k, m in enumerate(model.modes) if m.sliding]] = 1
@@ -79,19 +78,21 @@ def _on_surface(model: Model, section: str, sense: int) -> Cut:
     name = model.stop_surface if section == STOPS else section
     if section == STOPS:
         for reset in model.reset_by_surface:
-            joints[:, surfaces.index(reset)] = 1
+            joints[:, model.surface_index[reset]] = 1
     if name in surfaces:
-        k = surfaces.index(name)
+        k = model.surface_index[name]
         joints[:, k] = 1
         bounds = tables(model).bounds[:, k]
         inside[:] = [
             b == 0 and not _lies_on(model, m.name, name)
             for b, m in zip(bounds, model.modes, strict=True)
         ]
-        return Cut(joints, inside, observables.index(model.surfaces[k].observable), k, -1.0, sense)
+        return Cut(
+            joints, inside, model.observable_index[model.surfaces[k].observable], k, -1.0, sense
+        )
     if name in model.kinks:
         inside[:] = 1
-        return Cut(joints, inside, observables.index(name), -1, -1.0, sense)
+        return Cut(joints, inside, model.observable_index[name], -1, -1.0, sense)
     if section == STOPS:
         raise ParameterError(
             f"model '{model.name}' has no surface on which it stops: a section is {_choices(model)}"

@@ -46,7 +46,6 @@ class Targets(NamedTuple):
 def targets_of(model: Model, orbits: Sequence[Orbit]) -> Targets:
     """Return the joints of orbits of the same parameters, with their radii."""
     n, surfaces = len(model.states), [s.name for s in model.surfaces]
-    modes = [m.name for m in model.modes]
     keys: list[int] = []
     owners: list[int] = []
     rows = [np.empty((0, 1 + n))]
@@ -55,7 +54,7 @@ def targets_of(model: Model, orbits: Sequence[Orbit]) -> Targets:
         period = orbit.period / orbit.periods
         begins[:, 0] = 0.0 if model.autonomous else np.mod(begins[:, 0], period)
         for i, (mode, _) in enumerate(word):
-            keys.append(modes.index(mode) * len(surfaces) + surfaces.index(word[i - 1][1]))
+            keys.append(model.mode_index[mode] * len(surfaces) + surfaces.index(word[i - 1][1]))
             owners.append(number)
         rows.append(begins)
     z, key = np.concatenate(rows), np.array(keys, dtype=np.int64)

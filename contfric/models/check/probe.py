@@ -12,6 +12,7 @@ import numpy as np
 
 from contfric.models.build import load_module
 from contfric.models.definition import FloatArray, Model
+from contfric.models.view import FlowView
 
 #: Newton's method onto a surface: it converges in a few steps or not at all.
 _STEPS = 30
@@ -36,64 +37,40 @@ class Probe:
         return self.model.vector(self.params)
 
     @cached_property
-    def _none(self) -> np.ndarray:
-        return np.empty(0, dtype=np.int64)
+    def flow(self) -> FlowView:
+        """The model's flow at these parameters."""
+        return self.model.view(self.vector)
 
-    @cached_property
-    def names(self) -> list[str]:
-        """Names of the observables."""
-        return [o.name for o in self.model.observables]
-
-    @cached_property
+    @property
     def period(self) -> float:
         """Period of the excitation, 0 if there is none."""
-        return float(self.model.flow.period(self.vector, self._none, np.empty(0)))
-
-    def observable(self, name: str, t: float, y: FloatArray) -> float:
-        """Return the value of an observable."""
-        c = self.names.index(name)
-        return float(self.model.flow.observe(c, t, y, self.vector, self._none, np.empty(0)))
-
-    def level(self, surface: str) -> float:
-        """Return the level of a surface."""
-        k = [s.name for s in self.model.surfaces].index(surface)
-        return float(self.model.flow.level(k, self.vector, self._none, np.empty(0)))
+        return self.flow.period
 
     def height(self, surface: str, t: float, y: FloatArray) -> float:
         """Return (observable - level) of a surface."""
-        name = self.model.surface_by_name[surface].observable
-        return self.observable(name, t, y) - self.level(surface)
+        return self.flow.height(surface, t, y)
 
     def slope(self, surface: str, t: float, y: FloatArray) -> FloatArray:
         """Return the gradient of a surface's observable, shape (1 + n,)."""
-        c = self.names.index(self.model.surface_by_name[surface].observable)
-        grad = np.empty(1 + len(y))
-        self.model.flow.observe(c, t, y, self.vector, self._none, grad)
-        return grad
+        return self.flow.gradient(self.model.surface_by_name[surface].observable, t, y)
 
     def rate(self, mode: str, surface: str, t: float, y: FloatArray) -> float:
         """Return the rate of a surface's observable along a mode."""
-        c = self.names.index(self.model.surface_by_name[surface].observable)
-        m = [mode.name for mode in self.model.modes].index(mode)
-        return float(self.model.flow.rate(m, c, t, y, self.vector, self._none, np.empty(0)))
+        return self.flow.rate(mode, self.model.surface_by_name[surface].observable, t, y)
 
     def field(self, mode: str, t: float, y: FloatArray) -> FloatArray:
         """Return the rates of all states in a mode."""
-        m, n = [mode.name for mode in self.model.modes].index(mode), len(y)
+        n = len(y)
         if self.model.definition:  # without the flow, which takes much longer to compile
             out, module = np.empty(n), load_module(self.model.definition)
-            module.field_of(m, t, y, self.vector, self._none, out, np.empty((0, 0)))
+            m, none = self.model.mode_index[mode], np.empty(0, dtype=np.int64)
+            module.field_of(m, t, y, self.vector, none, out, np.empty((0, 0)))
             return out
-        state, jac = np.empty(n), np.empty((n, 2 + n))
-        self.model.flow.flow(m, t, y, 0.0, self.vector, self._none, state, jac)
-        return jac[:, 1 + n].copy()
+        return self.flow.jacobian(mode, t, y, 0.0)[:, 1 + n].copy()
 
     def reset(self, surface: str, t: float, y: FloatArray) -> FloatArray:
         """Return the state behind the reset at a surface."""
-        k = [s.name for s in self.model.surfaces].index(surface)
-        state = np.empty(len(y))
-        self.model.flow.reset(k, t, y, self.vector, self._none, state, np.empty((0, 0)))
-        return state
+        return self.flow.reset(surface, t, y)
 
     def states(self, count: int) -> Iterator[tuple[float, FloatArray]]:
         """Yield times in one period and states in twice the region that starts are drawn from."""

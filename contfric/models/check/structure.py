@@ -257,8 +257,8 @@ def check_period(report: ModelReport, probe: Probe) -> None:
             if not np.allclose(*fields, rtol=_SAME, atol=_SAME):
                 report.error(Topic.PERIOD, _not_periodic(f"the field of '{mode.name}'", period))
                 return
-            for name in probe.names:
-                a, b = (probe.observable(name, when, place[1]) for when in (place[0], later))
+            for name in probe.model.observable_index:
+                a, b = (probe.flow.observe(name, when, place[1]) for when in (place[0], later))
                 if not abs(a - b) <= _SAME * (1.0 + abs(a)):
                     report.error(Topic.PERIOD, _not_periodic(f"observable '{name}'", period))
                     return
