@@ -17,7 +17,7 @@ from numba import types
 
 from contfric.compiled import f8, helper, i8, indices, kernel, vector
 from contfric.continuation.geometry import (
-    RowsType,
+    PointsType,
     copy_to,
     copy_vector,
     interpolate,
@@ -152,7 +152,7 @@ class Sought(NamedTuple):
 def watched_value(way, sought, points, row):  # type: ignore[no-untyped-def]
     """Return the value that is sought, at a corrected point."""
     layout, workspace, functions, p = way.layout, way.workspace, way.functions, way.p
-    z, w, mu = points[0][row], points[1][row, 0], points[7][row]
+    z, w, mu = points.joints[row], points.w[row, 0], points.mu[row]
     margins, index = count_margins(layout), sought.number
     if sought.kind == BY_PARAMETER:
         return w - sought.target
@@ -168,7 +168,7 @@ def watched_value(way, sought, points, row):  # type: ignore[no-untyped-def]
         return margin_value(functions, layout, index, z, p, workspace)
     column = index - margins - layout.labels.shape[0]
     if column == FOLD:
-        return points[3][row, 0]
+        return points.directions[row, 0]
     way.counts[MULTIPLIERS] += 1
     one, minus = multipliers(
         layout.rank, workspace.pencil, workspace.equations.close, mu, workspace.spectral
@@ -187,17 +187,17 @@ def limited(value):  # type: ignore[no-untyped-def]
 @helper
 def values_at_ends(way, sought, points):  # type: ignore[no-untyped-def]
     """Return the value that is sought at rows 0 and 1."""
-    ws, tests = points[1], points[5]
+    ws, tests = points.w, points.tests
     if sought.kind == BY_TEST:
         return tests[0, sought.number], tests[1, sought.number]
     if sought.kind == BY_PARAMETER:
         return ws[0, 0] - sought.target, ws[1, 0] - sought.target
     equations = way.workspace.equations
     way.p[way.which[0]] = ws[0, 0]
-    close_chain(way.functions, way.layout, points[0][0], way.p, equations.none, equations)
+    close_chain(way.functions, way.layout, points.joints[0], way.p, equations.none, equations)
     first = watched_value(way, sought, points, 0)
     way.p[way.which[0]] = ws[1, 0]
-    close_chain(way.functions, way.layout, points[0][1], way.p, equations.none, equations)
+    close_chain(way.functions, way.layout, points.joints[1], way.p, equations.none, equations)
     return first, watched_value(way, sought, points, 1)
 
 
@@ -242,7 +242,7 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
         tuple
             (position in the step, value there, whether trials fail behind it, whether any did not).
         """
-        zs, ws, tzs, tws = points[0], points[1], points[2], points[3]
+        zs, ws, tzs, tws = points.joints, points.w, points.tangents, points.directions
         accuracy, two_sided, noise, narrowest, given_up = rules
         sign = -1.0 if two_sided and ends[0] < 0.0 else 1.0
         f_low, f_high = limited(sign * ends[0]), limited(sign * ends[1])
@@ -297,7 +297,7 @@ _bracket = bracketing(correct_branch, watched_value)
         i8,
         f8,
         types.boolean,
-        RowsType,
+        PointsType,
         indices,
     )
 )

@@ -5,21 +5,46 @@ two along a curve. The product of two directions is
 ``<a, b> = (1/N) sum a_i b_i + sum_k a_k b_k / width_k^2``,
 so that neither the number of segments nor the unit of a parameter matters.
 
-Points come as the rows that a march writes (``points``): joints, parameters, both tangents, arclength, tests,
-labels, multipliers.
+Points come as the rows that a march writes (:class:`Points`).
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
+import numpy as np
 from numba import types
+from numpy.typing import NDArray
 
 from contfric.compiled import blocks, helper, matrix, table, vector
+from contfric.models.definition import FloatArray
+from contfric.orbit.system import IntArray
 
-#: The points of a branch or curve as the march writes them, one a row.
-RowsType = types.Tuple(
-    (blocks, matrix, blocks, matrix, vector, matrix, table, types.complex128[:, ::1])
+
+class Points(NamedTuple):
+    """The points of a branch or curve as the march writes them, one a row.
+
+    Attributes
+    ----------
+    joints, w : shapes (rows, N, m) and (rows, q)
+    tangents, directions : the unit tangent of each, of the joints and of the parameters
+    arc : arclength
+    tests, labels, mu : what is watched
+    """
+
+    joints: FloatArray
+    w: FloatArray
+    tangents: FloatArray
+    directions: FloatArray
+    arc: FloatArray
+    tests: FloatArray
+    labels: IntArray
+    mu: NDArray[np.complex128]
+
+
+PointsType = types.NamedTuple(
+    [blocks, matrix, blocks, matrix, vector, matrix, table, types.complex128[:, ::1]], Points
 )
 
 
@@ -81,7 +106,7 @@ def predict(points, k, step):  # type: ignore[no-untyped-def]
     The cubic through the last two points and their tangents, ``z_k + t_k x + A x^2 + B x^3`` with
     ``A = (2 t_k + t_{k-1} - 3 D) / h`` and ``B = (t_k + t_{k-1} - 2 D) / h^2``, D the chord over h.
     """
-    zs, ws, tzs, tws, arc = points[0], points[1], points[2], points[3], points[4]
+    zs, ws, tzs, tws, arc = points.joints, points.w, points.tangents, points.directions, points.arc
     back = arc[k] - arc[k - 1] if k > 0 else 0.0
     square, cube = 0.0, 0.0
     if back > 0.0:
@@ -110,7 +135,7 @@ def predict(points, k, step):  # type: ignore[no-untyped-def]
 @helper
 def interpolate(points, x):  # type: ignore[no-untyped-def]
     """Write the point at a share x of the step from row 0 to row 1 to row 2, by the cubic through them."""
-    zs, ws, tzs, tws, arc = points[0], points[1], points[2], points[3], points[4]
+    zs, ws, tzs, tws, arc = points.joints, points.w, points.tangents, points.directions, points.arc
     y, length = 1.0 - x, arc[1] - arc[0]
     ha, hb = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x)
     ga, gb = x * y * y * length, -x * x * y * length

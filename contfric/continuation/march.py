@@ -24,7 +24,7 @@ from numba import types
 
 from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, vector
 from contfric.continuation.geometry import (
-    RowsType,
+    PointsType,
     copy_to,
     copy_vector,
     distance,
@@ -183,7 +183,7 @@ _march_branch = marching(correct_branch, observe_branch, accept_branch)
         blocks,
         matrix,
         i8,
-        RowsType,
+        PointsType,
         indices,
     )
 )
@@ -212,7 +212,7 @@ def march(  # type: ignore[no-untyped-def]
     tuple
         (why it stopped, index of the last row written, next step).
     """
-    zs = points[0]
+    zs = points.joints
     workspace = step_workspace(zs.shape[1], zs.shape[2], p.shape[0])
     way = Along(functions, layout, p.copy(), which, 1.0 / box[2] ** 2, stability, counts, workspace)
     integrated = layout.rounding > INTEGRATED

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,9 @@ from contfric.errors import ParameterError, checked_range, real_number, truth, w
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System
+
+if TYPE_CHECKING:
+    from contfric.continuation.geometry import Points
 
 #: Largest step of models that declare none, where the range of the parameter counts 1 (and grows with the
 #: size of the state): about 100 points over the range.
@@ -167,9 +170,11 @@ class Rows:
         """The parameter of a branch, one value a row."""
         return self.w[:, 0]
 
-    def arrays(self, stop: int | None = None) -> tuple[Any, ...]:
-        """Return the arrays up to a row, in the order in which the march takes them."""
-        return tuple(a[:stop] for a in vars(self).values())
+    def arrays(self, stop: int | None = None) -> Points:
+        """Return the arrays up to a row, as the march takes them."""
+        from contfric.continuation.geometry import Points
+
+        return Points(*(a[:stop] for a in vars(self).values()))
 
     def first(self, count: int) -> Rows:
         """Return the first rows."""

@@ -12,7 +12,7 @@ from numba import types
 
 from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, vector
 from contfric.continuation.bracket import BY_LABEL, BY_PARAMETER, BY_TEST, bracketing
-from contfric.continuation.geometry import RowsType
+from contfric.continuation.geometry import PointsType
 from contfric.continuation.steps import AT_EVENT
 from contfric.curves.conditions import ConditionType, curve_workspace
 from contfric.curves.correct import AlongCurve, correct_curve, observe_curve
@@ -50,7 +50,7 @@ class SoughtOnCurve(NamedTuple):
 @helper
 def value_of(sought, points, row):  # type: ignore[no-untyped-def]
     """Return the value that is sought, at one row of the points."""
-    ws, tests, labels = points[1], points[5], points[6]
+    ws, tests, labels = points.w, points.tests, points.labels
     if sought.kind == BY_TEST:
         return min(tests[row, sought.number], _LARGE)
     if sought.kind == BY_LABEL:
@@ -89,7 +89,7 @@ _bracket = bracketing(correct_curve, observed_value)
         i8,
         matrix,
         blocks,
-        RowsType,
+        PointsType,
         indices,
     )
 )
@@ -121,7 +121,7 @@ def locate_on_curve(  # type: ignore[no-untyped-def]
     tuple
         (1 if it is bracketed to its last digits, 0 if not, -1 if no trial was solved; the value there).
     """
-    workspace = curve_workspace(points[0].shape[1], points[0].shape[2], p.shape[0])
+    workspace = curve_workspace(points.joints.shape[1], points.joints.shape[2], p.shape[0])
     way = AlongCurve(
         functions, second, layout, condition, border, p.copy(), which, scale, counts, workspace
     )

@@ -10,7 +10,7 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import blocks, f8, i8, indices, kernel, matrix, vector
-from contfric.continuation.geometry import RowsType
+from contfric.continuation.geometry import PointsType
 from contfric.continuation.march import marching
 from contfric.curves.conditions import ConditionType, curve_workspace
 from contfric.curves.correct import AlongCurve, accept_curve, correct_curve, observe_curve
@@ -36,7 +36,7 @@ _march_points = marching(correct_curve, observe_curve, accept_curve)
         matrix,
         i8,
         blocks,
-        RowsType,
+        PointsType,
         indices,
     )
 )
@@ -75,7 +75,7 @@ def march_curve(  # type: ignore[no-untyped-def]
     tuple
         (why it stopped, index of the last row written, next step).
     """
-    zs, scale = points[0], 1.0 / box[2] ** 2
+    zs, scale = points.joints, 1.0 / box[2] ** 2
     workspace = curve_workspace(zs.shape[1], zs.shape[2], p.shape[0])
     way = AlongCurve(
         functions, second, layout, condition, border, p.copy(), which, scale, counts, workspace
