@@ -48,7 +48,6 @@ from contfric.orbit.monitor import (
 )
 from contfric.orbit.newton import ALONG, CHECKS, INTEGRATED, MULTIPLIERS
 from contfric.orbit.spectrum import multipliers
-from contfric.orbit.system import RETURNS
 
 #: What locate() follows: a column of the tests, a label, or the parameter itself.
 BY_TEST, BY_LABEL, BY_PARAMETER = range(3)
@@ -115,7 +114,7 @@ def plain_margin(functions, layout, index, z, p, workspace):  # type: ignore[no-
     if index < first:
         i, c = layout.interior[index, 0], layout.observables[layout.interior[index, 1]]
         equations, stationary = workspace.equations, workspace.stationary
-        if layout.departs[i] < RETURNS:
+        if layout.resets[i] >= 0:
             found = find_behind(functions, layout, i, c, z, p, equations, stationary)
         else:
             found = find_stationary(functions, layout, i, c, z, p, equations.last, stationary)

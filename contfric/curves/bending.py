@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from contfric.compiled import helper
 from contfric.orbit.equations import apply_reset, behind_reset, mean_rate_row
-from contfric.orbit.system import RETURNS
 
 #: Step of the differences where a flow has no second derivatives of its own, against the size of the
 #: direction: the cube root of rounding.
@@ -31,7 +30,7 @@ DIFFERENCE = 6e-6
 def segment_jacobian(functions, layout, i, start, duration, p, which, out, equations):  # type: ignore[no-untyped-def]
     """Write the end of segment i, from its joint, with the derivatives: behind a reset by the chain rule."""
     mode, state = layout.modes[i], equations.state
-    if layout.departs[i] < RETURNS:
+    if layout.resets[i] >= 0:
         n = state.shape[0]
         apply_reset(functions, layout, i, start, p, which, equations)
         begin = equations.behind[n, :n]
@@ -48,7 +47,7 @@ def bend_flow(  # type: ignore[no-untyped-def]
     """Write the derivative of the flow's jacobian in a direction."""
     mode = layout.modes[i]
     none = min(mode, 0) - 1  # -1, but no literal
-    if layout.departs[i] >= RETURNS and second.second(
+    if layout.resets[i] < 0 and second.second(
         mode, none, start[0], start[1:], duration, p, which, along, out, bordered.numbers
     ):
         return
@@ -77,7 +76,7 @@ def bend_mean_rate(functions, layout, i, start, duration, p, which, along, works
         h = step if side == 0 else -step
         for j in range(m):
             displaced[j] = start[j] + h * along[j]
-        if layout.departs[i] < RETURNS:
+        if layout.resets[i] >= 0:
             apply_reset(functions, layout, i, displaced, p, which, equations)
         lasts = duration + h * along[m]
         mean_rate_row(functions, layout, i, m, displaced, lasts, p, which, equations, rows)

@@ -41,7 +41,7 @@ from contfric.orbit.monitor import (
     stationary_workspace,
 )
 from contfric.orbit.spectrum import SpectralWorkspace, spectral_workspace
-from contfric.orbit.system import RETURNS, IntArray
+from contfric.orbit.system import IntArray
 
 JOINT, START, EXIT, INTERIOR, SPECTRAL = range(5)
 
@@ -115,7 +115,7 @@ def interior_value(functions, layout, condition, z, p, which, workspace):  # typ
     i, surface = condition.segment, condition.surface
     c, n = layout.observables[surface], z.shape[1] - 1
     level_grad, grad, jac = equations.level_grad, equations.grad, equations.jac
-    if layout.departs[i] < RETURNS:
+    if layout.resets[i] >= 0:
         found = find_behind(functions, layout, i, c, z, p, equations, stationary)
     else:
         found = find_stationary(functions, layout, i, c, z, p, equations.last, stationary)
@@ -146,7 +146,7 @@ def start_condition(functions, layout, i, c, target, z, p, which, workspace):  #
     equations = workspace.equations
     grad, behind = equations.grad, equations.behind
     n = z.shape[1] - 1
-    if layout.departs[i] >= RETURNS:
+    if layout.resets[i] < 0:
         value = functions.observe(c, z[i, 0], z[i, 1:], p, which, grad) - target
         for j in range(1 + n):
             workspace.d[1, i, j] += grad[j]

@@ -29,7 +29,7 @@ from contfric.orbit.newton import (
     off_normal,
 )
 from contfric.orbit.spectrum import multipliers
-from contfric.orbit.system import RETURNS, IntArray
+from contfric.orbit.system import IntArray
 
 #: The extra column that a curve watches where a branch watches the slope of its parameter: the
 #: coefficient of the normal form, or the rate of the load at a stop.
@@ -175,7 +175,7 @@ def other_touches(functions, layout, row, z, p, workspace):  # type: ignore[no-u
         workspace.equations,
     )
     c = layout.observables[surface]
-    if layout.departs[i] < RETURNS:
+    if layout.resets[i] >= 0:
         found = find_behind(functions, layout, i, c, z, p, equations, stationary)
     else:
         found = find_stationary(functions, layout, i, c, z, p, equations.last, stationary)

@@ -10,9 +10,6 @@ from contfric.orbit.holds import Hold
 from contfric.orbit.structure import mirror_mode, mode_domains
 from contfric.signature.holds import is_hold, mirror_exit
 
-#: In the array of departures: a segment that begins as any, and one that begins on its exit surface.
-PLAIN, RETURNS = -1, -2
-
 Word = tuple[tuple[str, str], ...]
 
 
@@ -24,25 +21,26 @@ def first_entry(model: Model, word: Word, half: bool) -> str:
     return mirror_exit(word[-1][1], inverse)
 
 
-def departures(
+def beginnings(
     model: Model,
     word: Word,
     exits: list[str],
     entered: list[str],
     half: bool,
     held: dict[int, Hold],
-) -> NDArray[np.int64]:
-    """How holds are left, and other segments begin, as a layout has it."""
+) -> dict[str, NDArray[np.int64]]:
+    """How holds are left and segments begin: ``departs``, ``resets`` and ``returns`` of a layout."""
     modes = [mode for mode, _ in word]
     before = [mirror_mode(model)[modes[-1]] if half else modes[-1], *modes[:-1]]
-    resets = {
-        s.name: k + 1 for k, s in enumerate(model.surfaces) if s.name in model.reset_by_surface
-    }
-    rows = zip(modes, before, exits, entered, strict=True)
-    found = [PLAIN - 2 * resets.get(row[3], 0) - _returns(model, *row) for row in rows]
-    for i, hold in held.items():
-        found[i] = model.mode_index[hold.departs]
-    return np.array(found, dtype=np.int64)
+    departs, resets, returns = (np.full(len(word), empty) for empty in (-1, -1, 0))
+    for i, row in enumerate(zip(modes, before, exits, entered, strict=True)):
+        if i in held:
+            departs[i] = model.mode_index[held[i].departs]
+            continue
+        returns[i] = _returns(model, *row)
+        if row[3] in model.reset_by_surface:
+            resets[i] = model.surface_index[row[3]]
+    return {"departs": departs, "resets": resets, "returns": returns}
 
 
 def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> int:

@@ -42,7 +42,7 @@ from contfric.compiled import (
 )
 from contfric.models.definition import FloatArray
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN
-from contfric.orbit.system import PLAIN, RETURNS, Layout
+from contfric.orbit.system import Layout
 
 #: Where a segment that begins on its exit surface is shorter than this (nondimensional), its exit row is
 #: divided by the duration: five points of Gauss are exact to rounding there (d^10 f^(10) / 5e32), and the
@@ -62,6 +62,8 @@ LayoutType = types.NamedTuple(
         table,
         table,
         table,
+        indices,
+        indices,
         indices,
         indices,
         indices,
@@ -159,9 +161,8 @@ def apply_reset(functions, layout, i, start, p, which, workspace):  # type: igno
 
     Only for a segment that has one: elsewhere its joint is where it begins.
     """
-    n, surface = start.shape[0] - 1, ((PLAIN - layout.departs[i]) >> 1) - 1
-    behind = workspace.behind
-    functions.reset(surface, start[0], start[1:], p, which, behind[n, :n], behind[:n])
+    n, behind = start.shape[0] - 1, workspace.behind
+    functions.reset(layout.resets[i], start[0], start[1:], p, which, behind[n, :n], behind[:n])
 
 
 @helper
@@ -228,7 +229,7 @@ def mean_rate_row(functions, layout, i, at, start, duration, p, which, workspace
     for k in range(_NODES.shape[0]):
         share, weight = _NODES[k], _WEIGHTS[k]
         time = share * duration
-        if layout.departs[i] < RETURNS:
+        if layout.resets[i] >= 0:
             functions.flow(mode, start[0], workspace.behind[n, :n], time, p, which, state, jac)
             behind_reset(jac, workspace.behind, grad, n)
         else:
@@ -257,8 +258,7 @@ def mean_rate_row(functions, layout, i, at, start, duration, p, which, workspace
 @helper
 def is_divided(layout, i, duration):  # type: ignore[no-untyped-def]
     """Tell whether the exit row of segment i is divided by its duration."""
-    departs = layout.departs[i]
-    return abs(duration) < _SHORT and (PLAIN - departs) & 1 == 1 and departs < 0
+    return abs(duration) < _SHORT and layout.returns[i] == 1
 
 
 @helper
@@ -277,11 +277,11 @@ def segment_rows(functions, layout, i, at, start, after, p, which, workspace, ro
     n, free, width = state.shape[0], which.shape[0], rows.shape[1]
     m = n + 1
     begin = start[1:]
-    if layout.departs[i] < RETURNS:
+    if layout.resets[i] >= 0:
         apply_reset(functions, layout, i, start, p, which, workspace)
         begin = workspace.behind[n, :n]
     functions.flow(layout.modes[i], start[0], begin, after[0] - start[0], p, which, state, jac)
-    if layout.departs[i] < RETURNS:
+    if layout.resets[i] >= 0:
         behind_reset(jac, workspace.behind, grad, n)
     worst = 0.0
     for j in range(n):
@@ -336,7 +336,7 @@ def mismatch(functions, layout, z, p, workspace):  # type: ignore[no-untyped-def
         after = z[i + 1] if i + 1 < count else workspace.last
         duration = after[0] - z[i, 0]
         begin = z[i, 1:]
-        if layout.departs[i] < RETURNS:
+        if layout.resets[i] >= 0:
             apply_reset(functions, layout, i, z[i], p, none, workspace)
             begin = workspace.behind[m - 1, : m - 1]
         functions.flow(layout.modes[i], z[i, 0], begin, duration, p, none, state, workspace.nothing)

@@ -9,7 +9,6 @@ from contfric.compiled import i8, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.orbit.equations import LayoutType, close_chain, equation_workspace
 from contfric.orbit.monitor import find_behind, find_stationary, start_value, stationary_workspace
-from contfric.orbit.system import RETURNS
 
 
 @kernel(types.boolean(FlowType, LayoutType, i8, matrix, vector, vector))
@@ -28,7 +27,7 @@ def extent(functions, layout, c, z, p, out):  # type: ignore[no-untyped-def]
     low, high = np.inf, -np.inf
     for i in range(count):
         low, high = min(low, z[i, 1]), max(high, z[i, 1])
-        if layout.departs[i] < RETURNS:
+        if layout.resets[i] >= 0:
             found = find_behind(functions, layout, i, c, z, p, workspace, stationary)
             begin = start_value(functions, layout, i, c, z, p, workspace)
             low, high = min(low, begin), max(high, begin)

@@ -25,7 +25,6 @@ from contfric.orbit.equations import (
 )
 from contfric.orbit.holds import NO_PIN
 from contfric.orbit.newton import CHECKS
-from contfric.orbit.system import RETURNS
 
 #: Most interior stationary points of one observable in one segment; beyond it the orbit is reported
 #: as not finite. A stick of 30 excitation periods has 180 of them with a third harmonic.
@@ -147,7 +146,7 @@ def margins(functions, layout, z, p, workspace, stationary, out):  # type: ignor
     for k in range(interior.shape[0]):
         i, c = interior[k, 0], observables[interior[k, 1]]
         if i != segment or c != watched:  # surfaces of one observable share its stationary points
-            if layout.departs[i] < RETURNS:
+            if layout.resets[i] >= 0:
                 found = find_behind(functions, layout, i, c, z, p, workspace, stationary)
             else:
                 found = find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
@@ -254,7 +253,7 @@ def ends_of(functions, layout, k, z, p, workspace):  # type: ignore[no-untyped-d
         first = functions.level(on, p, workspace.none, workspace.empty)
     else:
         first = functions.observe(c, z[i, 0], z[i, 1:], p, workspace.none, workspace.empty)
-        if layout.departs[i] < RETURNS:
+        if layout.resets[i] >= 0:
             first = start_value(functions, layout, i, c, z, p, workspace)
     if to >= 0:
         return first, functions.level(to, p, workspace.none, workspace.empty)
@@ -280,7 +279,7 @@ def crossings(functions, layout, k, z, p, workspace, stationary):  # type: ignor
         layout.labels[k, 2],
         layout.labels[k, 3],
     )
-    if layout.departs[i] < RETURNS:
+    if layout.resets[i] >= 0:
         found = find_behind(functions, layout, i, c, z, p, workspace, stationary)
     else:
         found = find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.begins import PLAIN, RETURNS, departures, entry_rows, first_entry
+from contfric.orbit.begins import beginnings, entry_rows, first_entry
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN, Hold, holds_of
 from contfric.orbit.margins import Margin, Test, double_zeros, lasting_segments
 from contfric.orbit.structure import (
@@ -44,8 +44,6 @@ from contfric.signature.holds import is_hold
 from contfric.stored import made_of
 
 __all__ = [
-    "PLAIN",
-    "RETURNS",
     "IntArray",
     "Layout",
     "Margin",
@@ -76,9 +74,9 @@ class Layout(NamedTuple):
         margins, at its beginning (1)
     labels : rows (segment, observable, surfaces that the segment starts and ends on, or -1)
     pins : surface that each hold starts on, shape (N,); -2 after a touch, -1 where there is no hold
-    departs : mode in which each hold is left, shape (N,). Where there is no hold it says how the segment
-        begins: PLAIN, or as far below that as bit 0 if it begins on its exit surface (RETURNS), so that it
-        may shrink to nothing, and above it the surface of the reset that it begins behind, plus one
+    departs : mode in which each hold is left, shape (N,); -1 where there is no hold
+    resets : surface of the reset that each segment begins behind, shape (N,); -1 where there is none
+    returns : 1 for segments that begin on their exit surface, so that they may shrink to nothing, shape (N,)
     lasting : segments that must last: holds after a stick, and that stick; a slide from a hold to a touch at
         which another begins, shape (k,)
     held : all holds, which could be left at any time, shape (k,)
@@ -98,6 +96,8 @@ class Layout(NamedTuple):
     labels: IntArray
     pins: IntArray
     departs: IntArray
+    resets: IntArray
+    returns: IntArray
     lasting: IntArray
     held: IntArray
     doubles: IntArray
@@ -179,7 +179,7 @@ def build_system(
         joint=joint,
         labels=_label_rows(model, word, half, bool(domains), holds),
         pins=np.array([_pin(held.get(i), surfaces) for i in range(len(word))], dtype=np.int64),
-        departs=departures(model, word, exits, entered, half, held),
+        **beginnings(model, word, exits, entered, half, held),
         lasting=np.array([i for i, _ in lasting_segments(word, holds)], dtype=np.int64),
         held=np.array([hold.segment for hold in holds], dtype=np.int64),
         doubles=_rows(
