@@ -42,6 +42,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     True
     """
     from contfric.models import load_model
+    from contfric.models.check.continuity import check_continuity
     from contfric.models.check.derivatives import check_derivatives
     from contfric.models.check.hidden import check_hidden
     from contfric.models.check.kinks import check_kinks
@@ -66,6 +67,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_surfaces(report, probe)
     check_transitions(report, probe)
     check_resets(report, probe)
+    check_continuity(report, probe)
     check_kinks(report, loaded)
     check_sliding(report, probe)
     check_symmetry(report, probe)

@@ -14,6 +14,7 @@ class Topic(str, Enum):
     SURFACES = "surfaces are regular: the gradient does not vanish on them"
     TRANSITIONS = "every region that motion reaches has a domain, and every crossing a next one"
     RESETS = "a reset leaves the state on its surface, and sends it back"
+    CONTINUITY = "fields and observables do not jump inside of a mode"
     KINKS = "kinks of the fields lie on surfaces that their modes know"
     SLIDING = "sliding modes stay on their surfaces"
     SYMMETRY = "the symmetry holds for fields, surfaces and domains"

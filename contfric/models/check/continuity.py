@@ -1,0 +1,158 @@
+"""Jumps and poles of fields and observables where no surface marks them.
+
+A field that jumps (a sawtooth written as ``atan(tan(t))``, a condition on time) is integrated across the jump
+as if there were none: orbits are wrong, or called aperiodic. Fields and observables are followed along time
+and along each state, as far as the mode goes; where they change most over one sample the interval is halved.
+What does not shrink with it is a jump.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+from contfric.models.check.probe import ON, Probe
+from contfric.models.check.report import ModelReport, Topic
+from contfric.models.definition import FloatArray
+
+#: States of each mode from which lines are followed, and samples of a line.
+_STATES, _SAMPLES = 2, 160
+#: Intervals of a line that are looked into: those of the largest changes.
+_INTERVALS = 3
+#: Change (relative to the values) that is looked into, and what is left of it at a jump: steep functions of
+#: slope 1e8 and more count as jumps, which arithmetic could not tell from them.
+_LOOKED_INTO, _LEFT = 1e-4, 1e-6
+#: Halvings: to the resolution of the arithmetic.
+_HALVINGS = 52
+
+#: A line in a mode: its point (t, y) at a place.
+Line = Callable[[float], tuple[float, FloatArray]]
+
+
+def check_continuity(report: ModelReport, probe: Probe) -> None:
+    """Check that no field and no observable jumps inside of a mode."""
+    for mode in probe.model.modes:
+        for name, line, low, high in _lines(probe, mode.name):
+            report.count(Topic.CONTINUITY)
+            found = _jump_along(probe, mode.name, line, low, high)
+            if found is None:
+                continue
+            what, at, by = found
+            t, y = line(at)
+            where = ", ".join(f"{s} = {v:.6g}" for s, v in zip(probe.model.states, y, strict=True))
+            report.error(
+                Topic.CONTINUITY,
+                f"{what} in mode '{mode.name}' jumps by {by:.3g} along {name}, at t = {t:.9g}, {where}: "
+                "it is integrated as if it were smooth. Make the place a surface, with a mode on each "
+                "side (of time: an observable such as sin(2*pi*t/T) that changes its sign there)",
+            )
+            return
+
+
+def _lines(probe: Probe, mode: str) -> Iterator[tuple[str, Line, float, float]]:
+    """Yield (what changes, line, first place, last place) through a few states of a mode."""
+    widths = 2.0 * np.abs(probe.model.spread(probe.model.mapping(probe.vector)))
+    seen = 0
+    for t, y in probe.states(100):
+        place = probe.inside(mode, t, y)
+        if place is None:
+            continue
+        seen += 1
+        time, state = place
+        if probe.period > 0.0:
+            yield "t", partial(_at_time, state), time, time + probe.period
+        for k, name in enumerate(probe.model.states):
+            yield name, partial(_at_state, time, state, k), -widths[k], widths[k]
+        if seen == _STATES:
+            return
+
+
+def _at_time(y: FloatArray, time: float) -> tuple[float, FloatArray]:
+    return time, y
+
+
+def _at_state(t: float, y: FloatArray, k: int, value: float) -> tuple[float, FloatArray]:
+    moved = y.copy()
+    moved[k] = value
+    return t, moved
+
+
+def _jump_along(
+    probe: Probe, mode: str, line: Line, low: float, high: float
+) -> tuple[str, float, float] | None:
+    """Return (what jumps, where, by how much) along a line; None if nothing does."""
+    # an irrational share: samples do not fall onto the places that people choose
+    places = low + (high - low) * (np.arange(_SAMPLES) + 0.381966) / _SAMPLES
+    values = [_values(probe, mode, *line(float(s))) for s in places]
+    known = [v for v in values if v is not None]
+    if not known:
+        return None
+    size = 1.0 + np.max(np.abs(np.where(np.isfinite(known), known, 0.0)), axis=0)
+    suspicion = _suspicion(values, size)
+    for k in np.argsort(suspicion)[::-1][:_INTERVALS]:
+        if suspicion[k] < _LOOKED_INTO:
+            return None
+        found = _halved(probe, mode, line, (float(places[k]), float(places[k + 1])), size)
+        if found is not None:
+            return found
+    return None
+
+
+def _suspicion(values: list[FloatArray | None], size: FloatArray) -> FloatArray:
+    """Return how far the change over each interval is from the mean of those beside it."""
+    outside = np.full(len(size), np.nan)
+    steps = np.diff([outside if v is None else v for v in values], axis=0)
+    around = np.vstack([steps[1:2], steps, steps[-2:-1]])
+    mean = 0.5 * (around[:-2] + around[2:])
+    apart = np.abs(steps - np.where(np.isfinite(mean), mean, 0.0)) / size
+    poles = ~np.isfinite(apart) & np.array(
+        [[a is not None and b is not None] for a, b in pairwise(values)]
+    )
+    return np.asarray(np.max(np.where(poles, np.inf, np.nan_to_num(apart)), axis=1))
+
+
+def _values(probe: Probe, mode: str, t: float, y: FloatArray) -> FloatArray | None:
+    """Return rates and observables at a state; None outside of the mode."""
+    signs = probe.signs(t, y)
+    domains = [d for d in probe.model.domains if d.own_mode == mode]
+    if not any(d.signs == signs for d in domains):
+        return None
+    observed = [probe.flow.observe(name, t, y) for name in probe.model.observable_index]
+    return np.array([*probe.field(mode, t, y), *observed])
+
+
+def _change(a: FloatArray | None, b: FloatArray | None, size: FloatArray) -> float:
+    """Return the largest relative change between two places; 0 where one is outside of the mode."""
+    if a is None or b is None:
+        return 0.0
+    change = np.max(np.abs(a - b) / size)
+    return float(change) if np.isfinite(change) else np.inf
+
+
+def _halved(
+    probe: Probe, mode: str, line: Line, ends: tuple[float, float], size: FloatArray
+) -> tuple[str, float, float] | None:
+    """Return the jump inside of an interval, if its change does not shrink with it."""
+    (a, b), before, after = ends, _values(probe, mode, *line(ends[0])), None
+    after = _values(probe, mode, *line(b))
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (a + b)
+        there = _values(probe, mode, *line(middle))
+        if there is None or middle in (a, b):
+            break
+        if _change(before, there, size) >= _change(there, after, size):
+            b, after = middle, there
+        else:
+            a, before = middle, there
+    if before is None or after is None or b - a > 1e3 * ON * (1.0 + abs(a)):
+        return None
+    change = np.abs(before - after) / size
+    k = int(np.argmax(np.where(np.isfinite(change), change, np.inf)))
+    if change[k] < _LEFT:
+        return None
+    names = [*(f"the rate of '{s}'" for s in probe.model.states)]
+    names += [f"the observable '{c}'" for c in probe.model.observable_index]
+    return names[k], 0.5 * (a + b), float(abs(before[k] - after[k]))

@@ -1,0 +1,77 @@
+"""``check`` refuses what an expression cannot be: jumps in time and state that no surface marks."""
+
+from __future__ import annotations
+
+import pytest
+
+import contfric as cf
+
+MODEL = """
+name: {name}
+states: [x, v]
+parameters:
+  w: {{default: 0.7, meaning: frequency}}
+period: 2*pi/w
+define:
+  f: {force}
+observables: {{v: v, x: x}}
+surfaces:
+  stop: {{observable: v, level: 0}}
+field: {{x: v, v: -x - 0.1*v + f}}
+modes:
+  up: {{in: {{stop: +}}}}
+  down: {{in: {{stop: -}}}}
+"""
+
+#: Jumps and poles: in time, at places of all kinds; in a state.
+JUMPS = {
+    "sawtooth": "atan(tan(w*t/2))",
+    "sawtooth of another phase": "0.1*atan(tan(w*t/2 + 0.123))",
+    "pulse": "where(sin(w*t) > 0.3, 1, 0)",
+    "small pulse": "where(sin(w*t) > 0.95, 0.01, 0)",
+    "sign": "sign(cos(w*t))",
+    "pole": "0.1*tan(w*t/2)",
+    "step in x": "where(x > 0.1, 0.5, 0)",
+    "pole in x": "0.01/(x - 0.2)",
+}
+#: Steep, but smooth; kinks; and a jump that the modes' sides decide.
+SMOOTH = {
+    "harmonic": "cos(w*t)",
+    "steep": "tanh(1e4*sin(w*t))",
+    "steep in x": "tanh(1e4*(x - 0.1)) + cos(w*t)",
+    "kink": "abs(sin(w*t))",
+    "friction": "0.2*cos(w*t) - 0.1*sign(v)",
+}
+
+
+def report_of(tmp_path, name: str, force: str) -> cf.ModelReport:
+    path = tmp_path / "model.yaml"
+    path.write_text(MODEL.format(name="model", force=force), encoding="utf-8")
+    return cf.check_model(path)
+
+
+@pytest.mark.parametrize("name", JUMPS)
+def test_jumps_are_refused(tmp_path, name) -> None:
+    report = report_of(tmp_path, name, JUMPS[name])
+    assert not report.ok
+    (found,) = [f for f in report.findings if f.topic.name == "CONTINUITY"]
+    assert found.severity.value == "error"
+    assert "the rate of 'v'" in found.message
+    assert "surface" in found.message
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_what_is_steep_or_has_kinks_is_no_jump(tmp_path, name) -> None:
+    report = report_of(tmp_path, name, SMOOTH[name])
+    assert not [f for f in report.findings if f.topic.name == "CONTINUITY"]
+
+
+def test_an_observable_that_jumps_is_refused(tmp_path) -> None:
+    text = MODEL.format(name="model", force="cos(w*t)").replace(
+        "x: x}", "u: 'x + where(sin(w*t) > 0.5, 0.2, 0)'}"
+    )
+    (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
+    (found,) = [
+        f for f in cf.check_model(tmp_path / "model.yaml").findings if f.topic.name == "CONTINUITY"
+    ]
+    assert "the observable 'u'" in found.message
