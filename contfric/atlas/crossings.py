@@ -66,8 +66,7 @@ def _follow_through(
         if known is not None or branch is None:
             state.judge(event, reason, Verdict.KNOWN, known)
         else:
-            state.judge(event, reason, Verdict.ACCEPTED, len(state.branches))
-            state.add_from(branch, event)
+            state.accept(event, reason, branch)
         return
     state.judge(event, reason, Verdict.REFUSED, why="no orbit beside the event was found")
 

@@ -19,6 +19,7 @@ from contfric.continuation.events import (
     Verdict,
 )
 from contfric.continuation.points import Settings
+from contfric.interrupts import held_back
 from contfric.orbit.orbit import Orbit
 
 Progress = Callable[[str], None]
@@ -57,7 +58,11 @@ class Exploration:
             self.progress(text)
 
     def add(self, branch: Branch) -> None:
-        """Register a branch and the events that it meets."""
+        """Register a branch and the events that it meets: all of it, whenever Ctrl-C comes."""
+        with held_back():
+            self._register(branch)
+
+    def _register(self, branch: Branch) -> None:
         index = len(self.branches)
         self.branches.append(branch)
         self.say(f"branch {index + 1}: {branch.name}, {len(branch)} points")
@@ -66,12 +71,14 @@ class Exploration:
         for bifurcation in branch.bifurcations:
             self._meet(bifurcation, index)
 
-    def add_from(self, branch: Branch, event: Event) -> None:
-        """Register a branch that starts at an event."""
+    def accept(self, event: Event, reason: str, branch: Branch) -> None:
+        """Register a branch that starts at an event, and why it was tried."""
         index = len(self.branches)
-        self.add(branch)
-        if index not in event.branches:
-            event.branches.append(index)
+        with held_back():
+            self.judge(event, reason, Verdict.ACCEPTED, index)
+            self._register(branch)
+            if index not in event.branches:
+                event.branches.append(index)
 
     def raise_copies(self, copies: int) -> None:
         """Try more copies at sliding events from now on, those that were followed already among them."""

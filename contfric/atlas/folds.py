@@ -103,5 +103,4 @@ def _add_crossing(
         side = trace_side(orbit, point, settings, progress=state.progress)
         first = first_end(EndReason.BP, event, side, settings)
         branch = assemble(orbit, settings, side, first, origin)
-    state.judge(event, reason, Verdict.ACCEPTED, len(state.branches))
-    state.add_from(branch, event)
+    state.accept(event, reason, branch)

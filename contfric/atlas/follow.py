@@ -131,8 +131,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
         elif (known := state.known(branch[len(branch) // 2])) is not None:
             state.judge(event, reason, Verdict.KNOWN, known)
         else:
-            state.judge(event, reason, Verdict.ACCEPTED, len(state.branches))
-            state.add_from(branch, event)
+            state.accept(event, reason, branch)
             for end in ends:
                 state.merge(event, end)
 
@@ -194,8 +193,7 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
             why = EndReason.CONTINUUM.value
         state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
         return False
-    state.judge(event, candidate.reason, Verdict.ACCEPTED, len(state.branches))
-    state.add_from(branch, event)
+    state.accept(event, candidate.reason, branch)
     return True
 
 
@@ -266,8 +264,7 @@ def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
     elif (known := state.known(branch[len(branch) // 2])) is not None:
         state.judge(event, reason, Verdict.KNOWN, known)
     else:
-        state.judge(event, reason, Verdict.ACCEPTED, len(state.branches))
-        state.add_from(branch, event)
+        state.accept(event, reason, branch)
 
 
 def _follow_departure(
@@ -311,8 +308,7 @@ def _follow_departure(
         )
         if went_somewhere(side, event) and not _comes_back(side, event, settings):
             first = first_end(reason, event, side, settings)
-            state.judge(event, text, Verdict.ACCEPTED, len(state.branches))
-            state.add_from(assemble(orbit, settings, side, first, departure.origin), event)
+            state.accept(event, text, assemble(orbit, settings, side, first, departure.origin))
             return
     state.judge(event, text, Verdict.REFUSED, why="it is not admissible")
 

@@ -13,6 +13,8 @@ import time
 
 import pytest
 
+import contfric as cf
+from contfric.atlas.exploration import Exploration
 from contfric.interrupts import held_back
 
 #: Time after the signal within which a call has returned (s); on an idle machine it is a tenth of that.
@@ -208,3 +210,30 @@ def test_other_threads_have_no_handlers() -> None:
     thread.start()
     thread.join()
     assert found == [signal.getsignal(signal.SIGINT)]
+
+
+@pytest.mark.parametrize("at", range(7))
+def test_a_diagram_is_whole_wherever_it_is_cut(monkeypatch, at) -> None:
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    monkeypatch.setattr(Exploration, "judge", _cutting(Exploration.judge, at))
+    found = cf.explore(orbit, "Omega", (0.4, 0.6))
+    assert not found.complete
+    assert "interrupted" in found.notes
+    for event in found.events:
+        for proposal in event.proposals:
+            if proposal.branch is not None:  # what a proposal became is there
+                assert 0 <= proposal.branch < len(found.branches)
+
+
+def _cutting(judge, at: int):
+    """A method that does what it did, and at its call number ``at`` gets a Ctrl-C."""
+    calls = []
+
+    def cut(*args, **kwargs):
+        result = judge(*args, **kwargs)
+        calls.append(1)
+        if len(calls) == at + 1:
+            signal.raise_signal(signal.SIGINT)
+        return result
+
+    return cut
