@@ -34,6 +34,7 @@ from contfric.plot.style import (
     UNKNOWN_WIDTH,
     UNSTABLE,
     branch_colours,
+    full_title,
     greyish,
     lighter,
     parameter_label,
@@ -129,6 +130,7 @@ def plot_diagram(
     rows: Sequence[str] = ("x_max", "stops", "psi"),
     fig: Figure | None = None,
     overlay: Sweep | None = None,
+    title: str = "",
 ) -> list[Axes]:
     """Draw a diagram in several rows over one parameter axis, as Figs. 4-7 of the reference.
 
@@ -141,6 +143,8 @@ def plot_diagram(
         An empty figure to draw in; a new one by default.
     overlay : Sweep, optional
         Simulated points of the same parameter, drawn behind the branches.
+    title : str, optional
+        What stands above; names of parameters become symbols. The fixed parameters by default.
 
     Returns
     -------
@@ -159,7 +163,11 @@ def plot_diagram(
     axes = list(fig.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0])
     axes[0].set_xlim(*diagram.range)
     draw_overlay(axes, rows, diagram.parameter, overlay)
-    axes[0].set_title(fixed_parameters(diagram.branches), fontsize=TEXT)
+    fixed = fixed_parameters(diagram.branches)
+    text = ", ".join(f"{parameter_label(n)} = {v:.6g}" for n, v in fixed.items())
+    if title:
+        text = full_title(title, diagram.model.parameter_names, fixed)
+    axes[0].set_title(text, fontsize=TEXT)
     marks = [
         marks_of(diagram.bifurcations, diagram.branches, ROWS[row].attribute, diagram.parameter)
         for row in rows
@@ -180,14 +188,14 @@ def plot_diagram(
     return axes
 
 
-def fixed_parameters(branches: Sequence[Branch]) -> str:
+def fixed_parameters(branches: Sequence[Branch]) -> dict[str, float]:
     """Return the parameters that do not vary and are not zero, for a title."""
     if not branches:
-        return ""
+        return {}
     first = branches[0]
     shown = first.model.mapping(first.vector)
     shown.pop(first.parameter, None)
-    return ", ".join(f"{parameter_label(n)} = {v:.6g}" for n, v in shown.items() if v != 0.0)
+    return {n: v for n, v in shown.items() if v != 0.0}
 
 
 def _plot_row(

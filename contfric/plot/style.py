@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -118,6 +118,40 @@ def parameter_label(name: str) -> str:
     word, index = found.groups()
     body = f"\\{word}" if word in _GREEK else word if len(word) == 1 else rf"\mathrm{{{word}}}"
     return f"${body}_{{{index}}}$" if index else f"${body}$"
+
+
+def title_label(title: str, names: Sequence[str]) -> str:
+    r"""Return a title with the names of parameters in it as mathematics.
+
+    A name of one letter may be a word: it counts where a value or "in" stands beside it.
+
+    Examples
+    --------
+    >>> title_label("A block in S at Omega = 0.5", ["A", "S", "Omega"])
+    'A block in $S$ at $\\Omega$ = 0.5'
+    """
+    for name in sorted(names, key=len, reverse=True):
+        word = rf"(?<![\w$\\{{]){re.escape(name)}(?![\w}}])"
+        if len(name) == 1:
+            word = rf"(?:{word}(?=\s*=)|(?<=\bin ){word}|(?<=\band ){word})"
+        title = re.sub(word, parameter_label(name).replace("\\", r"\\"), title)
+    return title
+
+
+def full_title(title: str, names: Sequence[str], fixed: Mapping[str, float]) -> str:
+    r"""Return a title with symbols, and below it the fixed parameters that it does not name, but zeros.
+
+    Examples
+    --------
+    >>> full_title("S at Omega = 0.5", ["S", "Omega", "h"], {"Omega": 0.5, "h": 0.1})
+    'S at $\\Omega$ = 0.5\n$h$ = 0.1'
+    """
+    missing = [
+        f"{parameter_label(name)} = {value:.6g}"
+        for name, value in fixed.items()
+        if value != 0.0 and not re.search(rf"(?<!\w){name}\s*=\s*{value:.6g}(?!\d)", title)
+    ]
+    return "\n".join([title_label(title, names), *([", ".join(missing)] if missing else [])])
 
 
 def surface_label(name: str) -> str:

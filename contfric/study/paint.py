@@ -50,7 +50,7 @@ def _behind(found: Findings, rows: list[str]) -> Sweep | None:
 
 
 def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
-    """Draw a figure and write it; a diagram and a map carry the study's title."""
+    """Draw a figure and write it; all but orbits and graphs carry the study's title."""
     from contfric.plot.branch_graph import plot_branch_graph
     from contfric.plot.diagram import plot_diagram
     from contfric.plot.graph import plot_transition_graph
@@ -58,32 +58,40 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
     from contfric.plot.orbit import plot_orbit_panels
     from contfric.plot.plane import plot_plane
     from contfric.plot.save import new_figure, save_figure
+    from contfric.plot.style import TEXT, full_title, title_label
 
     orbit, diagram, plane, lmap = found.orbit, found.diagram, found.plane, found.lyapunov
     width, height, row_height = _SIZES[drawing.kind]
     figure = new_figure(width, height + row_height * len(drawing.rows))
     if drawing.kind is FigureKind.LYAPUNOV:
         assert lmap is not None
-        figure.suptitle(title)
-        plot_lyapunov_map(lmap, ax=figure.add_subplot())
+        names = [*lmap.params, *lmap.axes]
+        plot_lyapunov_map(lmap, ax=figure.add_subplot()).set_title(
+            full_title(title, names, lmap.params), fontsize=TEXT
+        )
     elif drawing.kind.value in KEYS:
-        figure.suptitle(title)
-        found.responses[drawing.kind.value].plot(ax=figure.add_subplot())
+        response = found.responses[drawing.kind.value]
+        fixed = dict(response.params)
+        fixed.pop(getattr(response, "parameter", ""), None)
+        response.plot(ax=figure.add_subplot()).set_title(
+            full_title(title, response.model.parameter_names, fixed), fontsize=TEXT
+        )
     elif drawing.kind is FigureKind.PLANE:
         assert plane is not None
-        figure.suptitle(title)
         axes = figure.add_subplot()
         if lmap is not None and tuple(lmap.axes) == plane.parameters:
             plot_lyapunov_map(lmap, ax=axes)
+        axes.set_title(title_label(title, plane.model.parameter_names), fontsize=TEXT)
         plot_plane(plane, ax=axes, legend_below=True)
     elif drawing.kind in _OF_DIAGRAM:
         assert diagram is not None
-        figure.suptitle(title)
         if drawing.kind is FigureKind.DIAGRAM:
             rows = [row.value for row in drawing.rows]
-            plot_diagram(diagram, rows=rows, fig=figure, overlay=_behind(found, rows))
+            plot_diagram(diagram, rows, figure, _behind(found, rows), title)
         else:
-            plot_branch_graph(diagram, ax=figure.add_subplot())
+            axes = figure.add_subplot()
+            plot_branch_graph(diagram, ax=axes)
+            axes.set_title(title_label(title, diagram.model.parameter_names), fontsize=TEXT)
     else:
         assert orbit is not None
         if drawing.kind is FigureKind.ORBIT:
@@ -91,6 +99,8 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
         else:
             axes = figure.add_subplot()
             plot_transition_graph(orbit.model, ax=axes, signature=orbit.signature)
-    figure.set_layout_engine("none")  # it has converged, for the labels; a second time costs 0.1 s
+    figure.set_layout_engine(
+        "none"
+    )  # the layout is done, for the labels; a second time costs 0.1 s
     with replacing(path) as temporary:
         save_figure(figure, temporary)

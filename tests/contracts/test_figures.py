@@ -18,6 +18,7 @@ mpl.use("Agg")
 
 from matplotlib import pyplot
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
@@ -557,3 +558,14 @@ def test_colours_tell_apart() -> None:
     assert len(set(branch_colours(many).values())) == len(many)
     assert len(set(domain_colours(cf.load_model("popp")).values())) == 10
     assert isinstance(UNSTABLE, tuple)
+
+
+def test_a_study_has_one_title(diagram: Any) -> None:
+    title = "Bifurcations in Omega at S = 0.32, S0 = 0.4"
+    fig = Figure(figsize=(8, 6), layout="constrained")
+    axes = plot_diagram(diagram, ("x_max",), fig, None, title)
+    assert axes[0].get_title() == r"Bifurcations in $\Omega$ at $S$ = 0.32, $S_{0}$ = 0.4"
+    assert fig.get_suptitle() == ""
+    fig = Figure(figsize=(8, 6), layout="constrained")
+    (other,) = plot_diagram(diagram, ("x_max",), fig, None, "At S = 0.32")
+    assert other.get_title() == "At $S$ = 0.32\n$S_{0}$ = 0.4"

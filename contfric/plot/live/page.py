@@ -26,6 +26,7 @@ from contfric.plot.style import (
     SKY,
     UNKNOWN_WIDTH,
     VERMILLION,
+    parameter_label,
 )
 
 if TYPE_CHECKING:
@@ -102,7 +103,8 @@ def _page(diagram: Diagram, data: dict[str, Any]) -> str:
         document.add_root(figure)
     script = CustomJS(args={**figures, **sources}, code=_resource("page.js"))
     document.js_on_event("document_ready", script)
-    fixed = fixed_parameters(diagram.branches)
+    values = fixed_parameters(diagram.branches).items()
+    fixed = ", ".join(f"{parameter_label(name)} = {value:.6g}" for name, value in values)
     return str(
         file_html(
             document,
