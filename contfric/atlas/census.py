@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from contfric.atlas.census_conditions import Fate, Walk, fates_before
-from contfric.atlas.census_limits import ROOM, limits_of
+from contfric.atlas.census_limits import NEAR_ENOUGH, limits_of
 from contfric.atlas.census_net import Limits, Net
 from contfric.atlas.census_orbits import Catalogue
 from contfric.atlas.census_result import Census, SectionSearch
@@ -157,7 +157,7 @@ class _Census:
         sizes += [largest * 2.0**k for k in range(1, _DOUBLINGS + 1)]
         for reach in sizes:
             found = self._search(section, reach)
-            if found is None or (reach >= largest and found.farthest <= ROOM * reach):
+            if found is None or (reach >= largest and found.farthest <= NEAR_ENOUGH * reach):
                 return
 
     def _search(self, section: Section, reach: float) -> Findings | None:

@@ -9,8 +9,8 @@ from contfric.atlas.census_orbits import Catalogue
 from contfric.atlas.census_result import SectionSearch
 from contfric.signature.edits import show
 
-#: Orbits within this share of a box leave workspace for others outside of those found.
-ROOM = 0.75
+#: Orbits within this share of a box leave space for others outside of those found.
+NEAR_ENOUGH = 0.75
 
 
 def limits_of(
@@ -44,7 +44,7 @@ def _of_section(search: SectionSearch, limits: Limits) -> list[str]:
         lines.append(f"no start makes more than {limits.stops} stops in {limits.periods} period(s)")
     if search.held:
         lines.append(f"{search.held} of {search.starts} starts come to rest for ever")
-    if search.farthest > ROOM * search.reach:
+    if search.farthest > NEAR_ENOUGH * search.reach:
         lines.append(
             f"an orbit lies at {search.farthest:.3g}, near the edge of the box of half-width "
             f"{search.reach:.3g}: others may lie outside"

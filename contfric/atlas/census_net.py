@@ -214,10 +214,10 @@ class Net:
         self.code[new], self.lift[new], self.state[new] = code, lift, done.states
         self.time[new], self.start[new], self.count = phases, done.starts, last
 
-    def _grow(self, workspace: int) -> None:
+    def _grow(self, capacity: int) -> None:
         for name in ("code", "lift", "state", "time", "start"):
             old = getattr(self, name)
-            larger = np.empty((workspace, *old.shape[1:]), dtype=old.dtype)
+            larger = np.empty((capacity, *old.shape[1:]), dtype=old.dtype)
             larger[: len(old)] = old
             setattr(self, name, larger)
 

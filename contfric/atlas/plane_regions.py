@@ -26,7 +26,7 @@ from contfric.orbit.system import Word
 
 #: Cells along each side: a cell is finer than a line in a printed figure.
 CELLS = 400
-#: A region of fewer cells than this is the workspace between walls that touch.
+#: A region of fewer cells than this is a gap between walls that touch.
 _LEAST = 12
 #: Points of a branch nearer than this to a wall (cells) may lie on its other side.
 _AWAY = 1.5

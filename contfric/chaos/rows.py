@@ -66,7 +66,7 @@ class CellRows(NamedTuple):
 
 
 def empty_rows(cells: int, n: int) -> CellRows:
-    """Return workspace for the results of some cells."""
+    """Return empty rows for the results of some cells."""
     numbers = (np.empty(cells, dtype=np.int64) for _ in range(3))
     return CellRows(np.empty((cells, n)), np.empty((cells, n)), *numbers)
 

@@ -59,10 +59,8 @@ class Columns:
         for name, new in rows.items():
             array = self.arrays.setdefault(name, np.empty((0, *new.shape[1:]), new.dtype))
             if stop > len(array):
-                workspace = (
-                    stop if not self.count else max(stop, self.count + self.count // _GROWTH)
-                )
-                array.resize((workspace, *new.shape[1:]), refcheck=False)
+                capacity = stop if not self.count else max(stop, self.count + self.count // _GROWTH)
+                array.resize((capacity, *new.shape[1:]), refcheck=False)
             array[self.count : stop] = new
         self.count = stop
 

@@ -71,7 +71,7 @@ def step_workspace(count, m, parameters):  # type: ignore[no-untyped-def]
 
 
 class Along(NamedTuple):
-    """What a step along a branch needs beside its points.
+    """What a step along a branch needs besides its points.
 
     Attributes
     ----------

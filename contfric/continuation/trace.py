@@ -182,9 +182,9 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         return True, step
     count = side.count
     why, step = side.march(orbit, settings, step)
-    leap = overshoots_vertex(orbit, side, settings, side.count - count)
-    if leap is not Overshoot.NONE:
-        return leap is Overshoot.ENDED, step
+    overshoot = overshoots_vertex(orbit, side, settings, side.count - count)
+    if overshoot is not Overshoot.NONE:
+        return overshoot is Overshoot.ENDED, step
     if why in (kernels.STEP, kernels.BROKEN) and move_joints(orbit, side, settings):
         return False, FIRST_STEP * settings.largest
     reasons = {

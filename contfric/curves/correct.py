@@ -42,7 +42,7 @@ _ATTEMPTS, _SHORTER = 3, 1e-2
 
 
 class AlongCurve(NamedTuple):
-    """What a step along a curve needs beside its points.
+    """What a step along a curve needs besides its points.
 
     Attributes
     ----------

@@ -62,8 +62,8 @@ class Box:
 
     def contains(self, w: FloatArray, slack: float = 1e-9) -> bool:
         """Tell whether a point lies in the box."""
-        workspace = slack * self.widths
-        return bool(np.all(w >= self.low - workspace) and np.all(w <= self.high + workspace))
+        margin = slack * self.widths
+        return bool(np.all(w >= self.low - margin) and np.all(w <= self.high + margin))
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from contfric.flow.dense import (
 )
 from contfric.flow.panels import error_of, scan_values
 from contfric.flow.pieces import FREE, ISOLATED, coefficients, root_of
-from contfric.flow.stepping import next_step, settle
+from contfric.flow.stepping import accept_step, next_step
 from contfric.flow.variations import DEPTH
 
 #: Newton's correction, as a share of the step, that may be made along the tangent: its square is
@@ -163,7 +163,7 @@ def first_hit(motion, mode, c, target, on, t0, y0, dt_max, p, workspace, y1):  #
                 return done + at
             left, multiple = right, 0
         done = dt_max if h == dt_max - done else done + h
-        settle(workspace)
+        accept_step(workspace)
     if done >= dt_max:
         return -1.0
     for k in range(n):

@@ -38,9 +38,9 @@ from contfric.flow.stepping import (
     MOST_STEPS,
     REMEMBERED,
     TRIED,
+    accept_step,
     first_step,
     next_step,
-    settle,
 )
 from contfric.flow.variations import begin, integration_workspace, slope
 
@@ -142,7 +142,7 @@ def advance_through(motion, mode, t0, dt, y0, p, which, workspace):  # type: ign
         on = k
         if k < 0:
             done = dt if h == left else done + h
-            settle(workspace)
+            accept_step(workspace)
             continue
         if not motion.probe(motion, piece, -1, t, at, p, which, workspace):
             return -1

@@ -22,7 +22,7 @@ from contfric.flow.dense import (
 )
 from contfric.flow.panels import error_of, scan_slopes, zero_of_slope
 from contfric.flow.pieces import FREE, ISOLATED, coefficients
-from contfric.flow.stepping import next_step, settle
+from contfric.flow.stepping import accept_step, next_step
 from contfric.flow.variations import DEPTH
 
 #: Correction, as a share of the step, that a stationary point may be left with, whose value has an error
@@ -133,6 +133,6 @@ def all_stationary(motion, mode, c, t0, y0, dt, p, workspace, times, values):  #
             if count < 0:
                 return -1
         done = dt if h == dt - done else done + h
-        settle(workspace)
+        accept_step(workspace)
         left = right
     return count

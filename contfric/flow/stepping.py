@@ -124,7 +124,7 @@ def next_step(motion, mode, c, t, left, p, which, workspace):  # type: ignore[no
 
 
 @helper
-def settle(workspace):  # type: ignore[no-untyped-def]
+def accept_step(workspace):  # type: ignore[no-untyped-def]
     """Make the end of a step the start of the next one."""
     start, end, first, last = workspace.start, workspace.end, workspace.slopes, workspace.last
     for k in range(start.shape[0]):

@@ -102,7 +102,7 @@ class Lines:
 def write_block(
     code: Lines,
     outputs: Sequence[Output],
-    workspace: str,
+    derivatives: str,
     columns: Sequence[str],
     result: str | None,
 ) -> None:
@@ -110,7 +110,7 @@ def write_block(
 
     Parameters
     ----------
-    workspace : the array of derivatives: they are not wanted if it is empty
+    derivatives : the array for them: they are not wanted if it is empty
     columns : assignments ``target[...] = 0`` for one parameter that nothing depends on
     result : name of the value to return, None if there is none
     """
@@ -136,7 +136,7 @@ def write_block(
     if not slopes and not own and not columns:
         code.add(back)
         return
-    code.open(f"if {workspace}.shape[0] == 0:")
+    code.open(f"if {derivatives}.shape[0] == 0:")
     code.add(back)
     code.close()
     code.add(*slopes)

@@ -34,7 +34,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contfric.errors import ParameterError, did_you_mean, mapping_of, shown
-from contfric.models.lookup import Lookup
 from contfric.models.parts import (
     Constraint,
     Departure,
@@ -70,7 +69,7 @@ __all__ = [
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Model(Lookup, SectionMaps):
+class Model(SectionMaps):
     """A piecewise-smooth oscillator: its definition, and a factory of its compiled flow.
 
     Attributes

@@ -10,19 +10,14 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from contfric.models.parts import Domain
+from contfric.models.lookup import Lookup
 
 
-class SectionMaps:
+class SectionMaps(Lookup):
     """The part of a model that derives its sections from its domains and transitions."""
 
     if TYPE_CHECKING:
-        domains: tuple[Domain, ...]
         stop_surface: str
-
-        @cached_property
-        def domain_by_name(self) -> dict[str, Domain]:
-            """Domains by their names."""
 
         @cached_property
         def transitions(self) -> dict[tuple[str, str], str]:

@@ -157,9 +157,9 @@ def draw_node(ax: Axes, label: str, place: tuple[float, float], colour: str, fad
 
 
 def frame_nodes(ax: Axes, places: Sequence[tuple[float, float]]) -> None:
-    """Leave workspace for the nodes and draw no frame."""
+    """Leave a margin for the nodes and draw no frame."""
     points = np.array(places) if places else np.zeros((1, 2))
     for limits, column in ((ax.set_xlim, points[:, 0]), (ax.set_ylim, points[:, 1])):
-        workspace = 0.14 * max(float(np.ptp(column)), 1.0) + 0.1
-        limits(float(column.min()) - workspace, float(column.max()) + workspace)
+        margin = 0.14 * max(float(np.ptp(column)), 1.0) + 0.1
+        limits(float(column.min()) - margin, float(column.max()) + margin)
     ax.set_axis_off()

@@ -1,4 +1,4 @@
-"""Calls of the compiled sections: workspace that grows, and starts where nothing can be carried over."""
+"""Calls of the compiled sections: arrays that grow, and begin where nothing can be carried over."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from contfric.response.outcome import Outcome
 
 #: Points that there is space for at first, for each solution.
 _POINTS = 64
-#: Factor by which the workspace grows.
+#: Factor by which the arrays grow.
 _GROWTH = 4
 #: A return that differs by this many units of the model's rounding is a return to the same point: what
 #: is left of a thousand such steps is 1e-11.

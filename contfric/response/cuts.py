@@ -110,7 +110,7 @@ class Ends(NamedTuple):
 
 
 def empty_points(count: int, n: int) -> Points:
-    """Return workspace for points."""
+    """Return empty rows for points."""
     return Points(
         np.zeros(1, dtype=np.int64),
         np.zeros(count, dtype=np.int64),
@@ -121,13 +121,13 @@ def empty_points(count: int, n: int) -> Points:
 
 
 def empty_ends(count: int, n: int) -> Ends:
-    """Return workspace for the ends of solutions."""
+    """Return empty rows for the ends of solutions."""
     outcomes, turns, upto, words = np.zeros((4, count), dtype=np.int64)
     return Ends(outcomes, turns, upto, words, np.zeros((count, n)))
 
 
 def empty_batch(n: int) -> EventRows:
-    """Return workspace for the events between two looks."""
+    """Return empty rows for the events between two looks."""
     return EventRows(
         np.empty((BATCH, 2), dtype=np.int64),
         np.empty(BATCH, dtype=np.int64),

@@ -303,7 +303,7 @@ def _tile(model: cf.Model) -> Tile:
 
 
 def test_memory_is_that_of_the_results() -> None:
-    """Beyond its results a map takes the workspace of a few tiles, however large it is."""
+    """Beyond its results a map takes the memory of a few tiles, however large it is."""
     side = 160
     grid = {"Omega": np.linspace(0.3, 0.6, side), "S": np.linspace(0.1, 0.4, side)}
     cf.lyapunov_map(

@@ -102,7 +102,7 @@ def _jump_along(
 
 
 def _suspicion(values: list[FloatArray | None], size: FloatArray) -> FloatArray:
-    """Return how far the change over each interval is from the mean of those beside it."""
+    """Return how far the change over each interval is from the mean of its neighbours."""
     outside = np.full(len(size), np.nan)
     steps = np.diff([outside if v is None else v for v in values], axis=0)
     around = np.vstack([steps[1:2], steps, steps[-2:-1]])
