@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.errors import ContfricError
+
 if TYPE_CHECKING:
     from contfric.models.definition import FloatArray, Model
 
 _NONE = np.empty(0, dtype=np.int64)
 _EMPTY, _NOTHING = np.empty(0), np.empty((0, 0))
-#: Places for stationary points of one segment, more than one has.
-_MOST = 512
+#: Places for the stationary points of one segment: enough for nearly all, and where they are not.
+_MOST = (512, 65_536)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,13 +137,26 @@ class FlowView:
     def stationary(
         self, mode: str, observable: str, t: float, y: FloatArray, duration: float
     ) -> tuple[FloatArray, FloatArray]:
-        """Return durations to the stationary points of an observable along a segment, and its values."""
-        times, values = np.empty(_MOST), np.empty(_MOST)
+        """Return durations to the stationary points of an observable along a segment, and its values.
+
+        Raises
+        ------
+        ContfricError
+            If they do not fit, or the search gives up.
+        """
         m, c = self.model.mode_index[mode], self.model.observable_index[observable]
         y = np.ascontiguousarray(y)
-        found = self.model.flow.stationary(m, c, t, y, duration, self.vector, times, values)
-        count = max(int(found), 0)
-        return times[:count], values[:count]
+        for most in _MOST:
+            times, values = np.empty(most), np.empty(most)
+            found = int(
+                self.model.flow.stationary(m, c, t, y, duration, self.vector, times, values)
+            )
+            if found >= 0:
+                return times[:found], values[:found]
+        raise ContfricError(
+            f"the stationary points of '{observable}' in mode '{mode}' were not all found within "
+            f"{duration:g} from t = {t:g}: more than {_MOST[-1]}, or the search is too long"
+        )
 
     def reset(self, surface: str, t: float, y: FloatArray) -> FloatArray:
         """Return the state behind the reset at a surface, shape (n,)."""
