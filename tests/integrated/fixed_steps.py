@@ -8,7 +8,7 @@ from contfric.compiled import allocating_helper, f8, i8, indices, kernel, types,
 from contfric.flow.dop853 import STAGES, explicit_step
 from contfric.flow.general import Kind, handle_of
 from contfric.flow.radau import IMPLICIT_STAGES, implicit_step
-from contfric.flow.stepping import settle
+from contfric.flow.stepping import accept_step
 from contfric.flow.variations import begin, integration_workspace, slope
 from contfric.handle import Bound
 
@@ -27,7 +27,7 @@ def march(motion, implicit, mode, y0, dt, steps, p, which, out):
             implicit_step(motion, mode, -1, t, h, p, which, workspace, workspace.end, False)
         else:
             explicit_step(motion, mode, -1, t, h, p, which, workspace, workspace.end)
-        settle(workspace)
+        accept_step(workspace)
     for k in range(out.shape[0]):
         out[k] = workspace.start[k]
 
