@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+# A job that a shell starts in the background ignores Ctrl-C, and tests of it would wait for nothing.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Nothing is timed in tests: a draw may be the first to load a model, or the machine busy.
 settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])

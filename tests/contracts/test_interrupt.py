@@ -25,10 +25,7 @@ LOST = 150
 
 SCRIPT = """
 import faulthandler
-import signal
 import sys
-# where a shell starts a job in the background it is ignored
-signal.signal(signal.SIGINT, signal.default_int_handler)
 import numpy as np
 import contfric as cf
 from contfric.atlas.census_sweep import sweep

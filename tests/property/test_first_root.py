@@ -18,11 +18,14 @@ from scipy.optimize import brentq, minimize_scalar
 
 from contfric.flow.forced_oscillator import flow, hit, observe
 from contfric.flow.forced_oscillator import stationary as kernel
+from contfric.flow.roots import AT_STATIONARY
 
 LOAD, SPEED = range(2)
 STICK = 2
 #: Values nearer to zero than this are decided by rounding (states here are of order 1 to 10).
 UNSURE = 1e-12
+#: Nearer to a joint than this share of 1 + the duration a stationary point is the joint itself.
+AT_JOINT = 2 * AT_STATIONARY
 
 
 class Motion:
@@ -215,6 +218,13 @@ def test_every_stationary_point_is_found(p, phase, x0, v0, mode, c, share) -> No
     assume(abs(motion.rate(c, 0.0)) > 1e-9 and abs(motion.rate(c, end)) > 1e-9)
     roots = sure_roots(lambda tau: motion.rate(c, tau), 0.0, end)
     assume(roots is not None)
+    # one within its own error of a joint is at the joint (`interior_of`): its value differs by 1e-16
+    assume(
+        all(
+            2 * AT_JOINT < root / (1.0 + end) and 2 * AT_JOINT < (end - root) / (1.0 + end)
+            for root in roots
+        )
+    )
     found = stationary(mode, c, t0, y0, end, p)
     assert len(found) == len(roots), (found, roots)
     assert np.allclose(found, roots, rtol=0.0, atol=1e-7)
