@@ -219,12 +219,8 @@ def test_every_stationary_point_is_found(p, phase, x0, v0, mode, c, share) -> No
     roots = sure_roots(lambda tau: motion.rate(c, tau), 0.0, end)
     assume(roots is not None)
     # one within its own error of a joint is at the joint (`interior_of`): its value differs by 1e-16
-    assume(
-        all(
-            2 * AT_JOINT < root / (1.0 + end) and 2 * AT_JOINT < (end - root) / (1.0 + end)
-            for root in roots
-        )
-    )
+    clear = 2 * AT_JOINT * (1.0 + end)
+    assume(all(clear < root < end - clear for root in roots))
     found = stationary(mode, c, t0, y0, end, p)
     assert len(found) == len(roots), (found, roots)
     assert np.allclose(found, roots, rtol=0.0, atol=1e-7)
