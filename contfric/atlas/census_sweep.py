@@ -224,7 +224,7 @@ def sweep(  # type: ignore[no-untyped-def]
         )
         if not sense * rate > 0.0 or not math.isfinite(rate):
             continue
-        code = sign_code(functions, tables.observables, exit_, times[i], y, p, none, empty)
+        code = sign_code(functions, tables.observables, 1 << exit_, times[i], y, p, none, empty)
         if tables.following[(mode * surfaces + exit_) * (1 << surfaces) + code] != after:
             continue
         rows = EventRows(joints[i], cycles[i], clocks[i], states[i])

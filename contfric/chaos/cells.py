@@ -55,7 +55,7 @@ from contfric.chaos.tangent import (
 from contfric.compiled import allocating_helper, f8, helper, i8, indices, kernel, matrix
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
-from contfric.orbit.trajectory import QUIET, StateWorkspace, TablesType
+from contfric.orbit.trajectory import QUIET, StateWorkspace, TablesType, behind_event
 
 #: A separation that grew by this factor has grown from rounding to the size of the motion: the motion
 #: forgot where it started, which one that only converges never does.
@@ -281,7 +281,7 @@ def follow_cell(  # type: ignore[no-untyped-def]
         total += growth[0] if live > 0 else 0.0
         lowest = min(lowest, total)
         rise = max(rise, total - lowest)
-        on = (1 << surface) | (tables.lies_on[mode] & tables.kept[surface])
+        on = behind_event(tables, mode, surface)
         mode, joint, cycle = following, joint + 1, cycle + turns
         key = mode * surfaces + surface
         timeless = walk.at_once[1] & 1 != 0

@@ -36,6 +36,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import dense_solve
 from contfric.orbit.spectrum import spectrum
 from contfric.orbit.system import IntArray
+from contfric.orbit.trajectory import behind_event
 
 #: Joints that are remembered.
 _MEMORIES = 3
@@ -230,7 +231,7 @@ def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, works
         for k in range(rank):
             cycle.logs[k] += cycle.growth[k]
         turns += more
-        on = (1 << surface) | (tables.lies_on[mode] & tables.kept[surface])
+        on = behind_event(tables, mode, surface)
         mode = following
         key = mode * tables.observables.shape[0] + surface
     return key, rank, turns, t, lasted

@@ -145,7 +145,8 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
             return CHATTER if struck else IMPOSSIBLE, surface, mode, duration, turns, t
         if reset:  # the state before it stays where the hit has left it
             functions.reset(surface, t, workspace.after, p, workspace.none, y, workspace.nothing)
-        code = sign_code(functions, observables, surface, t, y, p, workspace.none, workspace.empty)
+        landed = tables.landed[surface]
+        code = sign_code(functions, observables, landed, t, y, p, workspace.none, workspace.empty)
         count = observables.shape[0]
         following = tables.following[(mode * count + surface) * (1 << count) + code]
         if following >= 0:

@@ -267,7 +267,8 @@ def meaning_of(kind: Kind, model: Model, surfaces: Set[str]) -> str:
     """Return what happens at an event on surfaces of a model: a sliding only where something slides."""
     if kind is not Kind.GS:
         return kind.meaning
-    if surfaces & set(model.reset_by_surface):
+    resets = [model.reset_by_surface[s] for s in surfaces if s in model.reset_by_surface]
+    if any(reset.stays for reset in resets):
         return "grazing impact"
     return kind.meaning if any(_is_rested_on(model, s) for s in surfaces) else "grazing"
 

@@ -112,7 +112,12 @@ def end_message(bifurcation: Bifurcation) -> str:
     if kind not in (Kind.SS, Kind.AS, Kind.GS) or orbit.system.holds:
         return ""
     if any(test.surface in orbit.model.reset_by_surface for test in bifurcation.tests):
-        return "grazing impact: the wall is just touched"
+        struck = next(
+            t.surface for t in bifurcation.tests if t.surface in orbit.model.reset_by_surface
+        )
+        if orbit.model.reset_by_surface[struck].stays:
+            return "grazing impact: the wall is just touched"
+        return f"grazing: the surface of the reset at '{struck}' is just touched"
     for place in places_of(bifurcation)[:1]:
         try:
             outcome_at(orbit.as_whole(), place, kind)
@@ -332,6 +337,10 @@ def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
     """GS at a reset: an impact of speed zero comes in, or goes."""
     word, i = orbit.word, place.segment
     mode, exit_ = word[i]
+    if not orbit.model.reset_by_surface[place.surface].stays:
+        raise NotationError(
+            f"behind the reset at {place.surface} motion starts somewhere else: no orbit is near"
+        )
     if place.margin is Margin.INTERIOR:
         edit = split(i, place.surface, (mode, exit_))
         reason = f"impact at the touch of {place.surface} in segment {i + 1}"

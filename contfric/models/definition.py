@@ -46,7 +46,7 @@ from contfric.models.parts import (
     Surface,
     Symmetry,
 )
-from contfric.models.section_maps import SectionMaps
+from contfric.models.transition_maps import TransitionMaps
 from contfric.stored import given
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ __all__ = [
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Model(SectionMaps):
+class Model(TransitionMaps):
     """A piecewise-smooth oscillator: its definition, and a factory of its compiled flow.
 
     Attributes
@@ -96,6 +96,9 @@ class Model(SectionMaps):
     filippov : bool
         Whether rest is left without acceleration everywhere (static and kinetic limit agree), so that the
         flow never jumps: slides may then shrink to nothing, and are solved for accordingly.
+    turned : frozenset of (str, str)
+        (mode, surface): motion that enters the mode where it meets the surface turns back to the side that it
+        came from, as a room does when its heater is switched off.
     max_step : float or None
         Largest step of a continuation, as a share of the range, where the user gives none; None for that
         of the engine. For a model whose branches fold in less.
@@ -128,6 +131,7 @@ class Model(SectionMaps):
     autonomous: bool = False
     kinks: tuple[str, ...] = ()
     filippov: bool = False
+    turned: frozenset[tuple[str, str]] = frozenset()
     max_step: float | None = None
     rounding: float = 1e-13
     displacement: str = ""
@@ -191,101 +195,6 @@ class Model(SectionMaps):
     def defaults(self) -> dict[str, float]:
         """A fresh mapping of every parameter to its default value."""
         return {p.name: p.default for p in self.parameters}
-
-    def cuts(self, surface: str) -> bool:
-        """Return whether motion is cut at a surface: it is switching, or has a reset."""
-        if surface in self.kinks or not surface:
-            return False
-        return self.surface_by_name[surface].switching or surface in self.reset_by_surface
-
-    @cached_property
-    def transitions(self) -> dict[tuple[str, str], str]:
-        """Next domain for each possible (domain, surface); what is absent cannot happen.
-
-        Resets are left out: what follows one depends on the state (:attr:`targets`).
-        """
-        found: dict[tuple[str, str], str] = {}
-        for domain in self.domains:
-            for surface in self.surfaces:
-                target = self._next_domain(domain, surface)
-                if target is not None and target != domain.name:
-                    found[domain.name, surface.name] = target
-        return found
-
-    @cached_property
-    def targets(self) -> dict[tuple[str, str], tuple[str, ...]]:
-        """Every domain that can follow each (domain, surface): one, but for a reset."""
-        found: dict[tuple[str, str], tuple[str, ...]] = {
-            key: (target,) for key, target in self.transitions.items()
-        }
-        for domain in self.domains:
-            for reset in self.resets:
-                behind = self._domains_behind(domain, reset)
-                if behind and domain.signs[reset.surface] != 0:
-                    found[domain.name, reset.surface] = behind
-        return found
-
-    def changed_by(self, reset: Reset, surface: str) -> bool:
-        """Return whether a reset may change the sign at a surface."""
-        observable = self.surface_by_name[surface].observable
-        if reset.changes:
-            return observable in reset.changes
-        return observable != self.surface_by_name[reset.surface].observable
-
-    def _domains_behind(self, domain: Domain, reset: Reset) -> tuple[str, ...]:
-        """Return the domains that a reset can map to: they differ in what it changes."""
-        fixed = {s.name for s in self.surfaces if not self.changed_by(reset, s.name)}
-        return tuple(
-            d.name
-            for d in self.domains
-            if all(d.signs[s] == domain.signs[s] for s in fixed)
-            and all(d.signs[s.name] != 0 for s in self.surfaces if s.name not in fixed)
-        )
-
-    def _next_domain(self, domain: Domain, surface: Surface) -> str | None:
-        sign = domain.signs[surface.name]
-        if sign == 0 or surface.name in self.reset_by_surface:
-            return None
-        if not surface.switching:
-            return self.domain_at({**domain.signs, surface.name: -sign})
-        resting = self.domain_at({**domain.signs, surface.name: 0})
-        through = {**domain.signs, surface.name: -sign}
-        return resting if resting is not None else self._domain_with(through)
-
-    def _resolve_at_rest(self, signs: Mapping[str, int]) -> str | None:
-        staying = self._domain_with(signs)
-        if staying is not None:
-            return staying
-        for departure in self.departures:
-            if all(signs[name] == value for name, value in departure.where.items()):
-                return self._domain_with({**signs, **departure.leaves})
-        return None
-
-    def domain_at(self, signs: Mapping[str, int]) -> str | None:
-        """Return the domain that a state with these signs is in, or leaves to from rest."""
-        if any(signs[s.name] == 0 for s in self.surfaces if s.switching):
-            return self._resolve_at_rest(signs)
-        return self._domain_with(signs)
-
-    def _domain_with(self, signs: Mapping[str, int]) -> str | None:
-        for domain in self.domains:
-            if all(domain.signs[name] == value for name, value in signs.items()):
-                return domain.name
-        return None
-
-    @cached_property
-    def mirror_domain(self) -> dict[str, str]:
-        """Image of each domain under the symmetry; empty if the model has none."""
-        if self.symmetry is None:
-            return {}
-        image: dict[str, str] = {}
-        for domain in self.domains:
-            signs = {self.symmetry.surfaces[s]: -v for s, v in domain.signs.items()}
-            target = self._domain_with(signs)
-            if target is None:
-                raise ParameterError(f"model {self.name}: domain {domain.name} has no mirror image")
-            image[domain.name] = target
-        return image
 
     def index_of(self, name: str) -> int:
         """Return the position of a parameter in the engine's vectors.

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import random
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from contfric.models.definition import Domain
+from contfric.models.definition import Domain, Surface
 from contfric.models.description import Description
 from contfric.models.evaluate import Sampler
 
@@ -34,6 +35,30 @@ def departing_side(
         ]
         verdicts.add(away[0] if len(away) == 1 else 0)
     return verdicts.pop() if len(verdicts) == 1 else 0
+
+
+def turned_modes(
+    sampler: Sampler, surfaces: Sequence[Surface], domains: Sequence[Domain]
+) -> frozenset[tuple[str, str]]:
+    """Return pairs (mode, surface): motion that enters the mode at the surface goes back to its own side.
+
+    That can only be where the mode holds on both sides of it: modes overlap there.
+    """
+    place = {(d.mode, *d.signs.items()) for d in domains}
+    found: dict[tuple[str, str], set[bool]] = {}
+    for surface, here, there in itertools.product([s.name for s in surfaces], domains, domains):
+        side, beyond = here.signs[surface], {**here.signs, surface: -here.signs[surface]}
+        overlap = there.signs == here.signs and there.mode != here.mode and side
+        if not overlap or (there.mode, *beyond.items()) not in place:
+            continue
+        if (here.mode, *beyond.items()) in place:
+            continue  # nothing happens there
+        others = {name: sign for name, sign in here.signs.items() if name != surface}
+        for t, y in sampler.on(surface, others, _PLACES):
+            if side * sampler.rate(here.mode, surface, side, t, y) < 0.0:
+                back = side * sampler.rate(there.mode, surface, side, t, y) > 0.0
+                found.setdefault((there.mode, surface), set()).add(back)
+    return frozenset(pair for pair, verdicts in found.items() if verdicts == {True})
 
 
 def leaves_at_rest(sampler: Sampler, description: Description, domains: tuple[Domain, ...]) -> bool:

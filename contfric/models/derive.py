@@ -19,15 +19,15 @@ from contfric.models.definition import (
     FloatArray,
     Mode,
     Model,
-    Reset,
     Surface,
     Symmetry,
 )
-from contfric.models.departing import departing_side, leaves_at_rest
+from contfric.models.departing import departing_side, leaves_at_rest, turned_modes
 from contfric.models.description import Description
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import Evaluator, Sampler, defaults, floats
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope, parse
+from contfric.models.landing import reset_of
 from contfric.models.measuring import displacement_of, extrema_at_joints
 from contfric.models.regions import combinations, domains_of, ordered_surfaces
 from contfric.models.sections import clear_surfaces, join_domains, joined_modes
@@ -96,10 +96,11 @@ def model_from(description: Description) -> Model:
         flow_factory=GeneratedFlow(description.motion),
         spread=Spread(description.spread, description.text),
         references=description.references,
-        resets=tuple(_reset(description, name, domains) for name in description.resets),
+        resets=tuple(reset_of(sampler, name, surfaces, declared) for name in description.resets),
         autonomous=not description.period,
         kinks=description.kinks,
         filippov=leaves_at_rest(sampler, description, declared),
+        turned=turned_modes(sampler, surfaces, declared),
         max_step=description.max_step,
         definition=description.text,
     )
@@ -119,27 +120,6 @@ def _mode(description: Description, name: str) -> Mode:
     held = sum(side == 0 for side in text.sides.values())
     rank = len(description.states) - held if text.rank is None else text.rank
     return Mode(name, rank, held > 0)
-
-
-def _reset(description: Description, surface: str, domains: tuple[Domain, ...]) -> Reset:
-    """Return a reset; observables without the states that it maps are not changed by it."""
-    sides = {domain.signs[surface] for domain in domains}
-    if len(sides) > 1:
-        raise EntryError(
-            ("resets", surface),
-            f"'{surface}' has a reset, and motion lies on both sides of it or on it: a reset is a wall that "
-            f"motion never passes. Write the side on which it stays to the 'in' of every mode ({surface}: +)",
-        )
-    texts = description.resets[surface]
-    changed = {state for state, value in texts.items() if value != state}
-    own = next(s.observable for s in description.surfaces if s.name == surface)
-    changes = tuple(
-        o.name
-        for o in description.observables
-        if o.name != own and description.names.leaves(parse(o.formula), ()) & changed
-    )
-    formula = ", ".join(f"{state} -> {value}" for state, value in texts.items())
-    return Reset(surface, formula, changes)
 
 
 # ------------------------------------------------------------------------------ constraints

@@ -22,6 +22,8 @@ KEYS = (
 _PARAMETER = ("default", "meaning")
 _SURFACE = ("observable", "level", "switching")
 _MODE = ("in", "field", "sliding", "rank")
+#: In a reset: the mode behind it.
+_TO = "to"
 _DOMAIN = ("mode", "in", "label")
 _METHODS = ("explicit", "implicit", "automatic")
 #: Tolerances between rounding and what Newton's method on a chain of segments still takes for smooth.
@@ -83,7 +85,7 @@ def describe(data: Mapping[str, Any]) -> Description:
         modes=modes,
         domains=_domains(top, modes, surfaces),
         departures=_departures(top, surfaces),
-        resets=_resets(top, states, surfaces),
+        **_resets(top, states, surfaces, modes),
         symmetry=_symmetry(top, states),
         stop_surface=_stop_surface(top, surfaces),
         kinks=top.texts("kinks"),
@@ -252,16 +254,24 @@ def _departures(top: Part, surfaces: tuple[Surface, ...]) -> tuple[Departure, ..
 
 
 def _resets(
-    top: Part, states: tuple[str, ...], surfaces: tuple[Surface, ...]
-) -> dict[str, dict[str, str]]:
-    part = top.part("resets", "a mapping of surfaces to {state: new value}")
+    top: Part,
+    states: tuple[str, ...],
+    surfaces: tuple[Surface, ...],
+    modes: tuple[ModeText, ...],
+) -> dict[str, Any]:
+    """Return the maps of the states, and the modes behind them that are named."""
+    part = top.part("resets", "a mapping of surfaces to {state: new value, to: mode}")
     part.only([s.name for s in surfaces])
-    found = {}
+    maps, leads = {}, {}
     for name in part.data:
-        entry = part.part(name, "{state: new value}")
-        entry.only(states)
-        found[name] = _expressions(entry)
-    return found
+        entry = part.part(name, "{state: new value, to: mode}")
+        entry.only((*states, _TO))
+        if _TO in entry.data:
+            leads[name] = entry.one_of(_TO, [m.name for m in modes], "mode")
+        maps[name] = _expressions(
+            Part({k: v for k, v in entry.data.items() if k != _TO}, entry.address)
+        )
+    return {"resets": maps, "leads": leads}
 
 
 def _symmetry(top: Part, states: tuple[str, ...]) -> dict[str, str] | None:

@@ -48,6 +48,7 @@ class Description:
     define : (name, expression) of each named part
     modes, domains, departures : as declared; what can be derived is derived from them
     resets : surface -> state -> expression
+    leads : surface -> mode behind the reset, where it is said
     symmetry : name (a state or t) -> expression of its image; None if there is none
     stop_surface : empty if it is to be found
     kinks : observables at whose zeros the fields have kinks, and are continuous
@@ -70,6 +71,7 @@ class Description:
     domains: tuple[DomainText, ...] = ()
     departures: tuple[Departure, ...] = ()
     resets: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    leads: Mapping[str, str] = field(default_factory=dict)
     symmetry: Mapping[str, str] | None = None
     stop_surface: str = ""
     kinks: tuple[str, ...] = ()
@@ -103,7 +105,10 @@ class Description:
             "departures": [
                 {"where": dict(d.where), "leaves": dict(d.leaves)} for d in self.departures
             ],
-            "resets": {name: dict(texts) for name, texts in self.resets.items()},
+            "resets": {
+                name: {**texts, **({"to": self.leads[name]} if name in self.leads else {})}
+                for name, texts in self.resets.items()
+            },
             "spread": dict(zip(self.states, self.spread, strict=True)),
             "integration": {"method": self.method, "tolerance": self.tolerance},
         }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,22 +100,33 @@ class Departure:
 
 @dataclass(frozen=True)
 class Reset:
-    """A map of the state where it meets a surface, ``y+ = R(t, y; p)``: an impact on a wall.
+    """A map of the state where it meets a surface, ``y+ = R(t, y; p)``: an impact, a switch, a firing.
 
-    The region is one-sided: before and behind the reset the state is on the same side of the surface,
-    and it never passes. The flow has the map (:data:`contfric.compiled.reset_signature`).
+    The flow has the map (:data:`contfric.compiled.reset_signature`). The state behind it is on the surface
+    still (an impact on a wall, or through the surface), on another one, or on none.
 
     Attributes
     ----------
     surface : the surface, not switching
     formula : the map, for the reader
-    changes : observables whose values the map changes, by default all but that of the surface; the
-        domains that can follow are those that differ in the signs of these
+    changes : observables whose values the map changes; the domains that can follow are those that differ in
+        the signs of these
+    lands : surfaces that every image lies on, and the side to which motion leaves them. For the reset's own
+        surface that is +1 where it goes back (a wall), -1 where it passes
+    leads : the mode behind the reset; empty if that follows from the sides: the mode before it where it
+        holds there, else another one
     """
 
     surface: str
     formula: str
     changes: tuple[str, ...] = ()
+    lands: Mapping[str, int] = field(default_factory=dict)
+    leads: str = ""
+
+    @property
+    def stays(self) -> bool:
+        """Whether the image lies on the surface of the reset."""
+        return self.surface in self.lands
 
 
 @dataclass(frozen=True)

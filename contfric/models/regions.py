@@ -79,18 +79,21 @@ def _heights(names: list[str]) -> list[Sides]:
 
 def domains_of(description: Description, surfaces: list[Surface]) -> tuple[Domain, ...]:
     """Return the domains of all modes, with the names that were given."""
-    owner: dict[tuple[int, ...], str] = {}
+    places: dict[str, set[tuple[int, ...]]] = {}
     found: list[Domain] = []
     order = [s.name for s in surfaces]
     for mode in description.modes:
         regions = combinations(surfaces, mode.sides)
         if not regions:
             raise EntryError(("modes", mode.name, "in"), _impossible(mode, surfaces))
+        places[mode.name] = {tuple(sides[name] for name in order) for sides in regions}
+        led = {*description.leads.values()}
+        for other, place in places.items():
+            inside = place <= places[mode.name] or places[mode.name] <= place
+            if other != mode.name and inside and not {mode.name, other} & led:
+                sides = next(s for s in regions if tuple(s.values()) in place)
+                raise EntryError(("modes", mode.name, "in"), _shared(mode, other, sides))
         for sides in regions:
-            key = tuple(sides[name] for name in order)
-            if key in owner:
-                raise EntryError(("modes", mode.name, "in"), _shared(mode, owner[key], sides))
-            owner[key] = mode.name
             name = mode.name if len(regions) == 1 else _auto_name(mode, sides, surfaces)
             found.append(Domain(name, mode.name, {n: sides[n] for n in order}, name))
     return _renamed(found, description.domains)
@@ -104,8 +107,9 @@ def _impossible(mode: ModeText, surfaces: list[Surface]) -> str:
 def _shared(mode: ModeText, other: str, sides: Sides) -> str:
     where = ", ".join(f"{name} {side:+d}" for name, side in sides.items())
     return (
-        f"modes '{other}' and '{mode.name}' share the region ({where}): give each a side of a "
-        "surface that divides them"
+        f"modes '{other}' and '{mode.name}' share the region ({where}), and one of them holds nowhere else: "
+        "give each a side of a surface that divides them. (Modes may overlap if each holds alone somewhere, "
+        f"too: motion stays in its mode. Else a reset has to lead to one of them: 'to: {mode.name}')"
     )
 
 

@@ -62,6 +62,8 @@ def _joined(key: _Key) -> dict[str, str]:
     if len(first) < 2:
         return first
     domains = domains_of(description, engine_order(description))
+    if len({tuple(d.signs.items()) for d in domains}) < len(domains):
+        return first  # modes overlap: which of them motion is in is part of its state
     moving = [mode for mode in description.modes if 0 not in mode.sides.values()]
     going_on = True
     while going_on:
@@ -191,7 +193,7 @@ def join_domains(domains: tuple[Domain, ...], first: Mapping[str, str]) -> tuple
 
 def clear_surfaces(surfaces: list[Surface], domains: tuple[Domain, ...]) -> list[Surface]:
     """Return the surfaces; where all that meets one goes on in its own mode, it is not switching any more."""
-    place = {tuple(d.signs.items()): d for d in domains}
+    place = {tuple(d.signs.items()): d for d in domains}  # of modes that overlap none are joined
     found = []
     for surface in surfaces:
         pairs = [(d, place.get(_beyond(d, surface.name))) for d in domains]

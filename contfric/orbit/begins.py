@@ -50,10 +50,12 @@ def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> 
     if is_hold(entered):
         return 1
     rest = any(domain.signs[exit_] == 0 for domain in model.domains)
+    reset = model.reset_by_surface.get(entered)
     if rest and not model.filippov:  # rest is left, and a stop reversed, with an acceleration
         return 0
-    reset = model.reset_by_surface.get(entered)
-    if reset is not None and model.changed_by(reset, exit_):
+    if reset is not None and exit_ in reset.lands:
+        return 1
+    if reset is not None and (exit_ == entered or model.changed_by(reset, exit_)):
         return 0  # thrown off the surface that it rested on
     rested = model.domain_by_name[mode_domains(model, before)[0]].signs[exit_] == 0
     return int(exit_ == entered or rested)
@@ -73,6 +75,7 @@ def entry_rows(
                 model.domain_by_name[d].signs[other.name]
                 for d in (domains[i : i + 1] or mode_domains(model, word[i][0]))
             }
-            if model.changed_by(reset, other.name) and len(signs) == 1:
+            free = model.changed_by(reset, other.name) and other.name not in reset.lands
+            if free and len(signs) == 1:
                 rows.append((i, k, signs.pop(), 1))
     return rows

@@ -15,7 +15,7 @@ from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
 from contfric.orbit.sections import is_smooth, loops, without_sections
-from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
+from contfric.orbit.simulation import SimulationEnd, Trajectory, go_on, simulate
 from contfric.orbit.solve import settle
 from contfric.orbit.system import build_system
 from contfric.signature.cyclic import primitive_length
@@ -87,9 +87,8 @@ def _settled(
 ) -> Orbit:
     """Return the orbit that a motion converges to."""
     span, done = _FIRST, 0
-    y: ArrayLike | None = state
+    trajectory = simulate(model, params, state=state, time=time, periods=span, events=10_000_000)
     while True:
-        trajectory = simulate(model, params, state=y, time=time, periods=span, events=10_000_000)
         _check_motion(trajectory)
         done += span
         orbit = _read_off(trajectory, final=done >= longest)
@@ -103,7 +102,7 @@ def _settled(
                 raise ConvergenceError(_unbounded(trajectory), trajectory)
             raise AperiodicError(_advice(trajectory, done), trajectory)
         span = min(span * _LONGER, longest - done)
-        _, time, y, _ = trajectory.last
+        trajectory = go_on(trajectory, span)
 
 
 def _wanted(orbit: Orbit, periods: int | None) -> Orbit:

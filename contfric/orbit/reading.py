@@ -68,7 +68,7 @@ def _domains(orbit: Orbit, labels: IntArray) -> list[str]:
     for path, (_, exit_) in zip(_paths(orbit, labels), system.word, strict=True):
         domains += [exit_] if is_hold(exit_) else path
         if exit_ in model.reset_by_surface:
-            domains.append(impact_at(exit_))
+            domains.append(impact_at(model, exit_))
     if system.half:
         assert model.symmetry is not None
         image = {**model.symmetry.surfaces, **model.mirror_domain}
@@ -86,7 +86,8 @@ def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
         return model.transitions[ends[i - 1], entry]
     begin = orbit.begins[i]
     signs = signs_at(model, float(begin[0]), begin[1:].copy(), orbit.vector)
-    del signs[entry]  # the joint lies on it to rounding, on the side of every domain
+    for surface in model.reset_by_surface[entry].lands:
+        del signs[surface]  # the joint lies on it to rounding; the transition says the side
     own = [model.domain_by_name[d] for d in mode_domains(model, word[i][0])]
     led = model.targets.get(
         (ends[i - 1], entry), ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
@@ -46,6 +47,7 @@ class Tables(NamedTuple):
     sliding : whether a mode slides on a surface; 2 if it may do so for long, without excitation
     lies_on : surfaces that a mode moves on, as bits
     kept : surfaces that the state stays on where a surface is met, as bits: a reset takes it off others
+    landed : surfaces that the state is on where motion goes on, as bits: the one met, but for a reset
     """
 
     observables: IntArray
@@ -54,6 +56,7 @@ class Tables(NamedTuple):
     sliding: IntArray
     lies_on: IntArray
     kept: IntArray
+    landed: IntArray
 
 
 class EventRows(NamedTuple):
@@ -140,7 +143,7 @@ def tables(model: Model) -> Tables:
         domain = model.domain_by_name[name]
         k = model.surface_index[surface]
         for code in range(codes):
-            if code >> k & 1 or not _matches(domain.signs, surfaces, k, code):
+            if code >> k & 1 or not _matches(domain.signs, surfaces, {surface}, code):
                 continue
             row = (model.mode_index[domain.own_mode] * len(surfaces) + k) * codes + code
             following[row] = model.mode_index[model.domain_by_name[target].own_mode]
@@ -151,10 +154,13 @@ def tables(model: Model) -> Tables:
             model.surface_index[surface],
             model.mode_index[model.domain_by_name[name].own_mode],
         )
+        skipped = _landed(model, surface)
         for code in range(codes):
             for behind in map(model.domain_by_name.__getitem__, targets):
                 # behind a reset the signs of the mapped state tell the domain
-                if not code >> k & 1 and _matches(behind.signs, surfaces, k, code):
+                if not code & _bits(model, skipped) and _matches(
+                    behind.signs, surfaces, skipped, code
+                ):
                     row = (source * len(surfaces) + k) * codes + code
                     following[row] = model.mode_index[behind.own_mode]
     return Tables(
@@ -166,34 +172,40 @@ def tables(model: Model) -> Tables:
         ),
         np.array([_surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
         np.array([_surfaces_kept(model, s.name) for s in model.surfaces], dtype=np.int64),
+        np.array([_bits(model, _landed(model, s.name)) for s in model.surfaces], dtype=np.int64),
     )
 
 
 def _surfaces_under(model: Model, mode: str) -> int:
     """Return the surfaces that a mode moves on, as bits."""
-    return sum(
-        1 << k
-        for k, surface in enumerate(model.surfaces)
-        if any(d.own_mode == mode and d.signs[surface.name] == 0 for d in model.domains)
-    )
+    own = [d for d in model.domains if d.own_mode == mode]
+    return _bits(model, (s.name for s in model.surfaces if any(d.signs[s.name] == 0 for d in own)))
 
 
 def _surfaces_kept(model: Model, met: str) -> int:
     """Return the surfaces that the state stays on where one is met, as bits."""
     reset = model.reset_by_surface.get(met)
-    return sum(
-        1 << k
-        for k, surface in enumerate(model.surfaces)
-        if reset is None or not model.changed_by(reset, surface.name)
-    )
+    kept = [s.name for s in model.surfaces if reset is None or not model.changed_by(reset, s.name)]
+    return _bits(model, kept)
 
 
-def _matches(signs: object, surfaces: list[str], skipped: int, code: int) -> bool:
-    assert hasattr(signs, "__getitem__")
+def _landed(model: Model, met: str) -> Collection[str]:
+    """Return the surfaces that the state is on behind one that is met."""
+    reset = model.reset_by_surface.get(met)
+    return {met} if reset is None else reset.lands
+
+
+def _bits(model: Model, surfaces: Iterable[str]) -> int:
+    return sum(1 << model.surface_index[name] for name in surfaces)
+
+
+def _matches(
+    signs: Mapping[str, int], surfaces: list[str], skipped: Collection[str], code: int
+) -> bool:
     return all(
         signs[name] == 0 or (signs[name] > 0) == bool(code >> j & 1)
         for j, name in enumerate(surfaces)
-        if j != skipped
+        if name not in skipped
     )
 
 
@@ -236,6 +248,22 @@ def simulate(
     events = whole_number("events", events, least=1)
     mode, on = start_of(model, time, y, vector, domain)
     return run(model, vector, mode, on, time, y, periods, events)
+
+
+def go_on(trajectory: Trajectory, periods: float) -> Trajectory:
+    """Follow a trajectory from where it ended, in the mode that it was in."""
+    model, (_, time, y, mode) = trajectory.model, trajectory.last
+    on = _surfaces_under(model, mode)
+    return run(
+        model,
+        model.vector(trajectory.params),
+        model.mode_index[mode],
+        on,
+        time,
+        y,
+        periods,
+        _MOST_EVENTS,
+    )
 
 
 def run(
@@ -299,5 +327,7 @@ def run(
     )
 
 
+#: Events that a trajectory goes on for.
+_MOST_EVENTS = 10_000_000
 #: Events that the first call of the simulation may follow: milliseconds, or half a second of a stiff one.
 _FIRST_EVENTS = 256

@@ -56,7 +56,8 @@ def _side_of_rates(
 
     def ends(domain: Domain, surface: Surface) -> bool:
         own = {d.signs[surface.name] for d in model.domains if d.own_mode == domain.own_mode}
-        return model.cuts(surface.name) or (bool(domain.declared) and len(own) == 1)
+        bounds = model.cuts(surface.name) or surface.name in cut_bounds(model)[domain.own_mode]
+        return bounds or (bool(domain.declared) and len(own) == 1)
 
     def enters(domain: Domain, surface: Surface) -> bool:
         if signs[surface.name] != 0 or not ends(domain, surface):

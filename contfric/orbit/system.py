@@ -326,8 +326,18 @@ def _label_rows(
             ]
             if clear and not model.mode_by_name[mode].sliding:
                 pin = next((h.pin for h in holds if h.segment == i + 1), exit_)
-                rows.append((i, c, *(_place(model, s, c, surfaces) for s in (entry, pin))))
+                on = _landed(model, entry, c)
+                rows.append((i, c, *(_place(model, s, c, surfaces) for s in (on, pin))))
     return _rows(rows, 4)
+
+
+def _landed(model: Model, entry: str, c: int) -> str | None:
+    """Return the surface of observable c that a segment begins on, behind a reset; else that of its entry."""
+    reset = model.reset_by_surface.get(entry)
+    if reset is None:
+        return entry
+    own = model.observables[c].name
+    return next((s for s in reset.lands if model.surface_by_name[s].observable == own), None)
 
 
 def _place(model: Model, surface: str | None, c: int, surfaces: list[str]) -> int:

@@ -21,7 +21,7 @@ from contfric.orbit.simulation import EventRows, Tables
 from contfric.orbit.system import IntArray
 
 #: Types of the model's tables and of the rows of events, as kernels take them.
-TablesType = types.NamedTuple([indices, table, indices, indices, indices, indices], Tables)
+TablesType = types.NamedTuple([indices, table, indices, indices, indices, indices, indices], Tables)
 RowsType = types.NamedTuple([table, indices, vector, matrix], EventRows)
 
 
@@ -67,11 +67,11 @@ def copy_state(source, target):  # type: ignore[no-untyped-def]
 
 
 @helper
-def sign_code(functions, observables, surface, t, y, p, none, empty):  # type: ignore[no-untyped-def]
-    """Return the sides of all surfaces but one, as bits."""
+def sign_code(functions, observables, landed, t, y, p, none, empty):  # type: ignore[no-untyped-def]
+    """Return the sides of all surfaces but those that the state is on, as bits."""
     code, observed, value = 0, -1, 0.0
     for k in range(observables.shape[0]):
-        if k == surface:
+        if landed >> k & 1:
             continue
         if observables[k] != observed:  # surfaces of one observable stand together
             observed = observables[k]
@@ -79,6 +79,12 @@ def sign_code(functions, observables, surface, t, y, p, none, empty):  # type: i
         if value > functions.level(k, p, none, empty):
             code |= 1 << k
     return code
+
+
+@helper
+def behind_event(tables, mode, surface):  # type: ignore[no-untyped-def]
+    """Return the surfaces that the state is on when motion in a mode has met one, as bits."""
+    return tables.landed[surface] | (tables.lies_on[mode] & tables.kept[surface])
 
 
 @helper
@@ -189,7 +195,8 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         if reset:  # rows keep the state before it, as the joints of orbits do
             copy_state(y, rows.states[event])
             functions.reset(surface, t, rows.states[event], p, none, y, workspace.nothing)
-        code = sign_code(functions, observables, surface, t, y, p, none, empty)
+        landed = tables.landed[surface]
+        code = sign_code(functions, observables, landed, t, y, p, none, empty)
         target = following[
             (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code
         ]
@@ -197,7 +204,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         struck = reset or (struck and at_once > 0)
         if at_once > MOST_AT_ONCE:
             return (CHATTER if struck else IMPOSSIBLE), event, mode, cycle, t
-        on = 1 << surface
+        on = landed
         if reset and target < 0:
             return IMPOSSIBLE, event, mode, cycle, t
         if target < 0:
@@ -208,7 +215,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         rows.times[event] = t
         if not reset:
             copy_state(y, rows.states[event])
-        on |= tables.lies_on[mode] & tables.kept[surface]
+        on = behind_event(tables, mode, surface)
         mode = target
         event += 1
     carry[CYCLE], carry[AT_ONCE], carry[ON] = float(cycle), float(at_once), float(on)

@@ -15,7 +15,7 @@ from contfric.chaos.cells import StartingType, start_mode
 from contfric.chaos.tangent import ARRIVED, new_walk, state_workspace, to_joint
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
-from contfric.orbit.trajectory import TablesType
+from contfric.orbit.trajectory import TablesType, behind_event
 from contfric.response.targets import Targets
 
 TargetsType = types.NamedTuple([indices, matrix, indices, vector], Targets)
@@ -96,7 +96,7 @@ def capture(  # type: ignore[no-untyped-def]
             if outcome != ARRIVED:
                 ends[cell] = outcome
                 break
-            on = (1 << surface) | (tables.lies_on[mode] & tables.kept[surface])
+            on = behind_event(tables, mode, surface)
             mode, cycle = following, cycle + turns
             label = caught(targets, mode * surfaces + surface, t, walk.y, period, timeless)
             if label >= 0:

@@ -35,6 +35,7 @@ from contfric.orbit.trajectory import (
     QUIET,
     RowsType,
     TablesType,
+    behind_event,
     copy_state,
     follow,
 )
@@ -74,7 +75,7 @@ def step_behind(functions, tables, mode, surface, following, cycle, t, y, p, ws)
     else:
         copy_state(ws.found, segment.y)
     segment.at[0], segment.at[2] = following, cycle
-    segment.at[1] = (1 << surface) | (tables.lies_on[mode] & tables.kept[surface])
+    segment.at[1] = behind_event(tables, mode, surface)
     segment.time[0] = t
 
 

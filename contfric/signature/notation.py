@@ -24,6 +24,7 @@ from contfric.signature.impacts import (
     is_event,
     is_impact,
     mirror_name,
+    stays_on,
     struck_surface,
 )
 
@@ -46,7 +47,8 @@ class Signature:
         The model, or its name; compared by its name.
     segments : tuple of str
         Names of the domains in the order of the visit, or their notation as one text; the last leads back
-        to the first. Between two of them may stand a hold (``hold@F+``) or an impact (``impact@wall``).
+        to the first. Between two of them may stand a hold (``hold@F+``) or an impact (``impact@wall``),
+        or another reset (``reset@tick``).
         The two may be given the other way round, as a signature is printed.
     periods : int
         Number of periods of the excitation.
@@ -118,7 +120,7 @@ class Signature:
         """The least rotation of the segments, by the order of the domains in the model."""
         names = [domain.name for domain in self.model.domains]
         holds = [TOUCH, *(hold_at(surface.name) for surface in self.model.surfaces)]
-        impacts = map(impact_at, self.model.reset_by_surface)
+        impacts = (impact_at(self.model, s) for s in self.model.reset_by_surface)
         order = {name: i for i, name in enumerate([*names, *holds, *impacts])}
         return rotated(self.segments, least_rotation([order[s] for s in self.segments]))
 
@@ -142,8 +144,13 @@ class Signature:
 
     @property
     def impacts(self) -> int:
-        """Number of impacts."""
-        return sum(is_impact(segment) for segment in self.segments)
+        """Number of impacts: resets on whose surface the state stays."""
+        return sum(is_impact(s) and stays_on(self.model, s) for s in self.segments)
+
+    @property
+    def resets(self) -> int:
+        """Number of other resets: behind them the state is somewhere else."""
+        return sum(is_impact(s) and not stays_on(self.model, s) for s in self.segments)
 
     @cached_property
     def is_mirror_symmetric(self) -> bool:
@@ -196,9 +203,10 @@ class Signature:
             Whether the orbit is symmetric; the segments alone do not tell.
         """
         name = f"{self.stops}{'s' if symmetric else 'a'}"
-        count = len(self.segments) - self.holds - self.impacts
+        count = len(self.segments) - self.holds - self.impacts - self.resets
         name = name if count == TYPICAL_SEGMENTS else f"{name}, {count}seg"
         name = f"{name}, {self.impacts}imp" if self.impacts else name
+        name = f"{name}, {self.resets}reset" if self.resets else name
         return f"{name}, {self.holds}hold" if self.holds else name
 
 

@@ -67,7 +67,7 @@ MISTAKES = [
     ("Omega > 0]", "Omega > 1]", Topic.CONSTRAINTS, "error", "violate Omega > 1 (Omega = 0.7)"),
     ("S*sign(v)", "S*sign(v/k)", Topic.KINKS, "warning", "kink where v/k = 0"),
     ("k: 1.0}", "k: 1.0, mu: 0.3}", Topic.NAMES, "warning", "parameter 'mu' is used nowhere"),
-    ("  backward: {in: {v: -}}\n", "", Topic.TRANSITIONS, "error", "is in no domain"),
+    ("  backward: {in: {v: -}}\n", "", Topic.TRANSITIONS, "error", "and no domain follows"),
     (
         "  stick: {in: {v: 0, F+: -, F-: +}, field: {x: 0, v: 0}}\n",
         "",
@@ -130,7 +130,12 @@ resets: {wall: {v: -e*v}}
 
 @pytest.mark.parametrize(
     ("reset", "says"),
-    [("v: -e*v", ""), ("v: e*v", "must turn the rate"), ("v: -e*v, x: x - 0.1", "off the surface")],
+    [
+        ("v: -e*v", ""),
+        ("v: e*v", "must turn the rate"),
+        ("v: -e*v, x: x - 0.1", ""),
+        ("v: -e*v, x: x + 0.1", "is in no domain"),
+    ],
 )
 def test_resets_are_checked(tmp_path: Path, reset: str, says: str) -> None:
     report = report_of(tmp_path, WALL.replace("v: -e*v", reset))

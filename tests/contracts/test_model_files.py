@@ -154,7 +154,12 @@ MISTAKES = [
     ("name: spring", "name: spring\nmax_step: 1e-3", 2, "write 1.0e-3"),
     ("name: spring", "name: spring\nmax_step: true", 2, "got True"),
     ("name: spring", "name: spring\nresets: {v: {w: 1}}", 2, "unknown key 'w'"),
-    ("name: spring", "name: spring\nresets: {v: {v: -v}}", 2, "motion lies on both sides of it"),
+    (
+        "name: spring",
+        "name: spring\nresets: {v: {v: -v}}",
+        2,
+        "behind a reset the rates must tell the side",
+    ),
     ("name: spring", "name: spring\ndomains: {a: {mode: forward}}", 2, "it holds for: forward:u+"),
     (
         "name: spring",

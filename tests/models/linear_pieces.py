@@ -538,7 +538,7 @@ impact = Model(
     stop_surface="v",
     flow_factory=_impact_flow,
     spread=_spread,
-    resets=(Reset("wall", "x' -> wall' - e (x' - wall')", changes=("v",)),),
+    resets=(Reset("wall", "x' -> wall' - e (x' - wall')", changes=("v",), lands={"wall": 1}),),
 )
 
 __all__ = ["belt", "dead_band", "impact"]

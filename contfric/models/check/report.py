@@ -12,8 +12,8 @@ class Topic(str, Enum):
 
     DERIVATIVES = "compiled values and derivatives against the formulas"
     SURFACES = "surfaces are regular: the gradient does not vanish on them"
-    TRANSITIONS = "every region that motion reaches has a domain, and every crossing a next one"
-    RESETS = "a reset leaves the state on its surface, and sends it back"
+    TRANSITIONS = "every crossing that motion makes has a next domain, which it can enter"
+    RESETS = "a reset leads into a domain, and away from the surfaces that it is on there"
     CONTINUITY = "fields and observables do not jump inside of a mode"
     KINKS = "kinks of the fields lie on surfaces that their modes know"
     SLIDING = "sliding modes stay on their surfaces"

@@ -6,7 +6,7 @@ import numpy as np
 
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.definition import FloatArray, Mode, Model, Surface
+from contfric.models.definition import Domain, FloatArray, Mode, Model, Reset, Surface
 
 #: States on each surface, and in the whole region.
 _ON_SURFACE, _EVERYWHERE = 200, 400
@@ -42,20 +42,8 @@ def check_surfaces(report: ModelReport, probe: Probe) -> None:
 
 
 def check_transitions(report: ModelReport, probe: Probe) -> None:
-    """Check that every region has a domain, and every crossing that motion makes a next one."""
+    """Check that every crossing that motion makes has a next domain."""
     model = probe.model
-    for t, y in probe.states(_EVERYWHERE):
-        signs = probe.signs(t, y)
-        if 0 in signs.values():
-            continue
-        report.count(Topic.TRANSITIONS)
-        if model.domain_at(signs) is None and not _behind_wall(probe, signs):
-            report.error(
-                Topic.TRANSITIONS,
-                f"the state {_place(probe, t, y)} is in no domain: {_sides(signs)}. Add a mode whose "
-                "'in' holds there",
-            )
-            return
     for surface in model.surfaces:
         if surface.name not in model.reset_by_surface:
             _check_crossings(report, probe, surface)
@@ -76,11 +64,10 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
         signs = {**probe.signs(t, y), surface.name: 0}
         if list(signs.values()).count(0) != 1 or _behind_wall(probe, {**signs}):
             continue
-        for side in (1, -1):
-            name = model.domain_at({**signs, surface.name: side})
-            if name is None:
+        for domain in model.domains:
+            side, name = domain.signs[surface.name], domain.name
+            if not side or domain.signs != {**signs, surface.name: side}:
                 continue
-            domain = model.domain_by_name[name]
             rate = probe.rate(domain.own_mode, surface.name, t, y)
             if not side * rate < -_STILL:
                 continue
@@ -110,8 +97,9 @@ def _goes_on(
     """Return whether motion can enter what follows; else it is sent back at once, for ever."""
     domain = probe.model.domain_by_name[following]
     side = domain.signs[surface.name]
-    if side == 0:
-        return True
+    back = probe.model.transitions.get((following, surface.name))
+    if side == 0 or (back and probe.model.domain_by_name[back].own_mode == domain.own_mode):
+        return True  # it stays, or the surface ends the other mode only
     rate = probe.rate(domain.own_mode, surface.name, t, y)
     if side * rate >= -_STILL:
         return True
@@ -125,38 +113,47 @@ def _goes_on(
 
 
 def check_resets(report: ModelReport, probe: Probe) -> None:
-    """Check that a reset leaves the state on its surface, and that it moves away from there."""
+    """Check that a reset leads into a domain, and away from the surfaces that it is on there."""
     model = probe.model
-    for name in model.reset_by_surface:
-        for t, y in probe.on(name, _ON_SURFACE // 2):
+    for reset in model.resets:
+        for t, y in probe.on(reset.surface, _ON_SURFACE // 2):
             signs = probe.signs(t, y)
-            inside = {d.signs[name] for d in model.domains} - {0}
-            before = model.domain_at({**signs, name: min(inside)}) if len(inside) == 1 else None
-            if before is None:
-                continue
-            side, mode = min(inside), model.domain_by_name[before].own_mode
-            if not side * probe.rate(mode, name, t, y) < -_STILL:
-                continue
-            report.count(Topic.RESETS)
-            behind = probe.reset(name, t, y)
-            if not abs(probe.height(name, t, behind)) <= _SAME * (1.0 + np.abs(y).max()):
-                report.error(
-                    Topic.RESETS,
-                    f"the reset at '{name}' takes the state {_place(probe, t, y)} off the surface: it may "
-                    "not change what the surface's observable depends on",
-                )
-                return
-            after = model.domain_at({**probe.signs(t, behind), name: side})
-            if after is None or not (
-                side * probe.rate(model.domain_by_name[after].own_mode, name, t, behind) > 0.0
-            ):
-                report.error(
-                    Topic.RESETS,
-                    f"behind the reset at '{name}' the motion from {_place(probe, t, y)} still runs into "
-                    "the surface, or is in no domain: a reset must turn the rate of "
-                    f"'{model.surface_by_name[name].observable}' around, such as v: -e*v",
-                )
-                return
+            for domain in model.domains:
+                side = domain.signs[reset.surface]
+                beside = all(signs[s] == v for s, v in domain.signs.items() if s != reset.surface)
+                if not (side and beside):
+                    continue
+                if not side * probe.rate(domain.own_mode, reset.surface, t, y) < -_STILL:
+                    continue
+                report.count(Topic.RESETS)
+                if fault := _reset_fault(probe, reset, domain, t, y):
+                    report.error(Topic.RESETS, fault)
+                    return
+
+
+def _reset_fault(probe: Probe, reset: Reset, before: Domain, t: float, y: FloatArray) -> str:
+    """Return what is wrong with the image of a state; nothing if motion goes on from there."""
+    model, name = probe.model, reset.surface
+    behind = probe.reset(name, t, y)
+    signs = probe.signs(t, behind)
+    where = f"behind the reset at '{name}' the motion from {_place(probe, t, y)}"
+    possible = [model.domain_by_name[d] for d in model.targets.get((before.name, name), ())]
+    fits = [
+        d
+        for d in possible
+        if all(d.signs[s] == v for s, v in signs.items() if s not in reset.lands)
+    ]
+    if not fits:
+        return f"{where} is in no domain: {_sides(signs)}. Add a mode that holds there"
+    for surface in reset.lands:
+        rate = probe.rate(fits[0].own_mode, surface, t, behind)
+        if not fits[0].signs[surface] * rate > 0.0:
+            observable = model.surface_by_name[surface].observable
+            return (
+                f"{where} still runs into the surface '{surface}': a reset must turn the rate of "
+                f"'{observable}' around, such as v: -e*v, or lead off the surface"
+            )
+    return ""
 
 
 def check_sliding(report: ModelReport, probe: Probe) -> None:

@@ -1,0 +1,146 @@
+"""Where a reset leads: the surfaces that its images lie on, and the sides to which motion leaves them.
+
+``theta -> -theta`` at ``theta = alpha`` lands on ``theta = -alpha``; ``omega -> r omega`` at ``theta = 0``
+stays there and lets motion pass, ``omega -> -r omega`` sends it back. Found at sampled states that motion
+arrives at: it is so for all of them, or it is not so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from contfric.models.definition import Domain, Reset, Surface
+from contfric.models.entries import EntryError
+from contfric.models.evaluate import Sampler
+from contfric.models.grammar import parse
+
+#: States on a surface that are asked: what a single one says may be an accident.
+_PLACES = 24
+#: Rounding of an image on a surface, relative to 1 + its values.
+_ON = 1e-9
+
+
+class Landing:
+    """The images of a reset, at sampled states on its surface."""
+
+    def __init__(
+        self,
+        sampler: Sampler,
+        surface: str,
+        surfaces: Sequence[Surface],
+        domains: Sequence[Domain],
+        leads: str,
+    ) -> None:
+        self.sampler, self.surface, self.leads = sampler, surface, leads
+        self.surfaces = [s.name for s in surfaces]
+        self.domains = domains
+        self.arrivals = list(self._arrivals())
+
+    def _arrivals(self) -> list[tuple[Domain, float, list[float]]]:
+        """Return (domain, time, state) of motion that meets the surface."""
+        found = []
+        for t, y in self.sampler.on(self.surface, {}, _PLACES):
+            sides = self.sampler.sides(t, y, self.surfaces)
+            for domain in self.domains:
+                side = domain.signs[self.surface]
+                if side == 0 or any(
+                    sides[s] != v for s, v in domain.signs.items() if s != self.surface
+                ):
+                    continue
+                if side * self.sampler.rate(domain.mode, self.surface, side, t, y) < 0.0:
+                    found.append((domain, t, y))
+        return found
+
+    def lands(self) -> dict[str, int]:
+        """Return the surfaces that all images lie on, and the side to which each is left.
+
+        For the reset's own surface that side is +1 where motion goes back, -1 where it passes.
+        """
+        images = [(d, t, self._image(t, y)) for d, t, y in self.arrivals]
+        met = [
+            s for s in self.surfaces if images and all(self._is_on(s, t, y) for _, t, y in images)
+        ]
+        return {surface: self._left_to(surface, met, images) for surface in met}
+
+    def _image(self, t: float, y: Sequence[float]) -> list[float]:
+        evaluator, params = self.sampler.evaluator, self.sampler.params
+        description = evaluator.description
+        texts = description.resets[self.surface]
+        return [
+            evaluator.value(texts[state], params, t, y) if state in texts else value
+            for state, value in zip(description.states, y, strict=True)
+        ]
+
+    def _is_on(self, surface: str, t: float, y: Sequence[float]) -> bool:
+        above = self.sampler.evaluator.height(surface, self.sampler.params, t, y)
+        return abs(above) <= _ON * (1.0 + max(map(abs, y)))
+
+    def _left_to(
+        self,
+        surface: str,
+        met: Sequence[str],
+        images: Sequence[tuple[Domain, float, list[float]]],
+    ) -> int:
+        own = surface == self.surface
+        verdicts = set()
+        for before, t, y in images:
+            side = self._side(before, surface, met, t, y)
+            verdicts.add(side * before.signs[surface] if own else side)
+        if len(verdicts) == 1 and 0 not in verdicts:
+            return verdicts.pop()
+        if own and len({d.signs[surface] for d in self.domains} - {0}) == 1:
+            return 1  # a wall that some states still run into: `contfric check` says where
+        raise EntryError(
+            ("resets", self.surface),
+            f"the reset at '{self.surface}' takes states to the surface '{surface}', and some of them to one "
+            "side of it, some to the other, or to none: behind a reset the rates must tell the side",
+        )
+
+    def _side(
+        self, before: Domain, surface: str, met: Sequence[str], t: float, y: Sequence[float]
+    ) -> int:
+        """Return the side of a surface to which one image leaves; 0 if there is none, or two."""
+        sides = self.sampler.sides(t, y, [s for s in self.surfaces if s not in met])
+        behind = [
+            d
+            for d in self.domains
+            if all(d.signs[s] == v for s, v in sides.items()) and self.leads in ("", d.mode)
+        ]
+        own = [d for d in behind if d.mode == before.mode]
+        away = set()
+        for domain in behind:
+            side = domain.signs[surface]
+            beside = any(d.signs == domain.signs for d in own) and domain not in own
+            if side == 0 or beside:
+                continue
+            if side * self.sampler.rate(domain.mode, surface, side, t, y) > 0.0:
+                away.add(side)
+        return away.pop() if len(away) == 1 else 0
+
+
+def reset_of(
+    sampler: Sampler, surface: str, surfaces: Sequence[Surface], domains: Sequence[Domain]
+) -> Reset:
+    """Return the reset at a surface; observables without the states that it maps are not changed by it."""
+    description = sampler.evaluator.description
+    texts, leads = description.resets[surface], description.leads.get(surface, "")
+    changed = {state for state, value in texts.items() if value != state}
+    own = next(s.observable for s in description.surfaces if s.name == surface)
+    seen = {
+        o.name
+        for o in description.observables
+        if description.names.leaves(parse(o.formula), ()) & changed
+    }
+    landing = Landing(sampler, surface, surfaces, domains, leads)
+    if landing.arrivals:
+        lands = landing.lands()
+    else:  # none of the states that were sampled: the formula tells
+        one_sided = len({d.signs[surface] for d in domains} - {0}) == 1
+        lands = {} if own in seen else {surface: 1 if one_sided else -1}
+    changes = tuple(
+        o.name
+        for o in description.observables
+        if o.name in seen and not (o.name == own and surface in lands)
+    )
+    formula = ", ".join(f"{state} -> {value}" for state, value in texts.items())
+    return Reset(surface, formula, changes, lands, leads)

@@ -1,0 +1,158 @@
+"""What a model says of its transitions: the domain that follows each (domain, surface), and mirror images.
+
+A domain is a mode with the sides of all surfaces. Where modes overlap several domains have the same sides:
+motion stays in the mode that it is in while that holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from contfric.errors import ParameterError
+from contfric.models.section_maps import SectionMaps
+
+if TYPE_CHECKING:
+    from contfric.models.parts import Departure, Domain, Reset, Surface, Symmetry
+
+
+class TransitionMaps(SectionMaps):
+    """The part of a model that derives its transitions from its domains, departures and resets."""
+
+    if TYPE_CHECKING:
+        name: str
+        departures: tuple[Departure, ...]
+        symmetry: Symmetry | None
+        kinks: tuple[str, ...]
+        turned: frozenset[tuple[str, str]]
+
+    def cuts(self, surface: str) -> bool:
+        """Return whether motion is cut at a surface: it is switching, or has a reset."""
+        if surface in self.kinks or not surface:
+            return False
+        return self.surface_by_name[surface].switching or surface in self.reset_by_surface
+
+    @cached_property
+    def transitions(self) -> dict[tuple[str, str], str]:
+        """Next domain for each possible (domain, surface); what is absent cannot happen.
+
+        Resets are left out: what follows one depends on the state (:attr:`targets`).
+        """
+        found: dict[tuple[str, str], str] = {}
+        for domain in self.domains:
+            for surface in self.surfaces:
+                target = self._next_domain(domain, surface)
+                if target is not None and target != domain.name:
+                    found[domain.name, surface.name] = target
+        return found
+
+    @cached_property
+    def targets(self) -> dict[tuple[str, str], tuple[str, ...]]:
+        """Every domain that can follow each (domain, surface): one, but for a reset."""
+        found: dict[tuple[str, str], tuple[str, ...]] = {
+            key: (target,) for key, target in self.transitions.items()
+        }
+        for domain in self.domains:
+            for reset in self.resets:
+                behind = self._domains_behind(domain, reset)
+                if behind and domain.signs[reset.surface] != 0:
+                    found[domain.name, reset.surface] = behind
+        return found
+
+    def changed_by(self, reset: Reset, surface: str) -> bool:
+        """Return whether a reset may change the sign at a surface."""
+        return self.surface_by_name[surface].observable in reset.changes
+
+    def _domains_behind(self, domain: Domain, reset: Reset) -> tuple[str, ...]:
+        """Return the domains that a reset can map to: they differ in what it changes.
+
+        Where several modes hold, the one that the reset names, or else the mode before it, goes on.
+        """
+        fixed = {
+            s.name: domain.signs[s.name]
+            for s in self.surfaces
+            if not self.changed_by(reset, s.name)
+        }
+        own = reset.lands.get(reset.surface, 1) * domain.signs[reset.surface]
+        landed = {**reset.lands, **({reset.surface: own} if reset.stays else {})}
+        behind = [
+            d
+            for d in self.domains
+            if all(d.signs[s] == side for s, side in {**fixed, **landed}.items())
+            and all(d.signs[s.name] != 0 for s in self.surfaces if s.name not in fixed)
+            and reset.leads in ("", d.own_mode)
+        ]
+        kept = [d.signs for d in behind if d.own_mode == domain.own_mode]
+        return tuple(d.name for d in behind if d.own_mode == domain.own_mode or d.signs not in kept)
+
+    def _next_domain(self, domain: Domain, surface: Surface) -> str | None:
+        sign = domain.signs[surface.name]
+        if sign == 0 or surface.name in self.reset_by_surface:
+            return None
+        mode = domain.own_mode
+        through = {**domain.signs, surface.name: -sign}
+        if not surface.switching:
+            target = self.domain_at(through, mode)
+            if target and (self.domain_by_name[target].own_mode, surface.name) in self.turned:
+                return self.domain_at(domain.signs, self.domain_by_name[target].own_mode)
+            return target
+        resting = self.domain_at({**domain.signs, surface.name: 0}, mode)
+        return resting if resting is not None else self.domain_at(through, mode)
+
+    def _resolve_at_rest(self, signs: Mapping[str, int], mode: str) -> str | None:
+        staying = self._domain_with(signs, mode)
+        if staying is not None:
+            return staying
+        for departure in self.departures:
+            if all(signs[name] == value for name, value in departure.where.items()):
+                return self._domain_with({**signs, **departure.leaves}, mode)
+        return None
+
+    def domain_at(self, signs: Mapping[str, int], mode: str = "") -> str | None:
+        """Return the domain that a state with these signs is in, or leaves to from rest.
+
+        Where modes overlap, motion stays in the ``mode`` that it is in if that holds there.
+        """
+        if any(signs[s.name] == 0 for s in self.surfaces if s.switching):
+            return self._resolve_at_rest(signs, mode)
+        return self._domain_with(signs, mode)
+
+    def _domain_with(self, signs: Mapping[str, int], mode: str = "") -> str | None:
+        fits = self._domains_by_signs.get(tuple(signs[s.name] for s in self.surfaces), ())
+        return next((d.name for d in fits if d.own_mode == mode), fits[0].name if fits else None)
+
+    @cached_property
+    def _domains_by_signs(self) -> dict[tuple[int, ...], tuple[Domain, ...]]:
+        """Domains by the sides of all surfaces: several where modes overlap."""
+        found: dict[tuple[int, ...], tuple[Domain, ...]] = {}
+        for domain in self.domains:
+            key = tuple(domain.signs[s.name] for s in self.surfaces)
+            found[key] = (*found.get(key, ()), domain)
+        return found
+
+    @cached_property
+    def mirror_domain(self) -> dict[str, str]:
+        """Image of each domain under the symmetry; empty if the model has none."""
+        if self.symmetry is None:
+            return {}
+        image: dict[str, str] = {}
+        modes: dict[
+            str, set[str]
+        ] = {}  # the image of a mode holds wherever a domain of it has its image
+        for domain in self.domains:
+            fits = {d.own_mode for d in self._mirrored(domain)}
+            modes[domain.own_mode] = modes.get(domain.own_mode, fits) & fits
+        for domain in self.domains:
+            fit = modes[domain.own_mode]
+            target = next((d.name for d in self._mirrored(domain) if d.own_mode in fit), None)
+            if target is None:
+                raise ParameterError(f"model {self.name}: domain {domain.name} has no mirror image")
+            image[domain.name] = target
+        return image
+
+    def _mirrored(self, domain: Domain) -> tuple[Domain, ...]:
+        """Return the domains in which the image of a domain under the symmetry lies."""
+        assert self.symmetry is not None
+        signs = {self.symmetry.surfaces[s]: -v for s, v in domain.signs.items()}
+        return self._domains_by_signs.get(tuple(signs[s.name] for s in self.surfaces), ())
