@@ -159,7 +159,7 @@ def _renewed(
 
 def _not_followed(end: End) -> End:
     """Return an end that could be followed and was not, saying so."""
-    return replace(end, message=f"{end.reason.value}; not followed (its bifurcation says why)")
+    return replace(end, message=f"{end}; not followed (its bifurcation says why)")
 
 
 def _nodes(event: Event, place: dict[int, int], image: dict[int, int]) -> list[Node]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from contfric.errors import ModelError
+from contfric.models.clocks import with_clock
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.description import Description, DomainText, ModeText
 from contfric.models.entries import Part
@@ -57,7 +58,7 @@ def describe(data: Mapping[str, Any]) -> Description:
     EntryError
         For the first mistake, with the address of its entry.
     """
-    top = Part({str(key): value for key, value in data.items()})
+    top = Part(with_clock({str(key): value for key, value in data.items()}))
     top.only(KEYS)
     states = _states(top)
     parameters = _parameters(top)

@@ -26,6 +26,7 @@ __all__ = [
     "log",
     "maximum",
     "minimum",
+    "mod",
     "pi",
     "sign",
     "sin",
@@ -45,6 +46,11 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
 def minimum(*values: Any) -> Any:
     """Return the least of some formulas."""
     return sympy.Min(*values, evaluate=False)
+
+
+def mod(time: Any, period: Any) -> Any:
+    """Return the time since the last tick of a clock: ``mod(t, T)`` with the period of the model."""
+    return sympy.Function("mod")(time, period)
 
 
 def maximum(*values: Any) -> Any:

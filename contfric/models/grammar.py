@@ -41,7 +41,7 @@ _COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
 #: What is refused, with what to write instead.
 _ADVICE: dict[type[ast.AST], str] = {
     ast.BitXor: "'^' is no power: write **",
-    ast.Mod: "there is no remainder (%): an expression must be smooth, or kinked by abs, min, where",
+    ast.Mod: "a remainder (%) is that of the time, mod(t, T)",
     ast.FloorDiv: "there is no whole division (//): write /",
     ast.IfExp: "write where(condition, a, b) for 'a if condition else b'",
     ast.Attribute: "a dot can only stand in a number",

@@ -1,0 +1,234 @@
+"""Clocks: ``mod(t, T)`` in the formulas of a model, the time since the last tick.
+
+A sawtooth, a pulse of 0.3 periods, a switch that is thrown once in a period: what jumps at known times.
+The time since the last tick is made a state, ``clock``, of rate 1; at the surface ``tick``, where it is
+the period, it begins again at 0. Everything else that depends on t has the same period, so the clock
+stands in the place of t, and the model has no other time: it is autonomous. A joint at a tick, or at
+``mod(t, T) = 0.3 T``, is then as ordinary as any other.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from typing import Any
+
+from contfric.models.entries import EntryError
+from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope
+from contfric.yaml_lines import Address
+
+#: What the clock and its surface are called, and the function that stands for it.
+CLOCK, TICK, MOD = "clock", "tick", "mod"
+#: Rounding in an identity of two periods.
+_SAME = 1e-12
+#: Shares by which parameters are moved: two periods that are equal at the defaults may be so by accident.
+_MOVED = (0.0, 0.137)
+
+#: Parts of a model that hold expressions, how many keys down.
+_PARTS = {"define": 1, "observables": 1, "field": 1, "resets": 2}
+
+
+def with_clock(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a model's data with ``mod(t, T)`` as a state; unchanged where it is not used.
+
+    Raises
+    ------
+    EntryError
+        Where ``mod`` is not that of the time and the model's period, or a name is taken.
+    """
+    if not any(_ticks(text) for _, text in _expressions(data)):
+        return data
+    period = data.get("period")
+    if not isinstance(period, (str, int, float)) or isinstance(period, bool):
+        raise EntryError((), f"{MOD}(t, T) needs the period T of the model: write 'period: ...'")
+    _check_names(data)
+    reader = _Reader(str(period), data)
+    found = {
+        key: _rewritten(value, (key,), depth, reader)
+        for key, value in data.items()
+        if (depth := _PARTS.get(key, 0)) >= 0
+    }
+    found["modes"] = {
+        name: _mode(mode, name, reader) for name, mode in _mapping(data, "modes").items()
+    }
+    if "field" in data:
+        found["field"] = {**found["field"], CLOCK: 1}
+    del found["period"]
+    return found | {
+        "autonomous": True,
+        "states": [*data.get("states", ()), CLOCK],
+        "surfaces": {
+            **_mapping(data, "surfaces"),
+            TICK: {"observable": CLOCK, "level": str(period)},
+        },
+        "resets": {
+            **found.get("resets", {}),
+            TICK: {CLOCK: 0, **_mapping(found, "resets").get(TICK, {})},
+        },
+        "symmetry": _symmetry(data),
+        "spread": {**_mapping(data, "spread"), CLOCK: f"({period})/2"},
+    }
+
+
+def _mapping(data: Mapping[str, Any], key: str) -> dict[str, Any]:
+    value = data.get(key)
+    return dict(value) if isinstance(value, Mapping) else {}
+
+
+def _expressions(data: Mapping[str, Any]) -> list[tuple[Address, str]]:
+    """Return all expressions of time with their addresses."""
+    parts = [(key, data.get(key), depth) for key, depth in _PARTS.items()]
+    found: list[tuple[Address, str]] = []
+    for key, value, depth in parts:
+        found += _texts(value, (key,), depth)
+    for name, mode in _mapping(data, "modes").items():
+        if isinstance(mode, Mapping):
+            found += _texts(mode.get("field"), ("modes", name, "field"), 1)
+    return found
+
+
+def _texts(value: object, address: Address, depth: int) -> list[tuple[Address, str]]:
+    if depth == 0:
+        return [(address, value)] if isinstance(value, str) else []
+    if not isinstance(value, Mapping):
+        return []
+    return [pair for key, v in value.items() for pair in _texts(v, (*address, str(key)), depth - 1)]
+
+
+def _tree(text: str) -> ast.Expression | None:
+    try:
+        return ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return None  # whoever reads the expression says what is wrong
+
+
+def _ticks(text: str) -> bool:
+    tree = _tree(text) if MOD in text or "%" in text else None
+    return tree is not None and any(_is_mod(node) for node in ast.walk(tree))
+
+
+def _is_mod(node: ast.AST) -> bool:
+    called = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == MOD
+    return called or (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod))
+
+
+def _check_names(data: Mapping[str, Any]) -> None:
+    taken = {*map(str, data.get("states", ())), *_mapping(data, "parameters")}
+    taken |= {*_mapping(data, "define"), *_mapping(data, "observables")}
+    if CLOCK in taken or TICK in _mapping(data, "surfaces"):
+        raise EntryError(
+            (),
+            f"a model with {MOD}(t, T) gets a state '{CLOCK}' and a surface '{TICK}': "
+            "give other names to yours",
+        )
+
+
+class _Reader(ast.NodeTransformer):
+    """Puts the clock in the place of ``mod(t, T)`` and of t."""
+
+    def __init__(self, period: str, data: Mapping[str, Any]) -> None:
+        self.period = period
+        self.address: Address = ()
+        self.parameters = {
+            str(name): value.get("default") if isinstance(value, Mapping) else value
+            for name, value in _mapping(data, "parameters").items()
+        }
+        self.define = {
+            name: tree.body
+            for name, text in _mapping(data, "define").items()
+            if (tree := _tree(str(text))) is not None
+        }
+
+    def read(self, text: str, address: Address) -> str:
+        """Return an expression with the clock in it."""
+        tree, self.address = _tree(text), address
+        return text if tree is None else ast.unparse(self.visit(tree))
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        """Replace mod(t, T)."""
+        if not _is_mod(node):
+            return self.generic_visit(node)
+        if len(node.args) != 2 or node.keywords:
+            raise EntryError(self.address, f"write {MOD}(t, T): time and period")
+        return self._clock(*node.args)
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        """Replace t % T."""
+        return self._clock(node.left, node.right) if _is_mod(node) else self.generic_visit(node)
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        """Replace t, and the period."""
+        if node.id == TIME:
+            return ast.Name(CLOCK, ast.Load())
+        return ast.parse(self.period, mode="eval").body if node.id == PERIOD else node
+
+    def _clock(self, time: ast.expr, period: ast.expr) -> ast.AST:
+        what = f"{MOD}({ast.unparse(time)}, {ast.unparse(period)})"
+        if not (isinstance(time, ast.Name) and time.id == TIME):
+            raise EntryError(
+                self.address,
+                f"{what}: only the time itself begins again: {MOD}(t, T). For a switch at another time give "
+                f"a surface to an observable '{MOD}(t, T)', at the level of that time; a state that jumps "
+                "has a reset",
+            )
+        if not self._is_period(period):
+            raise EntryError(
+                self.address,
+                f"{what}: what begins again does so with the period of the model, '{self.period}'",
+            )
+        return ast.Name(CLOCK, ast.Load())
+
+    def _is_period(self, node: ast.expr) -> bool:
+        if isinstance(node, ast.Name) and node.id == PERIOD:
+            return True
+        own = ast.parse(self.period, mode="eval").body
+        for k, share in enumerate(_MOVED):
+            moved = {
+                name: float(v) * (1.0 + share * (1 + i * k)) if isinstance(v, (int, float)) else 0.0
+                for i, (name, v) in enumerate(self.parameters.items())
+            }
+            a, b = (Scope(FLOATS, dict(moved), self.define).evaluate(e) for e in (node, own))
+            if not abs(a - b) <= _SAME * abs(b):
+                return False
+        return True
+
+
+def _rewritten(value: Any, address: Address, depth: int, reader: _Reader) -> Any:
+    if depth and isinstance(value, Mapping):
+        return {k: _rewritten(v, (*address, str(k)), depth - 1, reader) for k, v in value.items()}
+    named = address[:1] == ("resets",) and address[-1] == "to"
+    at_end = depth == 0 and address[0] in _PARTS
+    return reader.read(value, address) if at_end and isinstance(value, str) and not named else value
+
+
+def _mode(mode: Any, name: str, reader: _Reader) -> Any:
+    if not isinstance(mode, Mapping):
+        return mode
+    found = {**mode, "in": {**_mapping(mode, "in"), TICK: "-"}}
+    if isinstance(mode.get("field"), Mapping):
+        own = {
+            state: reader.read(text, ("modes", name, "field", str(state)))
+            if isinstance(text, str)
+            else text
+            for state, text in mode["field"].items()
+        }
+        found["field"] = {**own, CLOCK: 1}
+    return found
+
+
+def _symmetry(data: Mapping[str, Any]) -> Any:
+    symmetry = data.get("symmetry")
+    if symmetry is None:
+        return None
+    pieces = symmetry.split(",") if isinstance(symmetry, str) else []
+    images = dict(symmetry) if isinstance(symmetry, Mapping) else {}
+    for piece in pieces:
+        name, _, image = piece.partition("->")
+        images[name.strip()] = image.strip()
+    if str(images.pop(TIME, TIME)).strip() != TIME:
+        raise EntryError(
+            ("symmetry",),
+            f"a model with {MOD}(t, T) has a symmetry of its states only: half a period later the clock "
+            "shows another time",
+        )
+    return images
