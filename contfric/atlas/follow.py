@@ -51,6 +51,7 @@ from contfric.continuation.switching import (
     settings_value,
 )
 from contfric.continuation.trace import trace_side
+from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish
@@ -67,6 +68,9 @@ _NO_WIDTH = 1e-3
 _UNKNOWN = 0.1
 #: A hold shorter than this share of the arclength is rounding: on a bridge joints move as its length does.
 _NO_TIME = 1e-2
+#: A segment this short is known to the root of rounding only, where it touches a surface; and one that comes
+#: in at an event is longer than this share of the arclength.
+_NO_LENGTH, _NO_SHARE = 1e-6, 1e-2
 
 
 def follow(state: Exploration, event: Event) -> None:
@@ -125,7 +129,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
         guess = replace(found, vector=orbit.vector)
         branch = _through(state, guess)
         ends = [] if branch is None else [e for e in branch.ends if _meets(e, event, settings)]
-        if branch is None or not ends:
+        if branch is None or not ends or _never_lasts(branch):
             why = f"no orbit of {show(guess.word)} meets the event"
             state.judge(event, reason, Verdict.REFUSED, why=why)
         elif (known := state.known(branch[len(branch) // 2])) is not None:
@@ -183,6 +187,10 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         why = "its hold has no length anywhere: the motion of another word, that only touches rest"
         state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
         return False
+    if branch is not None and _never_lasts(branch):
+        why = "a segment of it has no length anywhere: the motion of another word, that touches a surface"
+        state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
+        return False
     if branch is not None and _has_no_width(branch, event, state.settings):
         why = "it begins and ends at the event, without any width"
         state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
@@ -215,8 +223,23 @@ def _never_held(branch: Branch) -> bool:
     holds = [hold.segment for hold in branch.system.holds]
     if not holds:
         return False
-    lasts = np.array([(o.ends[:, 0] - o.cycle[:, 0])[holds] for o in branch])
-    return bool(np.any(np.max(lasts, axis=0) < _NO_TIME * min(1.0, branch.arc[-1])))
+    lasts = _longest(branch)[holds]
+    return bool(np.any(lasts < _NO_TIME * min(1.0, branch.arc[-1])))
+
+
+def _never_lasts(branch: Branch) -> bool:
+    """Tell whether a segment has no length at any point of a branch: the orbits are those without it.
+
+    Where orbits are a continuum those of them that touch a surface solve the equations of a word with a
+    segment there, of no length. A segment that comes in at an event grows at least with the distance.
+    """
+    return bool(np.any(_longest(branch) < min(_NO_LENGTH, _NO_SHARE * branch.arc[-1])))
+
+
+def _longest(branch: Branch) -> FloatArray:
+    """Return the longest duration of each segment along a branch, shape (segments,)."""
+    found: FloatArray = np.max([o.ends[:, 0] - o.cycle[:, 0] for o in branch], axis=0)
+    return found
 
 
 def _has_no_width(branch: Branch, event: Event, settings: Settings) -> bool:
