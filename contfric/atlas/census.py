@@ -9,7 +9,6 @@ what follows from that for completeness, and what does not.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,8 +22,9 @@ from contfric.atlas.census_search import Findings, Mesh, Progress, Search, Wante
 from contfric.atlas.census_sections import Section, exit_arcs, period_of, sections_of
 from contfric.atlas.census_words import canonical_pair, closed_words
 from contfric.errors import ParameterError, whole_number
-from contfric.models import ModelSource, load_model
+from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
+from contfric.models.tied import tied
 from contfric.orbit.words import whole_of
 from contfric.signature import ReducedWord
 
@@ -48,7 +48,7 @@ _DOUBLINGS = 3
 
 def census(
     model: ModelSource,
-    params: Mapping[str, float],
+    params: Parameters,
     *,
     periods: int = 2,
     stops: int = 6,
@@ -90,7 +90,7 @@ def census(
     >>> [o.name for o in cf.census("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, stops=4)]
     ['1a', '2s']
     """
-    model = load_model(model)
+    model, params = tied(model, params)
     vector = model.vector(params)
     limits = Limits(
         whole_number("periods", periods, least=1), whole_number("stops", stops, least=1)

@@ -28,8 +28,9 @@ from contfric.chaos.tiles import (
 )
 from contfric.errors import ParameterError, function_of, mapping_of, shown, whole_number
 from contfric.memory import must_fit
-from contfric.models import ModelSource, load_model
+from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
+from contfric.models.tied import tied
 
 #: Bytes of a motion in a map beyond its exponents and its initial state.
 _BYTES = 24
@@ -139,7 +140,7 @@ def lyapunov_map(
     >>> cf.lyapunov_map("coulomb", grid, {"S0": 0.4}, periods=100).complete
     True
     """
-    model = load_model(model)
+    model, params = tied(model, params)
     limits = limits_of(transient, periods, tolerance, confirm)
     tile = whole_number("tile", tile, least=1)
     check_executor(executor)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +11,9 @@ from contfric.chaos.rows import Limits, follow
 from contfric.chaos.starts import StateLike, default_states, given_states
 from contfric.chaos.status import Motion
 from contfric.errors import ParameterError, real_number, whole_number
-from contfric.models import ModelSource, load_model
+from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
+from contfric.models.tied import tied
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +149,7 @@ def checked_time(time: float) -> float:
 
 def lyapunov_exponent(
     model: ModelSource,
-    params: Mapping[str, float] | None = None,
+    params: Parameters | None = None,
     *,
     state: StateLike | None = None,
     time: float = 0.0,
@@ -186,7 +186,7 @@ def lyapunov_exponent(
     >>> found.motion.name, round(found.largest, 6)
     ('PERIODIC', -0.026609)
     """
-    model = load_model(model)
+    model, params = tied(model, params)
     limits = limits_of(transient, periods, tolerance, confirm)
     vector = model.vector({} if params is None else params)
     named = model.mapping(vector)

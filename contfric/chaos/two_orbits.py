@@ -13,7 +13,6 @@ d_0 (curvature; pairs that a jump of the return map takes apart) and of eps / d_
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,8 +20,9 @@ from numpy.typing import ArrayLike
 
 from contfric.chaos.rows import check_excited
 from contfric.errors import ContfricError, ParameterError, real_number, whole_number
-from contfric.models import ModelSource, load_model
+from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
+from contfric.models.tied import tied
 from contfric.orbit.simulation import SimulationEnd, run, simulate
 
 #: Instants of comparison in a period of the excitation.
@@ -68,7 +68,7 @@ class _Rider:
 
 def two_orbit_estimate(
     model: ModelSource,
-    params: Mapping[str, float] | None = None,
+    params: Parameters | None = None,
     *,
     state: ArrayLike | None = None,
     time: float = 0.0,
@@ -93,7 +93,7 @@ def two_orbit_estimate(
     >>> round(two_orbit_estimate("coulomb", params, periods=50).value, 2)
     -0.03
     """
-    model = load_model(model)
+    model, params = tied(model, params)
     whole_number("periods", periods, least=_BATCHES)
     distance = real_number("distance", distance)
     if not 0.0 < distance < 1.0:

@@ -14,7 +14,7 @@ from contfric.cli.exits import Exit
 from contfric.errors import ContfricError, NotationError, ParameterError, ResultFileError
 
 if TYPE_CHECKING:
-    from contfric.models import Model
+    from contfric.models import Model, ModelSource
     from contfric.study import StudyResult
 
 Command: TypeAlias = Callable[[argparse.Namespace], int]
@@ -167,7 +167,7 @@ def check(options: argparse.Namespace) -> int:
     """``contfric check MODEL``: what would make its results wrong; warnings do not fail it."""
     from contfric.models.check import check_model
 
-    params = dict(_assignment(text) for text in options.params)
+    params = _parameters(options.params, options.model)
     report = check_model(options.model, params or None)
     print(json.dumps(report.to_dict(), indent=2) if options.json else report)
     return Exit.DONE if report.ok else Exit.BAD_INPUT
@@ -209,7 +209,7 @@ def simulate(options: argparse.Namespace) -> int:
     from contfric.orbit import simulation
 
     model = load_model(options.model)
-    params = dict(_assignment(text) for text in options.params)
+    params = _parameters(options.params, options.model)
     state = None if options.state is None else _state(options.state)
     found = simulation.simulate(
         model,
@@ -249,9 +249,9 @@ def census(options: argparse.Namespace) -> int:
     from contfric.cli.progress import ProgressLine
     from contfric.study.checkpoint import checkpoint_of
 
-    params = dict(_assignment(text) for text in options.params)
+    params = _parameters(options.params, options.model)
     asked = (options.periods, options.stops, options.finer, options.seed)
-    checkpoint = checkpoint_of(("census", options.model, sorted(params.items()), *asked))
+    checkpoint = checkpoint_of(("census", options.model, sorted(map(str, params.items())), *asked))
     with ProgressLine(options.quiet) as progress, checkpoint.kept():
         if checkpoint.earlier:
             progress(f"goes on: {checkpoint.earlier} results of the census before are kept")
@@ -273,11 +273,20 @@ def census(options: argparse.Namespace) -> int:
     return Exit.INTERRUPTED
 
 
-def _assignment(text: str) -> tuple[str, float]:
-    name, sign, value = text.partition("=")
-    if not sign or not name.strip():
-        raise ParameterError(f"-p takes NAME=VALUE, such as -p Omega=0.5; got '{text}'")
-    return name.strip(), _number(value, f"parameter '{name.strip()}'")
+def _parameters(texts: list[str], model: ModelSource) -> dict[str, Any]:
+    """Return what is assigned by -p: numbers, and names of other parameters (``-p S0=S``: a tie)."""
+    from contfric.models import load_model
+
+    found: dict[str, Any] = {}
+    for text in texts:
+        name, sign, value = (part.strip() for part in text.partition("="))
+        if not sign or not name:
+            raise ParameterError(f"-p takes NAME=VALUE, such as -p Omega=0.5; got '{text}'")
+        if value in load_model(model).parameter_names:
+            found[name] = {"tie": value}
+        else:
+            found[name] = _number(value, f"parameter '{name}'")
+    return found
 
 
 def _state(text: str) -> list[float]:

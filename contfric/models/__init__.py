@@ -11,13 +11,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from contfric.models.definition import Model
     from contfric.models.oscillator import OscillatorModel
 
-__all__ = ["DEFAULT_MODEL", "Model", "ModelSource", "load_model", "model_names"]
+__all__ = ["DEFAULT_MODEL", "Model", "ModelSource", "Parameters", "load_model", "model_names"]
 
 #: What :func:`load_model`, and with it whatever takes a model, accepts.
 ModelSource: TypeAlias = "str | Path | Model | type[OscillatorModel] | OscillatorModel"
+
+#: What functions take as parameters: names to numbers, or to what they follow (``{"S0": {"tie": "S"}}``).
+Parameters: TypeAlias = "Mapping[str, float | Mapping[str, str]]"
 
 #: The model of the command line where none is named.
 DEFAULT_MODEL = "coulomb"

@@ -239,13 +239,14 @@ class Model(TransitionMaps):
             left = constraint.value(values)
             if left < 0 or (constraint.strict and left == 0):
                 here = ", ".join(f"{n} = {values[n]!r}" for n in constraint.coefficients)
+                got = f"got {here}" if here else "which never holds"
                 raise ParameterError(
-                    f"model '{self.name}' needs {constraint.text}, got {here}. "
+                    f"model '{self.name}' needs {constraint.text}, {got}. "
                     + (constraint.meaning or "Choose a value that obeys it.")
                 )
         return values
 
-    def vector(self, params: Mapping[str, float]) -> FloatArray:
+    def vector(self, params: Mapping[str, Any]) -> FloatArray:
         """Return the checked parameters as the engine's vector, shape (parameters,)."""
         values = self.check_params(params)
         return np.array([values[name] for name in self.parameter_names], dtype=np.float64)

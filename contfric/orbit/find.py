@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.errors import AperiodicError, ConvergenceError, real_number, whole_number
 from contfric.journal import remembered
-from contfric.models import ModelSource, load_model
+from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
+from contfric.models.tied import tied
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
@@ -43,7 +44,7 @@ _ATTRACTS = 1.0 + 1e-6
 
 def find_orbit(
     model: ModelSource,
-    params: Mapping[str, float] | None = None,
+    params: Parameters | None = None,
     periods: int | None = None,
     *,
     state: ArrayLike | None = None,
@@ -73,7 +74,7 @@ def find_orbit(
     >>> cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}).name
     '1a'
     """
-    model = load_model(model)
+    model, params = tied(model, params)
     if periods is not None:
         periods = whole_number("periods", periods, least=1, most=MOST_PERIODS)
     longest = whole_number("longest", longest, least=1)

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.errors import real_number, whole_number
-from contfric.models import ModelSource, load_model
+from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
+from contfric.models.tied import tied
 from contfric.orbit.counts import TALLY
 from contfric.orbit.pace import Pace
 from contfric.orbit.starts import checked_state, start_of
@@ -211,7 +212,7 @@ def _matches(
 
 def simulate(
     model: ModelSource,
-    params: dict[str, float] | None = None,
+    params: Parameters | None = None,
     *,
     state: ArrayLike | None = None,
     time: float = 0.0,
@@ -241,7 +242,7 @@ def simulate(
     >>> cf.simulate("coulomb", {"Omega": 0.5}, state=[1.3, 0.0], periods=2).word[0]
     ('stick', 'F+')
     """
-    model = load_model(model)
+    model, params = tied(model, params)
     vector = model.vector({} if params is None else params)
     y = checked_state(model, vector, state)
     time, periods = real_number("time", time), real_number("periods", periods, least=0.0)

@@ -9,8 +9,9 @@ import numpy as np
 
 from contfric.errors import ConvergenceError, ParameterError, whole_number
 from contfric.journal import SLOW, remembered
-from contfric.models import ModelSource, load_model
+from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray
+from contfric.models.tied import tied
 from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit, Status
@@ -60,7 +61,7 @@ def polish(orbit: Orbit, damped: bool = True) -> Orbit:
 def solve_orbit(
     model: ModelSource,
     signature: str | Path | Signature,
-    params: Mapping[str, float],
+    params: Parameters,
     *,
     seed: int = 0,
 ) -> Orbit:
@@ -88,7 +89,7 @@ def solve_orbit(
     >>> cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4}).stable
     True
     """
-    model = load_model(model)
+    model, params = tied(model, params)
     if not isinstance(signature, Signature):
         from contfric.signature import load_signature
 

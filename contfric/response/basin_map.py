@@ -24,8 +24,9 @@ from contfric.errors import (
     whole_number,
 )
 from contfric.memory import must_fit
-from contfric.models import ModelSource, load_model
+from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
+from contfric.models.tied import tied
 from contfric.orbit.system import IntArray
 from contfric.response.attractors import Attractors, given_orbits
 from contfric.response.basin_tile import BasinRows, BasinTile, compute_basin_tile
@@ -67,7 +68,7 @@ class _Job:
 
 def basins(
     model: ModelSource,
-    params: Mapping[str, float] | None = None,
+    params: Parameters | None = None,
     grid: Mapping[str, ArrayLike] | None = None,
     at: Mapping[str, float] | None = None,
     *,
@@ -114,7 +115,7 @@ def basins(
     >>> sum(share.count for share in found.shares)
     100
     """
-    model = load_model(model)
+    model, params = tied(model, params)
     check_executor(executor)
     function_of("progress", progress)
     vector = model.vector(mapping_of("params", {} if params is None else params, "{'S0': 0.4}"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +16,9 @@ from contfric.errors import (
     whole_number,
 )
 from contfric.memory import must_fit
-from contfric.models import ModelSource, load_model
+from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
+from contfric.models.tied import tied
 from contfric.orbit.simulation import tables
 from contfric.orbit.starts import checked_state
 from contfric.orbit.structure import mirror_mode
@@ -42,7 +42,7 @@ _BYTES = 512
 
 def poincare(
     model: ModelSource,
-    params: Mapping[str, float] | None = None,
+    params: Parameters | None = None,
     *,
     section: SectionLike = STOPS,
     sense: str = "either",
@@ -75,7 +75,7 @@ def poincare(
     >>> bool(abs(found.coordinate("v")).max() < 1e-12)
     True
     """
-    model = load_model(model)
+    model, params = tied(model, params)
     cut = section_of(model, section, sense)
     vector = model.vector(mapping_of("params", {} if params is None else params, "{'S0': 0.4}"))
     y, begins = checked_state(model, vector, state), real_number("time", time)
@@ -100,7 +100,7 @@ class _Release(NamedTuple):
 
 def release_map(
     model: ModelSource,
-    params: Mapping[str, float] | None = None,
+    params: Parameters | None = None,
     *,
     surface: str | None = None,
     count: int = 2000,
@@ -132,7 +132,7 @@ def release_map(
     >>> bool(len(found.fixed_points()) >= 1)
     True
     """
-    model = load_model(model)
+    model, params = tied(model, params)
     vector = model.vector(mapping_of("params", {} if params is None else params, "{'S0': 0.4}"))
     count = whole_number("count", count, least=2)
     must_fit(f"a map of {count} releases", _BYTES * count)

@@ -23,8 +23,9 @@ from contfric.errors import (
     shown,
 )
 from contfric.memory import must_fit
-from contfric.models import ModelSource, load_model
+from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
+from contfric.models.tied import tied
 from contfric.orbit.starts import checked_state
 from contfric.orbit.system import IntArray
 from contfric.response.collecting import repeats_of
@@ -134,7 +135,7 @@ def sweep(
     >>> sum(found.counts().values())
     42
     """
-    model = load_model(model)
+    model, params = tied(model, params)
     check_executor(executor)
     function_of("progress", progress)
     cut = section_of(model, section, sense)

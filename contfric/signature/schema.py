@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, TypeAlias
 
@@ -90,7 +91,8 @@ def read_signature(path: Path, model: str | Model | None = None) -> Signature:
     fault = walk_fault(owner, segments)
     if fault is not None:
         located.fail(("segments", fault.index), fault.message)
-    if content.example is not None:
+    own = owner.name == content.model or is_path(content.model)
+    if content.example is not None and own:  # a tied parameter has no value of its own
         _check_example(located, owner, content.example)
     try:
         return Signature(
@@ -106,9 +108,16 @@ def _is_path(source: str | Path) -> bool:
     return isinstance(source, Path) or text.endswith(SUFFIXES) or "/" in text or "\\" in text
 
 
+def _alike(declared: Model, model: str | Model | None) -> bool:
+    """Tell whether a model has the domains and transitions of another: one with tied parameters does."""
+    return isinstance(model, Model) and declared.targets == model.targets
+
+
 def _same_model(signature: Signature, model: str | Model | None) -> Signature:
     wanted = model.name if isinstance(model, Model) else model
     if wanted not in (None, signature.model.name):
+        if isinstance(model, Model) and _alike(signature.model, model):
+            return replace(signature, model=model)
         raise NotationError(
             f"the signature is of model '{signature.model.name}', not of '{wanted}'"
         )
@@ -122,7 +131,7 @@ def _owner(located: LocatedYaml, name: str, model: str | Model | None) -> Model:
         # a path is meant from the folder of the signature's file
         found = load_model(relative_model(name, located.path)) if is_path(name) else None
         declared = found.name if found else name
-        if wanted not in (None, declared):
+        if wanted not in (None, declared) and not _alike(found or load_model(name), model):
             located.fail(("model",), f"the signature is of model '{declared}', not of '{wanted}'")
         return model if isinstance(model, Model) else found or load_model(name)
     except ParameterError as error:

@@ -18,6 +18,7 @@ from contfric.errors import (
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.models.files import relative_model
+from contfric.models.tied import tied
 from contfric.orbit.orbit import Orbit
 from contfric.signature import Signature, load_signature
 from contfric.study import responses
@@ -123,6 +124,7 @@ def _checked(located: LocatedYaml, content: StudyFile) -> Study:
         model = load_model(relative_model(content.model, located.path))
     except ParameterError as error:
         located.fail(("model",), str(error))
+    whole, (model, content) = content, _tied(located, content, model)
     params = _params(located, content, model)
     orbit = _orbit(located, content, model)
     if orbit is not None:
@@ -134,13 +136,25 @@ def _checked(located: LocatedYaml, content: StudyFile) -> Study:
     responses.check(located, content, model)
     return Study(
         located.path,
-        content,
+        whole,
         model,
         params,
         _signature(located, content, model),
         orbit,
         drawings_of(located, content),
     )
+
+
+def _tied(located: LocatedYaml, content: StudyFile, model: Model) -> tuple[Model, StudyFile]:
+    """Return the model with its tied parameters, and the study without them."""
+    for name, value in content.params.items():
+        if isinstance(value, dict):
+            try:
+                model, _ = tied(model, {name: value})
+            except ParameterError as error:
+                located.fail(("params", name), str(error))
+    free = {name: value for name, value in content.params.items() if not isinstance(value, dict)}
+    return model, content.model_copy(update={"params": free})
 
 
 def _params(located: LocatedYaml, content: StudyFile, model: Model) -> dict[str, float]:
@@ -157,7 +171,8 @@ def _params(located: LocatedYaml, content: StudyFile, model: Model) -> dict[str,
 
 def _violated(content: StudyFile, model: Model) -> list[str]:
     """Return the first parameter of the file that is part of a violated constraint."""
-    values = {**model.defaults, **content.params}
+    given = {name: v for name, v in content.params.items() if isinstance(v, float)}
+    values = {**model.defaults, **given}
     return [
         name
         for constraint in model.constraints

@@ -259,7 +259,10 @@ class StudyFile(_Part):
 
     title: str | None = Field(None, description="a text")
     model: str = Field(description="the name of a model, or the path of its YAML file")
-    params: dict[str, float] = Field({}, description="a mapping of parameters to finite numbers")
+    params: dict[str, float | dict[str, str]] = Field(
+        {},
+        description="a mapping of parameters to finite numbers, or to what they follow, such as {tie: S}",
+    )
     start: Start = Field(
         Start(simulate=Simulated()),
         description="'simulate', or a mapping with one of simulate, signature, orbit",

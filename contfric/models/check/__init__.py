@@ -41,7 +41,6 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     >>> check_model("belt").ok
     True
     """
-    from contfric.models import load_model
     from contfric.models.check.continuity import check_continuity
     from contfric.models.check.derivatives import check_derivatives
     from contfric.models.check.hidden import check_hidden
@@ -56,8 +55,9 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
         check_symmetry,
         check_transitions,
     )
+    from contfric.models.tied import tied
 
-    loaded = load_model(model)
+    loaded, params = tied(model, params)
     report = ModelReport(loaded.name, closed=loaded.closed_form, integrated=loaded.integrated)
     check_names(report, loaded)
     if params is None and not check_constraints(report, loaded):
