@@ -83,6 +83,17 @@ class _Printer(StrPrinter):  # type: ignore[misc]
             text = f"where({self._print(condition)}, {self._print(value)}, {text})"
         return text
 
+    def _print_Sign(self, expr: Any) -> str:
+        return f"sign({self._print(expr.args[0])})"
+
+    def _print_Where(self, expr: Any) -> str:
+        apart, yes, no = (self._print(part) for part in expr.args)
+        return f"where({apart} > 0, {yes}, {no})"
+
+    def _print_Power(self, expr: Any) -> str:
+        base, exponent = (self._print(part) for part in expr.args)
+        return f"({base})**({exponent})"
+
     def _print_And(self, expr: Any) -> str:
         return " and ".join(f"({self._print(a)})" for a in expr.args)
 

@@ -43,6 +43,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     """
     from contfric.models.check.continuity import check_continuity
     from contfric.models.check.derivatives import check_derivatives
+    from contfric.models.check.filippov import check_filippov
     from contfric.models.check.hidden import check_hidden
     from contfric.models.check.kinks import check_kinks
     from contfric.models.check.names import check_constraints, check_names
@@ -70,6 +71,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_continuity(report, probe)
     check_kinks(report, loaded)
     check_sliding(report, probe)
+    check_filippov(report, probe)
     check_symmetry(report, probe)
     check_hidden(report, probe)
     check_period(report, probe)

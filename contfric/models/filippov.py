@@ -1,0 +1,145 @@
+"""Sliding that is derived: ``sliding: filippov`` on a switching surface.
+
+Where the fields f+ and f- beside a surface h = 0 both lead to it, at the rates ``r+ = h_t + h_y f+ < 0``
+and ``r- = h_t + h_y f- > 0``, motion stays on it with the convex combination that keeps h (Filippov 1988,
+chapter 2; di Bernardo et al. 2008, equation 2.24)::
+
+    f = (r- f+ - r+ f-) / (r- - r+)
+
+The mode, its region ``r+ < 0 < r-`` and the surfaces that end it are put into the model as if they had
+been typed. Where r- less r+ depends on parameters only, both ends are levels of one observable.
+
+This module imports sympy, and is loaded where a model asks for it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import sympy
+
+from contfric.models.description import Description, ModeText
+from contfric.models.entries import EntryError
+from contfric.models.functions import as_text
+from contfric.models.symbols import Formulas
+
+#: The key of a surface, and its value.
+SLIDING, FILIPPOV = "sliding", "filippov"
+
+
+def sliding_parts(
+    description: Description, surfaces: tuple[str, ...], data: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return modes, observables and surfaces of a model with the sliding modes of some surfaces.
+
+    Parameters
+    ----------
+    description : the model without them
+    surfaces : where sliding is derived
+
+    Raises
+    ------
+    EntryError
+        If a surface has not a mode on each side.
+    """
+    formulas = Formulas(description)
+    if description.kinks:
+        raise EntryError(
+            ("kinks",),
+            "sliding is derived where fields are smooth beside their surfaces: no 'kinks'",
+        )
+    found: dict[str, Any] = {
+        key: dict(data.get(key) or {}) for key in ("observables", "surfaces", "modes")
+    }
+    pairs = [(s, above, below) for s in surfaces for above, below in _pairs(description, s)]
+    for surface, above, below in pairs:
+        name = _name(surface, above, below, pairs)
+        if name in found["modes"]:
+            raise EntryError(
+                ("modes", name), f"'{name}' is the name of the sliding mode on '{surface}'"
+            )
+        _add(found, _Sliding(formulas, surface, above, below, name))
+    return found
+
+
+def _pairs(description: Description, surface: str) -> Iterator[tuple[ModeText, ModeText]]:
+    """Yield the modes above and below a surface whose regions meet there."""
+    above, below = (
+        [m for m in description.modes if m.sides.get(surface) == side and 0 not in m.sides.values()]
+        for side in (1, -1)
+    )
+    pairs = [
+        (a, b)
+        for a, b in itertools.product(above, below)
+        if all(b.sides.get(s, v) == v for s, v in a.sides.items() if s != surface)
+    ]
+    if not pairs:
+        raise EntryError(
+            ("surfaces", surface, SLIDING),
+            f"sliding on '{surface}' is derived from the fields beside it: give it a mode on each side "
+            f"({surface}: + and {surface}: -)",
+        )
+    yield from pairs
+
+
+def _name(
+    surface: str, above: ModeText, below: ModeText, pairs: list[tuple[str, ModeText, ModeText]]
+) -> str:
+    if len(pairs) == 1:
+        return "slide"
+    alone = [s for s, _, _ in pairs].count(surface) == 1
+    return f"slide_{surface}" if alone else f"slide_{surface}_{above.name}_{below.name}"
+
+
+class _Sliding:
+    """The sliding mode of a surface between two modes: field and rates, as formulas and as texts."""
+
+    def __init__(
+        self, formulas: Formulas, surface: str, above: ModeText, below: ModeText, name: str
+    ) -> None:
+        description = formulas.description
+        self.surface, self.name = surface, name
+        self.sides = {s: v for s, v in {**above.sides, **below.sides}.items() if s != surface}
+        names = [m.name for m in description.modes]
+        own = next(s for s in description.surfaces if s.name == surface)
+        c = [o.name for o in description.observables].index(own.observable)
+        fields, rates = formulas.fields(), formulas.rates()
+        up, down = names.index(above.name), names.index(below.name)
+        self.rate_up, self.rate_down = rates[up][c], rates[down][c]
+        self.apart = sympy.simplify(self.rate_down - self.rate_up)
+        pair = zip(fields[up], fields[down], strict=True)
+        self.field = [
+            a
+            if sympy.expand(a - b) == 0
+            else sympy.simplify((self.rate_down * a - self.rate_up * b) / self.apart)
+            for a, b in pair
+        ]
+        self.states = description.states
+        known = dict(zip(formulas.y, description.states, strict=True))
+        known |= dict(zip(formulas.p, (p.name for p in description.parameters), strict=True))
+        self.named = {symbol: sympy.Symbol(name) for symbol, name in known.items()}
+        self.constant = not self.apart.free_symbols & {formulas.t, *formulas.y}
+
+    def text(self, formula: Any) -> str:
+        """Return a formula as an expression of the model."""
+        return as_text(formula.xreplace(self.named))
+
+
+def _add(found: dict[str, Any], sliding: _Sliding) -> None:
+    """Put a sliding mode into the parts of a model: its observables, the surfaces that end it, the mode."""
+    own, up = sliding.name, f"{sliding.name}_rate"
+    found["observables"][up] = sliding.text(sliding.rate_up)
+    found["surfaces"][f"{own}-"] = {"observable": up, "level": "0"}
+    if sliding.constant:
+        low = {"observable": up, "level": f"-({sliding.text(sliding.apart)})"}
+    else:
+        below = f"{sliding.name}_below"
+        found["observables"][below] = sliding.text(sliding.rate_down)
+        low = {"observable": below, "level": "0"}
+    found["surfaces"][f"{own}+"] = low
+    found["modes"][own] = {
+        "in": {**sliding.sides, sliding.surface: 0, f"{own}-": "-", f"{own}+": "+"},
+        "field": dict(zip(sliding.states, map(sliding.text, sliding.field), strict=True)),
+    }
