@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from contfric.errors import ModelError
+from contfric.models.angles import with_angles
 from contfric.models.clocks import with_clock
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.description import Description, DomainText, ModeText
@@ -17,7 +18,16 @@ from contfric.models.names import Names
 KEYS = (
     *("name", "title", "references", "states", "parameters", "constraints", "period"),
     *("autonomous", "define", "observables", "surfaces", "field", "modes", "domains"),
-    *("departures", "resets", "symmetry", "stop_surface", "kinks", "spread", "integration"),
+    *(
+        "angles",
+        "departures",
+        "resets",
+        "symmetry",
+        "stop_surface",
+        "kinks",
+        "spread",
+        "integration",
+    ),
     "max_step",
 )
 _PARAMETER = ("default", "meaning")
@@ -58,7 +68,7 @@ def describe(data: Mapping[str, Any]) -> Description:
     EntryError
         For the first mistake, with the address of its entry.
     """
-    plain = with_clock({str(key): value for key, value in data.items()})
+    plain = with_angles(with_clock({str(key): value for key, value in data.items()}))
     surfaces, plain = _derived_sliding(plain)
     found = _described(plain)
     if surfaces:
@@ -123,6 +133,7 @@ def _described(data: dict[str, Any]) -> Description:
         symmetry=_symmetry(top, states),
         stop_surface=_stop_surface(top, surfaces),
         kinks=top.texts("kinks"),
+        angles=top.texts("angles"),
         spread=_spread(top, states),
         method=method,
         tolerance=tolerance,

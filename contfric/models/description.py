@@ -52,6 +52,7 @@ class Description:
     symmetry : name (a state or t) -> expression of its image; None if there is none
     stop_surface : empty if it is to be found
     kinks : observables at whose zeros the fields have kinks, and are continuous
+    angles : states that are the same a turn later
     spread : expression of the half-width of starts, one a state
     method, tolerance : how motion is integrated (:mod:`contfric.flow.integrated`)
     max_step : largest step of a continuation where the user gives none; None for the engine's
@@ -75,6 +76,7 @@ class Description:
     symmetry: Mapping[str, str] | None = None
     stop_surface: str = ""
     kinks: tuple[str, ...] = ()
+    angles: tuple[str, ...] = ()
     spread: tuple[str, ...] = ()
     method: str = "explicit"
     tolerance: float = 1e-12
@@ -117,6 +119,8 @@ class Description:
             found["symmetry"] = dict(self.symmetry)
         if self.kinks:
             found["kinks"] = list(self.kinks)
+        if self.angles:
+            found["angles"] = list(self.angles)
         if self.stop_surface:
             found["stop_surface"] = self.stop_surface
         if self.max_step is not None:

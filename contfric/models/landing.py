@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from contfric.models.angles import wraps_of
 from contfric.models.definition import Domain, Reset, Surface
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import Sampler
@@ -143,4 +144,5 @@ def reset_of(
         if o.name in seen and not (o.name == own and surface in lands)
     )
     formula = ", ".join(f"{state} -> {value}" for state, value in texts.items())
-    return Reset(surface, formula, changes, lands, leads)
+    wraps = any(surface in wraps_of(angle) for angle in description.angles)
+    return Reset(surface, formula, changes, lands, leads, wraps)

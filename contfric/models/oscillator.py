@@ -57,7 +57,7 @@ class OscillatorModel:
        sides of the mode decide are replaced by what they are there.
     7. Write :meth:`period` if there is an excitation, :meth:`reset` if a surface maps the state (impact).
     8. If there is a symmetry, set ``symmetry``, such as ``"x -> -x, v -> -v, t -> t + T/2"``; ``spread``
-       is how far from 0 motion can start. ``kinks``, ``integration`` and ``max_step`` are as in a file.
+       is how far from 0 motion can start. ``kinks``, ``angles``, ``integration`` and ``max_step`` are as in a file.
     9. Load it with ``contfric.load_model(MyClass)``, and verify it with ``contfric.check_model(MyClass)``.
 
     Formulas are written with the functions of :mod:`contfric.models.functions` (or sympy's own); arguments
@@ -102,6 +102,7 @@ class OscillatorModel:
     symmetry: ClassVar[str | Mapping[str, str] | None] = None
     stop_surface: ClassVar[str | None] = None
     kinks: ClassVar[Sequence[str]] = ()
+    angles: ClassVar[Sequence[str]] = ()
     spread: ClassVar[Mapping[str, Any]] = {}
     integration: ClassVar[Mapping[str, Any]] = {}
     max_step: ClassVar[float | None] = None
@@ -182,6 +183,7 @@ def _data(oscillator: OscillatorModel) -> dict[str, Any]:
         "symmetry": oscillator.symmetry,
         "stop_surface": oscillator.stop_surface,
         "kinks": list(oscillator.kinks),
+        "angles": list(oscillator.angles),
         "spread": dict(oscillator.spread),
         "integration": dict(oscillator.integration),
         "max_step": oscillator.max_step,

@@ -115,6 +115,7 @@ class Reset:
         surface that is +1 where it goes back (a wall), -1 where it passes
     leads : the mode behind the reset; empty if that follows from the sides: the mode before it where it
         holds there, else another one
+    wraps : whether it takes an angle back by a turn, which is nothing to the motion: it bounds nothing
     """
 
     surface: str
@@ -122,6 +123,7 @@ class Reset:
     changes: tuple[str, ...] = ()
     lands: Mapping[str, int] = field(default_factory=dict)
     leads: str = ""
+    wraps: bool = False
 
     @property
     def stays(self) -> bool:

@@ -34,6 +34,11 @@ class TransitionMaps(SectionMaps):
         return self.surface_by_name[surface].switching or surface in self.reset_by_surface
 
     @cached_property
+    def wraps(self) -> frozenset[str]:
+        """Surfaces at which an angle begins again: joints of orbits that turn, and nothing else."""
+        return frozenset(reset.surface for reset in self.resets if reset.wraps)
+
+    @cached_property
     def transitions(self) -> dict[tuple[str, str], str]:
         """Next domain for each possible (domain, surface); what is absent cannot happen.
 

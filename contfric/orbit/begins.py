@@ -76,6 +76,7 @@ def entry_rows(
                 for d in (domains[i : i + 1] or mode_domains(model, word[i][0]))
             }
             free = model.changed_by(reset, other.name) and other.name not in reset.lands
+            free = free and other.name not in model.wraps
             if free and len(signs) == 1:
                 rows.append((i, k, signs.pop(), 1))
     return rows

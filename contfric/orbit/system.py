@@ -280,12 +280,12 @@ def _margins(
                 if full
                 else inside_sign(model, mode, surface)
             )
-            if sign != 0:
+            if sign != 0 and surface not in model.wraps:
                 interior.append((i, model.surface_index[surface], sign))
         for surface in names:
             signs = {model.domain_by_name[d].signs[surface] for d in inside[i]}
             pinned = any(h.segment == i + 1 and h.pin == surface for h in holds)
-            if surface == exit_ or pinned or len(signs) != 1:
+            if surface == exit_ or pinned or len(signs) != 1 or surface in model.wraps:
                 continue
             if (sign := signs.pop()) != 0:
                 joint.append((i, model.surface_index[surface], sign, 0))

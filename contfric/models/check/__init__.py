@@ -49,6 +49,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     from contfric.models.check.names import check_constraints, check_names
     from contfric.models.check.probe import Probe
     from contfric.models.check.structure import (
+        check_angles,
         check_period,
         check_resets,
         check_sliding,
@@ -75,4 +76,5 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_symmetry(report, probe)
     check_hidden(report, probe)
     check_period(report, probe)
+    check_angles(report, probe)
     return report

@@ -263,6 +263,25 @@ def check_period(report: ModelReport, probe: Probe) -> None:
                 break
 
 
+def check_angles(report: ModelReport, probe: Probe) -> None:
+    """Check that fields and observables are the same a turn of an angle later."""
+    model = probe.model
+    for state in {
+        s for reset in model.resets if reset.wraps for s in model.states if s in reset.changes
+    }:
+        turn = 2.0 * np.pi * np.array([float(s == state) for s in model.states])
+        for t, y in probe.states(_EVERYWHERE // 10):
+            report.count(Topic.PERIOD)
+            for mode in model.modes:
+                here, there = (probe.field(mode.name, t, at) for at in (y, y + turn))
+                if not np.allclose(here, there, rtol=_SAME, atol=_SAME):
+                    report.error(
+                        Topic.PERIOD,
+                        f"the field of '{mode.name}' is not the same a turn of '{state}' later: it is no angle",
+                    )
+                    return
+
+
 def _not_periodic(what: str, period: float) -> str:
     if period <= 0.0:
         return f"{what} depends on time, but the model is autonomous: give its 'period'"
