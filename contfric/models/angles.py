@@ -1,8 +1,8 @@
 """Angles: states that are the same a turn later.
 
-``angles: [theta]`` puts two surfaces into a model, at ``theta = pi`` and ``theta = -pi``; what meets one goes on at
-the other. So a pendulum oscillates and rotates, and its rotations close. Nothing happens to the motion there:
-the surfaces are joints of orbits that turn, and bound nothing (:attr:`contfric.models.parts.Reset.wraps`).
+``angles: [theta]`` puts two surfaces into a model, at ``theta = pi`` and ``theta = -pi``; what meets one goes
+on at the other. So a pendulum oscillates and rotates, and its rotations close. Nothing happens to the motion
+there: the surfaces are joints of orbits that turn, and bound nothing (:class:`contfric.models.parts.Reset`).
 """
 
 from __future__ import annotations
