@@ -7,13 +7,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from contfric.errors import ModelError
-from contfric.models.angles import with_angles
-from contfric.models.clocks import with_clock
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.description import Description, DomainText, ModeText
 from contfric.models.entries import Part
 from contfric.models.measuring import measured
 from contfric.models.names import Names
+from contfric.models.shorthand import expanded
 
 KEYS = (
     *("name", "title", "references", "states", "parameters", "constraints", "period"),
@@ -68,36 +67,7 @@ def describe(data: Mapping[str, Any]) -> Description:
     EntryError
         For the first mistake, with the address of its entry.
     """
-    plain = with_angles(with_clock({str(key): value for key, value in data.items()}))
-    surfaces, plain = _derived_sliding(plain)
-    found = _described(plain)
-    if surfaces:
-        from contfric.models.filippov import sliding_parts
-
-        found = _described(plain | sliding_parts(found, surfaces, _with_fields(plain)))
-    return found
-
-
-def _derived_sliding(data: dict[str, Any]) -> tuple[tuple[str, ...], dict[str, Any]]:
-    """Return the surfaces on which sliding is to be derived, and the model without saying so."""
-    surfaces = data.get("surfaces")
-    if not isinstance(surfaces, Mapping):
-        return (), data
-    asked, plain = [], {}
-    for name, entry in surfaces.items():
-        plain[str(name)] = entry
-        if isinstance(entry, Mapping) and entry.get("sliding") is not None:
-            Part(entry, ("surfaces", str(name))).one_of("sliding", ["filippov"], "sliding")
-            asked.append(str(name))
-            plain[str(name)] = {k: v for k, v in entry.items() if k != "sliding"}
-    return tuple(asked), {**data, "surfaces": plain}
-
-
-def _with_fields(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a model's data in which no mode relies on the common field."""
-    common = data.get("field")
-    modes = {name: {"field": common, **mode} for name, mode in data["modes"].items()}
-    return {**data, "modes": modes} if common else dict(data)
+    return expanded({str(key): value for key, value in data.items()}, _described)
 
 
 def _described(data: dict[str, Any]) -> Description:

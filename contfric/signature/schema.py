@@ -110,7 +110,9 @@ def _is_path(source: str | Path) -> bool:
 
 def _alike(declared: Model, model: str | Model | None) -> bool:
     """Tell whether a model has the domains and transitions of another: one with tied parameters does."""
-    return isinstance(model, Model) and declared.targets == model.targets
+    if not isinstance(model, Model) or not model.name.startswith(f"{declared.name} with "):
+        return False
+    return declared.targets == model.targets
 
 
 def _same_model(signature: Signature, model: str | Model | None) -> Signature:

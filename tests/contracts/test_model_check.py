@@ -49,7 +49,8 @@ def report_of(tmp_path: Path, text: str) -> cf.ModelReport:
 def test_bundled_models_pass(name: str) -> None:
     report = check_model(name)
     assert report.ok, str(report)
-    assert report.findings == []
+    # a static limit above the kinetic one is said, and no fault
+    assert all("above the kinetic one" in f.message for f in report.findings), str(report)
     assert report.counts[Topic.DERIVATIVES] > 0
 
 
@@ -99,7 +100,7 @@ def test_mistakes_are_found(
     if topic in (Topic.TRANSITIONS, Topic.PERIOD):
         text = text.replace("symmetry: x -> -x, v -> -v, t -> t + T/2\n", "")
     report = report_of(tmp_path, text)
-    found = [f for f in report.findings if f.topic is topic]
+    found = [f for f in report.findings if f.topic is topic and f.severity is not Severity.NOTE]
     assert any(says in f.message for f in found), str(report)
     assert {f.severity for f in found} == {Severity(severity)}
     assert report.ok == (severity == "warning")
