@@ -99,8 +99,9 @@ class TransitionMaps(SectionMaps):
         through = {**domain.signs, surface.name: -sign}
         if not surface.switching:
             target = self.domain_at(through, mode)
-            if target and (self.domain_by_name[target].own_mode, surface.name) in self.turned:
-                return self.domain_at(domain.signs, self.domain_by_name[target].own_mode)
+            entered = "" if target is None else self.domain_by_name[target].own_mode
+            if entered != mode and (entered, surface.name) in self.turned:
+                return self.domain_at(domain.signs, entered)
             return target
         resting = self.domain_at({**domain.signs, surface.name: 0}, mode)
         return resting if resting is not None else self.domain_at(through, mode)

@@ -40,6 +40,9 @@ ALL_EVENTS, ALL_TIME, HELD, IMPOSSIBLE, INFINITE, QUIET, CHATTER = range(7)
 #: A sliding mode that is not left within this many periods of the excitation is never left; a slide, and
 #: any mode of an autonomous model, gets far more (periods, or units of time).
 HOLD_PERIODS, SLIDE_PERIODS = 1.001, 1e4
+#: A motion that meets nothing is followed in stretches of this many periods (or units of time): the steps of
+#: one search have a limit.
+_STRETCH = 256.0
 #: Factor by which the search of a hit is extended: what was searched in vain costs a third more.
 _WIDER = 4.0
 
@@ -150,7 +153,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
     joints, none, empty, after = rows.joints, workspace.none, workspace.empty, workspace.after
     period = functions.period(p, none, empty)
     unit = period if period > 0.0 else 1.0
-    cycle, event, at_most = 0, 0, NO_TIME
+    cycle, event, at_most, waited = 0, 0, NO_TIME, 0.0
     if carry[STARTED] == 0.0:
         if period > 0.0:
             cycle = int(math.floor(t / period))
@@ -171,19 +174,22 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         if period <= 0.0:
             left = periods - (t - first_time)
         allowance = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * unit
-        tau, surface = first_hit(
-            functions, tables, mode, on, t, y, p, min(left, allowance), unit, workspace
-        )
+        stretch = min(left, allowance - waited, _STRETCH * unit)
+        tau, surface = first_hit(functions, tables, mode, on, t, y, p, stretch, unit, workspace)
         if surface < 0:
-            if left > allowance:
+            waited += stretch
+            if left > stretch and not waited < allowance:
                 return never_left(tables, mode), event, mode, cycle, t
-            functions.flow(mode, t, y, left, p, none, after, workspace.nothing)
+            functions.flow(mode, t, y, stretch, p, none, after, workspace.nothing)
             copy_state(after, y)
-            t += left
+            t, on = t + stretch, 0
             if period > 0.0:
                 turns, t = whole_turns(t, period)
                 cycle += turns
+            if left > stretch:
+                continue
             return ALL_TIME, event, mode, cycle, t
+        waited = 0.0
         copy_state(after, y)
         t += tau
         turns, t = whole_turns(t, period)

@@ -1,0 +1,57 @@
+"""What a model says in short, written out: clocks, angles, sliding that is derived.
+
+Each is put into the data of a model, before it is read, as if it had been typed: nothing behind knows of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from contfric.models.angles import with_angles
+from contfric.models.clocks import with_clock
+from contfric.models.description import Description
+from contfric.models.entries import Part
+
+
+def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]) -> Description:
+    """Return the description of a model, with all that it says in short.
+
+    Parameters
+    ----------
+    read : reads what is written out
+
+    Raises
+    ------
+    EntryError
+        For the first mistake, with the address of its entry.
+    """
+    surfaces, plain = _derived_sliding(with_angles(with_clock(data)))
+    found = read(plain)
+    if surfaces:
+        from contfric.models.filippov import sliding_parts
+
+        found = read(plain | sliding_parts(found, surfaces, _with_fields(plain)))
+    return found
+
+
+def _derived_sliding(data: dict[str, Any]) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """Return the surfaces on which sliding is to be derived, and the model without saying so."""
+    surfaces = data.get("surfaces")
+    if not isinstance(surfaces, Mapping):
+        return (), data
+    asked, plain = [], {}
+    for name, entry in surfaces.items():
+        plain[str(name)] = entry
+        if isinstance(entry, Mapping) and entry.get("sliding") is not None:
+            Part(entry, ("surfaces", str(name))).one_of("sliding", ["filippov"], "sliding")
+            asked.append(str(name))
+            plain[str(name)] = {k: v for k, v in entry.items() if k != "sliding"}
+    return tuple(asked), {**data, "surfaces": plain}
+
+
+def _with_fields(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a model's data in which no mode relies on the common field."""
+    common = data.get("field")
+    modes = {name: {"field": common, **mode} for name, mode in data["modes"].items()}
+    return {**data, "modes": modes} if common else dict(data)
