@@ -93,7 +93,7 @@ def continua_of(branch: Branch) -> Iterator[str]:
         yield f"a continuum of orbits at {name} = {middle:.10g}, between {between}"
         return
     mu = branch.turn_multipliers
-    if mu is None:
+    if mu is None or mu.shape[1] == 0:  # one state without excitation has none
         return
     away = np.abs(mu - 1.0)
     if branch.system.half:  # a multiplier of the whole is the square of one of the half

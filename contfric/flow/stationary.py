@@ -31,6 +31,11 @@ _LAST_STATIONARY = 1e-5
 #: Error of a stationary time, relative to 1 + the time: one within it of a joint is at the joint.
 _AT_JOINT = 4e-10
 
+#: Where the observable changes by less than this over a panel, relative to 1 + its size, the panel is not
+#: divided further: two stationary points in it have one value to rounding. (At a double zero of the rate
+#: thousands of panels would be too flat to tell its sign.)
+_LEVEL = 1e-15
+
 
 @helper
 def refine_stationary(motion, mode, c, t, h, low, high, at, p, workspace):  # type: ignore[no-untyped-def]
@@ -86,7 +91,8 @@ def stationary_in_step(  # type: ignore[no-untyped-def]
         if found:
             share = zero_of_slope(here)
         elif outcome != FREE:
-            if length > SHORTEST * h and depth < DEPTH and done + a < span[1]:
+            moves = max(abs(q1), abs(after[1])) * length > _LEVEL * (1.0 + abs(q))
+            if moves and length > SHORTEST * h and depth < DEPTH and done + a < span[1]:
                 next_node = 0.5 * (a + b)
             elif (q1 < 0.0) != (after[1] < 0.0) and not at_start:
                 found, low, high = True, 0.0, 1.0

@@ -116,6 +116,10 @@ class _Sliding:
             else sympy.simplify((self.rate_down * a - self.rate_up * b) / self.apart)
             for a, b in pair
         ]
+        formula = formulas.observables()[c]
+        if formula in formulas.y:  # on the surface of a state that state is known
+            level = formulas.read(("surfaces", surface, "level"), own.level)
+            self.field = [f.subs(formula, level) for f in self.field]
         self.states = description.states
         known = dict(zip(formulas.y, description.states, strict=True))
         known |= dict(zip(formulas.p, (p.name for p in description.parameters), strict=True))

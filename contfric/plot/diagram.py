@@ -235,7 +235,8 @@ def _draw_row(ax: Axes, branches: Sequence[Branch], marks: Sequence[Mark], row: 
             _draw_branch(ax, branch, row_of(row).attribute, colours[branch.name])
     draw_marks(ax, marks)
     ax.margins(y=0.12)
-    ax.set_ylabel(row_of(row).label, fontsize=TEXT + 1)
+    displacement = branches[0].model.states[0] if branches else "x"
+    ax.set_ylabel(row_of(row).name(displacement), fontsize=TEXT + 1)
     if branches:
         ax.set_xlabel(parameter_label(branches[0].parameter), fontsize=TEXT + 1)
     ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)

@@ -25,7 +25,7 @@ from contfric.plot.orbit_artists import (
     legend_handles,
     name_axes,
 )
-from contfric.plot.pieces import pieces_of, rest_bounds
+from contfric.plot.pieces import Piece, pieces_of, rest_bounds
 from contfric.plot.save import axes_or_new, figure_or_new
 from contfric.plot.style import BESIDE, SMALL, TEXT, parameter_label
 
@@ -55,8 +55,8 @@ def plot_orbit(
     ax : Axes, optional
         Where to draw; new axes by default.
     plane : (str, str), optional
-        States or observables on the two axes; the first two states by default. In the plane of the
-        observables, ``("u", "v")`` for dry friction, every surface is at rest.
+        States or observables on the two axes; the first two states by default (one alone: over
+        time). In the plane of the observables, ``("u", "v")`` for dry friction, every surface is at rest.
     legend : bool
         Whether to draw the legend of the domains.
 
@@ -83,6 +83,8 @@ def plot_orbit(
 def _draw_plane(new: Axes, orbit: Orbit, plane: tuple[str, str] | None) -> list[Anchor]:
     """Draw an orbit in a plane and return the labels that are to be placed when all is drawn."""
     pieces = pieces_of(orbit)
+    if plane is None and len(orbit.model.states) == 1:
+        return _draw_in_time(new, orbit, pieces)
     across, up = plane or (orbit.model.states[0], orbit.model.states[1])
     draw_rest_bands(new, orbit, pieces, across, up)
     path = [along(orbit, pieces, quantity) for quantity in (across, up)]
@@ -94,6 +96,17 @@ def _draw_plane(new: Axes, orbit: Orbit, plane: tuple[str, str] | None) -> list[
     draw_stops(new, orbit, across, up)
     name_axes(new, parameter_label(across), parameter_label(up))
     return named
+
+
+def _draw_in_time(new: Axes, orbit: Orbit, pieces: Sequence[Piece]) -> list[Anchor]:
+    """Draw the only state of an orbit over one period."""
+    times = [(p.times - float(orbit.cycle[0, 0])) / orbit.period for p in pieces]
+    state = orbit.model.states[0]
+    draw_pieces(new, orbit.model, pieces, times, along(orbit, pieces, state))
+    if state in orbit.model.observable_index:
+        draw_levels(new, orbit, state, vertical=False)
+    name_axes(new, "time / period of the orbit", parameter_label(state))
+    return []
 
 
 def plot_orbit_in_time(orbit: Orbit, axes: Sequence[Axes] | None = None) -> list[Axes]:

@@ -146,6 +146,8 @@ def draw_moving_surfaces(
             continue
         time, state = float(piece.times[-1]), piece.states[-1]
         slope = observe_gradient(orbit, surface.observable, time, state)[[i, j]] * spans
+        if not np.any(slope):  # the surface is of a state that is not drawn
+            continue
         tangent = np.array([-slope[1], slope[0]]) / np.hypot(*slope) * spans * 0.035
         ends = np.array([state[[i, j]] - tangent, state[[i, j]] + tangent])
         (line,) = ax.plot(*ends.T, color=BLACK, linewidth=0.9, zorder=4)

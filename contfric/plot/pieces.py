@@ -156,7 +156,7 @@ def rest_bounds(orbit: Orbit, observable: str) -> Iterator[tuple[float, float]]:
     """Yield the intervals of an observable inside which the model can stay on a surface."""
     model = orbit.model
     drawn = [s for s in model.surfaces if not s.switching and s.name not in model.section_surfaces]
-    own = [s for s in drawn if s.observable == observable]
+    own = [s for s in drawn if s.observable == observable and s.name not in model.wraps]
     for domain in model.domains:
         if not model.mode_by_name[domain.mode].sliding:
             continue

@@ -66,19 +66,27 @@ OTHER_MARKER = Marker("*", face="white", size=7.0)
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity of a diagram: the attribute of branch and orbit, and the name on the axis."""
+    """One quantity of a diagram: the attribute of branch and orbit, and the name on the axis.
+
+    In the label %s is the displacement as mathematics.
+    """
 
     attribute: str
     label: str
     even: bool = False  # the same for an orbit and its mirror image
 
+    def name(self, displacement: str) -> str:
+        """Return the name on the axis, by that of the displacement."""
+        return self.label.replace("%s", parameter_label(displacement).strip("$"))
+
 
 #: What a row of a diagram can show.
 ROWS = {
-    "x_max": Row("x_max", r"$x_{\max}$"),
-    "x_min": Row("x_min", r"$x_{\min}$"),
-    "stops": Row("stops", r"$x$ at stops"),
+    "x_max": Row("x_max", r"$%s_{\max}$"),
+    "x_min": Row("x_min", r"$%s_{\min}$"),
+    "stops": Row("stops", r"$%s$ at stops"),
     "psi": Row("asymmetry", r"$\psi$", even=True),
+    "period": Row("period", "period", even=True),
 }
 
 _GREEK = frozenset(

@@ -52,7 +52,7 @@ def _rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row, ..
     if figure.rows is None:
         return _default_rows(located, content, index)
     for place, row in enumerate(figure.rows):
-        if row.needs not in content.want:
+        if row.needs is not None and row.needs not in content.want:
             located.fail(
                 ("figures", index, "rows", place),
                 f"row '{row.value}' shows {row.needs.value}: add {row.needs.value} to 'want'",

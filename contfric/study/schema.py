@@ -44,11 +44,12 @@ class Row(str, Enum):
     X_MIN = "x_min"
     STOPS = "stops"
     PSI = "psi"
+    PERIOD = "period"
 
     @property
-    def needs(self) -> Want:
-        """The quantity that the row shows."""
-        return _NEEDS[self]
+    def needs(self) -> Want | None:
+        """The quantity that the row shows; None for one that is always there."""
+        return _NEEDS.get(self)
 
 
 _NEEDS = {
@@ -240,7 +241,7 @@ class Figure(_Part):
         "poincare, basins"
     )
     rows: _Rows | None = Field(
-        None, description="a list of rows of a diagram: any of x_max, x_min, stops, psi"
+        None, description="a list of rows of a diagram: any of x_max, x_min, stops, psi, period"
     )
     file: str | None = Field(None, min_length=1, description="the name of the figure's file")
     format: Annotated[Format, Field(strict=False)] | None = Field(
