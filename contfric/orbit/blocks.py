@@ -23,11 +23,17 @@ def rates_at_joint(functions, layout, i, after, p, which, workspace, rows):  # t
     """Take the rates at the end of segment i at the joint itself, where the exit's condition holds exactly.
 
     The state that the flow comes to misses it by rounding. Where the exit is tangential, time is divided by
-    that: multipliers would be rounding.
+    that: multipliers would be rounding. Where disturbances grow far along the segment (a rest that repels)
+    it is the other way around: growth and rate cancel, and only if both are of the same state.
     """
     n = after.shape[0] - 1
     m = n + 1
-    jac = workspace.jac
+    jac, grown = workspace.jac, 0.0
+    for j in range(n):
+        for k in range(n):
+            grown = max(grown, abs(rows[m + j, m + 1 + k]))
+    if grown * abs(workspace.rates[i]) > 1.0:
+        return
     functions.flow(layout.modes[i], after[0], after[1:], 0.0, p, which, workspace.state, jac)
     for j in range(n):
         change = jac[j, 1 + n] - rows[m + j, 2 * m]
