@@ -56,6 +56,10 @@ class AperiodicError(ConvergenceError):
     """The simulation did not converge to a periodic orbit within its allowance."""
 
 
+#: More valid names than these are no line to read: then the nearest ones.
+_MOST_NAMES, _NEAREST = 24, 12
+
+
 def did_you_mean(word: object, valid: Iterable[str]) -> str:
     """Return ``"; did you mean 'x'?"`` for the closest valid words, and the list of valid words.
 
@@ -71,7 +75,10 @@ def did_you_mean(word: object, valid: Iterable[str]) -> str:
     best = max(likeness.values(), default=0.0)
     close = [f"'{name}'" for name in likeness if likeness[name] == best]
     hint = f"; did you mean {' or '.join(close)}?" if best >= 0.5 and len(close) <= 2 else "."
-    return f"{hint} Valid: {', '.join(names)}"
+    if len(names) <= _MOST_NAMES:
+        return f"{hint} Valid: {', '.join(names)}"
+    nearest = sorted(names, key=lambda name: -likeness[name])[:_NEAREST]
+    return f"{hint} Valid, of {len(names)}: {', '.join(nearest)} and others"
 
 
 def whole_number(name: str, value: object, least: int, most: int | None = None) -> int:

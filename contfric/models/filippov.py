@@ -109,6 +109,12 @@ class _Sliding:
         up, down = names.index(above.name), names.index(below.name)
         self.rate_up, self.rate_down = rates[up][c], rates[down][c]
         self.apart = sympy.simplify(self.rate_down - self.rate_up)
+        if self.apart == 0:
+            raise EntryError(
+                ("surfaces", surface, SLIDING),
+                f"'{own.observable}' changes at one rate in '{above.name}' and '{below.name}': motion passes "
+                f"'{surface}', and nothing slides there",
+            )
         pair = zip(fields[up], fields[down], strict=True)
         self.field = [
             a

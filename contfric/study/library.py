@@ -64,5 +64,5 @@ def _file(path: Path) -> Path:
         raise StudyError(f"{path} is a folder; give the YAML file of a study")
     near = [p.name for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
     hint = did_you_mean(path.name, sorted(near)) if near else ""
-    bundled = ", ".join(study_names())
-    raise StudyError(f"there is no file {path}{hint}. Bundled studies: {bundled}")
+    bundled = did_you_mean(path.stem, study_names()).partition("Valid")[2]
+    raise StudyError(f"there is no file {path}{hint}. Bundled studies{bundled}")

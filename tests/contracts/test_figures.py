@@ -237,8 +237,9 @@ def test_stability_that_was_not_computed(orbit: Any) -> None:
 
 
 def test_diagram_rows_share_their_parameter(diagram: Any) -> None:
-    axes = plot_diagram(diagram, rows=("x_max", "x_min", "stops", "psi"))
-    assert [ax.get_ylabel() for ax in axes] == [look.label for look in ROWS.values()]
+    axes = plot_diagram(diagram, rows=tuple(ROWS))
+    assert [ax.get_ylabel() for ax in axes] == [look.name("x") for look in ROWS.values()]
+    assert axes[0].get_ylabel() == r"$x_{\max}$"
     assert {ax.get_xlim() for ax in axes} == {(0.4, 0.6)}
     assert axes[-1].get_xlabel() == r"$\Omega$"
     assert axes[0].get_title() == "$S$ = 0.32, $S_{0}$ = 0.4"

@@ -1,4 +1,4 @@
-"""Stationary points at double zeros of a rate: the search of integrated and of affine modes ends, and finds."""
+"""Stationary points at double zeros of a rate: the search ends, and finds what counts."""
 
 from __future__ import annotations
 
