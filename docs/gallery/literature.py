@@ -16,9 +16,13 @@ from contfric.study.tables import listed_nodes
 HERE = Path(__file__).resolve().parent
 IMAGES = HERE.parent / "images" / "gallery"
 #: Studies, each with a page of the same name.
-STUDIES = ("dead-band", "impact", "impact-friction", "belt", "popp", "bang-bang")
+STUDIES = (
+    *("dead-band", "impact", "impact-friction", "belt", "popp", "bang-bang"),
+    *("buck", "relay", "relay-sliding", "thermostat", "rocking-block", "rimless-wheel"),
+    *("bouncing-ball", "gear-pair", "pendulum", "normal-force", "jenkins"),
+)
 #: Studies of planes, each with the page that shows it.
-PLANES = {"popp-plane": "popp"}
+PLANES = {"popp-plane": "popp", "integrate-and-fire": "integrate-and-fire"}
 #: Digits behind the point: what is located to rounding, and confirmed in the tests.
 DIGITS = 11
 
@@ -37,6 +41,8 @@ def rows_of(diagram: cf.Diagram) -> list[tuple[str, float, str]]:
 def table_of(diagram: cf.Diagram) -> list[str]:
     """Return the events of a diagram as a table."""
     rows = [f"| {event} | {at:.{DIGITS}f} | {names} |" for event, at, names in rows_of(diagram)]
+    if not rows:
+        return ["No event: one branch over the whole range."]
     head = f"| event | {diagram.parameter} | branches that meet there |"
     return [head, "|---|---|---|", *rows]
 
@@ -77,13 +83,14 @@ def main(names: tuple[str, ...] = STUDIES) -> None:
         with tempfile.TemporaryDirectory() as folder:
             result = cf.run_study(name, Path(folder) / "out")
             assert result.diagram is not None
-            shutil.copyfile(result.out / "diagram.png", IMAGES / f"{name}.png")
-            shutil.copyfile(result.out / "orbit.png", IMAGES / f"{name}-orbit.png")
+            for figure, image in (("diagram", name), ("orbit", f"{name}-orbit")):
+                if (drawn := result.out / f"{figure}.png").is_file():
+                    shutil.copyfile(drawn, IMAGES / f"{image}.png")
         text = page.read_text(encoding="utf-8")
         page.write_text(with_table(text, name, table_of(result.diagram)), encoding="utf-8")
         print(f"{name}: {result.diagram!r}, {result.info['timings']}")
     for name, on in PLANES.items():
-        if on in names:
+        if on in names or on == name:
             draw_plane(name, HERE / f"{on}.md")
 
 
@@ -93,6 +100,8 @@ def draw_plane(name: str, page: Path) -> None:
         result = cf.run_study(name, Path(folder) / "out")
         assert result.plane is not None
         shutil.copyfile(result.out / "plane.png", IMAGES / f"{name}.png")
+        if name == page.stem:
+            shutil.copyfile(result.out / "orbit.png", IMAGES / f"{name}-orbit.png")
     text = with_table(page.read_text(encoding="utf-8"), name, table_of_plane(result.plane), "plane")
     page.write_text(text, encoding="utf-8")
     print(f"{name}: {result.plane!r}, {result.info['timings']}")
