@@ -29,14 +29,15 @@ _PARTS = {"define": 1, "observables": 1, "field": 1, "resets": 2}
 
 
 def with_clock(data: dict[str, Any]) -> dict[str, Any]:
-    """Return a model's data with ``mod(t, T)`` as a state; unchanged where it is not used.
+    """Return a model's data with ``mod(t, T)`` as a state; unchanged where neither it nor a tick is used.
 
     Raises
     ------
     EntryError
         Where ``mod`` is not that of the time and the model's period, or a name is taken.
     """
-    if not any(_ticks(text) for _, text in _expressions(data)):
+    latched = TICK in _mapping(data, "resets") and TICK not in _mapping(data, "surfaces")
+    if not latched and not any(_ticks(text) for _, text in _expressions(data)):
         return data
     period = data.get("period")
     if not isinstance(period, (str, int, float)) or isinstance(period, bool):

@@ -102,17 +102,14 @@ class Landing:
     ) -> int:
         """Return the side of a surface to which one image leaves; 0 if there is none, or two."""
         sides = self.sampler.sides(t, y, [s for s in self.surfaces if s not in met])
-        behind = [
-            d
-            for d in self.domains
-            if all(d.signs[s] == v for s, v in sides.items()) and self.leads in ("", d.mode)
-        ]
-        own = [d for d in behind if d.mode == before.mode]
+        behind = [d for d in self.domains if all(d.signs[s] == v for s, v in sides.items())]
+        for mode in (self.leads, before.mode):
+            kept = [d.signs for d in behind if d.mode == mode]
+            behind = [d for d in behind if d.mode == mode or d.signs not in kept]
         away = set()
         for domain in behind:
             side = domain.signs[surface]
-            beside = any(d.signs == domain.signs for d in own) and domain not in own
-            if side == 0 or beside:
+            if side == 0:
                 continue
             if side * self.sampler.rate(domain.mode, surface, side, t, y) > 0.0:
                 away.add(side)

@@ -113,8 +113,8 @@ class Reset:
         the signs of these
     lands : surfaces that every image lies on, and the side to which motion leaves them. For the reset's own
         surface that is +1 where it goes back (a wall), -1 where it passes
-    leads : the mode behind the reset; empty if that follows from the sides: the mode before it where it
-        holds there, else another one
+    leads : the mode behind the reset where that holds; else, and if it is empty, the mode before it where
+        that holds, or another one
     wraps : whether it takes an angle back by a turn, which is nothing to the motion: it bounds nothing
     """
 

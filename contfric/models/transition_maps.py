@@ -72,7 +72,7 @@ class TransitionMaps(SectionMaps):
     def _domains_behind(self, domain: Domain, reset: Reset) -> tuple[str, ...]:
         """Return the domains that a reset can map to: they differ in what it changes.
 
-        Where several modes hold, the one that the reset names, or else the mode before it, goes on.
+        Where several modes hold, the one that the reset names goes on, or else the mode before it.
         """
         fixed = {
             s.name: domain.signs[s.name]
@@ -86,10 +86,11 @@ class TransitionMaps(SectionMaps):
             for d in self.domains
             if all(d.signs[s] == side for s, side in {**fixed, **landed}.items())
             and all(d.signs[s.name] != 0 for s in self.surfaces if s.name not in fixed)
-            and reset.leads in ("", d.own_mode)
         ]
-        kept = [d.signs for d in behind if d.own_mode == domain.own_mode]
-        return tuple(d.name for d in behind if d.own_mode == domain.own_mode or d.signs not in kept)
+        for mode in (reset.leads, domain.own_mode):
+            kept = [d.signs for d in behind if d.own_mode == mode]
+            behind = [d for d in behind if d.own_mode == mode or d.signs not in kept]
+        return tuple(d.name for d in behind)
 
     def _next_domain(self, domain: Domain, surface: Surface) -> str | None:
         sign = domain.signs[surface.name]

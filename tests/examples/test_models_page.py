@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+import contfric as cf
+
 PAGE = Path(__file__).parents[2] / "docs" / "models.md"
 
 
@@ -14,7 +16,7 @@ def test_page_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = PAGE.read_text(encoding="utf-8")
-    (model,) = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
+    model, *_ = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
     (tmp_path / "my_block.yaml").write_text(model, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     scope: dict[str, object] = {}
@@ -24,3 +26,27 @@ def test_page_runs(
     assert lines[0] == "model my_block"
     assert "ok" in lines
     assert lines[-1] == "True True"
+
+
+EXAMPLES = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1:]
+#: The words of their orbits: domains may be many, modes are few.
+WORDS = {
+    "neuron": {("rest", "threshold")},
+    "relay": {("up", "high"), ("down", "low")},
+    "latch": {("on", "trip"), ("off", "tick")},
+    "knob": {("turns", "phi+")},
+    "dry": {("forward", "stop"), ("backward", "stop"), ("slide", "slide-"), ("slide", "slide+")},
+    "element": {("stick+", "z+"), ("stick+", "z-"), ("slip+", "stop"), ("slip-", "stop")},
+}
+
+
+@pytest.mark.parametrize("text", EXAMPLES, ids=list(WORDS))
+def test_each_example_is_checked_and_found(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "example.yaml"
+    path.write_text(text, encoding="utf-8")
+    report = cf.check_model(path)
+    assert report.ok, str(report)
+    orbit = cf.find_orbit(path).as_whole()
+    assert orbit.converged and orbit.admissible and orbit.stable
+    assert set(orbit.word) <= WORDS[orbit.model.name], orbit.word
+    assert {mode for mode, _ in orbit.word} == {mode for mode, _ in WORDS[orbit.model.name]}

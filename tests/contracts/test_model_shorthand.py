@@ -1,0 +1,150 @@
+"""What a model says in short - clocks, angles, derived sliding, ties - and how mistakes in it are told."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+import contfric as cf
+from contfric.models.describe import describe, from_text
+from contfric.models.entries import EntryError
+from contfric.models.files import built
+from contfric.resources import bundled_dir
+from contfric.results import save
+
+
+def data_of(name: str) -> dict[str, Any]:
+    text = (bundled_dir("models") / f"{name}.yaml").read_text(encoding="utf-8")
+    return yaml.load(text, yaml.BaseLoader)  # texts: `on` is a name, and no truth
+
+
+def changed(name: str, path: str, value: object) -> dict[str, Any]:
+    data = copy.deepcopy(data_of(name))
+    *way, last = path.split("/")
+    part = data
+    for key in way:
+        part = part.setdefault(key, {})
+    if value is None:
+        del part[last]
+    else:
+        part[last] = value
+    given = data["parameters"].items()  # numbers again
+    data["parameters"] = {k: float(v["default"] if isinstance(v, dict) else v) for k, v in given}
+    return data | ({"autonomous": True} if "autonomous" in data else {})
+
+
+RAMP = "low + (high - low)*{}/Ts"
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "value", "at", "says"),
+    [
+        (
+            "buck",
+            "define/ramp",
+            RAMP.format("mod(t, 2*Ts)"),
+            "define",
+            "the period of the model, 'Ts'",
+        ),
+        (
+            "buck",
+            "define/ramp",
+            RAMP.format("mod(t, R)"),
+            "define",
+            "the period of the model, 'Ts'",
+        ),
+        ("buck", "define/ramp", RAMP.format("mod(t - Ts, Ts)"), "define", "only the time itself"),
+        (
+            "buck",
+            "define/ramp",
+            RAMP.format("mod(v, Ts)"),
+            "define",
+            "a state that jumps has a reset",
+        ),
+        ("buck", "define/ramp", RAMP.format("mod(t)"), "define", "time and period"),
+        ("buck", "period", None, "", "write 'period: ...'"),
+        ("buck", "define/clock", "1.0", "", "give other names to yours"),
+        ("buck", "symmetry", "v -> -v, t -> t + T/2", "symmetry", "the clock"),
+        ("buck", "resets/tick/to", "of", "resets", "did you mean 'off'"),
+        ("buck", "surfaces/switch/sliding", "filipov", "surfaces", "did you mean 'filippov'"),
+        ("buck", "surfaces/switch/sliding", "filippov", "surfaces", "nothing slides there"),
+        ("relay", "surfaces/high/sliding", "filippov", "surfaces", "a mode on each side"),
+        ("pendulum", "angles", ["phi"], "angles", "'phi' is no state"),
+        ("pendulum", "surfaces/theta+", {"observable": "theta"}, "surfaces", "begins again"),
+        ("relay", "modes/third", {"field": {"x": "v", "v": "0"}}, "modes", "to: third"),
+    ],
+)
+def test_mistakes_are_told_in_their_place(
+    name: str, path: str, value: object, at: str, says: str
+) -> None:
+    with pytest.raises(EntryError) as caught:
+        built(describe(changed(name, path, value)))
+    assert says in str(caught.value), str(caught.value)
+    assert (caught.value.address[:1] or ("",))[0] == at
+
+
+def test_percent_and_T_are_the_same_clock() -> None:
+    typed = built(describe(changed("buck", "define/ramp", RAMP.format("mod(t, Ts)"))))
+    for text in ("(t % Ts)", "mod(t, T)", "mod(t, 1.0*Ts)"):
+        other = built(describe(changed("buck", "define/ramp", RAMP.format(text))))
+        assert other.states == typed.states == ("v", "i", "clock")
+        a, b = (cf.find_orbit(m) for m in (typed, other))
+        assert np.allclose(a.joints, b.joints, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["buck", "pendulum", "relay-sliding", "relay", "rimless-wheel"])
+def test_what_is_stored_is_the_same_model(name: str, tmp_path: Path) -> None:
+    model = cf.load_model(name)
+    again = built(from_text(model.definition))
+    assert again.targets == model.targets and again.definition == model.definition
+    orbit = cf.find_orbit(model)
+    save(orbit, tmp_path / "orbit.npz")
+    loaded = cf.load(tmp_path / "orbit.npz")
+    assert loaded.signature.segments == orbit.signature.segments
+    assert np.array_equal(loaded.joints, orbit.joints)
+
+
+def test_a_tie_is_kept_along_a_branch_and_in_files(tmp_path: Path) -> None:
+    tie = {"Omega": 0.47, "S": 0.3, "S0": {"tie": "1.2*S"}}
+    orbit = cf.find_orbit("coulomb", tie)
+    assert orbit.model.parameter_names == ("Omega", "S", "h", "zeta")
+    branch = cf.continue_orbit(orbit, "S", (0.2, 0.4))
+    for point in list(branch)[:: max(1, len(branch) // 5)]:
+        S = point.params["S"]
+        free = cf.simulate(
+            "coulomb",
+            {"Omega": 0.47, "S": S, "S0": 1.2 * S},
+            state=point.begins[0, 1:],
+            time=float(point.begins[0, 0]),
+            domain=None,
+            periods=2.0,
+        )
+        known = {(m, e) for m, e in point.as_whole().word}
+        assert set(free.word) <= {*known, *((e, m) for m, e in known)} or point.system.holds
+    save(branch, tmp_path / "branch.npz")
+    again = cf.load(tmp_path / "branch.npz")
+    assert again.model.parameter_names == orbit.model.parameter_names
+    assert np.array_equal(again.values, branch.values)
+
+
+@pytest.mark.parametrize(
+    ("params", "says"),
+    [
+        ({"S0": {"tie": "Q"}}, "'Q' is no parameter"),
+        ({"S0": {"tei": "S"}}, "such as {tie: S}"),
+        ({"S0": {"tie": "S0"}}, "'S0' is tied itself"),
+        ({"S0": {"tie": "S +"}}, "cannot read"),
+        ({"S9": {"tie": "S"}}, "no parameter 'S9'"),
+        ({"S": 0.3, "S0": {"tie": "0.5*S"}}, "S0 >= S"),
+    ],
+)
+def test_ties_that_mean_nothing(params: dict[str, Any], says: str) -> None:
+    for call in (cf.find_orbit, cf.simulate, cf.lyapunov_exponent):
+        with pytest.raises(cf.ParameterError) as caught:
+            call("coulomb", params)
+        assert says in str(caught.value) or says.replace("S0", "0.5 * S") in str(caught.value)
