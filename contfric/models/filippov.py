@@ -54,6 +54,7 @@ def sliding_parts(
         key: dict(data.get(key) or {}) for key in ("observables", "surfaces", "modes")
     }
     pairs = [(s, above, below) for s in surfaces for above, below in _pairs(description, s)]
+    _check_no_corner(surfaces, pairs)
     for surface, above, below in pairs:
         name = _name(surface, above, below, pairs)
         if name in found["modes"]:
@@ -62,6 +63,20 @@ def sliding_parts(
             )
         _add(found, _Sliding(formulas, surface, above, below, name))
     return found
+
+
+def _check_no_corner(
+    surfaces: tuple[str, ...], pairs: list[tuple[str, ModeText, ModeText]]
+) -> None:
+    """Refuse surfaces that cross each other where motion may slide on both."""
+    for surface, above, below in pairs:
+        for other in surfaces:
+            if other != surface and above.sides.get(other, below.sides.get(other, 0)) != 0:
+                raise EntryError(
+                    ("surfaces", surface, SLIDING),
+                    f"'{surface}' and '{other}' cross each other, and motion could slide on both: what it "
+                    "does there is not derived. Write the sliding modes yourself",
+                )
 
 
 def _pairs(description: Description, surface: str) -> Iterator[tuple[ModeText, ModeText]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from contfric.models.check.probe import Probe
@@ -113,22 +115,37 @@ def _goes_on(
 
 
 def check_resets(report: ModelReport, probe: Probe) -> None:
-    """Check that a reset leads into a domain, and away from the surfaces that it is on there."""
-    model = probe.model
-    for reset in model.resets:
-        for t, y in probe.on(reset.surface, _ON_SURFACE // 2):
-            signs = probe.signs(t, y)
-            for domain in model.domains:
-                side = domain.signs[reset.surface]
-                beside = all(signs[s] == v for s, v in domain.signs.items() if s != reset.surface)
-                if not (side and beside):
-                    continue
-                if not side * probe.rate(domain.own_mode, reset.surface, t, y) < -_STILL:
-                    continue
-                report.count(Topic.RESETS)
-                if fault := _reset_fault(probe, reset, domain, t, y):
-                    report.error(Topic.RESETS, fault)
-                    return
+    """Check that a reset leads into a domain, and away from the surfaces that it is on there.
+
+    Where that is so for some states only, others may be none that motion arrives in: a warning.
+    """
+    for reset in probe.model.resets:
+        faults, fine = [], 0
+        for domain, t, y in _arrivals(probe, reset):
+            report.count(Topic.RESETS)
+            fault = _reset_fault(probe, reset, domain, t, y)
+            fine += not fault
+            faults += [fault] if fault else []
+        if faults and fine:
+            share = f"{len(faults)} of {fine + len(faults)} states that were tried"
+            report.warn(Topic.RESETS, f"{faults[0]}; so it is for {share}, the others go on")
+        elif faults:
+            report.error(Topic.RESETS, faults[0])
+
+
+def _arrivals(probe: Probe, reset: Reset) -> Iterator[tuple[Domain, float, FloatArray]]:
+    """Yield (domain, time, state) of motion that meets the surface of a reset."""
+    for t, y in probe.on(reset.surface, _ON_SURFACE // 2):
+        signs = probe.signs(t, y)
+        for domain in probe.model.domains:
+            side = domain.signs[reset.surface]
+            beside = all(signs[s] == v for s, v in domain.signs.items() if s != reset.surface)
+            if (
+                side
+                and beside
+                and side * probe.rate(domain.own_mode, reset.surface, t, y) < -_STILL
+            ):
+                yield domain, t, y
 
 
 def _reset_fault(probe: Probe, reset: Reset, before: Domain, t: float, y: FloatArray) -> str:
