@@ -197,7 +197,7 @@ class _Reader(ast.NodeTransformer):
 def _rewritten(value: Any, address: Address, depth: int, reader: _Reader) -> Any:
     if depth and isinstance(value, Mapping):
         return {k: _rewritten(v, (*address, str(k)), depth - 1, reader) for k, v in value.items()}
-    named = address[:1] == ("resets",) and address[-1] == "to"
+    named = address[:1] == ("resets",) and address[-1] in ("to", "from")
     at_end = depth == 0 and address[0] in _PARTS
     return reader.read(value, address) if at_end and isinstance(value, str) and not named else value
 

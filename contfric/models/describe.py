@@ -32,8 +32,8 @@ KEYS = (
 _PARAMETER = ("default", "meaning")
 _SURFACE = ("observable", "level", "switching")
 _MODE = ("in", "field", "sliding", "rank")
-#: In a reset: the mode behind it.
-_TO = "to"
+#: In a reset: the mode behind it, and those in which it acts.
+_TO, _FROM = "to", "from"
 _DOMAIN = ("mode", "in", "label")
 _METHODS = ("explicit", "implicit", "automatic")
 #: Tolerances between rounding and what Newton's method on a chain of segments still takes for smooth.
@@ -274,19 +274,28 @@ def _resets(
     surfaces: tuple[Surface, ...],
     modes: tuple[ModeText, ...],
 ) -> dict[str, Any]:
-    """Return the maps of the states, and the modes behind them that are named."""
-    part = top.part("resets", "a mapping of surfaces to {state: new value, to: mode}")
+    """Return the maps of the states, the modes behind them that are named, and those that they act in."""
+    part = top.part("resets", "a mapping of surfaces to {state: new value, to: mode, from: modes}")
     part.only([s.name for s in surfaces])
-    maps, leads = {}, {}
+    maps, leads, acts = {}, {}, {}
     for name in part.data:
-        entry = part.part(name, "{state: new value, to: mode}")
-        entry.only((*states, _TO))
+        entry = part.part(name, "{state: new value, to: mode, from: modes}")
+        entry.only((*states, _TO, _FROM))
+        if _FROM in entry.data:
+            given = entry.data[_FROM]
+            named = Part(
+                {str(i): v for i, v in enumerate(given if isinstance(given, list) else [given])}
+            )
+            known = [m.name for m in modes]
+            acts[name] = tuple(
+                Part(named.data, entry.address).one_of(key, known, "mode") for key in named.data
+            )
         if _TO in entry.data:
             leads[name] = entry.one_of(_TO, [m.name for m in modes], "mode")
         maps[name] = _expressions(
-            Part({k: v for k, v in entry.data.items() if k != _TO}, entry.address)
+            Part({k: v for k, v in entry.data.items() if k not in (_TO, _FROM)}, entry.address)
         )
-    return {"resets": maps, "leads": leads}
+    return {"resets": maps, "leads": leads, "acts": acts}
 
 
 def _symmetry(top: Part, states: tuple[str, ...]) -> dict[str, str] | None:

@@ -49,6 +49,7 @@ class Description:
     modes, domains, departures : as declared; what can be derived is derived from them
     resets : surface -> state -> expression
     leads : surface -> mode behind the reset, where it is said
+    acts : surface -> modes in which the reset acts, where they are said
     symmetry : name (a state or t) -> expression of its image; None if there is none
     stop_surface : empty if it is to be found
     kinks : observables at whose zeros the fields have kinks, and are continuous
@@ -73,6 +74,7 @@ class Description:
     departures: tuple[Departure, ...] = ()
     resets: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     leads: Mapping[str, str] = field(default_factory=dict)
+    acts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     symmetry: Mapping[str, str] | None = None
     stop_surface: str = ""
     kinks: tuple[str, ...] = ()
@@ -108,7 +110,11 @@ class Description:
                 {"where": dict(d.where), "leaves": dict(d.leaves)} for d in self.departures
             ],
             "resets": {
-                name: {**texts, **({"to": self.leads[name]} if name in self.leads else {})}
+                name: {
+                    **texts,
+                    **({"to": self.leads[name]} if name in self.leads else {}),
+                    **({"from": list(self.acts[name])} if name in self.acts else {}),
+                }
                 for name, texts in self.resets.items()
             },
             "spread": dict(zip(self.states, self.spread, strict=True)),

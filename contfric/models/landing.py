@@ -7,6 +7,7 @@ arrives at: it is so for all of them, or it is not so.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 from contfric.models.angles import wraps_of
@@ -19,6 +20,19 @@ from contfric.models.grammar import parse
 _PLACES = 24
 #: Rounding of an image on a surface, relative to 1 + its values.
 _ON = 1e-9
+
+
+def acting_modes(sampler: Sampler, domains: Sequence[Domain], surface: str) -> set[str]:
+    """Return the modes in which a reset acts: of those that it names, those on one side of its surface."""
+    named = sampler.evaluator.description.acts.get(surface, ())
+    sides: dict[str, set[int]] = {}
+    for domain in domains:
+        sides.setdefault(domain.mode, set()).add(domain.signs[surface])
+    return {
+        mode
+        for mode, signs in sides.items()
+        if signs in ({1}, {-1}) and (not named or mode in named)
+    }
 
 
 class Landing:
@@ -39,14 +53,13 @@ class Landing:
 
     def _arrivals(self) -> list[tuple[Domain, float, list[float]]]:
         """Return (domain, time, state) of motion that meets the surface."""
-        found = []
+        found, acting = [], acting_modes(self.sampler, self.domains, self.surface)
         for t, y in self.sampler.on(self.surface, {}, _PLACES):
             sides = self.sampler.sides(t, y, self.surfaces)
             for domain in self.domains:
                 side = domain.signs[self.surface]
-                if side == 0 or any(
-                    sides[s] != v for s, v in domain.signs.items() if s != self.surface
-                ):
+                beside = all(sides[s] == v for s, v in domain.signs.items() if s != self.surface)
+                if not (domain.mode in acting and beside):
                     continue
                 if side * self.sampler.rate(domain.mode, self.surface, side, t, y) < 0.0:
                     found.append((domain, t, y))
@@ -83,35 +96,42 @@ class Landing:
         images: Sequence[tuple[Domain, float, list[float]]],
     ) -> int:
         own = surface == self.surface
-        verdicts = set()
+        verdicts, passed = Counter[int](), True
         for before, t, y in images:
-            side = self._side(before, surface, met, t, y)
-            verdicts.add(side * before.signs[surface] if own else side)
+            behind = self._behind(before, met, t, y)
+            side = self._side(behind, surface, t, y)
+            verdicts[side * before.signs[surface] if own else side] += 1
+            passed = passed and len({d.mode for d in behind}) == 1
         if len(verdicts) == 1 and 0 not in verdicts:
-            return verdicts.pop()
-        if own and len({d.signs[surface] for d in self.domains} - {0}) == 1:
+            return verdicts.popitem()[0]
+        one_sided = len({d.signs[surface] for d in self.domains} - {0}) == 1
+        if own and one_sided:
             return 1  # a wall that some states still run into: `contfric check` says where
+        if passed and any(verdicts[side] for side in (1, -1)):
+            return max((1, -1), key=verdicts.__getitem__)  # the mode behind passes it: a label
         raise EntryError(
             ("resets", self.surface),
             f"the reset at '{self.surface}' takes states to the surface '{surface}', and some of them to one "
             "side of it, some to the other, or to none: behind a reset the rates must tell the side",
         )
 
-    def _side(
-        self, before: Domain, surface: str, met: Sequence[str], t: float, y: Sequence[float]
-    ) -> int:
-        """Return the side of a surface to which one image leaves; 0 if there is none, or two."""
+    def _behind(
+        self, before: Domain, met: Sequence[str], t: float, y: Sequence[float]
+    ) -> list[Domain]:
+        """Return the domains that an image may be in, but for the sides of the surfaces that it is on."""
         sides = self.sampler.sides(t, y, [s for s in self.surfaces if s not in met])
         behind = [d for d in self.domains if all(d.signs[s] == v for s, v in sides.items())]
         for mode in (self.leads, before.mode):
             kept = [d.signs for d in behind if d.mode == mode]
             behind = [d for d in behind if d.mode == mode or d.signs not in kept]
+        return behind
+
+    def _side(self, behind: Sequence[Domain], surface: str, t: float, y: Sequence[float]) -> int:
+        """Return the side of a surface to which one image leaves; 0 if there is none, or two."""
         away = set()
         for domain in behind:
             side = domain.signs[surface]
-            if side == 0:
-                continue
-            if side * self.sampler.rate(domain.mode, surface, side, t, y) > 0.0:
+            if side and side * self.sampler.rate(domain.mode, surface, side, t, y) > 0.0:
                 away.add(side)
         return away.pop() if len(away) == 1 else 0
 
@@ -129,6 +149,12 @@ def reset_of(
         for o in description.observables
         if description.names.leaves(parse(o.formula), ()) & changed
     }
+    if not acting_modes(sampler, domains, surface):
+        raise EntryError(
+            ("resets", surface),
+            f"the reset at '{surface}' acts in no mode: it does in those that lie on one side of it. Write "
+            f"that side to the 'in' of a mode ({surface}: + or {surface}: -)",
+        )
     landing = Landing(sampler, surface, surfaces, domains, leads)
     if landing.arrivals:
         lands = landing.lands()
@@ -142,4 +168,5 @@ def reset_of(
     )
     formula = ", ".join(f"{state} -> {value}" for state, value in texts.items())
     wraps = any(surface in wraps_of(angle) for angle in description.angles)
-    return Reset(surface, formula, changes, lands, leads, wraps)
+    modes = description.acts.get(surface, ())
+    return Reset(surface, formula, changes, lands, leads, modes, wraps)

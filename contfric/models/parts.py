@@ -115,6 +115,7 @@ class Reset:
         surface that is +1 where it goes back (a wall), -1 where it passes
     leads : the mode behind the reset where that holds; else, and if it is empty, the mode before it where
         that holds, or another one
+    modes : modes in which it acts; by default (empty) those that lie on one side of the surface
     wraps : whether it takes an angle back by a turn, which is nothing to the motion: it bounds nothing
     """
 
@@ -123,6 +124,7 @@ class Reset:
     changes: tuple[str, ...] = ()
     lands: Mapping[str, int] = field(default_factory=dict)
     leads: str = ""
+    modes: tuple[str, ...] = ()
     wraps: bool = False
 
     @property

@@ -121,7 +121,7 @@ def _substituted(data: dict[str, Any], ties: Mapping[str, str]) -> dict[str, Any
         name: {**entry, "field": put.each(entry["field"])} for name, entry in data["modes"].items()
     }
     found["resets"] = {
-        name: put.each(texts, skip=("to",)) for name, texts in data["resets"].items()
+        name: put.each(texts, skip=("to", "from")) for name, texts in data["resets"].items()
     }
     return found
 

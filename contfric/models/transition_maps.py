@@ -61,9 +61,29 @@ class TransitionMaps(SectionMaps):
         for domain in self.domains:
             for reset in self.resets:
                 behind = self._domains_behind(domain, reset)
-                if behind and domain.signs[reset.surface] != 0:
+                if behind and self.maps_at(domain, reset.surface):
                     found[domain.name, reset.surface] = behind
         return found
+
+    def maps_at(self, domain: Domain, surface: str) -> bool:
+        """Return whether a reset acts on motion that meets a surface.
+
+        It does in the modes that it names, or else in those that lie on one side of the surface: a mode that
+        leaves the surface out passes it unchanged.
+        """
+        reset = self.reset_by_surface.get(surface)
+        if reset is None or self._side_of[domain.own_mode, surface] == 0:
+            return False
+        return not reset.modes or domain.own_mode in reset.modes
+
+    @cached_property
+    def _side_of(self) -> dict[tuple[str, str], int]:
+        """The side of each surface that a declared mode lies on; 0 if on both, or on it."""
+        sides: dict[tuple[str, str], set[int]] = {}
+        for domain in self.domains:
+            for surface, sign in domain.signs.items():
+                sides.setdefault((domain.own_mode, surface), set()).add(sign)
+        return {key: signs.pop() if len(signs) == 1 else 0 for key, signs in sides.items()}
 
     def changed_by(self, reset: Reset, surface: str) -> bool:
         """Return whether a reset may change the sign at a surface."""
@@ -94,7 +114,7 @@ class TransitionMaps(SectionMaps):
 
     def _next_domain(self, domain: Domain, surface: Surface) -> str | None:
         sign = domain.signs[surface.name]
-        if sign == 0 or surface.name in self.reset_by_surface:
+        if sign == 0 or self.maps_at(domain, surface.name):
             return None
         mode = domain.own_mode
         through = {**domain.signs, surface.name: -sign}

@@ -27,7 +27,8 @@ def cut_bounds(model: Model) -> dict[str, tuple[str, ...]]:
 def _bounds(model: Model, modes: dict[str, str]) -> dict[str, tuple[str, ...]]:
     bounds: dict[str, set[str]] = {mode.name: set() for mode in model.modes}
     for (name, surface), targets in model.targets.items():
-        if surface in model.reset_by_surface or modes[targets[0]] != modes[name]:
+        mapped = model.maps_at(model.domain_by_name[name], surface)
+        if mapped or modes[targets[0]] != modes[name]:
             bounds[modes[name]].add(surface)
     return {
         mode: tuple(s.name for s in model.surfaces if s.name in found)

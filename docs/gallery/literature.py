@@ -20,6 +20,7 @@ STUDIES = (
     *("dead-band", "impact", "impact-friction", "belt", "popp", "bang-bang"),
     *("buck", "relay", "relay-sliding", "thermostat", "rocking-block", "rimless-wheel"),
     *("bouncing-ball", "gear-pair", "pendulum", "normal-force", "jenkins"),
+    "compass-gait",
 )
 #: Studies of planes, each with the page that shows it.
 PLANES = {"popp-plane": "popp", "integrate-and-fire": "integrate-and-fire"}

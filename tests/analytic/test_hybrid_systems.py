@@ -398,3 +398,85 @@ def test_gear_pair_parts_at_a_grazing() -> None:
     grazings = values(found, "GS")
     at = brentq(least, 1.0, 1.2, xtol=1e-9)
     assert min(abs(v - at) for v in grazings) < 1e-7
+
+
+# ---------------------------------------------------------------------------- legs change roles
+
+
+def test_compass_gait() -> None:
+    """Segments by scipy, the strike by angular momentum, the time of a step as published (0.734 s)."""
+    model = cf.load_model("compass-gait")
+    p = model.defaults
+    a, b, m, mH, g = (p[n] for n in ("a", "b", "m", "mH", "g"))
+    length = a + b
+
+    def rates(t, y):
+        ns, s, wns, ws = y
+        c, sine = math.cos(s - ns), math.sin(s - ns)
+        inertia = np.array(
+            [
+                [m * b**2, -m * length * b * c],
+                [-m * length * b * c, mH * length**2 + m * (length**2 + a**2)],
+            ]
+        )
+        spin = m * length * b * sine
+        push = [-spin * ws**2 - m * b * g * math.sin(ns)]
+        push += [spin * wns**2 + (mH * length + m * (a + length)) * g * math.sin(s)]
+        return [wns, ws, *np.linalg.solve(inertia, push)]
+
+    def momenta(hip, foot, legs, rates_of_legs):
+        """Of all about the foot that stands, and of the leg that swings about the hip."""
+        (th_st, th_sw), (w_st, w_sw) = legs, rates_of_legs
+
+        def place(angle, rate, r):  # of a point at a distance r up the leg that stands
+            return (
+                np.array([-r * math.sin(angle), r * math.cos(angle)]),
+                rate * np.array([-r * math.cos(angle), -r * math.sin(angle)]),
+            )
+
+        stands, v_stands = place(th_st, w_st, a)
+        top, v_top = place(th_st, w_st, length)
+        back, v_back = place(th_sw, w_sw, b)
+        swings, v_swings = top - back, v_top - v_back
+
+        def moment(x, v, mass, about):
+            r = x - about
+            return mass * (r[0] * v[1] - r[1] * v[0])
+
+        whole = sum(
+            moment(x, v, mass, foot)
+            for x, v, mass in ((stands, v_stands, m), (top, v_top, mH), (swings, v_swings, m))
+        )
+        return (
+            whole,
+            moment(swings, v_swings, m, top if hip else foot),
+            (stands, v_stands, top, v_top),
+        )
+
+    orbit = cf.find_orbit(model, state=[-0.2942, 0.1894, 0.2146, -1.0506])
+    closes(orbit, {"early": rates, "scuff": rates, "late": rates})
+    assert orbit.period == pytest.approx(0.734, abs=5e-4)
+    i = next(k for k, (_, exit_) in enumerate(orbit.word) if exit_ == "strike")
+    ns, s, wns, ws = orbit.ends[i, 1:]
+    after = orbit.begins[(i + 1) % len(orbit.word), 1:]
+    assert after[:2] == pytest.approx([s, ns], abs=1e-14)
+    # about the foot that strikes: at the end of the swing leg, seen from the one that stood
+    struck = np.array(
+        [
+            -length * math.sin(s) + length * math.sin(ns),
+            length * math.cos(s) - length * math.cos(ns),
+        ]
+    )
+    whole, _, (leg, v_leg, top, _) = momenta(False, struck, (s, ns), (ws, wns))
+    r = leg - top
+    leaves = m * (r[0] * v_leg[1] - r[1] * v_leg[0])
+    again, swings, _ = momenta(True, np.zeros(2), (after[1], after[0]), (after[3], after[2]))
+    assert again == pytest.approx(whole, rel=1e-10)
+    assert swings == pytest.approx(leaves, rel=1e-10)
+
+
+def test_compass_gait_doubles() -> None:
+    """The published cascade begins at about 4.4 degrees."""
+    found = diagram("compass-gait", "slope", 0.05, 0.08, state=(-0.2942, 0.1894, 0.2146, -1.0506))
+    (doubles,) = values(found, "PD")
+    assert math.degrees(doubles) == pytest.approx(4.4, abs=0.05)

@@ -140,11 +140,8 @@ def _arrivals(probe: Probe, reset: Reset) -> Iterator[tuple[Domain, float, Float
         for domain in probe.model.domains:
             side = domain.signs[reset.surface]
             beside = all(signs[s] == v for s, v in domain.signs.items() if s != reset.surface)
-            if (
-                side
-                and beside
-                and side * probe.rate(domain.own_mode, reset.surface, t, y) < -_STILL
-            ):
+            meets = beside and probe.model.maps_at(domain, reset.surface)
+            if meets and side * probe.rate(domain.own_mode, reset.surface, t, y) < -_STILL:
                 yield domain, t, y
 
 
