@@ -49,8 +49,9 @@ def report_of(tmp_path: Path, text: str) -> cf.ModelReport:
 def test_bundled_models_pass(name: str) -> None:
     report = check_model(name)
     assert report.ok, str(report)
-    # a static limit above the kinetic one is said, and no fault
-    assert all("above the kinetic one" in f.message for f in report.findings), str(report)
+    # what is said and is no fault: a static limit above the kinetic one, states that nobody walks through
+    said = ("above the kinetic one", "states that were tried")
+    assert all(any(s in f.message for s in said) for f in report.findings), str(report)
     assert report.counts[Topic.DERIVATIVES] > 0
 
 

@@ -117,7 +117,7 @@ def _goes_on(
 def check_resets(report: ModelReport, probe: Probe) -> None:
     """Check that a reset leads into a domain, and away from the surfaces that it is on there.
 
-    Where that is so for some states only, others may be none that motion arrives in: a warning.
+    Where that is so for some states only, others may be none that motion arrives in: a note.
     """
     for reset in probe.model.resets:
         faults, fine = [], 0
@@ -128,7 +128,7 @@ def check_resets(report: ModelReport, probe: Probe) -> None:
             faults += [fault] if fault else []
         if faults and fine:
             share = f"{len(faults)} of {fine + len(faults)} states that were tried"
-            report.warn(Topic.RESETS, f"{faults[0]}; so it is for {share}, the others go on")
+            report.note(Topic.RESETS, f"{faults[0]}; so it is for {share}, the others go on")
         elif faults:
             report.error(Topic.RESETS, faults[0])
 
