@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from contfric.atlas.scenario import Scenario
     from contfric.atlas.verification import Verification
     from contfric.response.sweep import Sweep
 
@@ -129,6 +130,15 @@ class Diagram:
         """Every event once (symmetry images are not listed), in the order of the parameter."""
         found = [node for node in self.nodes if not node.mirrored]
         return tuple(sorted(found, key=lambda node: node.bifurcation.params[self.parameter]))
+
+    def scenario(self, event: Node) -> Scenario | None:
+        """Return what a non-smooth event is for the orbits beside it: persistence, a fold, or a jump.
+
+        None for a smooth event, and for one of orbits with a hold only.
+        """
+        from contfric.atlas.scenario import scenario_of
+
+        return scenario_of(self, event)
 
     def verify(self, restarts: int = 6, step: float | None = None) -> Verification:
         """Explore again from the diagram's own branches, and check the sums of indices.

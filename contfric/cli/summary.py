@@ -98,10 +98,11 @@ def _diagram(record: Record) -> Iterator[str]:
 def _bifurcations(record: Record) -> Iterator[str]:
     name = record["parameter"]
     names = {branch["branch"]: branch["signature"] for branch in record["branches"]}
-    rows = [["event", name, "branches"]]
+    rows = [["event", name, "branches", ""]]
     for event in record["bifurcations"]:
         joined = ", ".join(f"{names[i]} ({i})" for i in event["branches"])
-        rows.append([event["label"], f"{event['params'][name]:.13g}", joined])
+        says = event.get("scenario") or ""
+        rows.append([event["label"], f"{event['params'][name]:.13g}", joined, says])
     yield ""
     yield from table(rows)
 

@@ -70,10 +70,11 @@ def write_bifurcations(path: Path, diagram: Diagram) -> None:
             *(node.bifurcation.params[name] for name in names),
             _known(node.bifurcation.stable_before),
             _known(node.bifurcation.stable_after),
+            getattr(diagram.scenario(node), "value", ""),
         )
         for node in listed_nodes(diagram)
     )
-    header = ["kind", "branch", "signature", *names, "stable_before", "stable_after"]
+    header = ["kind", "branch", "signature", *names, "stable_before", "stable_after", "scenario"]
     write_table(path, header, rows)
 
 

@@ -314,7 +314,7 @@ def test_tables_are_exact(tmp_path, study) -> None:
     assert list(table[0]) == [
         *("kind", "branch", "signature"),
         *("Omega", "S", "S0", "h", "zeta"),
-        *("stable_before", "stable_after"),
+        *("stable_before", "stable_after", "scenario"),
     ]
     assert [float(row["Omega"]) for row in table] == [
         b.params["Omega"] for b in result.diagram.bifurcations
