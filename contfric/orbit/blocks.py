@@ -17,6 +17,10 @@ from contfric.orbit.equations import (
 )
 from contfric.orbit.holds import NO_PIN
 
+#: Growth along a segment, times the rate at its exit, from which the rates at the joint are no better than
+#: those of the state that the flow comes to: the first are wrong by the square of it, in units of rounding.
+_FAR = 1e3
+
 
 @helper
 def rates_at_joint(functions, layout, i, after, p, which, workspace, rows):  # type: ignore[no-untyped-def]
@@ -32,7 +36,7 @@ def rates_at_joint(functions, layout, i, after, p, which, workspace, rows):  # t
     for j in range(n):
         for k in range(n):
             grown = max(grown, abs(rows[m + j, m + 1 + k]))
-    if grown * abs(workspace.rates[i]) > 1.0:
+    if grown * abs(workspace.rates[i]) > _FAR:
         return
     functions.flow(layout.modes[i], after[0], after[1:], 0.0, p, which, workspace.state, jac)
     for j in range(n):
