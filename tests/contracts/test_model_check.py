@@ -279,3 +279,39 @@ def test_a_shift_of_differing_frictions_is_an_expression_of_them(tmp_path: Path)
     check_hidden(report, Probe(cf.load_model(path), {}))
     (finding,) = report.findings
     assert "x -> S - R - x, v -> -v" in finding.message and "Measure x" in finding.message
+
+
+APART = """\
+name: apart
+states: [x, q]
+parameters: {w: 1.0, h: 0.1}
+period: 2*pi/w
+surfaces:
+  up: {observable: x, level: h}
+modes:
+  low: {in: {up: -}, field: {x: cos(w*t) - x, q: x - q}}
+  high: {in: {up: +}, field: {x: cos(w*t) - 2*x, q: x - q}}
+spread: {x: 1, q: 1}
+"""
+
+
+def findings(tmp_path: Path, text: str, topic: Topic) -> list[str]:
+    return [f.message for f in report_of(tmp_path, text).findings if f.topic is topic]
+
+
+def test_a_mode_that_nothing_leads_into_is_told(tmp_path: Path) -> None:
+    assert not findings(tmp_path, APART, Topic.REACHED)
+    fields = "{x: v, v: cos(Omega*t) - x}"
+    sides = f"in: {{in: {{wall: -}}, field: {fields}}}\n  out: {{in: {{wall: +}}, field: {fields}}}"
+    text = WALL[: WALL.index("  rise")] + f"  {sides}\n" + WALL[WALL.index("resets") :]
+    told = findings(tmp_path, text, Topic.REACHED)
+    assert len(told) == 2 and "'out'" in told[1]
+
+
+def test_sizes_and_times_that_are_far_apart_are_told(tmp_path: Path) -> None:
+    assert not findings(tmp_path, APART, Topic.SCALES)
+    (sizes,) = findings(tmp_path, APART.replace("q: 1}", "q: 1.0e-9}"), Topic.SCALES)
+    assert "'q' (1e-09) and 'x' (1)" in sizes
+    fast = APART.replace("- x,", "- 1.0e+9*x,").replace("q: x - q", "q: 1.0e+9*(x - q)")
+    (times,) = findings(tmp_path, fast.replace("- 2*x", "- 1.0e+9*x"), Topic.SCALES)
+    assert "measure time" in times

@@ -48,6 +48,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     from contfric.models.check.kinks import check_kinks
     from contfric.models.check.names import check_constraints, check_names
     from contfric.models.check.probe import Probe
+    from contfric.models.check.scales import check_reached, check_scales
     from contfric.models.check.structure import (
         check_angles,
         check_period,
@@ -68,6 +69,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_derivatives(report, probe)
     check_surfaces(report, probe)
     check_transitions(report, probe)
+    check_reached(report, probe)
     check_resets(report, probe)
     check_continuity(report, probe)
     check_kinks(report, loaded)
@@ -77,4 +79,5 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_hidden(report, probe)
     check_period(report, probe)
     check_angles(report, probe)
+    check_scales(report, probe)
     return report

@@ -13,6 +13,7 @@ class Topic(str, Enum):
     DERIVATIVES = "compiled values and derivatives against the formulas"
     SURFACES = "surfaces are regular: the gradient does not vanish on them"
     TRANSITIONS = "every crossing that motion makes has a next domain, which it can enter"
+    REACHED = "every mode is entered from another one"
     RESETS = "a reset leads into a domain, and away from the surfaces that it is on there"
     CONTINUITY = "fields and observables do not jump inside of a mode"
     KINKS = "kinks of the fields lie on surfaces that their modes know"
@@ -22,6 +23,7 @@ class Topic(str, Enum):
     PERIOD = "the field repeats itself after the period"
     CONSTRAINTS = "the defaults obey the constraints"
     NAMES = "every parameter is used, and every state is driven"
+    SCALES = "states are of sizes, and change in times, that are not far apart"
 
 
 class Severity(str, Enum):
