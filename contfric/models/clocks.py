@@ -13,6 +13,7 @@ import ast
 from collections.abc import Mapping
 from typing import Any
 
+from contfric.errors import ModelError
 from contfric.models.entries import EntryError
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope
 from contfric.yaml_lines import Address
@@ -188,7 +189,10 @@ class _Reader(ast.NodeTransformer):
                 name: float(v) * (1.0 + share * (1 + i * k)) if isinstance(v, (int, float)) else 0.0
                 for i, (name, v) in enumerate(self.parameters.items())
             }
-            a, b = (Scope(FLOATS, dict(moved), self.define).evaluate(e) for e in (node, own))
+            try:
+                a, b = (Scope(FLOATS, dict(moved), self.define).evaluate(e) for e in (node, own))
+            except ModelError as error:
+                raise EntryError(self.address, str(error)) from None
             if not abs(a - b) <= _SAME * abs(b):
                 return False
         return True

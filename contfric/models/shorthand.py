@@ -1,4 +1,4 @@
-"""What a model says in short, written out: clocks, angles, sliding that is derived.
+"""What a model says in short, written out: tied parameters, clocks, angles, sliding that is derived.
 
 Each is put into the data of a model, before it is read, as if it had been typed: nothing behind knows of it.
 """
@@ -12,6 +12,7 @@ from contfric.models.angles import with_angles
 from contfric.models.clocks import with_clock
 from contfric.models.description import Description
 from contfric.models.entries import Part
+from contfric.models.tied import with_ties_put_in
 
 
 def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]) -> Description:
@@ -26,13 +27,40 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
     EntryError
         For the first mistake, with the address of its entry.
     """
-    surfaces, plain = _derived_sliding(with_angles(with_clock(data)))
+    if not _is_regular(data):
+        return read(data)  # which says what is wrong, and where
+    surfaces, plain = _derived_sliding(with_angles(with_clock(with_ties_put_in(data))))
     found = read(plain)
     if surfaces:
         from contfric.models.filippov import sliding_parts
 
         found = read(plain | sliding_parts(found, surfaces, _with_fields(plain)))
     return found
+
+
+#: Parts of a model that are mappings, and those of them whose entries are mappings.
+_MAPPINGS = (
+    "parameters",
+    "define",
+    "observables",
+    "field",
+    "spread",
+    "surfaces",
+    "modes",
+    "resets",
+)
+_NESTED = ("surfaces", "modes", "resets")
+
+
+def _is_regular(data: Mapping[str, Any]) -> bool:
+    """Tell whether the parts of a model are of the kinds that they should be."""
+    parts = [data[key] for key in _MAPPINGS if data.get(key) is not None]
+    entries = [
+        e for key in _NESTED if isinstance(data.get(key), Mapping) for e in data[key].values()
+    ]
+    own = [e["field"] for e in entries if isinstance(e, Mapping) and "field" in e]
+    lists = isinstance(data.get("states"), (list, tuple))
+    return lists and all(isinstance(part, Mapping) for part in (*parts, *entries, *own))
 
 
 def _derived_sliding(data: dict[str, Any]) -> tuple[tuple[str, ...], dict[str, Any]]:

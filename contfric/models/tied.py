@@ -9,6 +9,7 @@ the others are right by themselves. `coulomb`, whose motion is written by hand, 
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -99,6 +100,58 @@ def with_ties(model: Model, ties: Mapping[str, str]) -> Model:
         raise ParameterError(f"{_named(model.name, ties)}: {error}") from None
 
 
+def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a model's data without the parameters that it ties itself (``S0: {tie: S}``).
+
+    Raises
+    ------
+    EntryError
+        For a tie to what is no expression of other parameters.
+    """
+    from contfric.errors import ModelError
+    from contfric.models.entries import EntryError
+    from contfric.models.grammar import names_in, parse
+
+    given = data.get("parameters")
+    parameters = given if isinstance(given, Mapping) else {}
+    ties = {
+        str(name): str(value[_TIE])
+        for name, value in parameters.items()
+        if isinstance(value, Mapping) and _TIE in value
+    }
+    if not ties:
+        return data
+    left = [str(name) for name in parameters if name not in ties]
+    for name, text in ties.items():
+        try:
+            foreign = sorted(names_in(parse(text)) - {"pi", *left})
+        except ModelError as error:
+            raise EntryError(("parameters", name), str(error)) from None
+        if foreign:
+            hint = did_you_mean(foreign[0], left)
+            raise EntryError(
+                ("parameters", name),
+                f"a tie is an expression of other parameters, and '{foreign[0]}' is none{hint}",
+            )
+    constraints = data.get("constraints") or {}
+    if not isinstance(constraints, Mapping):
+        constraints = dict.fromkeys(map(str, constraints), "")
+    whole: dict[str, Any] = {
+        "define": {},
+        "observables": {},
+        "spread": {},
+        "surfaces": {},
+        "modes": {},
+        "resets": {},
+    }
+    plain = {
+        **whole,
+        **{k: v for k, v in data.items() if v is not None},
+        "constraints": constraints,
+    }
+    return _substituted(plain, ties)
+
+
 def _named(name: str, ties: Mapping[str, str]) -> str:
     return f"{name} with {', '.join(f'{k} = {v}' for k, v in ties.items())}"
 
@@ -113,12 +166,12 @@ def _substituted(data: dict[str, Any], ties: Mapping[str, str]) -> dict[str, Any
         found[key] = put.each(data[key])
     if "period" in data:
         found["period"] = put.text(data["period"])
-    found["surfaces"] = {
-        name: {**entry, "level": put.text(entry["level"])}
-        for name, entry in data["surfaces"].items()
-    }
+    if "field" in data:
+        found["field"] = put.each(data["field"])
+    found["surfaces"] = {name: put.part(entry, "level") for name, entry in data["surfaces"].items()}
     found["modes"] = {
-        name: {**entry, "field": put.each(entry["field"])} for name, entry in data["modes"].items()
+        name: {**entry, "field": put.each(entry["field"])} if "field" in entry else entry
+        for name, entry in data["modes"].items()
     }
     found["resets"] = {
         name: put.each(texts, skip=("to", "from")) for name, texts in data["resets"].items()
@@ -140,12 +193,20 @@ class _Put(ast.NodeTransformer):
 
     def text(self, text: str) -> str:
         """Return an expression with the ties put in."""
-        return ast.unparse(self.visit(ast.parse(str(text).strip(), mode="eval")))
+        try:
+            tree = ast.parse(str(text).strip(), mode="eval")
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            return text  # whoever reads it says what is wrong
+        return ast.unparse(self.visit(tree))
 
     def condition(self, text: str) -> str:
         """Return an inequality with the ties put in, as it stood if none is in it."""
-        changed = self.text(text)
-        return text if changed == ast.unparse(ast.parse(text.strip(), mode="eval")) else changed
+        names = {word for word in self.trees if re.search(rf"\b{re.escape(word)}\b", text)}
+        return self.text(text) if names else text
+
+    def part(self, entry: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+        """Return an entry with the ties put into one of its expressions, if it has that."""
+        return {**entry, key: self.text(entry[key])} if key in entry else entry
 
     def each(self, texts: Mapping[str, str], skip: Iterable[str] = ()) -> dict[str, str]:
         """Return a mapping of expressions with the ties put in."""

@@ -67,6 +67,7 @@ RAMP = "low + (high - low)*{}/Ts"
             "a state that jumps has a reset",
         ),
         ("buck", "define/ramp", RAMP.format("mod(t)"), "define", "time and period"),
+        ("buck", "define/ramp", RAMP.format("mod(t, Q)"), "define", "unknown name 'Q'"),
         ("buck", "period", None, "", "write 'period: ...'"),
         ("buck", "define/clock", "1.0", "", "give other names to yours"),
         ("buck", "symmetry", "v -> -v, t -> t + T/2", "symmetry", "the clock"),
@@ -132,6 +133,22 @@ def test_a_tie_is_kept_along_a_branch_and_in_files(tmp_path: Path) -> None:
     assert np.array_equal(again.values, branch.values)
 
 
+def test_a_model_ties_its_own_parameters() -> None:
+    data = data_of("coulomb-yaml")
+    given = {
+        k: float(v["default"] if isinstance(v, dict) else v) for k, v in data["parameters"].items()
+    }
+    own = built(describe({**data, "parameters": {**given, "S0": {"tie": "1.2*S"}}}))
+    asked = cf.find_orbit("coulomb", {"Omega": 0.47, "S": 0.3, "S0": {"tie": "1.2*S"}})
+    orbit = cf.find_orbit(own, {"Omega": 0.47, "S": 0.3})
+    assert own.parameter_names == asked.model.parameter_names
+    assert np.allclose(orbit.joints, asked.joints, rtol=0, atol=1e-13)
+    for text, says in (("Q", "'Q' is none"), ("S0", "'S0' is none"), ("S*", "cannot read")):
+        with pytest.raises(EntryError) as caught:
+            describe({**data, "parameters": {**given, "S0": {"tie": text}}})
+        assert says in str(caught.value) and caught.value.address == ("parameters", "S0")
+
+
 @pytest.mark.parametrize(
     ("params", "says"),
     [
@@ -148,3 +165,42 @@ def test_ties_that_mean_nothing(params: dict[str, Any], says: str) -> None:
         with pytest.raises(cf.ParameterError) as caught:
             call("coulomb", params)
         assert says in str(caught.value) or says.replace("S0", "0.5 * S") in str(caught.value)
+
+
+WRONG = [
+    *(("surfaces", v) for v in ([1], {"s": 3}, {"s": None})),
+    *(("modes", v) for v in ([2], {"m": 3}, {"m": {"field": [1]}}, {"m": None})),
+    *(("resets", v) for v in ([1], {"s": 4})),
+    *(
+        (key, v)
+        for key in ("define", "spread", "field", "observables", "parameters")
+        for v in ([1], 3)
+    ),
+    *(("states", v) for v in ("x", None, [1.5])),
+    *(("constraints", v) for v in ("a > 0", [3])),
+    *(("angles", v) for v in (3, ["x"], ["nobody"])),
+]
+
+
+@pytest.mark.parametrize("short", ["", "tie", "mod", "tie, mod", "filippov", "latch"])
+@pytest.mark.parametrize(("key", "value"), WRONG, ids=[f"{k}: {v}" for k, v in WRONG])
+def test_parts_of_the_wrong_kind_are_told(short: str, key: str, value: object) -> None:
+    data: dict[str, Any] = {
+        "name": "a",
+        "states": ["x"],
+        "parameters": {"a": 1.0},
+        "autonomous": True,
+        "surfaces": {"s": {"observable": "x"}},
+        "modes": {"m": {"field": {"x": "a"}}},
+    }
+    if "tie" in short:
+        data["parameters"]["b"] = {"tie": "a"}
+    if "mod" in short or "latch" in short:
+        del data["autonomous"]
+        data |= {"period": "a", "define": {"q": "mod(t, a)"}, "resets": {"tick": {"to": "m"}}}
+    if "filippov" in short:
+        data["surfaces"]["s"]["sliding"] = "filippov"
+    try:
+        describe({**data, key: value})
+    except EntryError as error:
+        assert "\n" not in str(error)
