@@ -265,7 +265,7 @@ made_of(Bifurcation, _parts, Bifurcation)
 
 def meaning_of(kind: Kind, model: Model, surfaces: Set[str]) -> str:
     """Return what happens at an event on surfaces of a model: a sliding only where something slides."""
-    if kind is Kind.CS and not any(_is_rested_on(model, s) for s in surfaces):
+    if kind is Kind.CS and not any(mode.sliding for mode in model.modes):
         return "corner: two surfaces are met at once"
     if kind is not Kind.GS:
         return kind.meaning
