@@ -41,6 +41,8 @@ _ROUNDING = 1e-15 * 46080.0
 MOST_PIECES = 3000
 #: Error of a stationary time, relative to 1 + the time: one within it of a joint is at the joint.
 _AT_JOINT = 4e-10
+#: By how much steps are shortened where a search fails: no ratio of small whole numbers.
+_OTHER_STEPS = 1.0873
 
 
 @inlined_helper
@@ -344,9 +346,18 @@ def linear_stationary(motion, piece, c, t0, y0, dt, p, times, values):  # type: 
 def search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, values):  # type: ignore[no-untyped-def]
     """Search all stationary points, from a folded time, in a workspace that is given."""
     system, sight = system_in(workspace[0][:1], workspace[1], workspace[2], 0), workspace[0][1]
-    reach = begin_search(motion, piece, c, t, y0, dt, p, none, system, sight)
-    if math.isnan(reach[0]):
-        return -1
-    return stationary_in(
-        motion, piece, c, t, dt, p, reach, system, sight, workspace[3], times, values
-    )
+    found, shorter = -1, 1.0
+    for _ in range(
+        2
+    ):  # a double zero at the very end of a step has no sign on either side: other steps
+        rate, spread = begin_search(motion, piece, c, t, y0, dt, p, none, system, sight)
+        if math.isnan(rate):
+            return -1
+        reach = (rate * shorter, spread)
+        found = stationary_in(
+            motion, piece, c, t, dt, p, reach, system, sight, workspace[3], times, values
+        )
+        if found >= 0:
+            break
+        shorter = _OTHER_STEPS
+    return found
