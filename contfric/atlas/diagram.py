@@ -132,7 +132,7 @@ class Diagram:
         return tuple(sorted(found, key=lambda node: node.bifurcation.params[self.parameter]))
 
     def scenario(self, event: Node) -> Scenario | None:
-        """Return what a non-smooth event is for the orbits beside it: persistence, a fold, or a jump.
+        """Return what a non-smooth event is for nearby orbits: persistence, a fold, or a jump.
 
         None for a smooth event, and for one of orbits with a hold only.
         """

@@ -1,10 +1,10 @@
-"""What a non-smooth event is for the orbits beside it: persistence, a non-smooth fold, or a jump.
+"""What a non-smooth event is for nearby orbits: persistence, a non-smooth fold, or a jump.
 
 At an event of the vector field's discontinuities (CS, SS, AS, GS) the branches that meet exist on one side
 of the parameter value each. One below and one above: an orbit persists, with another signature. Two on one
 side and none on the other: they annihilate each other, as at a fold, without a vertical tangent (di Bernardo,
-Budd, Champneys, Kowalczyk 2008). One alone: what is beside it is not near, and motion jumps. Orbits with a
-hold, which no motion follows, do not count.
+Budd, Champneys, Kowalczyk 2008). One alone: no orbit is near on the other side, and motion jumps. Orbits
+with a hold, which no motion follows, do not count.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Scenario(str, Enum):
 
 
 def scenario_of(diagram: Diagram, node: Node) -> Scenario | None:
-    """Return what an event is for the orbits beside it; None if it is smooth, or only of orbits with holds.
+    """Return what an event is for nearby orbits; None if it is smooth, or only of orbits with holds.
 
     Examples
     --------

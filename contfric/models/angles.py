@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from contfric.models.entries import EntryError, Part
+from contfric.models.entries import EntryError, Part, mapping_in
 
 #: The key of a model.
 ANGLES = "angles"
@@ -36,7 +36,7 @@ def with_angles(data: dict[str, Any]) -> dict[str, Any]:
             raise EntryError(
                 (ANGLES, index), f"'{angle}' is no state: an angle is one of {', '.join(states)}"
             )
-    surfaces, resets = _mapping(data, "surfaces"), _mapping(data, "resets")
+    surfaces, resets = mapping_in(data, "surfaces"), mapping_in(data, "resets")
     wanted = {s: angle for angle in angles for s in wraps_of(angle)}
     if not wanted or all(name in resets for name in wanted):  # a model that was stored has them
         return data
@@ -52,14 +52,9 @@ def with_angles(data: dict[str, Any]) -> dict[str, Any]:
         surfaces[name] = {"observable": angle, "level": "pi" if side < 0 else "-pi"}
         resets[name] = {angle: f"{angle} {'-' if side < 0 else '+'} 2*pi"}
     modes = {
-        name: {**mode, "in": {**_mapping(mode, "in"), **sides}}
+        name: {**mode, "in": {**mapping_in(mode, "in"), **sides}}
         if isinstance(mode, Mapping)
         else mode
-        for name, mode in _mapping(data, "modes").items()
+        for name, mode in mapping_in(data, "modes").items()
     }
     return {**data, "surfaces": surfaces, "resets": resets, "modes": modes}
-
-
-def _mapping(data: Mapping[str, Any], key: str) -> dict[str, Any]:
-    value = data.get(key)
-    return {str(k): v for k, v in value.items()} if isinstance(value, Mapping) else {}

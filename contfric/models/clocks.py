@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from contfric.errors import ModelError
-from contfric.models.entries import EntryError
+from contfric.models.entries import EntryError, mapping_in
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope
 from contfric.yaml_lines import Address
 
@@ -37,7 +37,7 @@ def with_clock(data: dict[str, Any]) -> dict[str, Any]:
     EntryError
         Where ``mod`` is not that of the time and the model's period, or a name is taken.
     """
-    latched = TICK in _mapping(data, "resets") and TICK not in _mapping(data, "surfaces")
+    latched = TICK in mapping_in(data, "resets") and TICK not in mapping_in(data, "surfaces")
     if not latched and not any(_ticks(text) for _, text in _expressions(data)):
         return data
     period = data.get("period")
@@ -51,7 +51,7 @@ def with_clock(data: dict[str, Any]) -> dict[str, Any]:
         if (depth := _PARTS.get(key, 0)) >= 0
     }
     found["modes"] = {
-        name: _mode(mode, name, reader) for name, mode in _mapping(data, "modes").items()
+        name: _mode(mode, name, reader) for name, mode in mapping_in(data, "modes").items()
     }
     if "field" in data:
         found["field"] = {**found["field"], CLOCK: 1}
@@ -60,21 +60,16 @@ def with_clock(data: dict[str, Any]) -> dict[str, Any]:
         "autonomous": True,
         "states": [*data.get("states", ()), CLOCK],
         "surfaces": {
-            **_mapping(data, "surfaces"),
+            **mapping_in(data, "surfaces"),
             TICK: {"observable": CLOCK, "level": str(period)},
         },
         "resets": {
             **found.get("resets", {}),
-            TICK: {CLOCK: 0, **_mapping(found, "resets").get(TICK, {})},
+            TICK: {CLOCK: 0, **mapping_in(found, "resets").get(TICK, {})},
         },
         "symmetry": _symmetry(data),
-        "spread": {**_mapping(data, "spread"), CLOCK: f"({period})/2"},
+        "spread": {**mapping_in(data, "spread"), CLOCK: f"({period})/2"},
     }
-
-
-def _mapping(data: Mapping[str, Any], key: str) -> dict[str, Any]:
-    value = data.get(key)
-    return dict(value) if isinstance(value, Mapping) else {}
 
 
 def _expressions(data: Mapping[str, Any]) -> list[tuple[Address, str]]:
@@ -83,7 +78,7 @@ def _expressions(data: Mapping[str, Any]) -> list[tuple[Address, str]]:
     found: list[tuple[Address, str]] = []
     for key, value, depth in parts:
         found += _texts(value, (key,), depth)
-    for name, mode in _mapping(data, "modes").items():
+    for name, mode in mapping_in(data, "modes").items():
         if isinstance(mode, Mapping):
             found += _texts(mode.get("field"), ("modes", name, "field"), 1)
     return found
@@ -115,9 +110,9 @@ def _is_mod(node: ast.AST) -> bool:
 
 
 def _check_names(data: Mapping[str, Any]) -> None:
-    taken = {*map(str, data.get("states", ())), *_mapping(data, "parameters")}
-    taken |= {*_mapping(data, "define"), *_mapping(data, "observables")}
-    if CLOCK in taken or TICK in _mapping(data, "surfaces"):
+    taken = {*map(str, data.get("states", ())), *mapping_in(data, "parameters")}
+    taken |= {*mapping_in(data, "define"), *mapping_in(data, "observables")}
+    if CLOCK in taken or TICK in mapping_in(data, "surfaces"):
         raise EntryError(
             (),
             f"a model with {MOD}(t, T) gets a state '{CLOCK}' and a surface '{TICK}': "
@@ -133,11 +128,11 @@ class _Reader(ast.NodeTransformer):
         self.address: Address = ()
         self.parameters = {
             str(name): value.get("default") if isinstance(value, Mapping) else value
-            for name, value in _mapping(data, "parameters").items()
+            for name, value in mapping_in(data, "parameters").items()
         }
         self.define = {
             name: tree.body
-            for name, text in _mapping(data, "define").items()
+            for name, text in mapping_in(data, "define").items()
             if (tree := _tree(str(text))) is not None
         }
 
@@ -209,7 +204,7 @@ def _rewritten(value: Any, address: Address, depth: int, reader: _Reader) -> Any
 def _mode(mode: Any, name: str, reader: _Reader) -> Any:
     if not isinstance(mode, Mapping):
         return mode
-    found = {**mode, "in": {**_mapping(mode, "in"), TICK: "-"}}
+    found = {**mode, "in": {**mapping_in(mode, "in"), TICK: "-"}}
     if isinstance(mode.get("field"), Mapping):
         own = {
             state: reader.read(text, ("modes", name, "field", str(state)))

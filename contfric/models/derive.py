@@ -76,7 +76,7 @@ def model_from(description: Description) -> Model:
     departures = description.departures or _departures(sampler, surfaces, declared)
     domains = join_domains(declared, joined_modes(description))
     surfaces = clear_surfaces(surfaces, domains)
-    return Model(
+    model = Model(
         name=description.name,
         title=description.title or description.name,
         states=description.states,
@@ -104,6 +104,14 @@ def model_from(description: Description) -> Model:
         max_step=description.max_step,
         definition=description.text,
     )
+    if undecided := model.undecided():
+        domain, surface, modes = undecided
+        raise EntryError(
+            ("modes", modes[-1], "in"),
+            f"motion that meets '{surface}' in '{domain}' could go on in {' or '.join(modes)}: give them "
+            f"a side of a surface that divides them, or write a reset at '{surface}' with 'to: {modes[0]}'",
+        )
+    return model
 
 
 def _level(evaluator: Evaluator[float], surface: Surface, params: dict[str, float]) -> float:

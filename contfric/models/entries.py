@@ -24,6 +24,12 @@ class EntryError(ModelError):
         self.address = address
 
 
+def mapping_in(data: Mapping[str, Any], key: str) -> dict[str, Any]:
+    """Return a part of a model's data that is a mapping, as a copy; an empty one if it is not there."""
+    value = data.get(key)
+    return {str(k): v for k, v in value.items()} if isinstance(value, Mapping) else {}
+
+
 @dataclass(frozen=True)
 class Part:
     """A mapping inside a description, with its place."""

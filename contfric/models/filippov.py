@@ -1,8 +1,8 @@
 """Sliding that is derived: ``sliding: filippov`` on a switching surface.
 
-Where the fields f+ and f- beside a surface h = 0 both lead to it, at the rates ``r+ = h_t + h_y f+ < 0``
-and ``r- = h_t + h_y f- > 0``, motion stays on it with the convex combination that keeps h (Filippov 1988,
-chapter 2; di Bernardo et al. 2008, equation 2.24)::
+Where the fields f+ and f- on the sides of a surface h = 0 both lead to it, at the rates
+``r+ = h_t + h_y f+ < 0`` and ``r- = h_t + h_y f- > 0``, motion stays on it with the convex combination that
+keeps h (A. F. Filippov, Differential Equations with Discontinuous Righthand Sides, Kluwer 1988)::
 
     f = (r- f+ - r+ f-) / (r- - r+)
 
@@ -48,7 +48,7 @@ def sliding_parts(
     if description.kinks:
         raise EntryError(
             ("kinks",),
-            "sliding is derived where fields are smooth beside their surfaces: no 'kinks'",
+            "sliding is derived where fields are smooth near their surfaces: no 'kinks'",
         )
     found: dict[str, Any] = {
         key: dict(data.get(key) or {}) for key in ("observables", "surfaces", "modes")
@@ -93,7 +93,7 @@ def _pairs(description: Description, surface: str) -> Iterator[tuple[ModeText, M
     if not pairs:
         raise EntryError(
             ("surfaces", surface, SLIDING),
-            f"sliding on '{surface}' is derived from the fields beside it: give it a mode on each side "
+            f"sliding on '{surface}' is derived from the fields on its sides: give it a mode on each side "
             f"({surface}: + and {surface}: -)",
         )
     yield from pairs

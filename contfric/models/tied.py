@@ -30,7 +30,7 @@ def tied(model: ModelSource, params: Any = None) -> tuple[Model, Any]:
     Raises
     ------
     ParameterError
-        For a tie to what is no expression of other parameters, or of a model without formulas.
+        If a tie is not an expression of other parameters, or of a model without formulas.
 
     Examples
     --------
@@ -68,7 +68,7 @@ def with_ties(model: Model, ties: Mapping[str, str]) -> Model:
     Raises
     ------
     ParameterError
-        If an expression is none of the other parameters, or the model has no formulas.
+        If an expression has other names than those of parameters, or the model has no formulas.
     """
     from contfric.errors import ModelError
     from contfric.models import load_model
@@ -106,7 +106,7 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
     Raises
     ------
     EntryError
-        For a tie to what is no expression of other parameters.
+        If a tie is not an expression of other parameters.
     """
     from contfric.errors import ModelError
     from contfric.models.entries import EntryError
@@ -131,7 +131,7 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
             hint = did_you_mean(foreign[0], left)
             raise EntryError(
                 ("parameters", name),
-                f"a tie is an expression of other parameters, and '{foreign[0]}' is none{hint}",
+                f"a tie is an expression of other parameters, and there is no '{foreign[0]}'{hint}",
             )
     constraints = data.get("constraints") or {}
     if not isinstance(constraints, Mapping):

@@ -65,6 +65,24 @@ class TransitionMaps(SectionMaps):
                     found[domain.name, reset.surface] = behind
         return found
 
+    def undecided(self) -> tuple[str, str, tuple[str, ...]] | None:
+        """Return (domain, surface, modes) where motion could go on in several modes; else None."""
+        for domain in self.domains:
+            for surface in self.surfaces:
+                found = [
+                    self.domain_by_name[d]
+                    for d in self.targets.get((domain.name, surface.name), ())
+                ]
+                for target in found:
+                    key = tuple(target.signs[s.name] for s in self.surfaces)
+                    fits = {d.own_mode for d in self._domains_by_signs[key]}
+                    named = {d.own_mode for d in found if d.signs == target.signs}
+                    mapped = self.maps_at(domain, surface.name)
+                    several = len(named) > 1 if mapped else len(fits) > 1
+                    if several and not (not mapped and domain.own_mode in fits):
+                        return domain.name, surface.name, tuple(sorted(named if mapped else fits))
+        return None
+
     def maps_at(self, domain: Domain, surface: str) -> bool:
         """Return whether a reset acts on motion that meets a surface.
 

@@ -143,7 +143,7 @@ def test_a_model_ties_its_own_parameters() -> None:
     orbit = cf.find_orbit(own, {"Omega": 0.47, "S": 0.3})
     assert own.parameter_names == asked.model.parameter_names
     assert np.allclose(orbit.joints, asked.joints, rtol=0, atol=1e-13)
-    for text, says in (("Q", "'Q' is none"), ("S0", "'S0' is none"), ("S*", "cannot read")):
+    for text, says in (("Q", "there is no 'Q'"), ("S0", "there is no 'S0'"), ("S*", "cannot read")):
         with pytest.raises(EntryError) as caught:
             describe({**data, "parameters": {**given, "S0": {"tie": text}}})
         assert says in str(caught.value) and caught.value.address == ("parameters", "S0")
@@ -204,3 +204,28 @@ def test_parts_of_the_wrong_kind_are_told(short: str, key: str, value: object) -
         describe({**data, key: value})
     except EntryError as error:
         assert "\n" not in str(error)
+
+
+def test_motion_that_could_go_on_in_two_modes_is_refused() -> None:
+    data: dict[str, Any] = {
+        "name": "two",
+        "states": ["x", "y"],
+        "parameters": {"h": 1.0},
+        "autonomous": True,
+        "surfaces": {
+            "hi": {"observable": "x", "level": "h"},
+            "lo": {"observable": "x", "level": "-h"},
+            "q": {"observable": "y"},
+        },
+        "modes": {
+            "up": {"in": {"hi": "-"}, "field": {"x": 1, "y": 1}},
+            "down": {"in": {"lo": "+", "q": "+"}, "field": {"x": -1, "y": 1}},
+            "fast": {"in": {"hi": "+"}, "field": {"x": -2, "y": 1}},
+        },
+    }
+    with pytest.raises(EntryError) as caught:
+        built(describe(data))
+    assert "down or fast" in str(caught.value) and caught.value.address == ("modes", "fast", "in")
+    apart = copy.deepcopy(data)
+    apart["modes"]["fast"]["in"]["q"] = "-"
+    assert built(describe(apart)).targets["up:x0,y+", "hi"] == ("down:x0",)  # it turns back there

@@ -1,4 +1,4 @@
-"""Sliding modes beside Filippov's: the field that follows from those on both sides of the surface."""
+"""Sliding modes compared with Filippov's: the field that follows from those on both sides of the surface."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _compare(
         if not np.allclose(probe.field(mode.name, *place), derived, rtol=_SAME, atol=_SAME):
             report.note(
                 Topic.SLIDING,
-                f"the field of '{mode.name}' is not the one that follows from those beside '{surface}' "
+                f"the field of '{mode.name}' is not the one that follows from both sides of '{surface}' "
                 f"(Filippov's): {derived.tolist()} at states such as {place[1].tolist()}. That is legal; "
                 "write 'sliding: filippov' to the surface for the other",
             )
@@ -61,6 +61,6 @@ def _compare(
     if held:
         report.note(
             Topic.SLIDING,
-            f"'{mode.name}' holds motion on '{surface}' where the fields beside it lead away, too: a static "
-            "limit above the kinetic one",
+            f"'{mode.name}' holds motion on '{surface}' where the fields on both sides lead away, too: a "
+            "static limit above the kinetic one",
         )
