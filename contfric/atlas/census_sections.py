@@ -25,8 +25,8 @@ from contfric.atlas.census_words import letters_of, modes_after
 from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.counts import TALLY
-from contfric.orbit.simulation import tables
 from contfric.orbit.system import IntArray, exit_domains, mirror_mode
+from contfric.orbit.tables import tables
 from contfric.signature.reduced import ReducedPair
 
 #: Phases at which it is asked whether an exit can be met: an arc narrower than this part of a period

@@ -11,9 +11,9 @@ import numpy as np
 
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.simulation import tables
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.system import IntArray
+from contfric.orbit.tables import tables
 
 
 class Starting(NamedTuple):

@@ -182,21 +182,26 @@ def _departures(
     sampler: Sampler, surfaces: list[Surface], domains: tuple[Domain, ...]
 ) -> tuple[Departure, ...]:
     """Find where motion on a surface goes when it leaves: the side that its field points to."""
-    found = []
+    found: dict[tuple[str, str, int], Departure] = {}
+    order = [s.name for s in surfaces]
+    beside: dict[tuple[int, ...], str] = {}  # the last mode of each combination of sides
+    for domain in domains:
+        beside[tuple(domain.signs[name] for name in order)] = domain.mode
     for domain in domains:
         on = [name for name, side in domain.signs.items() if side == 0]
         if len(on) != 1:
             continue
-        for surface in surfaces:
-            if surface.name == on[0] or not _can_flip(surfaces, domain, surface.name):
+        for surface in order:
+            key = on[0], surface, -domain.signs[surface]
+            if key in found or surface == on[0] or not _can_flip(surfaces, domain, surface):
+                continue  # the first one that holds decides where motion goes
+            signs = {**domain.signs, surface: key[2]}
+            if tuple(signs[name] for name in order) in beside:
                 continue
-            signs = {**domain.signs, surface.name: -domain.signs[surface.name]}
-            if any(d.signs == signs for d in domains):
-                continue
-            departure = _departure(sampler, on[0], surface.name, signs, domains)
-            if departure is not None and departure not in found:
-                found.append(departure)
-    return tuple(found)
+            departure = _departure(sampler, on[0], surface, signs, beside)
+            if departure is not None:
+                found[key] = departure
+    return tuple(found.values())
 
 
 def _can_flip(surfaces: list[Surface], domain: Domain, surface: str) -> bool:
@@ -205,13 +210,17 @@ def _can_flip(surfaces: list[Surface], domain: Domain, surface: str) -> bool:
 
 
 def _departure(
-    sampler: Sampler, on: str, through: str, signs: dict[str, int], domains: tuple[Domain, ...]
+    sampler: Sampler,
+    on: str,
+    through: str,
+    signs: dict[str, int],
+    modes: Mapping[tuple[int, ...], str],
 ) -> Departure | None:
     beside = {}
     for side in (1, -1):
-        modes = {d.mode for d in domains if d.signs == {**signs, on: side}}
-        if modes:
-            beside[side] = modes.pop()
+        mode = modes.get(tuple(side if name == on else sign for name, sign in signs.items()))
+        if mode is not None:
+            beside[side] = mode
     side = departing_side(sampler, beside, on, signs)
     if side == 0:
         return None

@@ -35,6 +35,14 @@ class Evaluator(Generic[T]):
     def _trees(self) -> dict[str, object]:
         return {}
 
+    @cached_property
+    def _observable(self) -> dict[str, str]:
+        return {o.name: o.formula for o in self.description.observables}
+
+    @cached_property
+    def _surface(self) -> dict[str, tuple[str, str]]:
+        return {s.name: (s.observable, s.level) for s in self.description.surfaces}
+
     def value(
         self, text: str, params: Mapping[str, T], t: T | None = None, y: Sequence[T] = (), **more: T
     ) -> T:
@@ -53,14 +61,13 @@ class Evaluator(Generic[T]):
 
     def observable(self, name: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> T:
         """Return the value of an observable."""
-        formula = next(o.formula for o in self.description.observables if o.name == name)
-        return self.value(formula, params, t, y)
+        return self.value(self._observable[name], params, t, y)
 
     def height(self, surface: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> T:
         """Return (observable - level) of a surface."""
-        s = next(s for s in self.description.surfaces if s.name == surface)
-        above = self.observable(s.observable, params, t, y)
-        return above - self.value(s.level, params)  # type: ignore[operator,no-any-return]
+        observable, level = self._surface[surface]
+        above = self.observable(observable, params, t, y)
+        return above - self.value(level, params)  # type: ignore[operator,no-any-return]
 
     def field(self, mode: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> list[T]:
         """Return the rates of all states in a mode."""

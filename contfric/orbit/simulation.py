@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from functools import cache
 from time import perf_counter
 from typing import NamedTuple
 
@@ -19,8 +17,8 @@ from contfric.models.tied import tied
 from contfric.orbit.counts import TALLY
 from contfric.orbit.pace import Pace
 from contfric.orbit.starts import checked_state, start_of
-from contfric.orbit.structure import cut_bounds
 from contfric.orbit.system import IntArray
+from contfric.orbit.tables import surfaces_under, tables
 
 
 class SimulationEnd(str, Enum):
@@ -35,29 +33,6 @@ class SimulationEnd(str, Enum):
     CHATTER = (
         "impacts follow each other faster and faster (chatter): infinitely many in finite time"
     )
-
-
-class Tables(NamedTuple):
-    """The model's transitions in the form that the compiled simulation takes.
-
-    Attributes
-    ----------
-    observables : observable of each surface
-    bounds : whether a surface bounds a mode, shape (modes, surfaces); 2 if it has a reset
-    following : mode after (mode, surface, signs of the other surfaces as bits); -1 if there is none
-    sliding : whether a mode slides on a surface; 2 if it may do so for long, without excitation
-    lies_on : surfaces that a mode moves on, as bits
-    kept : surfaces that the state stays on where a surface is met, as bits: a reset takes it off others
-    landed : surfaces that the state is on where motion goes on, as bits: the one met, but for a reset
-    """
-
-    observables: IntArray
-    bounds: IntArray
-    following: IntArray
-    sliding: IntArray
-    lies_on: IntArray
-    kept: IntArray
-    landed: IntArray
 
 
 class EventRows(NamedTuple):
@@ -127,89 +102,6 @@ class Trajectory:
         return tuple((modes[m], surfaces[k]) for m, k in zip(self.modes, self.exits, strict=True))
 
 
-@cache
-def tables(model: Model) -> Tables:
-    """Return the transition tables of a model, in modes as they were declared: sections are events, too."""
-    surfaces = [s.name for s in model.surfaces]
-    modes = [m.name for m in model.modes]
-    bounds = np.zeros((len(modes), len(surfaces)), dtype=np.int64)
-    for mode, names in cut_bounds(model).items():
-        for name in names:
-            bounds[model.mode_index[mode], model.surface_index[name]] = 1 + (
-                name in model.reset_by_surface
-            )
-    codes = 1 << len(surfaces)
-    following = np.full(len(modes) * len(surfaces) * codes, -1, dtype=np.int64)
-    for (name, surface), target in model.transitions.items():
-        domain = model.domain_by_name[name]
-        k = model.surface_index[surface]
-        for code in range(codes):
-            if code >> k & 1 or not _matches(domain.signs, surfaces, {surface}, code):
-                continue
-            row = (model.mode_index[domain.own_mode] * len(surfaces) + k) * codes + code
-            following[row] = model.mode_index[model.domain_by_name[target].own_mode]
-    for (name, surface), targets in model.targets.items():
-        if surface not in model.reset_by_surface:
-            continue
-        k, source = (
-            model.surface_index[surface],
-            model.mode_index[model.domain_by_name[name].own_mode],
-        )
-        skipped = _landed(model, surface)
-        for code in range(codes):
-            for behind in map(model.domain_by_name.__getitem__, targets):
-                # behind a reset the signs of the mapped state tell the domain
-                if not code & _bits(model, skipped) and _matches(
-                    behind.signs, surfaces, skipped, code
-                ):
-                    row = (source * len(surfaces) + k) * codes + code
-                    following[row] = model.mode_index[behind.own_mode]
-    return Tables(
-        np.array([model.observable_index[s.observable] for s in model.surfaces], dtype=np.int64),
-        bounds,
-        following,
-        np.array(
-            [int(m.sliding) * (1 + int(model.autonomous)) for m in model.modes], dtype=np.int64
-        ),
-        np.array([_surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
-        np.array([_surfaces_kept(model, s.name) for s in model.surfaces], dtype=np.int64),
-        np.array([_bits(model, _landed(model, s.name)) for s in model.surfaces], dtype=np.int64),
-    )
-
-
-def _surfaces_under(model: Model, mode: str) -> int:
-    """Return the surfaces that a mode moves on, as bits."""
-    own = [d for d in model.domains if d.own_mode == mode]
-    return _bits(model, (s.name for s in model.surfaces if any(d.signs[s.name] == 0 for d in own)))
-
-
-def _surfaces_kept(model: Model, met: str) -> int:
-    """Return the surfaces that the state stays on where one is met, as bits."""
-    reset = model.reset_by_surface.get(met)
-    kept = [s.name for s in model.surfaces if reset is None or not model.changed_by(reset, s.name)]
-    return _bits(model, kept)
-
-
-def _landed(model: Model, met: str) -> Collection[str]:
-    """Return the surfaces that the state is on behind one that is met."""
-    reset = model.reset_by_surface.get(met)
-    return {met} if reset is None else reset.lands
-
-
-def _bits(model: Model, surfaces: Iterable[str]) -> int:
-    return sum(1 << model.surface_index[name] for name in surfaces)
-
-
-def _matches(
-    signs: Mapping[str, int], surfaces: list[str], skipped: Collection[str], code: int
-) -> bool:
-    return all(
-        signs[name] == 0 or (signs[name] > 0) == bool(code >> j & 1)
-        for j, name in enumerate(surfaces)
-        if name not in skipped
-    )
-
-
 def simulate(
     model: ModelSource,
     params: Parameters | None = None,
@@ -254,7 +146,7 @@ def simulate(
 def go_on(trajectory: Trajectory, periods: float) -> Trajectory:
     """Follow a trajectory from where it ended, in the mode that it was in."""
     model, (_, time, y, mode) = trajectory.model, trajectory.last
-    on = _surfaces_under(model, mode)
+    on = surfaces_under(model, mode)
     return run(
         model,
         model.vector(trajectory.params),

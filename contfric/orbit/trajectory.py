@@ -17,11 +17,14 @@ from numba import types
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, vector
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
-from contfric.orbit.simulation import EventRows, Tables
+from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
+from contfric.orbit.tables import Tables
 
 #: Types of the model's tables and of the rows of events, as kernels take them.
-TablesType = types.NamedTuple([indices, table, indices, indices, indices, indices, indices], Tables)
+TablesType = types.NamedTuple(
+    [indices, table, indices, table, indices, indices, indices, indices], Tables
+)
 RowsType = types.NamedTuple([table, indices, vector, matrix], EventRows)
 
 
@@ -82,6 +85,16 @@ def sign_code(functions, observables, landed, t, y, p, none, empty):  # type: ig
         if value > functions.level(k, p, none, empty):
             code |= 1 << k
     return code
+
+
+@helper
+def mode_after(tables, mode, surface, code):  # type: ignore[no-untyped-def]
+    """Return the mode that follows where motion meets a surface, by the sides of all; -1 if none does."""
+    place = mode * tables.observables.shape[0] + surface
+    for k in range(tables.first[place], tables.first[place + 1]):
+        if code & tables.rules[k, 0] == tables.rules[k, 1]:
+            return tables.rules[k, 2]
+    return -1
 
 
 @helper
@@ -149,7 +162,7 @@ def whole_turns(t, period):  # type: ignore[no-untyped-def]
 @helper
 def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, workspace):  # type: ignore[no-untyped-def]
     """Follow a trajectory; see :func:`simulate`."""
-    observables, following = tables.observables, tables.following
+    observables = tables.observables
     joints, none, empty, after = rows.joints, workspace.none, workspace.empty, workspace.after
     period = functions.period(p, none, empty)
     unit = period if period > 0.0 else 1.0
@@ -203,9 +216,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
             functions.reset(surface, t, rows.states[event], p, none, y, workspace.nothing)
         landed = tables.landed[surface]
         code = sign_code(functions, observables, landed, t, y, p, none, empty)
-        target = following[
-            (mode * observables.shape[0] + surface) * (1 << observables.shape[0]) + code
-        ]
+        target = mode_after(tables, mode, surface, code)
         at_once = at_once + 1 if tau <= at_most * unit else 0
         struck = reset or (struck and at_once > 0)
         if at_once > MOST_AT_ONCE:

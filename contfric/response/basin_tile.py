@@ -13,8 +13,8 @@ from contfric.chaos.rows import Limits, follow, new_stop, starting, until_interr
 from contfric.chaos.status import Motion
 from contfric.chaos.tiles import packed, unpacked
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.simulation import tables
 from contfric.orbit.system import IntArray
+from contfric.orbit.tables import tables
 from contfric.response.targets import Targets
 
 #: Periods before the growth of a separation is averaged, and its relative error, for what no orbit has

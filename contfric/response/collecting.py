@@ -7,9 +7,9 @@ import numpy as np
 from contfric.chaos.rows import new_stop, starting, until_interrupted
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.simulation import tables
 from contfric.orbit.starts import displaced
 from contfric.orbit.system import IntArray
+from contfric.orbit.tables import tables
 from contfric.response.cuts import (
     Cut,
     Ends,

@@ -19,10 +19,10 @@ from contfric.memory import must_fit
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
-from contfric.orbit.simulation import tables
 from contfric.orbit.starts import checked_state
 from contfric.orbit.structure import mirror_mode
 from contfric.orbit.system import IntArray
+from contfric.orbit.tables import tables
 from contfric.response.collecting import collect
 from contfric.response.cuts import Following, Points
 from contfric.response.outcome import Outcome

@@ -9,8 +9,8 @@ import numpy as np
 
 from contfric.errors import ParameterError, did_you_mean, real_number, shown
 from contfric.models.definition import Model
-from contfric.orbit.simulation import tables
 from contfric.orbit.system import IntArray
+from contfric.orbit.tables import tables
 from contfric.response.cuts import Cut
 
 #: "stops", "releases", the name of a surface (or kink), or a phase as a share of the period.

@@ -1,0 +1,168 @@
+"""A model's transitions as the compiled simulation takes them: bounds of modes, and which mode follows.
+
+What follows where a motion meets a surface depends on the sides of the other surfaces. It is a list of rules
+for each (mode, surface), ``sides & mask == value -> mode``, as short as merging makes it: a table of all
+combinations of sides doubles with each surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from contfric.errors import ModelError
+from contfric.models.definition import Model
+from contfric.orbit.structure import cut_bounds
+from contfric.orbit.system import IntArray
+
+#: Sides are the bits of one signed number of 64.
+_MOST_SURFACES = 62
+#: A rule for the sides of surfaces as bits: (mask, value, mode that follows).
+Rule = tuple[int, int, int]
+
+
+class Tables(NamedTuple):
+    """The model's transitions in the form that the compiled simulation takes.
+
+    Attributes
+    ----------
+    observables : observable of each surface
+    bounds : whether a surface bounds a mode, shape (modes, surfaces); 2 if it has a reset
+    first : first rule of each (mode, surface), and the number of rules, shape (modes * surfaces + 1,)
+    rules : rows (mask, value, mode that follows): the first that the sides of all surfaces fit, as bits
+    sliding : whether a mode slides on a surface; 2 if it may do so for long, without excitation
+    lies_on : surfaces that a mode moves on, as bits
+    kept : surfaces that the state stays on where a surface is met, as bits: a reset takes it off others
+    landed : surfaces that the state is on where motion goes on, as bits: the one met, but for a reset
+    """
+
+    observables: IntArray
+    bounds: IntArray
+    first: IntArray
+    rules: IntArray
+    sliding: IntArray
+    lies_on: IntArray
+    kept: IntArray
+    landed: IntArray
+
+
+@cache
+def tables(model: Model) -> Tables:
+    """Return the transition tables of a model, in modes as they were declared: sections are events, too.
+
+    Raises
+    ------
+    ModelError
+        If it has more surfaces than can be told apart.
+    """
+    if len(model.surfaces) > _MOST_SURFACES:
+        raise ModelError(
+            f"model '{model.name}' has {len(model.surfaces)} surfaces, a simulation takes {_MOST_SURFACES}: "
+            "leave out those at which nothing changes"
+        )
+    bounds = np.zeros((len(model.modes), len(model.surfaces)), dtype=np.int64)
+    for mode, names in cut_bounds(model).items():
+        for name in names:
+            bounds[model.mode_index[mode], model.surface_index[name]] = 1 + (
+                name in model.reset_by_surface
+            )
+    first, rules = _rules(model)
+    return Tables(
+        np.array([model.observable_index[s.observable] for s in model.surfaces], dtype=np.int64),
+        bounds,
+        first,
+        rules,
+        np.array(
+            [int(m.sliding) * (1 + int(model.autonomous)) for m in model.modes], dtype=np.int64
+        ),
+        np.array([surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
+        np.array([_surfaces_kept(model, s.name) for s in model.surfaces], dtype=np.int64),
+        np.array([_bits(model, _landed(model, s.name)) for s in model.surfaces], dtype=np.int64),
+    )
+
+
+def _rules(model: Model) -> tuple[IntArray, IntArray]:
+    """Return the rules of all (mode, surface), one after the other, and where each begins."""
+    found: dict[tuple[int, int], dict[tuple[int, int], int]] = {}
+
+    def add(
+        source: str, surface: str, signs: Mapping[str, int], skipped: Collection[str], to: str
+    ) -> None:
+        pair = model.mode_index[model.domain_by_name[source].own_mode], model.surface_index[surface]
+        where = found.setdefault(pair, {})
+        where[_sides(model, signs, skipped)] = model.mode_index[model.domain_by_name[to].own_mode]
+
+    for (name, surface), target in model.transitions.items():
+        add(name, surface, model.domain_by_name[name].signs, {surface}, target)
+    for (name, surface), targets in model.targets.items():
+        if surface in model.reset_by_surface:
+            for after in targets:  # behind a reset the signs of the mapped state tell the domain
+                signs = model.domain_by_name[after].signs
+                add(name, surface, signs, _landed(model, surface), after)
+    first, rules = [0], []
+    for mode in range(len(model.modes)):
+        for k in range(len(model.surfaces)):
+            rules += _merged(found.get((mode, k), {}))
+            first.append(len(rules))
+    return np.array(first, dtype=np.int64), np.array(rules, dtype=np.int64).reshape(-1, 3)
+
+
+def _merged(cases: Mapping[tuple[int, int], int]) -> list[Rule]:
+    """Return rules for the same cases: two that differ in one side, and lead to one mode, are one.
+
+    The cases of a (mode, surface) are distinct, so that their order does not matter.
+    """
+    rules = dict(cases)
+    bits = 0
+    for mask, _ in rules:
+        bits |= mask
+    for k in range(bits.bit_length()):
+        bit = 1 << k
+        for (mask, value), to in list(rules.items()):
+            other = mask, value ^ bit
+            if mask & bit and not value & bit and rules.get(other) == to:
+                rules.pop((mask, value)), rules.pop(other)
+                rules[mask & ~bit, value] = to
+    return [(mask, value, to) for (mask, value), to in rules.items()]
+
+
+def _sides(model: Model, signs: Mapping[str, int], skipped: Collection[str]) -> tuple[int, int]:
+    """Return the sides of a domain as (mask, value); those that a motion lies on are not asked for."""
+    asked = [s for s, sign in signs.items() if sign != 0 and s not in skipped]
+    return _bits(model, asked), _bits(model, (s for s in asked if signs[s] > 0))
+
+
+def surfaces_under(model: Model, mode: str) -> int:
+    """Return the surfaces that a mode moves on, as bits."""
+    return _bits(model, _lies_on(model).get(mode, ()))
+
+
+@cache
+def _lies_on(model: Model) -> dict[str, set[str]]:
+    """Return the surfaces that each mode moves on."""
+    found: dict[str, set[str]] = {}
+    for domain in model.domains:
+        found.setdefault(domain.own_mode, set()).update(
+            s for s, v in domain.signs.items() if v == 0
+        )
+    return found
+
+
+def _surfaces_kept(model: Model, met: str) -> int:
+    """Return the surfaces that the state stays on where one is met, as bits."""
+    reset = model.reset_by_surface.get(met)
+    kept = [s.name for s in model.surfaces if reset is None or not model.changed_by(reset, s.name)]
+    return _bits(model, kept)
+
+
+def _landed(model: Model, met: str) -> Collection[str]:
+    """Return the surfaces that the state is on behind one that is met."""
+    reset = model.reset_by_surface.get(met)
+    return {met} if reset is None else reset.lands
+
+
+def _bits(model: Model, surfaces: Iterable[str]) -> int:
+    return sum(1 << model.surface_index[name] for name in surfaces)
