@@ -31,9 +31,10 @@ from numba.core.typing.templates import AttributeTemplate
 
 from contfric.compiled import Kernel, f8, i8
 
-#: What a block may hold: a function (its signature), whole numbers, a number, or the address of another block
-#: of the same layout.
-TABLE, ITSELF = types.CPointer(types.int64), "itself"
+#: What a block may hold: a function (its signature), whole numbers, numbers, a number, or the address of another
+#: block of the same layout.
+TABLE, WEIGHTS, ITSELF = types.CPointer(types.int64), types.CPointer(types.float64), "itself"
+_ARRAYS = (TABLE, WEIGHTS)
 Layout = Mapping[str, Any]
 
 
@@ -114,8 +115,9 @@ class Block:
 
     def __init__(self, layout: Layout, values: Mapping[str, Any]) -> None:
         self._layout = layout
+        kinds = {TABLE: np.int64, WEIGHTS: np.float64}
         self._values: dict[str, Any] = {
-            name: np.array(value, dtype=np.int64) if layout[name] is TABLE else value
+            name: np.array(value, dtype=kinds[layout[name]]) if layout[name] in kinds else value
             for name, value in values.items()
         }
         self._memory = np.zeros(len(layout), dtype=np.int64)
@@ -132,7 +134,7 @@ class Block:
             elif kind is i8:
                 self._memory[k] = value
             else:
-                self._memory[k] = value.ctypes.data if kind is TABLE else value.address
+                self._memory[k] = value.ctypes.data if kind in _ARRAYS else value.address
         return int(self._memory.ctypes.data)
 
 

@@ -28,6 +28,11 @@ if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
 
 
+#: Rates of states, over all modes, up to which code is generated: it takes half of the time that tables take,
+#: and half a second for each rate to be compiled, once.
+_FEW = 24
+
+
 @dataclass(frozen=True)
 class GeneratedFlow:
     """Factory of the compiled flow of a description; it can be pickled, for other processes."""
@@ -36,8 +41,23 @@ class GeneratedFlow:
 
     def __call__(self) -> CompiledFlow:
         """Return the compiled functions; the module is generated if that was never done."""
-        module = load_module(self.definition)
-        return module.compiled_flow()  # type: ignore[no-any-return]
+        return _tables_flow(self.definition) or load_module(self.definition).compiled_flow()  # type: ignore[no-any-return]
+
+
+@cache
+def _tables_flow(definition: str) -> CompiledFlow | None:
+    """Return the flow of a model of many affine modes, whose formulas are data; None for others."""
+    from contfric.models.affine import NotAffineError
+    from contfric.models.coded import coded_flow
+    from contfric.models.describe import from_text
+
+    description = from_text(definition)
+    if len(description.modes) * len(description.states) <= _FEW:
+        return None
+    try:
+        return coded_flow(description)
+    except NotAffineError:
+        return None
 
 
 @cache
