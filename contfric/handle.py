@@ -31,8 +31,8 @@ from numba.core.typing.templates import AttributeTemplate
 
 from contfric.compiled import Kernel, f8, i8
 
-#: What a block may hold: a function (its signature), whole numbers, numbers, a number, or the address of another
-#: block of the same layout.
+#: What a block may hold: a function (its signature), whole numbers, numbers, a number, or the address of
+#: another block of the same layout.
 TABLE, WEIGHTS, ITSELF = types.CPointer(types.int64), types.CPointer(types.float64), "itself"
 _ARRAYS = (TABLE, WEIGHTS)
 Layout = Mapping[str, Any]

@@ -41,6 +41,7 @@ from contfric.orbit.trajectory import (
     TablesType,
     copy_state,
     follow,
+    mode_after,
     sign_code,
 )
 
@@ -225,7 +226,7 @@ def sweep(  # type: ignore[no-untyped-def]
         if not sense * rate > 0.0 or not math.isfinite(rate):
             continue
         code = sign_code(functions, tables.observables, 1 << exit_, times[i], y, p, none, empty)
-        if tables.following[(mode * surfaces + exit_) * (1 << surfaces) + code] != after:
+        if mode_after(tables, mode, exit_, code) != after:
             continue
         rows = EventRows(joints[i], cycles[i], clocks[i], states[i])
         on = (1 << exit_) | tables.lies_on[mode]

@@ -51,6 +51,7 @@ from contfric.orbit.trajectory import (
     StateWorkspace,
     copy_state,
     first_hit,
+    mode_after,
     sign_code,
     whole_turns,
 )
@@ -147,8 +148,7 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
             functions.reset(surface, t, workspace.after, p, workspace.none, y, workspace.nothing)
         landed = tables.landed[surface]
         code = sign_code(functions, observables, landed, t, y, p, workspace.none, workspace.empty)
-        count = observables.shape[0]
-        following = tables.following[(mode * count + surface) * (1 << count) + code]
+        following = mode_after(tables, mode, surface, code)
         if following >= 0:
             return ARRIVED, surface, following, duration, turns, t
         if reset:

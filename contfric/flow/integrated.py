@@ -65,7 +65,7 @@ class AffineModes:
     closed, seen : the pieces of modes, and the observables, that are affine
     """
 
-    functions: Mapping[str, Kernel]
+    functions: Mapping[str, Kernel | Bound]
     entries: int
     waves: int
     closed: Collection[int]
@@ -100,11 +100,11 @@ class Functions:
         method is not explicit, whose kernels alone know it.
     """
 
-    field: Kernel
-    observe: Kernel
-    rate: Kernel
-    period: Kernel
-    scale: Kernel
+    field: Kernel | Bound
+    observe: Kernel | Bound
+    rate: Kernel | Bound
+    period: Kernel | Bound
+    scale: Kernel | Bound
     modes: int
     observables: int
     method: Method = Method.EXPLICIT
@@ -113,7 +113,7 @@ class Functions:
     sides: Mapping[tuple[int, int], int] = dataclasses.field(default_factory=dict)
     kinks: Sequence[int] = ()
     slides: Collection[int] = ()
-    onto: Kernel | None = None
+    onto: Kernel | Bound | None = None
     idle: Collection[tuple[int, int]] = ()
     timed: Collection[int] = ()
     affine: AffineModes | None = None
@@ -130,7 +130,7 @@ class Functions:
         """Which kernels the motions are found by."""
         return Kind.PLAIN if Method(self.method) is Method.EXPLICIT else Kind.STIFF
 
-    def flow(self, level: Kernel, **others: Any) -> CompiledFlow:
+    def flow(self, level: Kernel | Bound, **others: Any) -> CompiledFlow:
         """Return the flow.
 
         Parameters

@@ -19,18 +19,14 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from contfric.checked import read_sealed, write_sealed
 from contfric.errors import ResultFileError
+from contfric.models.coded import coded_functions, forms_of
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
-
-
-#: Rates of states, over all modes, up to which code is generated: it takes half of the time that tables take,
-#: and half a second for each rate to be compiled, once.
-_FEW = 24
 
 
 @dataclass(frozen=True)
@@ -40,24 +36,29 @@ class GeneratedFlow:
     definition: str
 
     def __call__(self) -> CompiledFlow:
-        """Return the compiled functions; the module is generated if that was never done."""
-        return _tables_flow(self.definition) or load_module(self.definition).compiled_flow()  # type: ignore[no-any-return]
+        """Return the compiled functions; a module is generated if one is needed and was never written."""
+        found = coded_functions(self.definition)
+        if found is not None:
+            return found.flow
+        return load_module(self.definition).compiled_flow()  # type: ignore[no-any-return]
 
 
-@cache
-def _tables_flow(definition: str) -> CompiledFlow | None:
-    """Return the flow of a model of many affine modes, whose formulas are data; None for others."""
-    from contfric.models.affine import NotAffineError
-    from contfric.models.coded import coded_flow
-    from contfric.models.describe import from_text
+def field_of(definition: str) -> Any:
+    """Return the compiled field of the modes of a definition, without the flow, which takes longer."""
+    found = coded_functions(definition)
+    return load_module(definition).field_of if found is None else found.field
 
-    description = from_text(definition)
-    if len(description.modes) * len(description.states) <= _FEW:
-        return None
-    try:
-        return coded_flow(description)
-    except NotAffineError:
-        return None
+
+def prepare(definition: str) -> None:
+    """Write the module of a definition, if it has one and that was never done.
+
+    Raises
+    ------
+    ModelError
+        For a formula that has no value, with its place.
+    """
+    if forms_of(definition) is None:
+        module_path(definition)
 
 
 @cache

@@ -1,15 +1,15 @@
 """A model's formulas as tables of numbers: no module is generated for it, and nothing is compiled.
 
-Every mode has to be affine (:mod:`contfric.models.coefficients`); then its matrices, observables and resets are
-data for the functions of :mod:`contfric.flow.linear.coded`. Where a mode has a handful of numbers, straight
-lines of code are faster; where a model has dozens of modes, compiling them takes minutes.
+Every mode has to be affine (:mod:`contfric.models.coefficients`); then its matrices, observables and resets
+are data for the functions of :mod:`contfric.flow.coded`. Where a mode has a handful of numbers,
+straight lines of code are faster; where a model has dozens of modes, compiling them takes minutes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,8 +34,12 @@ from contfric.models.regions import engine_order, known_sides
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
+    from contfric.handle import Bound
 
 Form = list[Affine]
+#: Rates of states, over all modes, up to which code is generated: it takes half of the time that tables take,
+#: and half a second for each rate to be compiled, once.
+_FEW = 24
 
 
 class Forms:
@@ -49,7 +53,7 @@ class Forms:
 
     def __init__(self, description: Description) -> None:
         self.description = description
-        if description.kinks or description.method != "explicit":
+        if description.kinks or description.method != "explicit":  # other kernels do these
             raise NotAffineError("modes with kinks, or an implicit method")
         names = tuple(p.name for p in description.parameters)
         self._symbols = symbols(description.states, names)
@@ -119,7 +123,7 @@ class Forms:
 
 @dataclass
 class Tables:
-    """The tables of :mod:`contfric.flow.linear.coded`, while they are written.
+    """The tables of :mod:`contfric.flow.coded`, while they are written.
 
     Attributes
     ----------
@@ -145,7 +149,7 @@ class Tables:
 
     @cached_property
     def _kinds(self) -> Mapping[str, int]:
-        from contfric.flow.linear.coded import OPERATIONS
+        from contfric.flow.coded.operations import OPERATIONS
 
         return OPERATIONS
 
@@ -157,7 +161,7 @@ class Tables:
 
     def value(self, coefficient: Coefficient) -> int:
         """Return the operation whose result is a coefficient."""
-        from contfric.flow.linear.coded import NUMBER, SUM
+        from contfric.flow.coded.operations import NUMBER, SUM
 
         if coefficient in self._known:
             return self._known[coefficient]
@@ -175,7 +179,7 @@ class Tables:
 
     def product(self, product: Product) -> int:
         """Return the operation whose result is a product."""
-        from contfric.flow.linear.coded import PRODUCT
+        from contfric.flow.coded.operations import PRODUCT
 
         if not product:
             return self.value(ONE)
@@ -189,15 +193,19 @@ class Tables:
         return self._add(product, PRODUCT, self.product(tuple(before)), last)
 
     def _power(self, atom: Atom, power: int) -> int:
-        from contfric.flow.linear.coded import WHOLE
+        from contfric.flow.coded.operations import WHOLE
 
         if power == 1:
             return self._atom(atom)
         key = atom, power
-        return self._known[key] if key in self._known else self._add(key, WHOLE, self._atom(atom), power)
+        return (
+            self._known[key]
+            if key in self._known
+            else self._add(key, WHOLE, self._atom(atom), power)
+        )
 
     def _atom(self, atom: Atom) -> int:
-        from contfric.flow.linear.coded import PARAMETER
+        from contfric.flow.coded.operations import PARAMETER
 
         if atom in self._known:
             return self._known[atom]
@@ -216,11 +224,15 @@ class Tables:
         """Write the rows of some affine forms; return the number of their group."""
         data, coefficients, waves = self.data, [], []
         for form in forms:
-            for key, c in sorted(form.parts.items(), key=lambda item: (item[0][0], str(item[0][1]))):
+            for key, c in sorted(
+                form.parts.items(), key=lambda item: (item[0][0], str(item[0][1]))
+            ):
                 if key[0] == "y":
                     data["columns"].append(key[1])
                     coefficients.append(c)
-            own = {key[1] if key != CONSTANT else Coefficient() for key in form.parts if key[0] != "y"}
+            own = {
+                key[1] if key != CONSTANT else Coefficient() for key in form.parts if key[0] != "y"
+            }
             for frequency in sorted(own):
                 data["harmonics"].append(self.wave(frequency))
                 cosine = ("cos", frequency) if frequency else CONSTANT
@@ -249,7 +261,9 @@ def _returns(forms: Forms, mode: int, held: Sequence[int]) -> list[float]:
     gradients = np.zeros((len(held), len(forms.description.states)))
     names = [o.name for o in forms.description.observables]
     for row, k in enumerate(held):
-        for key, slope in forms.observables[names.index(forms.surfaces[k].observable)].parts.items():
+        for key, slope in forms.observables[
+            names.index(forms.surfaces[k].observable)
+        ].parts.items():
             if key[0] == "y":
                 if slope.number is None:
                     raise NotAffineError("a surface of rest depends on a parameter")
@@ -257,20 +271,44 @@ def _returns(forms: Forms, mode: int, held: Sequence[int]) -> list[float]:
     return [float(x) for x in np.linalg.pinv(gradients).T.ravel()]
 
 
-def coded_flow(description: Description) -> CompiledFlow:
-    """Return the compiled functions of a description whose modes are all affine.
+@dataclass(frozen=True)
+class CodedFunctions:
+    """The flow of a model whose formulas are tables, and the field of its modes."""
 
-    Raises
-    ------
-    NotAffineError
-        With the reason, where one is not.
-    """
+    flow: CompiledFlow
+    field: Bound
+
+
+@lru_cache(maxsize=64)
+def forms_of(definition: str) -> Forms | None:
+    """Return the affine forms of a definition, if its formulas are to be tables; else None."""
+    from contfric.models.describe import from_text
+
+    description = from_text(definition)
+    if len(description.modes) * len(description.states) <= _FEW:
+        return None
+    try:
+        return Forms(description)
+    except (NotAffineError, ArithmeticError):
+        return None
+
+
+@lru_cache(maxsize=64)
+def coded_functions(definition: str) -> CodedFunctions | None:
+    """Return the compiled functions of a definition whose formulas are to be tables; else None."""
+    forms = forms_of(definition)
+    return None if forms is None else functions_from(forms)
+
+
+def functions_from(forms: Forms) -> CodedFunctions:
+    """Return the compiled functions of affine forms."""
+    from contfric.flow.coded.kernels import KERNELS
+    from contfric.flow.coded.tables import LAYOUT
     from contfric.flow.integrated import AffineModes, Functions
     from contfric.flow.layouts import AFFINE as HELPERS
-    from contfric.flow.linear.coded import KERNELS, LAYOUT
     from contfric.handle import Block, Bound
 
-    forms = Forms(description)
+    description = forms.description
     tables = Tables([p.name for p in description.parameters], len(description.states))
     pieces = [tables.group(rows) for rows in forms.fields]
     data = tables.data
@@ -297,7 +335,12 @@ def coded_flow(description: Description) -> CompiledFlow:
     bound = {name: Bound(kernel, block) for name, kernel in KERNELS.items()}
     count = len(forms.observables)
     functions = Functions(
-        **{name: bound[name] for name in ("field", "observe", "rate", "period", "scale", "onto")},
+        field=bound["field"],
+        observe=bound["observe"],
+        rate=bound["rate"],
+        period=bound["period"],
+        scale=bound["scale"],
+        onto=bound["onto"],
         modes=len(pieces),
         observables=count,
         slides=slides,
@@ -311,7 +354,8 @@ def coded_flow(description: Description) -> CompiledFlow:
             seen=range(count),
         ),
     )
-    return functions.flow(bound["level"], reset=bound["reset"] if forms.resets else None)
+    flow = functions.flow(bound["level"], reset=bound["reset"] if forms.resets else None)
+    return CodedFunctions(flow, bound["field"])
 
 
 def _slides(forms: Forms, data: dict[str, list[Any]]) -> list[int]:
@@ -327,4 +371,3 @@ def _slides(forms: Forms, data: dict[str, list[Any]]) -> list[int]:
         data["surface_at"].append(len(data["surfaces"]))
         slides += [m] if held else []
     return slides
-

@@ -1,6 +1,6 @@
 """Formulas of affine modes without computer algebra: coefficients of the parameters, states and harmonics.
 
-An expression of a model is evaluated in an algebra (:class:`contfric.models.grammar.Algebra`) whose numbers are
+An expression of a model is evaluated in an algebra (:class:`contfric.models.grammar.Algebra`) of
 
 * *coefficients*: sums ``c1 m1 + c2 m2 + ...`` of numbers times products of powers of parameters and of
   functions of them, such as ``2 k - c/m + cos(beta)``,

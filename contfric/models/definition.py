@@ -151,9 +151,12 @@ class Model(TransitionMaps):
         """Modes that are integrated numerically, and why (of a model that is declared by its equations)."""
         if not self.definition:
             return {}
+        from contfric.models.coded import forms_of
         from contfric.models.describe import from_text
         from contfric.models.symbols import integrated_modes
 
+        if forms_of(self.definition) is not None:
+            return {}
         return integrated_modes(from_text(self.definition))
 
     @property

@@ -45,10 +45,14 @@ def turned_modes(
     That can only be where the mode holds on both sides of it: modes overlap there.
     """
     place = {(d.mode, *d.signs.items()) for d in domains}
+    at: dict[tuple[tuple[str, int], ...], list[Domain]] = {}
+    for domain in domains:
+        at.setdefault(tuple(domain.signs.items()), []).append(domain)
+    pairs = [pair for same in at.values() for pair in itertools.permutations(same, 2)]
     found: dict[tuple[str, str], set[bool]] = {}
-    for surface, here, there in itertools.product([s.name for s in surfaces], domains, domains):
+    for surface, (here, there) in itertools.product([s.name for s in surfaces], pairs):
         side, beyond = here.signs[surface], {**here.signs, surface: -here.signs[surface]}
-        overlap = there.signs == here.signs and there.mode != here.mode and side
+        overlap = there.mode != here.mode and side
         if not overlap or (there.mode, *beyond.items()) not in place:
             continue
         if (here.mode, *beyond.items()) in place:
@@ -67,41 +71,40 @@ def leaves_at_rest(sampler: Sampler, description: Description, domains: tuple[Do
     That is so where the limit under which a mode slides is the very place at which the field beside it
     turns around (static and kinetic limits agree); it must be so for other parameters, too.
     """
+    under = {
+        domain.mode: [n for n, side in domain.signs.items() if side == 0] for domain in domains
+    }
+    pairs = {
+        (under[mode.name][0], limit)
+        for mode in description.modes
+        for limit, side in mode.sides.items()
+        if side != 0 and len(under.get(mode.name, ())) == 1
+    }
+    at = {tuple(sorted(d.signs.items())): d for d in domains}
     found = False
-    for domain in domains:
-        on = [name for name, side in domain.signs.items() if side == 0]
-        limits = {
-            name
-            for mode in description.modes
-            if mode.name == domain.mode
-            for name, side in mode.sides.items()
-            if side != 0
-        }
-        for limit in limits if len(on) == 1 else ():
-            verdicts = _left_at_rest(sampler, domain, on[0], limit, domains)
-            if False in verdicts:  # one place decides: of many contacts there are many domains
-                return False
-            found = found or bool(verdicts)
+    for on, limit in sorted(pairs):
+        verdicts = _left_at_rest(sampler, on, limit, at)
+        if False in verdicts:  # one place decides
+            return False
+        found = found or bool(verdicts)
     return found
 
 
 def _left_at_rest(
-    sampler: Sampler, domain: Domain, on: str, limit: str, domains: tuple[Domain, ...]
+    sampler: Sampler, on: str, limit: str, at: Mapping[tuple[tuple[str, int], ...], Domain]
 ) -> set[bool]:
-    beyond = {**domain.signs, limit: -domain.signs[limit]}
-    beside = [d for d in domains if d.signs[on] != 0 and {**d.signs, on: 0} == beyond]
+    """Return whether rest on a surface is left without acceleration, at places where its limit is met."""
     found: set[bool] = set()
+    names = [name for name, _ in next(iter(at))]
     for other in (sampler, _moved(sampler)):
         places = 0
         for t, y in other.states(_TRIES):
-            place = other.landed(on, t, y)
-            for _ in range(20):  # one after the other, until both surfaces are met
-                second = place and other.landed(limit, *place)
-                place = second and other.landed(on, *second)
-            if place is None or other.sides(*place, (on, limit)) != {on: 0, limit: 0}:
+            place = _on_both(other, on, limit, t, y)
+            if place is None:
                 continue
-            rest = {k: v for k, v in domain.signs.items() if k not in (on, limit)}
-            if other.sides(*place, rest) != rest or not beside:
+            signs = {**other.sides(*place, names), on: 0}
+            beside = _beside_limit(at, signs, on, limit)
+            if not beside:
                 continue
             rates = [other.rate(d.mode, on, d.signs[on], *place) for d in beside]
             found.add(min(abs(rate) for rate in rates) <= _STILL)
@@ -110,6 +113,34 @@ def _left_at_rest(
                 return found
             if places == _PLACES:
                 break
+    return found
+
+
+def _on_both(
+    sampler: Sampler, on: str, limit: str, t: float, y: Sequence[float]
+) -> tuple[float, Sequence[float]] | None:
+    """Return a place on two surfaces, near a state; None if none is found."""
+    place: tuple[float, Sequence[float]] | None = sampler.landed(on, t, y)
+    for _ in range(20):  # one after the other, until both surfaces are met
+        second = place and sampler.landed(limit, *place)
+        place = second and sampler.landed(on, *second)
+    if place is None or sampler.sides(*place, (on, limit)) != {on: 0, limit: 0}:
+        return None
+    return place
+
+
+def _beside_limit(
+    at: Mapping[tuple[tuple[str, int], ...], Domain], signs: Mapping[str, int], on: str, limit: str
+) -> list[Domain]:
+    """Return the domains beside a rest, beyond its limit; none where there is no rest within the limit."""
+    found = []
+    for side in (1, -1):  # of the limit, within which there is rest
+        rest = at.get(tuple(sorted({**signs, limit: side}.items())))
+        if rest is not None and rest.signs[on] == 0:
+            beyond = [
+                at.get(tuple(sorted({**signs, limit: -side, on: s}.items()))) for s in (1, -1)
+            ]
+            found += [d for d in beyond if d is not None]
     return found
 
 

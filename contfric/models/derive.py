@@ -29,7 +29,7 @@ from contfric.models.evaluate import Evaluator, Sampler, defaults, floats
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope, parse
 from contfric.models.landing import reset_of
 from contfric.models.measuring import displacement_of, extrema_at_joints
-from contfric.models.regions import combinations, domains_of, ordered_surfaces
+from contfric.models.regions import domains_of, is_possible, ordered_surfaces
 from contfric.models.sections import clear_surfaces, join_domains, joined_modes
 from contfric.yaml_lines import Address
 
@@ -193,20 +193,15 @@ def _departures(
             continue
         for surface in order:
             key = on[0], surface, -domain.signs[surface]
-            if key in found or surface == on[0] or not _can_flip(surfaces, domain, surface):
-                continue  # the first one that holds decides where motion goes
             signs = {**domain.signs, surface: key[2]}
+            if key in found or surface == on[0] or not is_possible(surfaces, signs):
+                continue  # the first one that holds decides where motion goes
             if tuple(signs[name] for name in order) in beside:
                 continue
             departure = _departure(sampler, on[0], surface, signs, beside)
             if departure is not None:
                 found[key] = departure
     return tuple(found.values())
-
-
-def _can_flip(surfaces: list[Surface], domain: Domain, surface: str) -> bool:
-    signs = {**domain.signs, surface: -domain.signs[surface]}
-    return signs in combinations(surfaces, signs)
 
 
 def _departure(

@@ -7,10 +7,11 @@ import random
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from contfric.models.description import Description
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Algebra, parse
+from contfric.models.python_code import Function, function_of
 
 T = TypeVar("T")
 
@@ -40,6 +41,10 @@ class Evaluator(Generic[T]):
         return {o.name: o.formula for o in self.description.observables}
 
     @cached_property
+    def _fields(self) -> dict[str, tuple[str, ...]]:
+        return {m.name: m.field for m in self.description.modes}
+
+    @cached_property
     def _surface(self) -> dict[str, tuple[str, str]]:
         return {s.name: (s.observable, s.level) for s in self.description.surfaces}
 
@@ -63,15 +68,30 @@ class Evaluator(Generic[T]):
         """Return the value of an observable."""
         return self.value(self._observable[name], params, t, y)
 
+    @cached_property
+    def _quick(self) -> dict[str, Function]:
+        return {}
+
+    def _function(self, text: str) -> Function:
+        """Return an expression as a function of ordinary numbers."""
+        if text not in self._quick:
+            self._quick[text] = function_of(self.description.names, text)
+        return self._quick[text]
+
     def height(self, surface: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> T:
         """Return (observable - level) of a surface."""
         observable, level = self._surface[surface]
+        if self.algebra is FLOATS:
+            here: Any = self._function(self._observable[observable])(params, t, y)  # type: ignore[arg-type]
+            return here - self._function(level)(params, t, y)  # type: ignore[arg-type,no-any-return]
         above = self.observable(observable, params, t, y)
         return above - self.value(level, params)  # type: ignore[operator,no-any-return]
 
     def field(self, mode: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> list[T]:
         """Return the rates of all states in a mode."""
-        rates = next(m.field for m in self.description.modes if m.name == mode)
+        rates = self._fields[mode]
+        if self.algebra is FLOATS:
+            return [self._function(rate)(params, t, y) for rate in rates]  # type: ignore[arg-type,misc]
         return [self.value(rate, params, t, y) for rate in rates]
 
     def period(self, params: Mapping[str, T]) -> T | None:

@@ -93,10 +93,10 @@ def model_of(definition: str) -> Model:
     ModelError
         If it cannot be built.
     """
-    from contfric.models.build import module_path
+    from contfric.models.build import prepare
     from contfric.models.derive import model_from
 
     description = from_text(definition)
     # written first: what has no value is reported by formula and place
-    module_path(description.motion)
+    prepare(description.motion)
     return model_from(description)

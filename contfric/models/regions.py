@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -69,6 +70,15 @@ def combinations(surfaces: list[Surface], fixed: Mapping[str, int]) -> list[Side
     return found
 
 
+def is_possible(surfaces: list[Surface], sides: Mapping[str, int]) -> bool:
+    """Tell whether a motion can be on all of some sides at once."""
+    for _, group in itertools.groupby(surfaces, key=lambda s: s.observable):
+        names = [s.name for s in group]
+        if {name: sides[name] for name in names} not in _heights(names):
+            return False
+    return True
+
+
 def _heights(names: list[str]) -> list[Sides]:
     """Return the sides from above the highest level to below the lowest one."""
     found = []
@@ -81,20 +91,20 @@ def domains_of(description: Description, surfaces: list[Surface]) -> tuple[Domai
     """Return the domains of all modes, with the names that were given."""
     places: dict[str, set[tuple[int, ...]]] = {}
     found: list[Domain] = []
-    order = [s.name for s in surfaces]
+    order, led = [s.name for s in surfaces], {*description.leads.values()}
     for mode in description.modes:
         regions = combinations(surfaces, mode.sides)
         if not regions:
             raise EntryError(("modes", mode.name, "in"), _impossible(mode, surfaces))
         places[mode.name] = {tuple(sides[name] for name in order) for sides in regions}
-        led = {*description.leads.values()}
         for other, place in places.items():
             inside = place <= places[mode.name] or places[mode.name] <= place
             if other != mode.name and inside and not {mode.name, other} & led:
                 sides = next(s for s in regions if tuple(s.values()) in place)
                 raise EntryError(("modes", mode.name, "in"), _shared(mode, other, sides))
+        known = {name for name in order if len({sides[name] for sides in regions}) == 1}
         for sides in regions:
-            name = mode.name if len(regions) == 1 else _auto_name(mode, sides, surfaces)
+            name = mode.name if len(regions) == 1 else _auto_name(mode, sides, surfaces, known)
             found.append(Domain(name, mode.name, {n: sides[n] for n in order}, name))
     return _renamed(found, description.domains)
 
@@ -113,8 +123,9 @@ def _shared(mode: ModeText, other: str, sides: Sides) -> str:
     )
 
 
-def _auto_name(mode: ModeText, sides: Sides, surfaces: list[Surface]) -> str:
-    parts, known = [], known_sides(mode, surfaces)
+def _auto_name(mode: ModeText, sides: Sides, surfaces: list[Surface], known: set[str]) -> str:
+    """Return the name of a region by the observables whose surfaces divide the mode."""
+    parts = []
     for observable, group in itertools.groupby(surfaces, key=lambda s: s.observable):
         members = [s.name for s in group]
         if all(name in known for name in members):
@@ -148,8 +159,8 @@ def _renamed(domains: list[Domain], named: tuple[DomainText, ...]) -> tuple[Doma
                 f"'{found[fits[0]].name}': each region has one name",
             )
         found[fits[0]] = Domain(text.name, d.mode, d.signs, text.label or text.name)
-    every = [d.name for d in found]
-    twice = [name for name in every if every.count(name) > 1]
+    counts = Counter(d.name for d in found)
+    twice = [name for name, count in counts.items() if count > 1]
     if twice:
         raise EntryError(("domains",), f"two domains have the name '{twice[0]}'")
     return tuple(found)

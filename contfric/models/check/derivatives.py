@@ -16,7 +16,7 @@ import mpmath
 import numpy as np
 
 from contfric.errors import ParameterError
-from contfric.models.build import load_module
+from contfric.models.build import field_of
 from contfric.models.check.digits import DIGITS, digits, slopes
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
@@ -157,11 +157,11 @@ def _shown(names: list[str], point: FloatArray) -> str:
 
 def _described(probe: Probe) -> list[Case]:
     model, description = probe.model, from_text(probe.model.definition)
-    exact, module = digits(description), load_module(model.definition)
+    exact, field = digits(description), field_of(model.definition)
     split = _Split(model)
     found = [_observable(split, exact, o.name, c) for c, o in enumerate(model.observables)]
     for m, mode in enumerate(model.modes):
-        found.append(_field(split, exact, module.field_of, mode.name, m))
+        found.append(_field(split, exact, field, mode.name, m))
         found += [
             _rate(split, exact, mode.name, m, o.name, c) for c, o in enumerate(model.observables)
         ]

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from contfric.models.build import load_module
+from contfric.models.build import field_of
 from contfric.models.definition import FloatArray, Model
 from contfric.models.view import FlowView
 
@@ -62,9 +62,9 @@ class Probe:
         """Return the rates of all states in a mode."""
         n = len(y)
         if self.model.definition:  # without the flow, which takes much longer to compile
-            out, module = np.empty(n), load_module(self.model.definition)
+            out, field = np.empty(n), field_of(self.model.definition)
             m, none = self.model.mode_index[mode], np.empty(0, dtype=np.int64)
-            module.field_of(m, t, y, self.vector, none, out, np.empty((0, 0)))
+            field(m, t, y, self.vector, none, out, np.empty((0, 0)))
             return out
         return self.flow.jacobian(mode, t, y, 0.0)[:, 1 + n].copy()
 

@@ -1,0 +1,1 @@
+"""Affine modes whose formulas are tables of numbers: nothing is compiled for a model."""
