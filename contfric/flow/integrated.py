@@ -180,4 +180,5 @@ class Functions:
             "observables": self.observables,
             "entries_count": self.affine.entries if self.affine else 0,
             "waves_count": self.affine.waves if self.affine else 0,
+            "carries": int(self.affine is not None and "carry" in self.affine.functions),
         }

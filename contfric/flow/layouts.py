@@ -71,6 +71,8 @@ AFFINE = {
     # terms; vary(piece, co, by, z, waves, w, dw, h, terms, series, out): their derivatives
     "rates": types.void(i8, vector, vector, vector, vector, vector),
     "expand": types.void(i8, vector, vector, vector, vector, vector, f8, i8, matrix),
+    # carry(piece, co, h, terms, columns): rows of ``columns`` times exp(A h)
+    "carry": types.void(i8, vector, f8, i8, matrix),
     "vary": types.void(i8, vector, vector, vector, matrix, vector, vector, f8, i8, matrix, matrix),
     # sums(piece, co, d, row, column, own): sums of the matrix in units d
     "sums": types.void(i8, vector, vector, vector, vector, vector),
@@ -98,6 +100,7 @@ NUMBERS = {
     "observables": i8,
     "entries_count": i8,
     "waves_count": i8,
+    "carries": i8,  # whether there is ``carry``; else ``expand`` does it column by column
 }
 #: What an integrator knows of a model. A clock is a block along whose field no state moves: zeros of
 #: observables of time alone are sought along it.

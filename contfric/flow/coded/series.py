@@ -112,6 +112,30 @@ def expand(model, piece, co, y, c, s, w, h, terms, series):  # type: ignore[no-u
             series[m + 1, i] += f * total
 
 
+def carry(model, piece, co, h, terms, columns):  # type: ignore[no-untyped-def]
+    """Multiply columns (rows of an array) by exp(A h): ``v + h A (v + h A / 2 (v + ...))``."""
+    count, n = columns.shape
+    row = model.row_of[piece]
+    first = model.slope_at[row]
+    start, sums, other = np.empty((n, count)), np.empty((n, count)), np.empty((n, count))
+    for i in range(n):
+        for j in range(count):
+            start[i, j] = sums[i, j] = columns[j, i]
+    for m in range(terms, 0, -1):
+        f = h / m
+        for i in range(n):
+            for j in range(count):
+                other[i, j] = start[i, j]
+            for k in range(model.slope_at[row + i], model.slope_at[row + i + 1]):
+                a, source = f * co[k - first], model.columns[k]
+                for j in range(count):
+                    other[i, j] += a * sums[source, j]
+        sums, other = other, sums
+    for i in range(n):
+        for j in range(count):
+            columns[j, i] = sums[i, j]
+
+
 @helper
 def add_varied_waves(model, row, n, shift, co, by, waves, w, dw, h, terms, out):  # type: ignore[no-untyped-def]
     """Add the derivatives of the harmonics by a parameter to the Taylor terms of their integrals."""

@@ -42,6 +42,9 @@ MOST_STEPS = 2_000_000
 @inlined_helper
 def carry_by_series(motion, piece, h, terms, system, columns):  # type: ignore[no-untyped-def]
     """Multiply columns (rows of an array) by exp(A h)."""
+    if motion.carries != 0:
+        motion.carry(piece, system.co, h, terms, columns)
+        return
     silence = system.waves[4]
     for j in range(columns.shape[0]):
         motion.expand(
