@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from contfric.models import Model, load_model, model_names
     from contfric.models.check import ModelReport, check_model
     from contfric.models.oscillator import OscillatorModel
+    from contfric.models.structure import Mechanism
     from contfric.orbit.find import find_orbit
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.simulation import simulate
@@ -85,6 +86,7 @@ _HOMES = {
     "Orbit": "contfric.orbit.orbit",
     "Outcome": "contfric.response.outcome",
     "OscillatorModel": "contfric.models.oscillator",
+    "Mechanism": "contfric.models.structure",
     "Plane": "contfric.atlas.plane",
     "ParameterError": "contfric.errors",
     "ReleaseMap": "contfric.response.returns",
@@ -136,6 +138,7 @@ __all__ = [
     "Kind",
     "LyapunovExponents",
     "LyapunovMap",
+    "Mechanism",
     "Model",
     "ModelError",
     "ModelReport",

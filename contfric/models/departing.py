@@ -122,11 +122,11 @@ def _on_both(
     """Return a place on two surfaces, near a state; None if none is found."""
     place: tuple[float, Sequence[float]] | None = sampler.landed(on, t, y)
     for _ in range(20):  # one after the other, until both surfaces are met
-        second = place and sampler.landed(limit, *place)
+        if place is None or sampler.sides(*place, (on, limit)) == {on: 0, limit: 0}:
+            return place
+        second = sampler.landed(limit, *place)
         place = second and sampler.landed(on, *second)
-    if place is None or sampler.sides(*place, (on, limit)) != {on: 0, limit: 0}:
-        return None
-    return place
+    return None
 
 
 def _beside_limit(

@@ -11,6 +11,7 @@ from contfric.models.definition import Model
 from contfric.models.describe import describe, from_text
 from contfric.models.description import Description
 from contfric.models.entries import EntryError
+from contfric.models.matrices import loaded
 
 if TYPE_CHECKING:
     from contfric.yaml_lines import Address, LocatedYaml
@@ -53,7 +54,7 @@ def read_model(path: Path) -> Model:
     try:
         located = read_yaml(_file(path))
         try:
-            return built(describe(located.data))
+            return built(describe(loaded(located.data, path.parent)))
         except EntryError as error:
             located.fail(_written_at(located, error.address), str(error))
     except NotationError as error:

@@ -1,4 +1,4 @@
-"""What a model says in short, written out: tied parameters, clocks, angles, sliding that is derived.
+"""What a model says in short, written out: structures, ties, clocks, angles, sliding that is derived.
 
 Each is put into the data of a model, before it is read, as if it had been typed: nothing behind knows of it.
 """
@@ -12,6 +12,7 @@ from contfric.models.angles import with_angles
 from contfric.models.clocks import with_clock
 from contfric.models.description import Description
 from contfric.models.entries import Part
+from contfric.models.mechanism import with_contacts
 from contfric.models.tied import with_ties_put_in
 
 
@@ -27,6 +28,7 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
     EntryError
         For the first mistake, with the address of its entry.
     """
+    data = with_contacts(data)
     if not _is_regular(data):
         return read(data)  # which says what is wrong, and where
     surfaces, plain = _derived_sliding(with_angles(with_clock(with_ties_put_in(data))))

@@ -119,16 +119,30 @@ class TransitionMaps(SectionMaps):
         }
         own = reset.lands.get(reset.surface, 1) * domain.signs[reset.surface]
         landed = {**reset.lands, **({reset.surface: own} if reset.stays else {})}
-        behind = [
-            d
-            for d in self.domains
-            if all(d.signs[s] == side for s, side in {**fixed, **landed}.items())
-            and all(d.signs[s.name] != 0 for s in self.surfaces if s.name not in fixed)
-        ]
+        asked = {**fixed, **landed}
+        behind = self._domains_landed(reset).get(tuple(asked[name] for name in sorted(asked)), [])
         for mode in (reset.leads, domain.own_mode):
             kept = [d.signs for d in behind if d.own_mode == mode]
             behind = [d for d in behind if d.own_mode == mode or d.signs not in kept]
         return tuple(d.name for d in behind)
+
+    def _domains_landed(self, reset: Reset) -> dict[tuple[int, ...], list[Domain]]:
+        """Return the domains that lie on no surface of what a reset changes, by the sides of all others."""
+        if reset.surface not in self._landed_on:
+            free = [s.name for s in self.surfaces if self.changed_by(reset, s.name)]
+            landed = {*reset.lands, *([reset.surface] if reset.stays else [])}
+            asked = sorted({s.name for s in self.surfaces if s.name not in free} | landed)
+            found: dict[tuple[int, ...], list[Domain]] = {}
+            for domain in self.domains:
+                if all(domain.signs[name] != 0 for name in free):
+                    key = tuple(domain.signs[name] for name in asked)
+                    found.setdefault(key, []).append(domain)
+            self._landed_on[reset.surface] = found
+        return self._landed_on[reset.surface]
+
+    @cached_property
+    def _landed_on(self) -> dict[str, dict[tuple[int, ...], list[Domain]]]:
+        return {}
 
     def _next_domain(self, domain: Domain, surface: Surface) -> str | None:
         sign = domain.signs[surface.name]

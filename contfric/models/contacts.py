@@ -1,0 +1,182 @@
+"""Contacts between the parts of a structure: each has a few states, surfaces between them, and forces.
+
+``friction``
+    sticks (s) until its load reaches the static limit, slides up (p) or down (n) with the kinetic one;
+``jenkins``
+    a spring in series with a slider: its stretch is a state; the slider sticks (s) until the force is the
+    limit, and slides (p, n) until the velocity changes its sign;
+``spring``
+    a gap that is open (o), or closed (c) with a force ``-stiffness * gap``;
+``impact``
+    a gap at whose end the relative velocity is reversed, times the restitution.
+
+A contact acts along a direction W of the coordinates: the gradient of its velocity, gap or displacement. With
+the mass matrix M, the forces f and the relative velocity ``w = W . v - w0(t)`` a friction contact that sticks
+carries the load ``u = (W . M^-1 f - w0') / (W . M^-1 W)``: it slides when that is the static limit
+(Lagrange's multiplier of the constraint w = 0 [1]_). Where ``W_i . M^-1 W_j = 0`` for any two of them, the
+load of each is a function of time and state alone; others are refused.
+
+.. [1] F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral Contacts, Wiley (1996), chapters 3 and 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from contfric.errors import ModelError
+from contfric.models.affine import NotAffineError
+from contfric.models.coefficient_texts import text_of
+from contfric.models.coefficients import AFFINE, CONSTANT, Affine, symbols
+from contfric.models.entries import Part
+from contfric.models.grammar import Scope, parse
+
+
+class ContactKind(str, Enum):
+    """Kinds of contacts, by their names in a model's file."""
+
+    FRICTION = "friction"
+    JENKINS = "jenkins"
+    SPRING = "spring"
+    IMPACT = "impact"
+
+
+#: What a contact of each kind is declared by; the last ones may be left out.
+KEYS = {
+    ContactKind.FRICTION: ("velocity", "kinetic", "static"),
+    ContactKind.JENKINS: ("displacement", "stiffness", "limit"),
+    ContactKind.SPRING: ("gap", "stiffness"),
+    ContactKind.IMPACT: ("gap", "restitution"),
+}
+_OPTIONAL = ("static",)
+#: What the direction of each kind is the gradient of.
+_DIRECTION = {
+    ContactKind.FRICTION: "velocity",
+    ContactKind.JENKINS: "displacement",
+    ContactKind.SPRING: "gap",
+    ContactKind.IMPACT: "gap",
+}
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A contact as it is declared.
+
+    Attributes
+    ----------
+    texts : its expressions by their keys
+    direction : (coordinate, weight), the entries of W that are not zero
+    form : what W is the gradient of, an affine form of states and time
+    """
+
+    name: str
+    kind: ContactKind
+    texts: Mapping[str, str]
+    direction: Mapping[int, float]
+    form: Affine = field(repr=False)
+
+    @property
+    def states(self) -> str:
+        """A letter for each state."""
+        return {"friction": "spn", "jenkins": "spn", "spring": "oc", "impact": ""}[self.kind.value]
+
+    def pull(self, state: str) -> str:
+        """Return the force along its direction, apart from that of friction which sticks."""
+        if self.kind is ContactKind.FRICTION and state in "pn":
+            return f"{'-' if state == 'p' else ''}({self.texts['kinetic']})"
+        if self.kind is ContactKind.JENKINS:
+            return f"-({self.texts['stiffness']})*{self.name}"
+        if self.kind is ContactKind.SPRING and state == "c":
+            return f"-({self.texts['stiffness']})*({self.texts['gap']})"
+        return "0"
+
+
+def read_contacts(
+    part: Part,
+    coordinates: tuple[str, ...],
+    velocities: tuple[str, ...],
+    parameters: tuple[str, ...],
+    define: Mapping[str, str],
+) -> list[Contact]:
+    """Read the contacts of a structure.
+
+    Raises
+    ------
+    EntryError
+        For the first mistake.
+    """
+    own = tuple(n for n in part.data if _is_jenkins(part.data[n]))
+    scope = Scope(
+        AFFINE,
+        symbols((*coordinates, *velocities, *own), parameters),
+        {name: parse(text) for name, text in define.items()},
+    )
+    found = []
+    for name in part.data:
+        entry = part.part(name, "{kind: friction, velocity: v1, kinetic: S, static: S0}")
+        kind = ContactKind(entry.one_of("kind", [k.value for k in ContactKind], "kind of contact"))
+        entry.only(("kind", *KEYS[kind]))
+        texts = {
+            key: _expression(entry, key)
+            for key in KEYS[kind]
+            if key not in _OPTIONAL or entry.data.get(key) is not None
+        }
+        form = _form(entry, _DIRECTION[kind], texts, scope)
+        count = len(coordinates)
+        shift = count if kind is ContactKind.FRICTION else 0
+        direction = _direction(entry, _DIRECTION[kind], form, shift, count)
+        found.append(Contact(name, kind, texts, direction, form))
+    return found
+
+
+def _is_jenkins(entry: object) -> bool:
+    return isinstance(entry, Mapping) and entry.get("kind") == ContactKind.JENKINS.value
+
+
+def _expression(entry: Part, key: str) -> str:
+    value = entry.needs(key, "an expression")
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        entry.fail(key, f"'{key}' is an expression, got {value!r}")
+    return str(value)
+
+
+def _form(entry: Part, key: str, texts: Mapping[str, str], scope: Scope[Affine]) -> Affine:
+    try:
+        return scope.evaluate(parse(texts[key]))
+    except NotAffineError as reason:
+        entry.fail(key, f"'{key}' is linear in the states: {reason}")
+    except ModelError as error:
+        entry.fail(key, str(error))
+
+
+def _direction(entry: Part, key: str, form: Affine, shift: int, count: int) -> dict[int, float]:
+    """Return the gradient of an affine form by the coordinates (or, shifted, by the velocities)."""
+    what = "velocities" if shift else "coordinates"
+    found: dict[int, float] = {}
+    for (kind, which), slope in form.parts.items():
+        if kind != "y":
+            continue
+        weight = slope.number
+        if weight is None:
+            entry.fail(key, f"the factors of the {what} in '{key}' are numbers, not parameters")
+        if not shift <= which < shift + count:
+            entry.fail(
+                key, f"'{key}' is made of {what}, numbers, parameters and t, such as v1 - v2"
+            )
+        found[which - shift] = weight
+    if not found:
+        entry.fail(key, f"'{key}' has none of the {what}: nothing moves this contact")
+    return found
+
+
+def drift(contact: Contact) -> str:
+    """Return the derivative of the given part ``w0(t)`` of a contact's velocity by time."""
+    parts = []
+    for (kind, which), by in contact.form.parts.items():
+        if (kind, which) == CONSTANT or kind == "y":
+            continue
+        w = text_of(which)
+        wave, sign = ("sin", "") if kind == "cos" else ("cos", "-")  # w0 is minus what stands in w
+        parts.append(f"{sign}({text_of(by)})*({w})*{wave}(({w})*t)")
+    return " + ".join(parts) or "0"

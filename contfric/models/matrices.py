@@ -1,0 +1,217 @@
+"""Mass, damping and stiffness of a structure, and what follows from them.
+
+A matrix is a list of rows of expressions, a list of its diagonal, one expression (times identity), or the
+word ``identity``; in a file of a model also ``{file: frame.npz, array: M}``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contfric.errors import ModelError, did_you_mean, shown
+from contfric.models.entries import EntryError, Part
+from contfric.models.grammar import number_of
+
+#: Rows of expressions.
+Texts = list[list[str]]
+#: Two entries of a matrix that should be equal, relative to its largest one: measured masses have 6 digits.
+_SYMMETRIC = 1e-6
+#: An entry of the inverse of a mass matrix this small, relative to the largest one, is rounding.
+_ROUNDING = 1e-14
+IDENTITY = "identity"
+
+
+def is_zero(text: str) -> bool:
+    """Tell whether an expression is the number 0."""
+    try:
+        return float(text) == 0.0
+    except ValueError:
+        return False
+
+
+def matrix_of(key: str, value: Any, size: int, default: str | None = None) -> Texts:
+    """Return a matrix as rows of expressions.
+
+    Raises
+    ------
+    EntryError
+        If it is none, or has another size.
+    """
+    wanted = (
+        f"'{key}' is a matrix of {size} rows of {size}: a list of rows, a list of its diagonal, one "
+        f"expression (times identity), or '{IDENTITY}'"
+    )
+    if value is None and default is not None:
+        value = default
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, (str, int, float)) and not isinstance(value, bool):
+        value = ["1" if value == IDENTITY else value] * size
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != size:
+        raise EntryError((key,), f"{wanted}; got {shown(value)}")
+    rows = list(value)
+    if not any(isinstance(row, (list, tuple)) for row in rows):
+        rows = [[entry if i == j else 0 for j in range(size)] for i, entry in enumerate(rows)]
+    for i, row in enumerate(rows):
+        if not isinstance(row, (list, tuple)) or len(row) != size:
+            raise EntryError((key, i), f"{wanted}; row {i + 1} is {shown(row)}")
+    return [[_text(key, i, entry) for entry in row] for i, row in enumerate(rows)]
+
+
+def _text(key: str, row: int, entry: Any) -> str:
+    if isinstance(entry, bool) or not isinstance(entry, (str, int, float)):
+        raise EntryError((key, row), f"an entry of '{key}' is an expression, got {shown(entry)}")
+    return entry if isinstance(entry, str) else repr(float(entry))
+
+
+def loaded(data: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Return a model's data with the matrices that lie in files.
+
+    Parameters
+    ----------
+    folder : that of the model, to which the names of the files are relative
+
+    Raises
+    ------
+    EntryError
+        If a file or an array is not there.
+    """
+    found = dict(data)
+    for key in ("mass", "damping", "stiffness"):
+        value = data.get(key)
+        if isinstance(value, Mapping):
+            part = Part({str(k): v for k, v in value.items()}, (key,))
+            part.only(("file", "array"))
+            found[key] = _from_file(part, folder / part.text("file"))
+    return found
+
+
+def _from_file(part: Part, path: Path) -> Any:
+    """Read a matrix: an array of an npz, or a MatrixMarket file."""
+    if not path.is_file():
+        part.fail("file", f"there is no file {path}")
+    try:
+        if path.suffix == ".mtx":
+            from scipy.io import mmread
+
+            found = mmread(path)
+            return np.asarray(found.todense() if hasattr(found, "todense") else found)
+        with np.load(path, allow_pickle=False) as arrays:
+            if not hasattr(arrays, "files"):
+                part.fail("file", f"{path.name} is no npz with named arrays, and no .mtx")
+            name = part.text("array")
+            if name not in arrays.files:
+                hint = did_you_mean(name, arrays.files)
+                part.fail("array", f"{path.name} has no array '{name}'{hint}")
+            return np.asarray(arrays[name], dtype=np.float64)
+    except (OSError, ValueError) as error:
+        part.fail("file", f"{path.name} cannot be read: {error}")
+
+
+@dataclass(frozen=True)
+class Mass:
+    """A mass matrix, ready to be divided by.
+
+    Attributes
+    ----------
+    inverse : its inverse, rows of expressions
+    """
+
+    inverse: Texts
+
+    def of(self, vector: Mapping[int, str]) -> dict[int, str]:
+        """Return the inverse times a vector that is given by its entries which are not zero."""
+        found: dict[int, list[str]] = {}
+        for i, row in enumerate(self.inverse):
+            for j, entry in vector.items():
+                if not is_zero(row[j]):
+                    found.setdefault(i, []).append(times(row[j], entry))
+        return {i: summed(parts) for i, parts in found.items()}
+
+
+def mass_of(texts: Texts, params: Mapping[str, float]) -> Mass:
+    """Return a mass matrix.
+
+    Parameters
+    ----------
+    params : values of the parameters, at which it has to be positive definite
+
+    Raises
+    ------
+    EntryError
+        If it is not symmetric and positive definite, or depends on parameters off its diagonal.
+    """
+    size = len(texts)
+    values = np.array([[_number(i, text, params) for text in row] for i, row in enumerate(texts)])
+    largest = float(np.max(np.abs(values)))
+    off = np.abs(values - values.T)
+    if np.any(off > _SYMMETRIC * largest):
+        i, j = map(int, np.unravel_index(np.argmax(off), off.shape))
+        raise EntryError(
+            ("mass", i),
+            f"a mass matrix is symmetric; here entry ({i + 1}, {j + 1}) is {values[i, j]:g} and "
+            f"({j + 1}, {i + 1}) is {values[j, i]:g}",
+        )
+    lowest = float(np.min(np.linalg.eigvalsh(values)))
+    if not lowest > _ROUNDING * largest:
+        raise EntryError(
+            ("mass",),
+            f"a mass matrix is positive definite; the smallest eigenvalue of this one is {lowest:g} at the "
+            "defaults: leave out coordinates without mass",
+        )
+    if all(is_zero(texts[i][j]) for i in range(size) for j in range(size) if i != j):
+        return Mass(
+            [[_over(texts[i][i]) if i == j else "0" for j in range(size)] for i in range(size)]
+        )
+    if any(_is_expression(text) for row in texts for text in row):
+        raise EntryError(
+            ("mass",),
+            "a mass matrix that is not diagonal has numbers only: parameters cannot stand in it",
+        )
+    inverse = np.linalg.inv(values)
+    small = np.abs(inverse) <= _ROUNDING * np.max(np.abs(inverse))
+    inverse[small] = 0.0
+    return Mass([[repr(float(x)) for x in row] for row in inverse])
+
+
+def _number(row: int, text: str, params: Mapping[str, float]) -> float:
+    try:
+        value = number_of(text, params)
+    except ModelError as error:
+        raise EntryError(("mass", row), str(error)) from None
+    if not np.isfinite(value):
+        raise EntryError(("mass", row), f"'{text}' has no value at the defaults")
+    return value
+
+
+def _is_expression(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return True
+    return False
+
+
+def _over(text: str) -> str:
+    return f"1/({text})" if _is_expression(text) else repr(1.0 / float(text))
+
+
+def times(first: str, second: str) -> str:
+    """Return a product as an expression."""
+    for one, other in ((first, second), (second, first)):
+        if one in ("1", "1.0"):
+            return other
+        if one in ("-1", "-1.0"):
+            return f"-({other})"
+    return f"({first})*({second})"
+
+
+def summed(parts: Sequence[str]) -> str:
+    """Return a sum as an expression."""
+    kept = [part for part in parts if not is_zero(part)]
+    return " + ".join(f"({part})" for part in kept) if len(kept) > 1 else (kept or ["0"])[0]

@@ -1,0 +1,77 @@
+"""Structures with contacts from matrices in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from contfric.errors import ModelError
+from contfric.models.definition import Model
+from contfric.models.describe import describe
+from contfric.models.entries import EntryError
+from contfric.models.files import built
+from contfric.models.mechanism import COORDINATES
+
+
+def Mechanism(  # the name that is promised: it makes a model as a class makes an object
+    mass: Any,
+    damping: Any,
+    stiffness: Any,
+    *,
+    contacts: Mapping[str, Mapping[str, Any]],
+    force: Mapping[str, Any] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    period: str = "",
+    coordinates: list[str] | None = None,
+    name: str = "mechanism",
+    **more: Any,
+) -> Model:
+    """Return the model of ``M q'' + C q' + K q = f(t)`` with contacts.
+
+    Parameters
+    ----------
+    mass, damping, stiffness : arrays of shape (n, n), or lists of expressions of the parameters
+    contacts : as in a model's file, such as ``{"pad": {"kind": "friction", ...}}``
+    force : expression of the force on each coordinate that has one
+    parameters : their defaults
+    period : expression of the period of the excitation; empty for an autonomous model
+    coordinates : their names; q1, q2, ... by default. Their velocities are v1, v2, ...
+    more : what else a model's file may have: ``constraints``, ``define``, ``symmetry``, ``spread``, ...
+
+    Raises
+    ------
+    ModelError
+        For the first mistake, with the name of its entry.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> brake = {"kind": "friction", "velocity": "v1", "kinetic": "S", "static": "S0"}
+    >>> cf.Mechanism([[1.0]], [[0.0]], [[1.0]], contacts={"brake": brake}, force={"q1": "cos(Omega*t)"},
+    ...              parameters={"Omega": 0.5, "S": 0.3, "S0": 0.4}, period="2*pi/Omega").states
+    ('q1', 'v1')
+    """
+    size = len(stiffness) if coordinates is None else len(coordinates)
+    data: dict[str, Any] = {
+        "name": name,
+        COORDINATES: coordinates or [f"q{i}" for i in range(1, size + 1)],
+        "parameters": dict(parameters or {}),
+        "mass": _rows(mass),
+        "damping": _rows(damping),
+        "stiffness": _rows(stiffness),
+        "force": dict(force or {}),
+        "contacts": {key: dict(entry) for key, entry in contacts.items()},
+        **({"period": period} if period else {"autonomous": True}),
+        **more,
+    }
+    try:
+        return built(describe(data))
+    except EntryError as error:
+        where = " -> ".join(map(str, error.address))
+        raise ModelError(f"model '{name}', {where or 'as a whole'}: {error}") from None
+
+
+def _rows(matrix: Any) -> Any:
+    return matrix.tolist() if isinstance(matrix, np.ndarray) else matrix

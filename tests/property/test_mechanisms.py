@@ -1,0 +1,289 @@
+"""Structures with contacts: each mode obeys the equations of motion and the laws of its contacts."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import contfric as cf
+from contfric.errors import ModelError
+from contfric.models.describe import from_text
+from contfric.models.evaluate import floats
+
+PARAMETERS = {"Omega": 0.9, "S": 0.25, "S0": 0.3, "F": 1.1, "kd": 1.7, "e": 0.6}
+#: Directions of contacts that act on masses of their own where the mass matrix is diagonal.
+FRICTION = {"brake": ("v1 - 0.2*cos(Omega*t)", {0: 1.0}), "pad": ("2*v2 - v3", {1: 2.0, 2: -1.0})}
+
+
+def random_structure(seed: int) -> tuple[cf.Model, dict[str, np.ndarray]]:
+    """Return four masses with two friction contacts, a Jenkins element, a spring and a wall."""
+    rng = np.random.default_rng(seed)
+    mass = np.diag(rng.uniform(0.5, 2.0, 4))
+    damping, stiffness = (m @ m.T for m in rng.normal(size=(2, 4, 4)))
+    contacts = {
+        name: {"kind": "friction", "velocity": velocity, "kinetic": "S", "static": "S0"}
+        for name, (velocity, _) in FRICTION.items()
+    }
+    contacts |= {
+        "jk": {"kind": "jenkins", "displacement": "q1 - q4", "stiffness": "kd", "limit": "S"},
+        "pad2": {"kind": "spring", "gap": "0.3 - q3 + q4", "stiffness": "3*kd"},
+        "wall": {"kind": "impact", "gap": "1.5 - q4 + 0.1*sin(Omega*t)", "restitution": "e"},
+    }
+    model = cf.Mechanism(
+        mass,
+        damping,
+        stiffness,
+        contacts=contacts,
+        force={"q1": "F*cos(Omega*t)", "q3": "0.2*F*sin(Omega*t)"},
+        parameters=PARAMETERS,
+        period="2*pi/Omega",
+        name=f"random-{seed}",
+    )
+    return model, {"M": mass, "C": damping, "K": stiffness}
+
+
+def pulls(letters: dict[str, str], y: np.ndarray) -> np.ndarray:
+    """Return the forces of all contacts but those that stick, from their laws."""
+    q, z = y[:4], y[8]
+    found = -PARAMETERS["kd"] * z * np.array([1.0, 0.0, 0.0, -1.0])
+    if letters["pad2"] == "c":
+        gap = 0.3 - q[2] + q[3]
+        found += -3.0 * PARAMETERS["kd"] * gap * np.array([0.0, 0.0, -1.0, 1.0])
+    for name, (_, direction) in FRICTION.items():
+        sign = {"p": -1.0, "n": 1.0, "s": 0.0}[letters[name]]
+        for i, w in direction.items():
+            found[i] += sign * PARAMETERS["S"] * w
+    return found
+
+
+@settings(max_examples=6, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_every_mode_obeys_the_equations_of_motion(seed: int) -> None:
+    model, parts = random_structure(seed)
+    evaluator = floats(from_text(model.definition))
+    rng, omega, checked = np.random.default_rng(seed + 1), PARAMETERS["Omega"], 0
+    for mode in model.modes:
+        letters = dict(zip((*FRICTION, "jk", "pad2"), mode.name, strict=True))
+        t, y = float(rng.uniform(0.0, 7.0)), rng.normal(size=9)
+        rates = np.array(evaluator.field(mode.name, PARAMETERS, t, list(map(float, y))))
+        v, a = y[4:8], rates[4:8]
+        force = np.array([np.cos(omega * t), 0.0, 0.2 * np.sin(omega * t), 0.0]) * PARAMETERS["F"]
+        rest = parts["M"] @ a + parts["C"] @ v + parts["K"] @ y[:4] - force - pulls(letters, y)
+        assert np.allclose(rates[:4], v)
+        assert rates[8] == pytest.approx(v[0] - v[3] if letters["jk"] == "s" else 0.0)
+        for name, (_, direction) in FRICTION.items():
+            w = np.array([direction.get(i, 0.0) for i in range(4)])
+            if letters[name] == "s":  # the velocity keeps the given one; the multiplier is the load
+                given_rate = -0.2 * omega * np.sin(omega * t) if name == "brake" else 0.0
+                assert w @ a == pytest.approx(given_rate, abs=1e-11)
+                load = evaluator.height(f"{name}+", PARAMETERS, t, list(map(float, y))) + 0.3
+                closed = letters["pad2"] == "c" and name == "pad"
+                if not closed:
+                    rest += w * load
+                else:
+                    other = evaluator.height(f"{name}+pad2", PARAMETERS, t, list(map(float, y)))
+                    rest += w * (other + 0.3)
+                checked += 1
+        assert np.max(np.abs(rest)) < 1e-10
+    assert len(model.modes) == 54
+    assert checked == 36
+
+
+def test_one_mass_is_the_oscillator_of_the_article() -> None:
+    contacts = {"brake": {"kind": "friction", "velocity": "v1", "kinetic": "S", "static": "S0"}}
+    model = cf.Mechanism(
+        [[1.0]],
+        [["2*zeta"]],
+        [[1.0]],
+        contacts=contacts,
+        force={"q1": "cos(Omega*t)"},
+        parameters={"Omega": 0.5, "S": 0.32, "S0": 0.4, "zeta": 0.0},
+        constraints=["S0 >= S"],
+        period="2*pi/Omega",
+    )
+    params = {"Omega": 0.52, "S": 0.32, "S0": 0.4, "zeta": 0.03}
+    mine, theirs = cf.find_orbit(model, params), cf.find_orbit("coulomb", params)
+    assert mine.x_max == pytest.approx(theirs.x_max, rel=1e-11)
+    assert sorted(map(abs, mine.multipliers)) == pytest.approx(
+        sorted(map(abs, theirs.multipliers)), abs=1e-10
+    )
+    assert model.symmetry is not None
+
+
+def test_a_jenkins_element_is_that_of_its_equations() -> None:
+    contacts = {"z": {"kind": "jenkins", "displacement": "q1", "stiffness": "kt", "limit": "muN"}}
+    model = cf.Mechanism(
+        [[1.0]],
+        [["2*zeta"]],
+        [["k"]],
+        contacts=contacts,
+        force={"q1": "F*cos(W*t)"},
+        parameters={"W": 0.9, "F": 1.0, "k": 1.0, "kt": 2.0, "zeta": 0.02, "muN": 0.8},
+        period="2*pi/W",
+    )
+    mine, theirs = cf.find_orbit(model, {}), cf.find_orbit("jenkins", {})
+    assert mine.x_max == pytest.approx(theirs.x_max, rel=1e-10)
+
+
+def test_a_wall_is_that_of_its_equations() -> None:
+    impact = cf.load_model("impact")
+    orbit = cf.find_orbit(impact, {})
+    assert orbit.stable
+    contacts = {"wall": {"kind": "impact", "gap": "1 - q1", "restitution": "r"}}
+    model = cf.Mechanism(
+        [["m"]],
+        [[0.1]],
+        [["k"]],
+        contacts=contacts,
+        force={"q1": "cos(w*t)"},
+        parameters={"w": 2.2, "m": 1.3, "k": 1.0, "r": 0.7},
+        period="2*pi/w",
+    )
+    view = model.view(model.vector({}))
+    for v in (0.3, 1.7):
+        assert view.reset("wall", 0.2, np.array([1.0, v]))[1] == pytest.approx(-0.7 * v)
+
+
+def test_two_masses_that_hit_each_other_keep_their_momentum() -> None:
+    contacts = {"pound": {"kind": "impact", "gap": "0.2 + q2 - q1", "restitution": 0.5}}
+    model = cf.Mechanism(
+        np.diag([1.0, 3.0]),
+        0.02 * np.eye(2),
+        np.diag([1.0, 4.0]),
+        contacts=contacts,
+        force={"q1": "cos(w*t)", "q2": "cos(w*t)"},
+        parameters={"w": 0.8},
+        period="2*pi/w",
+    )
+    before = np.array([0.5, 0.3, 1.1, -0.4])
+    after = model.view(model.vector({})).reset("pound", 0.0, before)
+    assert after[2] + 3.0 * after[3] == pytest.approx(before[2] + 3.0 * before[3])
+    assert after[3] - after[2] == pytest.approx(-0.5 * (before[3] - before[2]))
+    orbit = cf.find_orbit(model, {})
+    assert orbit.admissible
+
+
+WRONG: list[tuple[dict[str, Any], str]] = [
+    ({"mass": [[1.0, 0.5], [0.0, 1.0]]}, "a mass matrix is symmetric"),
+    (
+        {"mass": [[1.0, 2.0], [2.0, 1.0]]},
+        "positive definite; the smallest eigenvalue of this one is -1",
+    ),
+    ({"mass": [[1.0, 0.0], [0.0, 0.0]]}, "leave out coordinates without mass"),
+    ({"mass": [["m", 0.1], [0.1, 1.0]]}, "parameters cannot stand in it"),
+    ({"mass": [1.0, 2.0, 3.0]}, "'mass' is a matrix of 2 rows of 2"),
+    ({"stiffness": [[1.0, "k"], [0.0]]}, "row 2 is"),
+    ({"force": {"q3": "1"}}, "unknown key 'q3'"),
+    ({"contacts": {"a": {"kind": "glue", "velocity": "v1"}}}, "no kind of contact 'glue'"),
+    (
+        {"contacts": {"a": {"kind": "friction", "velocity": "v7", "kinetic": "S"}}},
+        "unknown name 'v7'",
+    ),
+    (
+        {"contacts": {"a": {"kind": "friction", "velocity": "q1", "kinetic": "S"}}},
+        "made of velocities",
+    ),
+    ({"contacts": {"a": {"kind": "friction", "velocity": "m*v1", "kinetic": "S"}}}, "are numbers"),
+    (
+        {"contacts": {"a": {"kind": "friction", "velocity": "0.3", "kinetic": "S"}}},
+        "nothing moves this",
+    ),
+    ({"contacts": {"a": {"kind": "friction", "velocity": "v1"}}}, "key 'kinetic' is missing"),
+    (
+        {"contacts": {"a": {"kind": "impact", "gap": "q1*q2", "restitution": 1}}},
+        "linear in the states",
+    ),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), WRONG)
+def test_mistakes_say_what_and_where(change: dict[str, Any], message: str) -> None:
+    given = {
+        "mass": np.eye(2),
+        "damping": np.zeros((2, 2)),
+        "stiffness": np.eye(2),
+        "contacts": {"a": {"kind": "friction", "velocity": "v1", "kinetic": "S"}},
+        "force": {"q1": "cos(t)"},
+        "parameters": {"S": 0.2, "m": 1.0, "k": 1.0},
+        "period": "2*pi",
+        "coordinates": ["q1", "q2"],
+    } | change
+    with pytest.raises(ModelError, match=message):
+        cf.Mechanism(given.pop("mass"), given.pop("damping"), given.pop("stiffness"), **given)
+
+
+def test_contacts_that_share_their_load_and_too_many_are_refused() -> None:
+    def rubs(velocity: str) -> dict[str, str]:
+        return {"kind": "friction", "velocity": velocity, "kinetic": "0.2"}
+
+    eye = np.eye(7)
+    with pytest.raises(ModelError, match="the loads of 'a' and 'b' depend on each other"):
+        cf.Mechanism(eye, eye, eye, contacts={"a": rubs("v1"), "b": rubs("v1 - v2")})
+    many = {f"c{i}": rubs(f"v{i}") for i in range(1, 7)}
+    with pytest.raises(ModelError, match="729 combinations of states"):
+        cf.Mechanism(eye, eye, eye, contacts=many)
+
+
+def test_matrices_from_files(tmp_path: Any) -> None:
+    stiffness = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    np.savez(tmp_path / "frame.npz", K=stiffness)
+    lines = [
+        "name: frame",
+        "coordinates: {q: 2}",
+        "parameters: {Omega: 0.9, S: 0.25}",
+        "period: 2*pi/Omega",
+        "damping: 0.05",
+        "stiffness: {file: frame.npz, array: K}",
+        "force: {q2: cos(Omega*t)}",
+        "contacts: {brake: {kind: friction, velocity: v1, kinetic: S}}",
+    ]
+    path = tmp_path / "frame.yaml"
+    path.write_text("\n".join(lines))
+    model = cf.load_model(path)
+    y = [0.3, -0.7, 0.4, 0.1]
+    rates = floats(from_text(model.definition)).field("p", model.defaults, 0.0, y)
+    force = np.array([-0.25, 1.0]) - 0.05 * np.array(y[2:]) - stiffness @ np.array(y[:2])
+    assert rates[2:] == pytest.approx(list(force))
+    path.write_text("\n".join(lines).replace("array: K", "array: KK"))
+    with pytest.raises(
+        ModelError, match=r"frame.yaml:6: frame.npz has no array 'KK'.*did you mean 'K'"
+    ):
+        cf.load_model(path)
+
+
+def test_masses_side_by_side_move_as_one_alone() -> None:
+    """Masses that share nothing move as one alone does."""
+    contacts = {
+        f"c{i}": {"kind": "friction", "velocity": f"v{i}", "kinetic": "S", "static": "S0"}
+        for i in (1, 2, 3)
+    }
+    model = cf.Mechanism(
+        np.eye(3),
+        np.zeros((3, 3)),
+        np.eye(3),
+        contacts=contacts,
+        force={f"q{i}": "cos(Omega*t)" for i in (1, 2, 3)},
+        parameters={"Omega": 0.5, "S": 0.32, "S0": 0.4},
+        period="2*pi/Omega",
+    )
+    alone = cf.simulate(
+        "coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, state=[1.3, 0.0], periods=3.2
+    )
+    state = list(itertools.chain([1.3, 1.1, 0.9], [0.0] * 3))
+    together = cf.simulate(model, {}, state=state, periods=3.2)
+    mine = [
+        k for k, exit_ in enumerate(together.exits) if model.surfaces[exit_].name.startswith("c1")
+    ]
+    stops = [(c, t) for c, t in zip(together.cycles[mine], together.times[mine], strict=True)]
+    wanted = [
+        (c, t)
+        for c, t, m, k in zip(alone.cycles, alone.times, alone.modes, alone.exits, strict=True)
+        if alone.model.surfaces[k].name == "v" or alone.model.modes[m].name == "stick"
+    ]
+    assert len(wanted) >= 8
+    assert np.allclose(np.array(stops), np.array(wanted), atol=1e-10)
