@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     )
     from contfric.models import Model, load_model, model_names
     from contfric.models.check import ModelReport, check_model
+    from contfric.models.mechanism import Mechanism
     from contfric.models.oscillator import OscillatorModel
-    from contfric.models.structure import Mechanism
     from contfric.orbit.find import find_orbit
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.simulation import simulate
@@ -86,7 +86,7 @@ _HOMES = {
     "Orbit": "contfric.orbit.orbit",
     "Outcome": "contfric.response.outcome",
     "OscillatorModel": "contfric.models.oscillator",
-    "Mechanism": "contfric.models.structure",
+    "Mechanism": "contfric.models.mechanism",
     "Plane": "contfric.atlas.plane",
     "ParameterError": "contfric.errors",
     "ReleaseMap": "contfric.response.returns",

@@ -10,9 +10,9 @@ from typing import Any
 
 from contfric.models.angles import with_angles
 from contfric.models.clocks import with_clock
+from contfric.models.contact_modes import with_contacts
 from contfric.models.description import Description
 from contfric.models.entries import Part
-from contfric.models.mechanism import with_contacts
 from contfric.models.tied import with_ties_put_in
 
 

@@ -1,77 +1,166 @@
-"""Structures with contacts from matrices in Python."""
+"""A structure with contacts as it is declared: ``M q'' + C q' + K q = f(t)``, and what its contacts carry."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
+from functools import cached_property
 
-import numpy as np
+from contfric.models.contacts import Contact, ContactKind, drift, read_contacts
+from contfric.models.entries import EntryError, Part, mapping_in
+from contfric.models.matrices import Mass, Texts, is_zero, mass_of, matrix_of, summed, times
 
-from contfric.errors import ModelError
-from contfric.models.definition import Model
-from contfric.models.describe import describe
-from contfric.models.entries import EntryError
-from contfric.models.files import built
-from contfric.models.mechanism import COORDINATES
+COORDINATES = "coordinates"
+#: Most combinations of states of contacts: each is a mode with regions of its own.
+_MOST_MODES = 243
 
 
-def Mechanism(  # the name that is promised: it makes a model as a class makes an object
-    mass: Any,
-    damping: Any,
-    stiffness: Any,
-    *,
-    contacts: Mapping[str, Mapping[str, Any]],
-    force: Mapping[str, Any] | None = None,
-    parameters: Mapping[str, float] | None = None,
-    period: str = "",
-    coordinates: list[str] | None = None,
-    name: str = "mechanism",
-    **more: Any,
-) -> Model:
-    """Return the model of ``M q'' + C q' + K q = f(t)`` with contacts.
+@dataclass(frozen=True)
+class Structure:
+    """A structure as it is declared.
 
-    Parameters
+    Attributes
     ----------
-    mass, damping, stiffness : arrays of shape (n, n), or lists of expressions of the parameters
-    contacts : as in a model's file, such as ``{"pad": {"kind": "friction", ...}}``
-    force : expression of the force on each coordinate that has one
-    parameters : their defaults
-    period : expression of the period of the excitation; empty for an autonomous model
-    coordinates : their names; q1, q2, ... by default. Their velocities are v1, v2, ...
-    more : what else a model's file may have: ``constraints``, ``define``, ``symmetry``, ``spread``, ...
-
-    Raises
-    ------
-    ModelError
-        For the first mistake, with the name of its entry.
-
-    Examples
-    --------
-    >>> import contfric as cf
-    >>> brake = {"kind": "friction", "velocity": "v1", "kinetic": "S", "static": "S0"}
-    >>> cf.Mechanism([[1.0]], [[0.0]], [[1.0]], contacts={"brake": brake}, force={"q1": "cos(Omega*t)"},
-    ...              parameters={"Omega": 0.5, "S": 0.3, "S0": 0.4}, period="2*pi/Omega").states
-    ('q1', 'v1')
+    forces : of the coordinates, without contacts: ``f - C q' - K q``
     """
-    size = len(stiffness) if coordinates is None else len(coordinates)
-    data: dict[str, Any] = {
-        "name": name,
-        COORDINATES: coordinates or [f"q{i}" for i in range(1, size + 1)],
-        "parameters": dict(parameters or {}),
-        "mass": _rows(mass),
-        "damping": _rows(damping),
-        "stiffness": _rows(stiffness),
-        "force": dict(force or {}),
-        "contacts": {key: dict(entry) for key, entry in contacts.items()},
-        **({"period": period} if period else {"autonomous": True}),
-        **more,
-    }
-    try:
-        return built(describe(data))
-    except EntryError as error:
-        where = " -> ".join(map(str, error.address))
-        raise ModelError(f"model '{name}', {where or 'as a whole'}: {error}") from None
+
+    top: Part
+    coordinates: tuple[str, ...]
+    velocities: tuple[str, ...]
+    mass: Mass
+    forces: tuple[str, ...]
+    contacts: tuple[Contact, ...]
+
+    @classmethod
+    def read(cls, top: Part) -> Structure:
+        """Read a structure."""
+        coordinates = _coordinates(top)
+        size = len(coordinates)
+        velocities = tuple(f"v{i}" for i in range(1, size + 1))
+        params = defaults_of(top)
+        mass = mass_of(matrix_of("mass", top.data.get("mass"), size, "identity"), params)
+        damping, stiffness = (
+            matrix_of(key, top.data.get(key), size, "0") for key in ("damping", "stiffness")
+        )
+        given = top.part("force", "a mapping of coordinates to expressions")
+        given.only(coordinates)
+        forces = tuple(
+            _force(str(given.data.get(q, "0")), i, coordinates, velocities, damping, stiffness)
+            for i, q in enumerate(coordinates)
+        )
+        contacts = read_contacts(
+            top.part("contacts", "a mapping of names to contacts"),
+            coordinates,
+            velocities,
+            tuple(params),
+            {str(k): str(v) for k, v in mapping_in(top.data, "define").items()},
+        )
+        found = cls(top, coordinates, velocities, mass, forces, tuple(contacts))
+        found.check()
+        return found
+
+    # ------------------------------------------------------------------------------- checks
+
+    def check(self) -> None:
+        """Refuse what cannot be written out."""
+        count = 1
+        for contact in self.contacts:
+            count *= max(1, len(contact.states))
+        if count > _MOST_MODES:
+            raise EntryError(
+                ("contacts",),
+                f"these contacts have {count} combinations of states, and each is a mode: at most "
+                f"{_MOST_MODES} can be listed (five contacts of three states)",
+            )
+        rubbing = [c for c in self.contacts if c.kind is ContactKind.FRICTION]
+        for one, other in itertools.combinations(rubbing, 2):
+            if not is_zero(self.mobility(one, other)):
+                raise EntryError(
+                    ("contacts", other.name),
+                    f"the loads of '{one.name}' and '{other.name}' depend on each other (W . M^-1 W' is not "
+                    "0): friction contacts have to act on masses of their own. A Jenkins element, whose "
+                    "force is a state, can be put anywhere",
+                )
+
+    def mobility(self, one: Contact, other: Contact) -> str:
+        """Return ``W . M^-1 W'`` of two contacts, an expression."""
+        moved = self.mass.of({i: repr(w) for i, w in other.direction.items()})
+        return summed([times(repr(w), moved[i]) for i, w in one.direction.items() if i in moved])
+
+    # ---------------------------------------------------------------------------- expressions
+
+    def load(self, contact: Contact, closed: tuple[Contact, ...]) -> str:
+        """Return the load that friction carries where it sticks, with some springs closed."""
+        pulls: dict[int, list[str]] = {i: [f"f_{q}"] for i, q in enumerate(self.coordinates)}
+        for other in self.contacts:
+            if other.kind is ContactKind.JENKINS or other in closed:
+                for i, w in other.direction.items():
+                    pulls[i].append(times(repr(w), other.pull("c")))
+        moved = self.mass.of({i: summed(parts) for i, parts in pulls.items()})
+        along = summed(
+            [times(repr(w), moved[i]) for i, w in contact.direction.items() if i in moved]
+        )
+        apart = drift(contact)
+        free = along if is_zero(apart) else f"{along} - ({apart})"
+        return f"({free})/({self.mobility(contact, contact)})"
+
+    @cached_property
+    def springs(self) -> dict[str, tuple[Contact, ...]]:
+        """The springs that the load of each friction contact depends on."""
+        every = [c for c in self.contacts if c.kind is ContactKind.SPRING]
+        return {
+            c.name: tuple(s for s in every if not is_zero(self.mobility(c, s)))
+            for c in self.contacts
+            if c.kind is ContactKind.FRICTION
+        }
+
+    def closed(self, contact: Contact, states: Mapping[str, str]) -> tuple[Contact, ...]:
+        """Return the springs that are closed in a mode, of those that a load depends on."""
+        return tuple(s for s in self.springs[contact.name] if states[s.name] == "c")
 
 
-def _rows(matrix: Any) -> Any:
-    return matrix.tolist() if isinstance(matrix, np.ndarray) else matrix
+def _coordinates(top: Part) -> tuple[str, ...]:
+    value = top.data[COORDINATES]
+    if isinstance(value, Mapping) and len(value) == 1:  # q: 20
+        (name, count), *_ = value.items()
+        if isinstance(count, int) and not isinstance(count, bool) and count >= 1:
+            return tuple(f"{name}{i}" for i in range(1, count + 1))
+    if (
+        not isinstance(value, (list, tuple))
+        or not value
+        or not all(isinstance(q, str) for q in value)
+    ):
+        top.fail(
+            COORDINATES,
+            f"'{COORDINATES}' is a list of names such as [q1, q2], or {{q: 20}}, got {value!r}",
+        )
+    return tuple(value)
+
+
+def defaults_of(top: Part) -> dict[str, float]:
+    """Return the defaults of the parameters that are numbers; others are refused where they are read."""
+    found = {}
+    for name, value in mapping_in(top.data, "parameters").items():
+        given = value.get("default") if isinstance(value, Mapping) else value
+        if isinstance(given, (int, float)) and not isinstance(given, bool):
+            found[name] = float(given)
+    return found
+
+
+def _force(
+    given: str,
+    i: int,
+    coordinates: tuple[str, ...],
+    velocities: tuple[str, ...],
+    damping: Texts,
+    stiffness: Texts,
+) -> str:
+    parts = [] if is_zero(given) else [given]
+    for texts, names in ((damping, velocities), (stiffness, coordinates)):
+        parts += [
+            f"-{times(text, name)}"
+            for text, name in zip(texts[i], names, strict=True)
+            if not is_zero(text)
+        ]
+    return summed(parts)

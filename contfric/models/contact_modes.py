@@ -1,0 +1,268 @@
+"""Structures with contacts written out: the states of the contacts, and their combinations as modes.
+
+A model that has ``coordinates`` in place of states is written out here: its states are the coordinates, the
+velocities v1, v2, ... and the stretches of Jenkins elements; its modes are the combinations of the states of
+its contacts (:mod:`contfric.models.contacts`), a letter for each, in their order.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from contfric.errors import ModelError
+from contfric.models.affine import NotAffineError
+from contfric.models.coefficient_texts import text_of
+from contfric.models.coefficients import AFFINE, symbols
+from contfric.models.contacts import Contact, ContactKind, drift
+from contfric.models.entries import EntryError, Part, mapping_in
+from contfric.models.grammar import Scope, names_in, number_of, parse
+from contfric.models.matrices import is_zero, summed, times
+from contfric.models.structure import COORDINATES, Structure, defaults_of
+
+#: What a model of a structure has of its own; everything else is as in any model.
+KEYS = (COORDINATES, "mass", "damping", "stiffness", "force", "contacts")
+_OTHERS = (
+    *("name", "title", "references", "parameters", "constraints", "period", "autonomous", "define"),
+    *("observables", "symmetry", "spread", "integration", "max_step"),
+)
+#: How far the order of a harmonic may be from an odd number: rounding.
+_ODD = 1e-9
+
+
+def with_contacts(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a model's data with its structure and contacts written out; unchanged where it has none.
+
+    Raises
+    ------
+    EntryError
+        For the first mistake, with the address of its entry.
+    """
+    if COORDINATES not in data:
+        for key in KEYS[1:]:
+            if key in data and "states" not in data:
+                raise EntryError(
+                    (key,), f"'{key}' needs '{COORDINATES}': write {COORDINATES}: [q1, q2]"
+                )
+        return data
+    top = Part(data)
+    top.only((*KEYS, *_OTHERS))
+    return _Modes(Structure.read(top)).data()
+
+
+class _Modes:
+    """The parts of a model that a structure with contacts is."""
+
+    def __init__(self, structure: Structure) -> None:
+        self.structure, self.top = structure, structure.top
+        self.coordinates, self.velocities = structure.coordinates, structure.velocities
+        self.contacts, self.mass = structure.contacts, structure.mass
+
+    def data(self) -> dict[str, Any]:
+        """Return the model in the schema of all models."""
+        kept = {key: value for key, value in self.top.data.items() if key not in KEYS}
+        stretches = [c.name for c in self.contacts if c.kind is ContactKind.JENKINS]
+        states = [*self.coordinates, *self.velocities, *stretches]
+        define = {**mapping_in(kept, "define")}
+        define |= {
+            f"f_{q}": force
+            for q, force in zip(self.coordinates, self.structure.forces, strict=True)
+        }
+        observables, surfaces = self._surfaces()
+        found = {
+            **kept,
+            "states": states,
+            "define": define,
+            "observables": {**mapping_in(kept, "observables"), **observables},
+            "surfaces": surfaces,
+            "modes": self._modes(),
+            "departures": [d for c in self.contacts for d in self._departures(c)],
+            "spread": {**dict.fromkeys(states, "1"), **mapping_in(kept, "spread")},
+        }
+        resets = self._resets()
+        found |= {"resets": resets} if resets else {}
+        if "symmetry" not in kept and self._is_symmetric():
+            images = [f"{name} -> -{name}" for name in states]
+            found["symmetry"] = ", ".join(
+                [*images, *(["t -> t + T/2"] if "period" in kept else [])]
+            )
+        return found
+
+    def _is_symmetric(self) -> bool:
+        """Tell whether the motion of the opposite states half a period later is one, too, at the defaults."""
+        params = defaults_of(self.top)
+        if any(c.kind in (ContactKind.SPRING, ContactKind.IMPACT) for c in self.contacts):
+            return False
+        names = (*self.coordinates, *self.velocities)
+        define = {k: parse(str(v)) for k, v in mapping_in(self.top.data, "define").items()}
+        scope = Scope(AFFINE, symbols(names, tuple(params)), define)
+        period = self.top.data.get("period")
+        try:
+            forms = [
+                *(scope.evaluate(parse(f)) for f in self.structure.forces),
+                *(c.form for c in self.contacts),
+            ]
+            turn = number_of(str(period), params) / math.tau if period else math.nan
+            waves = [key[1] for form in forms for key in form.parts if key[0] != "y"]
+            orders = [number_of(text_of(w), params) * turn if w else 0.0 for w in waves]
+        except (NotAffineError, ModelError):
+            return False
+        return all(abs(math.remainder(order - 1.0, 2.0)) < _ODD for order in orders)
+
+    def _surfaces(self) -> tuple[dict[str, str], dict[str, Any]]:
+        observables: dict[str, str] = {}
+        surfaces: dict[str, Any] = {}
+
+        def add(name: str, observable: str, text: str, level: str) -> None:
+            if text in (*self.coordinates, *self.velocities) or text == observable:
+                observable = text  # a state needs no second name
+            else:
+                observables[observable] = text
+            surfaces[name] = {"observable": observable, "level": level}
+
+        for c in self.contacts:
+            if c.kind is ContactKind.FRICTION:
+                add(c.name, f"{c.name}_velocity", c.texts["velocity"], "0")
+                self._limits(c, add)
+            elif c.kind is ContactKind.JENKINS:
+                level = f"({c.texts['limit']})/({c.texts['stiffness']})"
+                add(c.name, f"{c.name}_velocity", self._speed(c), "0")
+                add(f"{c.name}+", c.name, c.name, level)
+                add(f"{c.name}-", c.name, c.name, f"-{level}")
+            else:
+                add(c.name, f"{c.name}_gap", c.texts["gap"], "0")
+        return observables, surfaces
+
+    def _limits(self, c: Contact, add: Any) -> None:
+        static = c.texts.get("static", c.texts["kinetic"])
+        fixed = names_in(parse(static)) <= {*defaults_of(self.top), "pi"}
+        for closed in _subsets(self.structure.springs[c.name]):
+            name, load = (
+                "_".join([f"{c.name}_load", *(s.name for s in closed)]),
+                self.structure.load(c, closed),
+            )
+            for sign, other in ("+", "-"), ("-", "+"):
+                surface = _limit(c, closed, sign)
+                if fixed:
+                    add(surface, name, load, f"{sign}({static})")
+                else:  # a limit that moves
+                    side = "high" if sign == "+" else "low"
+                    add(surface, f"{name}_{side}", f"{load} {other} ({static})", "0")
+
+    def _speed(self, c: Contact) -> str:
+        """Return the velocity along a direction of coordinates."""
+        return summed([times(repr(w), self.velocities[i]) for i, w in c.direction.items()])
+
+    def _modes(self) -> dict[str, Any]:
+        found = {}
+        acting = [c for c in self.contacts if c.states]
+        for letters in itertools.product(*(c.states for c in acting)):
+            states = {c.name: letter for c, letter in zip(acting, letters, strict=True)}
+            name = "".join(letters) or "free"
+            found[name] = {"in": self._sides(states), "field": self._field(states)}
+        return found
+
+    def _sides(self, states: Mapping[str, str]) -> dict[str, str]:
+        sides: dict[str, str] = {}
+        for c in self.contacts:
+            state = states.get(c.name, "")
+            if c.kind is ContactKind.IMPACT:
+                sides[c.name] = "+"
+            elif c.kind is ContactKind.SPRING:
+                sides[c.name] = "+" if state == "o" else "-"
+            elif c.kind is ContactKind.JENKINS:
+                limits = {"s": {"+": "-", "-": "+"}, "p": {"+": "0"}, "n": {"-": "0"}}[state]
+                sides |= {f"{c.name}{sign}": side for sign, side in limits.items()}
+                if state != "s":
+                    sides[c.name] = "+" if state == "p" else "-"
+            elif state == "s":
+                closed = self.structure.closed(c, states)
+                sides |= {c.name: "0", _limit(c, closed, "+"): "-", _limit(c, closed, "-"): "+"}
+            else:
+                sides[c.name] = "+" if state == "p" else "-"
+        return sides
+
+    def _field(self, states: Mapping[str, str]) -> dict[str, str]:
+        pulls: dict[int, list[str]] = {i: [f"f_{q}"] for i, q in enumerate(self.coordinates)}
+        for c in self.contacts:
+            stuck = c.kind is ContactKind.FRICTION and states[c.name] == "s"
+            pull = (
+                f"-({self.structure.load(c, self.structure.closed(c, states))})"
+                if stuck
+                else c.pull(states.get(c.name, ""))
+            )
+            for i, w in c.direction.items():
+                pulls[i].append(times(repr(w), pull))
+        moved = self.mass.of({i: summed(parts) for i, parts in pulls.items()})
+        field = dict(zip(self.coordinates, self.velocities, strict=True))
+        field |= {v: moved.get(i, "0") for i, v in enumerate(self.velocities)}
+        for c in self.contacts:
+            state = states.get(c.name, "")
+            if c.kind is ContactKind.FRICTION and state == "s":
+                self._hold(c, field)
+            elif c.kind is ContactKind.JENKINS:
+                field[c.name] = self._speed(c) if state == "s" else "0"
+        return field
+
+    def _hold(self, c: Contact, field: dict[str, str]) -> None:
+        """Write the rate of one velocity by those of the others, so that the constraint holds exactly."""
+        pivot = max(c.direction, key=lambda i: abs(c.direction[i]))
+        others = [o for o in self.contacts if o is not c and pivot in o.direction]
+        if any(o.kind is ContactKind.FRICTION for o in others):
+            return  # two constraints share the coordinate
+        by = c.direction[pivot]
+        parts = [
+            times(repr(-w / by), field[self.velocities[i]])
+            for i, w in c.direction.items()
+            if i != pivot
+        ]
+        field[self.velocities[pivot]] = summed([*parts, times(repr(1.0 / by), drift(c))])
+
+    def _departures(self, c: Contact) -> list[dict[str, Any]]:
+        """Return where motion on the surfaces of a contact leaves to."""
+        if c.kind is ContactKind.JENKINS:  # when the velocity changes its sign the slider sticks
+            return [
+                {
+                    "where": {f"{c.name}{sign}": "0", c.name: other},
+                    "leaves": {f"{c.name}{sign}": other},
+                }
+                for sign, other in (("+", "-"), ("-", "+"))
+            ]
+        if c.kind is not ContactKind.FRICTION:
+            return []
+        found = []
+        for closed in _subsets(self.structure.springs[c.name]):
+            gaps = {s.name: "-" if s in closed else "+" for s in self.structure.springs[c.name]}
+            for sign in "+-":  # friction that has reached its limit slides
+                where = {c.name: "0", _limit(c, closed, sign): sign, **gaps}
+                found.append({"where": where, "leaves": {c.name: sign}})
+        return found
+
+    def _resets(self) -> dict[str, dict[str, str]]:
+        found = {}
+        for c in self.contacts:
+            if c.kind is ContactKind.IMPACT:
+                over = self.structure.mobility(c, c)
+                kick = f"-(1 + ({c.texts['restitution']}))*({self._approach(c)})/({over})"
+                moved = self.mass.of({i: repr(w) for i, w in c.direction.items()})
+                found[c.name] = {
+                    self.velocities[i]: f"{self.velocities[i]} + {times(w, kick)}"
+                    for i, w in moved.items()
+                }
+        return found
+
+    def _approach(self, c: Contact) -> str:
+        """Return the rate of a gap: the wall may move."""
+        given = drift(c)  # minus the rate of what is given: a gap is W . q + g(t)
+        return self._speed(c) if is_zero(given) else f"{self._speed(c)} - ({given})"
+
+
+def _subsets(springs: tuple[Contact, ...]) -> list[tuple[Contact, ...]]:
+    return [s for k in range(len(springs) + 1) for s in itertools.combinations(springs, k)]
+
+
+def _limit(contact: Contact, closed: tuple[Contact, ...], sign: str) -> str:
+    """Return the name of a surface: a load's limit, with the springs that are closed."""
+    return "".join([contact.name, sign, *(s.name for s in closed)])
