@@ -194,7 +194,7 @@ def _gradient(orbit: Orbit, active: int, condition: _Condition, value: float) ->
         on_joints, row[-1] = condition.gradient
         close = np.eye(m)
         close[0, 0] = 0.0 if orbit.model.autonomous else 1.0
-        close[1:, 1:] = orbit.system.layout.closure
+        close[1:, 1:] = orbit.system.layout.closing
         row[:-1] = on_joints[:-1].ravel()
         row[:m] += on_joints[-1] @ close
         row[-1] += on_joints[-1] @ closing(orbit, active)

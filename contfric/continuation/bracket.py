@@ -170,7 +170,7 @@ def watched_value(way, sought, points, row):  # type: ignore[no-untyped-def]
         return points.directions[row, 0]
     way.counts[MULTIPLIERS] += 1
     one, minus = multipliers(
-        layout.rank, workspace.pencil, workspace.equations.close, mu, workspace.spectral
+        layout, workspace.pencil, workspace.equations.close, mu, workspace.spectral
     )
     if column == CHI_ONE:
         return one

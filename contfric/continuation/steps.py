@@ -131,7 +131,7 @@ def observe_branch(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped
     if way.stability:
         way.counts[MULTIPLIERS] += 1
         tests[at + CHI_ONE], tests[at + CHI_MINUS] = multipliers(
-            layout.rank, workspace.pencil, workspace.equations.close, mu, workspace.spectral
+            layout, workspace.pencil, workspace.equations.close, mu, workspace.spectral
         )
         if layout.rank > 1:
             tests[at + CHI_PAIR] = 1.0 - abs(mu[0]) * abs(mu[1])

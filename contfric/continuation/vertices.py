@@ -191,7 +191,7 @@ def opening(orbit: Orbit) -> float:
     p, q = pencil_of_turn(orbit.system, orbit.joints, orbit.vector)
     close = np.eye(len(p))
     close[0, 0] = 0.0 if orbit.model.autonomous else 1.0  # a turn may take another time
-    close[1:, 1:] = orbit.system.layout.closure
+    close[1:, 1:] = orbit.system.layout.closing
     left = p - q @ close
     if not np.all(np.isfinite(left)):  # an orbit that Newton has lost
         return np.nan

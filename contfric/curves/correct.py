@@ -200,7 +200,7 @@ def observe_curve(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped-
     way.counts[MULTIPLIERS] += 1
     equations = workspace.equations
     at = tests.shape[0] - EXTRA
-    one, minus = multipliers(layout.rank, workspace.pencil, equations.close, mu, workspace.spectral)
+    one, minus = multipliers(layout, workspace.pencil, equations.close, mu, workspace.spectral)
     tests[at + BEND] = bend_value(functions, second, layout, condition, z, p, which, workspace)
     finite = watch(functions, layout, z, p, equations, workspace.stationary, tests, labels)
     for k in range(condition.pinned.shape[0]):

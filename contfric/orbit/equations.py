@@ -70,6 +70,8 @@ LayoutType = types.NamedTuple(
         indices,
         table,
         matrix,
+        matrix,
+        matrix,
         f8,
         i8,
         f8,
@@ -151,7 +153,7 @@ def close_chain(functions, layout, z, p, which, workspace):  # type: ignore[no-u
         value = 0.0
         for j in range(n):
             value += layout.closure[i, j] * z[0, 1 + j]
-            close[1 + i, 1 + j] = layout.closure[i, j]
+            close[1 + i, 1 + j] = layout.closing[i, j]
         last[1 + i] = value
 
 

@@ -4,6 +4,8 @@ They are the eigenvalues of the linear map M of one turn on ``z_0 = (t_0, y_0)``
 0 for the direction off the section, and one more for each direction that a stick takes away; those
 are exactly zero. One or two others are the roots of a quadratic in closed form, more of them LAPACK's.
 
+What a word conserves is taken away in the same way (:mod:`contfric.orbit.conserved`).
+
 Of an autonomous model a shift in time is mapped to itself: M is block triangular with a 1 for dt_0, the
 trivial multiplier, and the map of the states in the section. Its first column is made zero, which takes
 the trivial multiplier away exactly, and leaves one direction less.
@@ -160,7 +162,20 @@ def spectral_workspace(m):  # type: ignore[no-untyped-def]
 
 
 @helper
-def multipliers(rank, pencil, close, out, workspace):  # type: ignore[no-untyped-def]
+def take_away(turn, directions):  # type: ignore[no-untyped-def]
+    """Make the eigenvalues zero whose left eigenvectors are given: ``turn (1 - w w')``."""
+    n = turn.shape[0] - 1
+    for d in range(directions.shape[0]):
+        for i in range(n + 1):
+            along = 0.0
+            for j in range(n):
+                along += turn[i, 1 + j] * directions[d, j]
+            for j in range(n):
+                turn[i, 1 + j] -= along * directions[d, j]
+
+
+@helper
+def multipliers(layout, pencil, close, out, workspace):  # type: ignore[no-untyped-def]
     """Write the multipliers of one turn from its pencil; return (chi(1), chi(-1))."""
     n = out.shape[0]
     timeless = close[0, 0] == 0.0  # autonomous: the closure forgets the time, the turn does not
@@ -174,9 +189,9 @@ def multipliers(rank, pencil, close, out, workspace):  # type: ignore[no-untyped
         for k in range(n):
             out[k] = np.inf
         return np.nan, np.nan
-    return spectrum(
-        workspace.turn, min(rank, n), out, workspace.real, workspace.left, workspace.product
-    )
+    take_away(workspace.turn, layout.conserved)
+    rank = max(0, min(layout.rank, n))
+    return spectrum(workspace.turn, rank, out, workspace.real, workspace.left, workspace.product)
 
 
 @kernel(types.UniTuple(f8, 2)(LayoutType, blocks, types.complex128[::1], indices))
@@ -188,6 +203,6 @@ def stability(layout, pencil, mu, counts):  # type: ignore[no-untyped-def]
     for i in range(m):
         for j in range(m):
             inner = i > 0 and j > 0
-            close[i, j] = layout.closure[i - 1, j - 1] if inner else 0.0
+            close[i, j] = layout.closing[i - 1, j - 1] if inner else 0.0
     close[0, 0] = 0.0 if layout.turn == 0.0 else 1.0
-    return multipliers(layout.rank, pencil, close, mu, spectral_workspace(m))
+    return multipliers(layout, pencil, close, mu, spectral_workspace(m))

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.begins import beginnings, entry_rows, first_entry
+from contfric.orbit.conserved import conserved, kept_by
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN, Hold, holds_of
 from contfric.orbit.margins import Margin, Test, double_zeros, lasting_segments
 from contfric.orbit.structure import (
@@ -82,6 +83,8 @@ class Layout(NamedTuple):
     held : all holds, which could be left at any time, shape (k,)
     doubles : rows (margin, segment): the margin has a double zero where the segment has no length
     closure : state matrix of the closure, shape (n, n)
+    closing : the same for corrections, which leave alone what the word conserves, shape (n, n)
+    conserved : directions of the linear functions of the state that the word conserves, shape (k, n)
     turn : duration of one turn in periods of the excitation; 0 of an autonomous model
     rank : number of independent directions that survive one turn
     rounding : relative rounding of the flow
@@ -102,6 +105,8 @@ class Layout(NamedTuple):
     held: IntArray
     doubles: IntArray
     closure: FloatArray
+    closing: FloatArray
+    conserved: FloatArray
     turn: float
     rank: int
     rounding: float
@@ -167,7 +172,9 @@ def build_system(
     exits = [_exit_surface(i, exit_, holds) for i, (_, exit_) in enumerate(word)]
     held = {hold.segment: hold for hold in holds}
     symmetry = model.symmetry
-    n = len(model.states)
+    closure = symmetry.array() if half and symmetry else np.eye(len(model.states))
+    still = conserved(model, word)
+    datum = kept_by(closure, still)
     layout = Layout(
         modes=np.array([model.mode_index[mode] for mode, _ in word], dtype=np.int64),
         exits=np.array([model.surface_index[exit_] for exit_ in exits], dtype=np.int64),
@@ -186,10 +193,14 @@ def build_system(
             [(tests.index(t), i) for t, i in double_zeros(model, word, half, holds) if t in tests],
             2,
         ),
-        closure=symmetry.array() if half and symmetry else np.eye(n),
+        closure=closure,
+        closing=closure + datum.T @ datum,
+        conserved=still,
         turn=_turn(model, periods, half),
         # a shift in time is no disturbance of an autonomous orbit
-        rank=min(model.mode_by_name[mode].rank for mode, _ in word) - int(model.autonomous),
+        rank=min(model.mode_by_name[mode].rank for mode, _ in word)
+        - int(model.autonomous)
+        - len(still),
         rounding=model.rounding,
     )
     return System(model, word, periods, half, layout, tests, domains, holds)

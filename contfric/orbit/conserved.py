@@ -1,0 +1,126 @@
+"""What never changes along an orbit: where a contact rests that never slips, the offset of a stuck slider.
+
+A linear function ``w . y`` whose rate vanishes in all modes of a word keeps its value: the orbits form a
+continuum, with a multiplier 1 (-1 of a half turn, if the symmetry turns it over) for each such w, which is a
+left eigenvector of the linear map of a turn. The value is a given datum: Newton's method does not move it,
+and the trivial multiplier is taken away exactly (:mod:`contfric.orbit.spectrum`). In the matrix of the
+closure K that a correction is solved with, ``K + w w'`` stands for K wherever ``w . K = w``: the closure's
+residual along w is zero, so that the correction is zero along w too, and the matrix is regular.
+
+A velocity that is 0 as long as a contact sticks is no datum: the surface that all modes lie on gives it.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from contfric.models.definition import FloatArray, Model
+from contfric.models.evaluate import Sampler, defaults, floats
+
+Word = tuple[tuple[str, str], ...]
+#: A rate this small, relative to the largest one, is zero: rounding of formulas of moderate size.
+_ZERO = 1e-9
+#: States at which rates are asked for, beyond the number of states: one more says that none is an accident.
+_MORE = 3
+#: A second set of parameters: what vanishes at the defaults alone is no datum.
+_MOVED = 1.07
+
+
+def conserved(model: Model, word: Word) -> FloatArray:
+    """Return the directions w of the linear functions that a word conserves.
+
+    Orthonormal rows, shape (k, n).
+    """
+    n = len(model.states)
+    if not model.definition:  # of functions of its own: such a model says nothing of its fields
+        return np.empty((0, n))
+    changes, places = np.empty((n, 0)), np.empty((n, 0))
+    for mode in dict.fromkeys(mode for mode, _ in word):
+        rates, apart = _along(model, mode)
+        changes, places = np.hstack([changes, rates]), np.hstack([places, apart])
+        if _rank(changes) == n:
+            return np.empty((0, n))
+    for surface in dict.fromkeys(exit_ for _, exit_ in word if exit_ in model.reset_by_surface):
+        changes = np.hstack([changes, _jumps(model, surface)])
+    left, sizes, _ = np.linalg.svd(changes)
+    rank = int(np.sum(sizes > _ZERO))
+    still = left[:, rank:].T
+    own, sizes, _ = np.linalg.svd(still @ places)  # not what is the same at all places
+    return np.ascontiguousarray(own[:, : int(np.sum(sizes > _ZERO))].T @ still)
+
+
+def kept_by(closure: FloatArray, directions: FloatArray) -> FloatArray:
+    """Return those of some directions, orthonormal rows, that a closure maps to themselves."""
+    if not len(directions):
+        return directions
+    own = directions @ closure @ directions.T - np.eye(len(directions))
+    left, sizes, _ = np.linalg.svd(own)
+    return np.ascontiguousarray(left[:, sizes <= _ZERO].T @ directions)
+
+
+def _rank(changes: FloatArray) -> int:
+    sizes = np.linalg.svd(changes, compute_uv=False)
+    return int(np.sum(sizes > _ZERO))
+
+
+@cache
+def _samplers(model: Model) -> tuple[Sampler, Sampler]:
+    from contfric.models.describe import from_text
+
+    description = from_text(model.definition)
+    params = defaults(description)
+    moved = {name: value * _MOVED for name, value in params.items()}
+    evaluator = floats(description)
+    return Sampler(evaluator, params), Sampler(evaluator, moved)
+
+
+@cache
+def _along(model: Model, mode: str) -> tuple[FloatArray, FloatArray]:
+    """Return rates along a mode at some states that it has, and how far these are from the first.
+
+    Columns of size 1, shapes (n, states).
+    """
+    rates, states = [], []
+    description = _samplers(model)[0].evaluator.description
+    parts = [
+        name for name in model.mode_by_name if model.whole_mode(name) == model.whole_mode(mode)
+    ]
+    text = next(m for m in description.modes if m.name in parts)
+    held = [surface for surface, side in text.sides.items() if side == 0]
+    for sampler in _samplers(model):
+        for t, y in sampler.states(len(model.states) + _MORE):
+            place: tuple[float, list[float]] | None = (t, y)
+            for surface in (*held, *held):  # twice: one may move a state off the other
+                place = place and sampler.landed(surface, *place)
+            if place is not None:
+                states.append(place[1])
+                rates.append(sampler.evaluator.field(text.name, sampler.params, *place))
+    first = states[0] if states else []
+    apart = [[b - a for a, b in zip(first, state, strict=True)] for state in states[1:]]
+    return _columns(rates, len(model.states)), _columns(apart, len(model.states))
+
+
+@cache
+def _jumps(model: Model, surface: str) -> FloatArray:
+    """Return by how much a reset changes some states."""
+    found = []
+    texts = _samplers(model)[0].evaluator.description.resets[surface]
+    for sampler in _samplers(model):
+        for t, y in sampler.states(len(model.states) + _MORE):
+            place = sampler.landed(surface, t, y)
+            if place is not None:
+                at, state = place
+                value = sampler.evaluator.value
+                after = [value(texts.get(s, s), sampler.params, at, state) for s in model.states]
+                found.append([b - a for a, b in zip(state, after, strict=True)])
+    return _columns(found, len(model.states))
+
+
+def _columns(rows: list[list[float]], n: int) -> FloatArray:
+    """Return rows as columns, each of size 1: a stiff mode must not drown a slow one."""
+    columns = np.array([row for row in rows if np.all(np.isfinite(row))]).reshape(-1, n).T
+    sizes: FloatArray = np.linalg.norm(columns, axis=0)
+    found: FloatArray = columns[:, sizes > 0.0] / sizes[sizes > 0.0]
+    return found
