@@ -133,6 +133,22 @@ def predict(points, k, step):  # type: ignore[no-untyped-def]
 
 
 @helper
+def keep(directions, before, z):  # type: ignore[no-untyped-def]
+    """Give a predicted point the data of the point before it (:mod:`contfric.orbit.conserved`).
+
+    Corrections leave them alone; a cubic through points would carry their rounding farther and farther.
+    """
+    n = directions.shape[1]
+    for d in range(directions.shape[0]):
+        for i in range(z.shape[0]):
+            apart = 0.0
+            for j in range(n):
+                apart += directions[d, j] * (z[i, 1 + j] - before[i, 1 + j])
+            for j in range(n):
+                z[i, 1 + j] -= apart * directions[d, j]
+
+
+@helper
 def interpolate(points, x):  # type: ignore[no-untyped-def]
     """Write the point at a share x of the step from row 0 to row 1 to row 2, by the cubic through them."""
     zs, ws, tzs, tws, arc = points.joints, points.w, points.tangents, points.directions, points.arc

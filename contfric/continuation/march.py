@@ -28,6 +28,7 @@ from contfric.continuation.geometry import (
     copy_to,
     copy_vector,
     distance,
+    keep,
     largest_state,
     outside,
     predict,
@@ -120,6 +121,7 @@ def marching(correct_at: Any, observe_at: Any, accept: Any) -> Any:
                 if step < smallest:
                     return (STEP if finite else BROKEN), k, step
                 predict(points, k, step)
+                keep(way.layout.conserved, zs[k], zs[row])
                 copy_to(guess_z, zs[row])
                 copy_vector(guess_w, ws[row])
             fine, finite = correct_at(way, zs[row], ws[row], tzs[row], tws[row], accuracy)

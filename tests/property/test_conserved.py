@@ -1,0 +1,102 @@
+"""Contacts that never slip: where they rest is a datum, and no disturbance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.models.evaluate import floats
+from contfric.orbit.conserved import conserved, kept_by
+
+PARAMETERS = {"Omega": 0.9, "k": 1.0, "S1": 0.3, "S2": 1.5}
+FREE = {"c1": {"kind": "friction", "velocity": "v1", "kinetic": "S1"}}
+BOTH = FREE | {"c2": {"kind": "friction", "velocity": "v2", "kinetic": "S2"}}
+
+
+def two_masses() -> cf.Model:
+    return cf.Mechanism(
+        np.eye(2),
+        0.05 * np.eye(2),
+        [["2*k", "-k"], ["-k", "2*k"]],
+        contacts=BOTH,
+        force={"q1": "cos(Omega*t)"},
+        parameters=PARAMETERS,
+        period="2*pi/Omega",
+        name="two masses",
+    )
+
+
+def one_mass(rest: float) -> cf.Model:
+    """The first mass, the second one fixed where it rests."""
+    return cf.Mechanism(
+        [[1.0]],
+        [[0.05]],
+        [["2*k"]],
+        contacts=FREE,
+        force={"q1": f"cos(Omega*t) + k*({rest!r})"},
+        parameters={name: PARAMETERS[name] for name in ("Omega", "k", "S1")},
+        period="2*pi/Omega",
+        name="one mass",
+    )
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.2, -0.35])
+def test_an_orbit_with_a_contact_at_rest_is_that_of_the_others(rest: float) -> None:
+    model = two_masses()
+    settled = cf.simulate(model, {}, state=[0.0, rest, 0.0, 0.0], periods=40, domain=None)
+    assert abs(settled.last[2][1] - rest) < 1e-12
+    orbit = cf.find_orbit(model, {}, state=[0.0, rest, 0.0, 0.0])
+    alone = cf.find_orbit(one_mass(rest), {})
+    assert orbit.joints[:, 2] == pytest.approx(rest, abs=1e-10)
+    assert orbit.x_max == pytest.approx(alone.x_max, rel=1e-9)
+    mine = orbit.as_whole().multipliers
+    other = alone.as_whole().multipliers
+    assert np.sort_complex(mine[:2]) == pytest.approx(np.sort_complex(other), abs=1e-8)
+    assert np.all(mine[2:] == 0.0)
+    assert orbit.stable
+
+
+def test_a_branch_keeps_the_datum() -> None:
+    model = two_masses()
+    orbit = cf.find_orbit(model, {}, state=[0.0, 0.2, 0.0, 0.0])
+    branch = cf.continue_orbit(orbit, "Omega", (0.75, 1.1))
+    assert len(branch) > 20
+    for index in range(0, len(branch), 5):
+        assert branch[index].joints[:, 2] == pytest.approx(0.2, abs=1e-10)
+    kinds = {b.kind for b in branch.bifurcations}
+    assert not kinds & {cf.Kind.SN, cf.Kind.BP, cf.Kind.PD}
+
+
+def test_what_a_word_conserves() -> None:
+    model = two_masses()
+    word = (("ps", "c1"), ("ns", "c1"))
+    (direction,) = conserved(model, word)
+    assert np.abs(direction) == pytest.approx([0.0, 1.0, 0.0, 0.0], abs=1e-9)
+    assert conserved(model, (*word, ("np", "c2"))).shape == (0, 4)
+    assert conserved(cf.load_model("coulomb"), (("slide+", "v"),)).shape == (0, 2)
+    mirror = -np.eye(4)
+    assert kept_by(mirror, direction[None, :]).shape == (0, 4)
+    assert np.abs(kept_by(np.eye(4), direction[None, :])) == pytest.approx(
+        np.abs(direction[None, :])
+    )
+
+
+def test_a_slider_that_never_slips_has_an_offset() -> None:
+    """The stretch of a Jenkins element less the displacement."""
+    model = cf.load_model("jenkins")
+    (direction,) = conserved(model, (("stick+", "stop"), ("stick-", "stop")))
+    assert np.abs(direction) == pytest.approx(np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0), abs=1e-9)
+    assert direction[0] == pytest.approx(-direction[2])
+    assert conserved(model, (("stick+", "z+"), ("slip+", "stop"))).shape == (0, 3)
+
+
+def test_the_fields_of_contacts_at_rest_conserve_it_exactly() -> None:
+    from contfric.models.describe import from_text
+
+    model = two_masses()
+    field = floats(from_text(model.definition)).field(
+        "ps", model.defaults, 0.3, [0.5, 0.2, 0.7, 0.0]
+    )
+    assert field[1] == 0.0
+    assert field[3] == 0.0
