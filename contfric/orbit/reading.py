@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from contfric.models.definition import Domain
 from contfric.orbit.starts import signs_at
 from contfric.orbit.structure import mode_domains
 from contfric.orbit.words import decode, end_domain, passed_domains
 from contfric.signature import Signature
-from contfric.signature.holds import TOUCH, domain_after, is_hold
+from contfric.signature.holds import TOUCH, domains_after, is_hold
 from contfric.signature.impacts import impact_at, mirror_name
 
 if TYPE_CHECKING:
@@ -80,12 +82,13 @@ def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
     """Domain in which a segment of the whole orbit begins."""
     model, word = orbit.model, orbit.word
     mode, entry = word[i - 1]  # of the whole word: its last exit leads into the first
-    if is_hold(entry):
-        return str(domain_after(model, mode, word[i][0]))
-    if entry not in model.reset_by_surface:
+    if entry not in model.reset_by_surface and not is_hold(entry):
         return model.transitions[ends[i - 1], entry]
     begin = orbit.begins[i]
     signs = signs_at(model, float(begin[0]), begin[1:].copy(), orbit.vector)
+    if is_hold(entry):
+        after = [model.domain_by_name[d] for d in domains_after(model, mode, word[i][0])]
+        return _nearest(after, signs)
     for surface in model.reset_by_surface[entry].lands:
         del signs[surface]  # the joint lies on it to rounding; the transition says the side
     own = [model.domain_by_name[d] for d in mode_domains(model, word[i][0])]
@@ -93,7 +96,12 @@ def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
         (ends[i - 1], entry), ()
     )  # a surface met at the impact is on either side
     own = [d for d in own if d.name in led] or own
-    return min(own, key=lambda d: sum(d.signs[s] * sign < 0 for s, sign in signs.items())).name
+    return _nearest(own, signs)
+
+
+def _nearest(domains: Sequence[Domain], signs: Mapping[str, int]) -> str:
+    """Return the domain that fits the sides of a state best; on a surface to rounding none fits for sure."""
+    return min(domains, key=lambda d: sum(d.signs[s] * sign < 0 for s, sign in signs.items())).name
 
 
 def _end_domains(orbit: Orbit) -> list[str]:

@@ -77,7 +77,11 @@ class Row:
 
     def name(self, displacement: str) -> str:
         """Return the name on the axis, by that of the displacement."""
-        return self.label.replace("%s", parameter_label(displacement).strip("$"))
+        symbol = parameter_label(displacement).strip("$")
+        name, index, below = symbol.partition("_{")
+        if index and "%s_{" in self.label:  # one index for both: q_{1,max}
+            return self.label.replace("%s_{", f"{name}_{{{below.rstrip('}')},")
+        return self.label.replace("%s", symbol)
 
 
 #: What a row of a diagram can show.

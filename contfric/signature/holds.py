@@ -147,14 +147,21 @@ def surface_into(model: Model, segments: Sequence[str], index: int) -> str | Non
     return None
 
 
-def domain_after(model: Model, mode: str, departs: str) -> str | None:
-    """Return the domain that a hold is left into: beside its rest, in the departing mode."""
-    rest = next(domain for domain in model.domains if domain.mode == mode)
-    for domain in model.domains:
-        beside = all(domain.signs[name] == sign for name, sign in rest.signs.items() if sign)
-        if domain.mode == departs and beside:
-            return domain.name
-    return None
+def domains_after(model: Model, mode: str, departs: str) -> tuple[str, ...]:
+    """Return the domains that a hold is left into: next to a rest, in the departing mode.
+
+    Where other contacts have regions of their own there are several.
+    """
+    rests = [domain for domain in model.domains if domain.mode == mode]
+    return tuple(
+        domain.name
+        for domain in model.domains
+        if domain.mode == departs
+        and any(
+            all(domain.signs[name] == sign for name, sign in rest.signs.items() if sign)
+            for rest in rests
+        )
+    )
 
 
 def hold_fault(model: Model, segments: Sequence[str], index: int) -> str | None:
@@ -182,10 +189,13 @@ def hold_fault(model: Model, segments: Sequence[str], index: int) -> str | None:
     mode = mode_of(model, segments, index)
     source = model.domain_by_name[before].mode
     try:
-        expected = domain_after(model, mode, departing_mode(model, (source, surface), (mode, hold)))
+        departs = departing_mode(model, (source, surface), (mode, hold))
     except NotationError as error:
         return str(error)
-    return None if after == expected else f"'{hold}' leads to {expected}, not to {after}"
+    expected = domains_after(model, mode, departs)
+    if after in expected:
+        return None
+    return f"'{hold}' leads to {' or '.join(expected) or 'no domain'}, not to {after}"
 
 
 def without_holds(word: tuple[Pair, ...], model: Model) -> tuple[Pair, ...]:
