@@ -124,15 +124,15 @@ class _Modes:
 
         for c in self.contacts:
             if c.kind is ContactKind.FRICTION:
-                add(c.name, f"{c.name}_velocity", c.texts["velocity"], "0")
+                add(c.name, f"w_{c.name}", c.texts["velocity"], "0")
                 self._limits(c, add)
             elif c.kind is ContactKind.JENKINS:
                 level = f"({c.texts['limit']})/({c.texts['stiffness']})"
-                add(c.name, f"{c.name}_velocity", self._speed(c), "0")
+                add(c.name, f"w_{c.name}", self._speed(c), "0")
                 add(f"{c.name}+", c.name, c.name, level)
                 add(f"{c.name}-", c.name, c.name, f"-{level}")
             else:
-                add(c.name, f"{c.name}_gap", c.texts["gap"], "0")
+                add(c.name, f"g_{c.name}", c.texts["gap"], "0")
         return observables, surfaces
 
     def _limits(self, c: Contact, add: Any) -> None:
@@ -140,7 +140,7 @@ class _Modes:
         fixed = names_in(parse(static)) <= {*defaults_of(self.top), "pi"}
         for closed in _subsets(self.structure.springs[c.name]):
             name, load = (
-                "_".join([f"{c.name}_load", *(s.name for s in closed)]),
+                "_".join([f"u_{c.name}", *(s.name for s in closed)]),
                 self.structure.load(c, closed),
             )
             for sign, other in ("+", "-"), ("-", "+"):

@@ -157,6 +157,11 @@ def _columns(labels: Sequence[str], width: float) -> int:
     return math.ceil(len(labels) / rows)
 
 
+def panels_height(orbit: Orbit) -> float:
+    """Return the height of a figure of an orbit (inches): each observable in time has a panel."""
+    return max(6.2, 1.0 + 1.1 * len(orbit.model.observables))
+
+
 def plot_orbit_panels(orbit: Orbit, fig: Figure | None = None) -> list[Axes]:
     """Draw an orbit in the phase plane, beside the load plane and its observables in time.
 
@@ -179,12 +184,17 @@ def plot_orbit_panels(orbit: Orbit, fig: Figure | None = None) -> list[Axes]:
     >>> len(plot_orbit_panels(orbit))
     4
     """
-    fig = figure_or_new(fig, 9.0, 6.2)
     names = [o.name for o in orbit.model.observables]
+    fig = figure_or_new(fig, 9.0, panels_height(orbit))
     planes = 2 if len(names) > 1 else 1
-    grid = fig.add_gridspec(planes * len(names), 2)
-    left = [fig.add_subplot(grid[k * len(names) : (k + 1) * len(names), 0]) for k in range(planes)]
-    right = [fig.add_subplot(grid[k * planes : (k + 1) * planes, 1]) for k in range(len(names))]
+    grid = fig.add_gridspec(1, 2)
+    left, right = (
+        [fig.add_subplot(column[k, 0]) for k in range(count)]
+        for count, column in (
+            (count, grid[0, side].subgridspec(count, 1))
+            for side, count in enumerate((planes, len(names)))
+        )
+    )
     shown = [None, (names[0], names[1])] if planes == 2 else [None]
     named = [_draw_plane(ax, orbit, plane) for ax, plane in zip(left, shown, strict=True)]
     plot_orbit_in_time(orbit, right)

@@ -29,6 +29,7 @@ from contfric.plot.style import (
     SMALL,
     TEXT,
     domain_colours,
+    domain_labels,
     parameter_label,
     surface_label,
 )
@@ -230,16 +231,11 @@ def name_axes(ax: Axes, across: str, up: str) -> None:
 def legend_handles(orbit: Orbit, pieces: Sequence[Piece]) -> list[Line2D | Patch]:
     """Return the entries of the legend: domains in the order of the orbit, stops, bands."""
     model, colours = orbit.model, domain_colours(orbit.model)
-    visited = list(dict.fromkeys(p.domain for p in pieces))
+    visited, labels = list(dict.fromkeys(p.domain for p in pieces)), domain_labels(model)
+    shown = {labels[name]: colours[name] for name in visited}
     handles: list[Line2D | Patch] = [
-        Line2D(
-            [],
-            [],
-            color=colours[name],
-            linewidth=_WIDTH,
-            label=model.domain_by_name[name].label or name,
-        )
-        for name in visited
+        Line2D([], [], color=colour, linewidth=_WIDTH, label=label)
+        for label, colour in shown.items()
     ]
     holds = {p.domain for p in pieces if _is_hold(model, p)}
     handles += [

@@ -124,10 +124,13 @@ def parameter_label(name: str) -> str:
     >>> parameter_label("S0"), parameter_label("Omega")
     ('$S_{0}$', '$\\Omega$')
     """
-    found = re.fullmatch(r"([A-Za-z]+?)_?(\d*)", name)
+    found = re.fullmatch(r"([A-Za-z]+?)_?(\d*)|([A-Za-z])_([A-Za-z]\w*)", name)
     if found is None:
         return name
-    word, index = found.groups()
+    word, index, letter, words = found.groups()
+    if letter:  # the load u_brake
+        below = words.replace("_", r"\,")
+        return rf"${letter}_{{\mathrm{{{below}}}}}$"
     body = f"\\{word}" if word in _GREEK else word if len(word) == 1 else rf"\mathrm{{{word}}}"
     return f"${body}_{{{index}}}$" if index else f"${body}$"
 
@@ -233,6 +236,10 @@ def branch_colours(names: Iterable[str]) -> dict[str, str]:
     return {name: _TYPICAL.get(name) or cycle[name] for name in distinct}
 
 
+#: Domains that a legend can tell apart.
+_MANY = 24
+
+
 def domain_colours(model: Model) -> dict[str, str]:
     """Return a colour for each domain: dark and light of one hue for mirror images.
 
@@ -244,19 +251,27 @@ def domain_colours(model: Model) -> dict[str, str]:
     >>> domain_colours(load_model("coulomb"))["stick"]
     '#000000'
     """
+    labels = domain_labels(model)
+    images = {labels[name]: labels[image] for name, image in model.mirror_domain.items()}
     found: dict[str, str] = {}
     hues = iter(range(len(model.domains)))
-    for domain in model.domains:
-        image = model.mirror_domain.get(domain.name)
-        if domain.name in found:
+    for label in dict.fromkeys(labels.values()):
+        image = images.get(label)
+        if label in found:
             continue
-        if image == domain.name:
-            found[domain.name] = BLACK
+        if image == label:
+            found[label] = BLACK
             continue
         k = next(hues)
         if image is None:
-            found[domain.name] = _nth(_SINGLES, k)
+            found[label] = _nth(_SINGLES, k)
             continue
         dark, light = zip(*_DOMAIN_PAIRS, strict=True)
-        found[domain.name], found[image] = _nth(dark, k), _nth(light, k)
-    return {domain.name: found[domain.name] for domain in model.domains}
+        found[label], found[image] = _nth(dark, k), _nth(light, k)
+    return {domain.name: found[labels[domain.name]] for domain in model.domains}
+
+
+def domain_labels(model: Model) -> dict[str, str]:
+    """Return what each domain is called in a legend: by its mode where a model has too many domains."""
+    many = len(model.domains) > _MANY
+    return {d.name: d.mode if many else d.label or d.name for d in model.domains}

@@ -55,7 +55,7 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
     from contfric.plot.diagram import plot_diagram
     from contfric.plot.graph import plot_transition_graph
     from contfric.plot.lyapunov import plot_lyapunov_map
-    from contfric.plot.orbit import plot_orbit_panels
+    from contfric.plot.orbit import panels_height, plot_orbit_panels
     from contfric.plot.plane import plot_plane
     from contfric.plot.save import new_figure, save_figure
     from contfric.plot.style import TEXT, full_title, title_label
@@ -95,6 +95,7 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
     else:
         assert orbit is not None
         if drawing.kind is FigureKind.ORBIT:
+            figure.set_size_inches(width, panels_height(orbit))
             plot_orbit_panels(orbit, fig=figure)
         else:
             axes = figure.add_subplot()
