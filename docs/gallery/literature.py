@@ -21,6 +21,7 @@ STUDIES = (
     *("buck", "relay", "relay-sliding", "thermostat", "rocking-block", "rimless-wheel"),
     *("bouncing-ball", "gear-pair", "pendulum", "normal-force", "jenkins"),
     "compass-gait",
+    *("blade-damper", "pounding", "two-blocks", "braced-chain"),
 )
 #: Studies of planes, each with the page that shows it.
 PLANES = {"popp-plane": "popp", "integrate-and-fire": "integrate-and-fire"}

@@ -37,6 +37,7 @@ WORDS = {
     "knob": {("turns", "phi+")},
     "dry": {("forward", "stop"), ("backward", "stop"), ("slide", "slide-"), ("slide", "slide+")},
     "element": {("stick+", "z+"), ("stick+", "z-"), ("slip+", "stop"), ("slip-", "stop")},
+    "frame": {("p", "brake"), ("n", "brake"), ("s", "brake+"), ("s", "brake-")},
 }
 
 
