@@ -187,13 +187,9 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         assert candidate.orbit is not None
         own = settings_for(candidate.orbit, state.settings)
         branch = leave_singular(state, candidate.orbit, event, own) or branch
-    if branch is not None and _never_held(branch):
-        why = "its hold has no length anywhere: the motion of another word, that only touches rest"
-        state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
-        return False
-    if branch is not None and _never_lasts(branch):
-        why = "a segment of it has no length anywhere: the motion of another word, that touches a surface"
-        state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
+    fault = None if branch is None else next((why for is_so, why in _FAULTS if is_so(branch)), None)
+    if fault is not None:
+        state.judge(event, candidate.reason, Verdict.REFUSED, why=fault)
         return False
     if branch is not None and _has_no_width(branch, event, state.settings):
         why = "it begins and ends at the event, without any width"
@@ -239,6 +235,31 @@ def _never_lasts(branch: Branch) -> bool:
     """
     asked = {round(share * (len(branch) - 1)) for share in _ASKED}
     return bool(np.any(_longest(branch, asked) < min(_NO_LENGTH, _NO_SHARE * branch.arc[-1])))
+
+
+def _repeats(branch: Branch) -> bool:
+    """Tell whether the orbits of a branch are shorter ones that are run through several times.
+
+    Where an orbit begins at a graze its rounding is the root of rounding, and does not tell; the branch does.
+    """
+    if branch.system.periods == 1:
+        return False
+    asked = {round(share * (len(branch) - 1)) for share in _ASKED}
+    return all(shortest(orbit) is not orbit for orbit in (branch[k] for k in asked))
+
+
+#: What a branch must not be, and why it is refused then.
+_FAULTS = (
+    (
+        _never_held,
+        "its hold has no length anywhere: the motion of another word, that only touches rest",
+    ),
+    (
+        _never_lasts,
+        "a segment of it has no length anywhere: the motion of another word, that touches a surface",
+    ),
+    (_repeats, "its orbits are shorter ones, run through several times"),
+)
 
 
 def _longest(branch: Branch, asked: Iterable[int]) -> FloatArray:

@@ -79,3 +79,15 @@ def test_a_blade_whose_damper_never_slips_is_linear() -> None:
     motion = cf.simulate(model, params, state=start, periods=3.0)
     assert motion.end is not None
     assert np.allclose(motion.last[2], start, atol=1e-11)
+
+
+def test_an_orbit_that_grazes_is_not_followed_twice() -> None:
+    """From the graze of an impact the orbit run through twice solves the equations, too: it is no branch."""
+    from contfric.orbit.repetition import shortest
+
+    diagram = cf.explore(cf.find_orbit("pounding"), "w", (0.7, 0.95))
+    assert len(diagram.branches) == 3
+    for branch in diagram.branches:
+        orbit = branch[len(branch) // 2]
+        assert shortest(orbit) is orbit
+    assert not [b for b in diagram.bifurcations if b.kind is cf.Kind.BP]
