@@ -1,0 +1,149 @@
+r"""A curve of zeros ``g(y, p) = 0`` of one region in one parameter, by pseudo-arclength.
+
+In scaled unknowns ``x = (y / s, p / w)`` (s the natural sizes, w the width of the range) the curve has at each
+regular point one unit tangent, the null vector of the n by n + 1 Jacobian J. A step goes along it and comes back
+in the plane normal to it by Newton's method on
+
+.. math:: \begin{pmatrix} J \\ t^T \end{pmatrix} \delta = -\begin{pmatrix} g \\ t^T (x - \hat x) \end{pmatrix}
+
+(E. L. Allgower, K. Georg, Introduction to Numerical Continuation Methods, SIAM 2003, chapters 2 and 8). The bordered
+matrix is regular at folds; at a simple branch point its determinant changes sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from contfric.equilibria.regions import Region
+from contfric.models.definition import FloatArray
+
+#: Newton's method in the normal plane: quadratic, from a predictor that is near.
+_STEPS, _SHORT, _CONVERGED = 12, 1e-14, 1e-10
+#: Share of a step by which an event is located: rounding of the arclength.
+_LOCATED = 1e-15
+
+
+class Place(NamedTuple):
+    """A point of a curve: the scaled unknowns and the unit tangent, shapes (n + 1,)."""
+
+    x: FloatArray
+    tangent: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Arc:
+    """The equations of a curve of zeros.
+
+    Parameters
+    ----------
+    vector : all parameters, of which one varies
+    active : its number
+    scale : natural size of each state, shape (n,)
+    width : that of the parameter
+    """
+
+    region: Region
+    vector: FloatArray
+    active: int
+    scale: FloatArray
+    width: float
+
+    def state(self, x: FloatArray) -> FloatArray:
+        """Return the state of a point."""
+        return np.asarray(x[:-1] * self.scale)
+
+    def parameter(self, x: FloatArray) -> float:
+        """Return the parameter of a point."""
+        return float(x[-1] * self.width)
+
+    def parameters(self, x: FloatArray) -> FloatArray:
+        """Return all parameters of a point."""
+        found = self.vector.copy()
+        found[self.active] = self.parameter(x)
+        return found
+
+    def unknowns(self, y: FloatArray, value: float) -> FloatArray:
+        """Return the scaled unknowns of a state and a parameter."""
+        return np.append(y / self.scale, value / self.width)
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        """Return the field at a point, relative to the sizes of the states."""
+        return self.region.fields.value(self.state(x), self.parameters(x)) / self.scale
+
+    def jacobian(self, x: FloatArray) -> FloatArray:
+        """Return its derivatives by the unknowns, shape (n, n + 1)."""
+        y, p, fields = self.state(x), self.parameters(x), self.region.fields
+        by_state = fields.jacobian(y, p) * self.scale
+        by_parameter = fields.slope(y, p, self.active) * self.width
+        return np.asarray(np.column_stack([by_state, by_parameter]) / self.scale[:, None])
+
+    def corrected(self, guess: FloatArray, normal: FloatArray) -> Place | None:
+        """Return the point in the plane through a guess that is normal to a direction; None if none is near."""
+        x, length = guess.copy(), np.inf
+        for _ in range(_STEPS):
+            matrix = np.vstack([self.jacobian(x), normal])
+            side = np.append(self.residual(x), normal @ (x - guess))
+            if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(side))):
+                return None
+            try:
+                step = np.linalg.solve(matrix, -side)
+            except np.linalg.LinAlgError:
+                return None
+            x, before, length = x + step, length, float(np.max(np.abs(step)))
+            size = 1.0 + float(np.max(np.abs(x)))
+            if length <= _SHORT * size or (length < _CONVERGED * size and length >= 0.5 * before):
+                break
+        else:
+            if length > _CONVERGED:
+                return None
+        tangent = self.tangent(x, normal)
+        return None if tangent is None else Place(x, tangent)
+
+    def tangent(self, x: FloatArray, along: FloatArray) -> FloatArray | None:
+        """Return the unit tangent at a point, on the side of a direction."""
+        matrix = np.vstack([self.jacobian(x), along])
+        right = np.zeros(len(x))
+        right[-1] = 1.0
+        try:
+            found = np.linalg.solve(matrix, right)
+        except np.linalg.LinAlgError:
+            return None
+        size = float(np.linalg.norm(found))
+        return found / size if np.isfinite(size) else None
+
+    def start(self, y: FloatArray, value: float, sign: float) -> Place | None:
+        """Return the point at a parameter, with the tangent along which it grows (sign 1) or falls."""
+        upwards = np.zeros(len(y) + 1)
+        upwards[-1] = sign
+        return self.corrected(self.unknowns(y, value), upwards)
+
+    def orientation(self, place: Place) -> float:
+        """Return the determinant of the bordered matrix, as a geometric mean; its sign changes at a branch point."""
+        sign, size = np.linalg.slogdet(np.vstack([self.jacobian(place.x), place.tangent]))
+        return float(sign * np.exp(size / len(place.x))) if np.isfinite(size) else 0.0
+
+    def located(
+        self, before: Place, after: Place, test: Callable[[Place], float]
+    ) -> Place | None:
+        """Return the point between two at which a test function vanishes; None if the curve is lost there."""
+        from scipy.optimize import brentq
+
+        chord = after.x - before.x
+        length = float(np.linalg.norm(chord))
+        normal = chord / length
+
+        def at(share: float) -> Place:
+            found = self.corrected(before.x + share * chord, normal)
+            if found is None:
+                raise ArithmeticError
+            return found
+
+        try:
+            share = brentq(lambda s: test(at(s)), 0.0, 1.0, xtol=_LOCATED, rtol=4.0 * _LOCATED)
+            return at(float(share))
+        except (ArithmeticError, ValueError):
+            return None
