@@ -1,13 +1,13 @@
 r"""A curve of zeros ``g(y, p) = 0`` of one region in one parameter, by pseudo-arclength.
 
-In scaled unknowns ``x = (y / s, p / w)`` (s the natural sizes, w the width of the range) the curve has at each
-regular point one unit tangent, the null vector of the n by n + 1 Jacobian J. A step goes along it and comes back
-in the plane normal to it by Newton's method on
+In scaled unknowns ``x = (y / s, p / w)`` (s the natural sizes, w the width of the range) the curve has at
+each regular point one unit tangent, the null vector of the n by n + 1 Jacobian J. A step goes along it and
+comes back in the plane normal to it by Newton's method on
 
 .. math:: \begin{pmatrix} J \\ t^T \end{pmatrix} \delta = -\begin{pmatrix} g \\ t^T (x - \hat x) \end{pmatrix}
 
-(E. L. Allgower, K. Georg, Introduction to Numerical Continuation Methods, SIAM 2003, chapters 2 and 8). The bordered
-matrix is regular at folds; at a simple branch point its determinant changes sign.
+(E. L. Allgower, K. Georg, Introduction to Numerical Continuation Methods, SIAM 2003, chapters 2 and 8). The
+bordered matrix is regular at folds; at a simple branch point its determinant changes sign.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class Arc:
         return np.asarray(np.column_stack([by_state, by_parameter]) / self.scale[:, None])
 
     def corrected(self, guess: FloatArray, normal: FloatArray) -> Place | None:
-        """Return the point in the plane through a guess that is normal to a direction; None if none is near."""
+        """Return the point in the plane through a guess normal to a direction; None if none is near."""
         x, length = guess.copy(), np.inf
         for _ in range(_STEPS):
             matrix = np.vstack([self.jacobian(x), normal])
@@ -113,7 +113,7 @@ class Arc:
         except np.linalg.LinAlgError:
             return None
         size = float(np.linalg.norm(found))
-        return found / size if np.isfinite(size) else None
+        return np.asarray(found / size) if np.isfinite(size) else None
 
     def start(self, y: FloatArray, value: float, sign: float) -> Place | None:
         """Return the point at a parameter, with the tangent along which it grows (sign 1) or falls."""
@@ -122,13 +122,11 @@ class Arc:
         return self.corrected(self.unknowns(y, value), upwards)
 
     def orientation(self, place: Place) -> float:
-        """Return the determinant of the bordered matrix, as a geometric mean; its sign changes at a branch point."""
+        """Return the determinant of the bordered matrix as a geometric mean; 0 at a branch point."""
         sign, size = np.linalg.slogdet(np.vstack([self.jacobian(place.x), place.tangent]))
         return float(sign * np.exp(size / len(place.x))) if np.isfinite(size) else 0.0
 
-    def located(
-        self, before: Place, after: Place, test: Callable[[Place], float]
-    ) -> Place | None:
+    def located(self, before: Place, after: Place, test: Callable[[Place], float]) -> Place | None:
         """Return the point between two at which a test function vanishes; None if the curve is lost there."""
         from scipy.optimize import brentq
 

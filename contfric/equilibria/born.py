@@ -1,10 +1,11 @@
 """Cycles that are born at a Hopf point or a boundary equilibrium, solved for as periodic orbits.
 
-A cycle of a Hopf point is, to first order in its amplitude a, the ellipse ``y0 + 2 a Re(q exp(i omega t))`` of the
-centre subspace, at the parameter where the normal form (:mod:`contfric.equilibria.hopf`) has it,
-``mu = -omega l1 a^2``. It is cut where it crosses a section of the model and handed to Newton's method, which finds it
-whether it is stable or not. A cycle at a boundary equilibrium has no such ellipse: its size is
-proportional to the distance of the parameter, and simulations on both sides of the event find it where it attracts.
+A cycle of a Hopf point is, to first order in its amplitude a, the ellipse ``y0 + 2 a Re(q exp(i omega t))``
+of the centre subspace, at the parameter where the normal form (:mod:`contfric.equilibria.hopf`) has it,
+``mu = -omega l1 a^2``. It is cut where it crosses a section of the model and handed to Newton's method, which
+finds it whether it is stable or not. A cycle at a boundary equilibrium has no such ellipse: its size is
+proportional to the distance of the parameter, and simulations on both sides of the event find it where it
+attracts.
 """
 
 from __future__ import annotations
@@ -24,32 +25,35 @@ from contfric.orbit.orbit import Orbit, Status
 if TYPE_CHECKING:
     from contfric.equilibria.hopf import Centre
 
-#: Share of the way to the nearest boundary (or of the natural sizes) that a cycle takes up by default, and how often it
-#: is halved where Newton's method fails.
+#: Share of the way to the nearest boundary (or of the natural sizes) that a cycle takes up by default, and
+#: how often it is halved where Newton's method fails.
 _SHARE, _HALVINGS = 0.1, 8
 #: A cycle is of the size that it was asked for within this factor; else it is another one.
 _LIKE = 2.0
-#: Distance of the parameter from a boundary equilibrium by default, relative to its value; a second one, nearer by
-#: this factor, tells whether a cycle shrinks with it, to this accuracy.
+#: Distance of the parameter from a boundary equilibrium by default, relative to its value; a second one,
+#: nearer by this factor, tells whether a cycle shrinks with it, to this accuracy.
 _DISTANCE, _NEARER, _PROPORTIONAL = 1e-2, 4.0, 0.3
 #: Units of time that a cycle may take to attract.
 _LONGEST = 4000
 
 
 def cycle_of_hopf(event: HopfPoint, amplitude: float | None = None) -> Orbit:
-    """Return a small cycle near a Hopf point; see :meth:`contfric.equilibria.events.HopfPoint.cycle`."""
+    """Return a small cycle near a Hopf point; see :meth:`~contfric.HopfPoint.cycle`."""
     _check_autonomous(event)
     if event.lyapunov == 0.0:
         raise ConvergenceError(
             f"{event!r}: the first Lyapunov coefficient is 0, and tells neither side nor size of a cycle"
         )
-    first = _amplitude(event) if amplitude is None else real_number("amplitude", amplitude, least=0.0)
+    first = (
+        _amplitude(event) if amplitude is None else real_number("amplitude", amplitude, least=0.0)
+    )
     for k in range(_HALVINGS if amplitude is None else 1):
         orbit = _solved(event, first * 0.5**k)
         if orbit is not None:
             return orbit
     raise ConvergenceError(
-        f"{event!r}: Newton's method found no cycle of amplitude {first:.3g} or less; try another amplitude=..."
+        f"{event!r}: Newton's method found no cycle of amplitude {first:.3g} or less; try another "
+        "amplitude=..."
     )
 
 
@@ -93,7 +97,7 @@ def _solved(event: HopfPoint, amplitude: float) -> Orbit | None:
 
 
 def _ellipse(event: HopfPoint, amplitude: float) -> Orbit | None:
-    """Return the cycle of the normal form as an unsolved orbit; None at parameters that the model does not have."""
+    """Return the cycle of the normal form, unsolved; None at parameters that the model does not have."""
     from contfric.orbit.clock import clocked
     from contfric.orbit.system import build_system
 
@@ -121,7 +125,7 @@ def _point(centre: Centre, middle: FloatArray, amplitude: float, angle: float) -
 def _cut(
     event: HopfPoint, middle: FloatArray, vector: FloatArray, amplitude: float
 ) -> tuple[tuple[tuple[str, str], ...], tuple[float, float]]:
-    """Return the word of the cycle at the section that cuts it best, and the times of its crossings, upwards first.
+    """Return the word of the cycle at a section that cuts it, and the times of its crossings, upwards first.
 
     Raises
     ------
@@ -140,8 +144,9 @@ def _cut(
             best = share, name, modes, swing, float(values[k])
     if best is None:
         raise ConvergenceError(
-            f"{event!r}: the cycle meets no surface of '{at.model.name}', and an orbit needs one to be fixed: declare a "
-            "section through the equilibrium, a surface with a mode of the same field on each side (such as v = 0)"
+            f"{event!r}: the cycle meets no surface of '{at.model.name}', an orbit needs one to be fixed: "
+            "declare a section through the equilibrium, a surface with a mode of the same field on each side "
+            "(such as v = 0)"
         )
     _, name, (above, below), swing, height = best
     # height + |swing| cos(angle + turn) = 0, upwards where the sine is negative
@@ -173,7 +178,7 @@ def _sections(event: HopfPoint) -> Iterator[tuple[str, tuple[str, str]]]:
 
 
 def cycle_of_boundary(event: BoundaryPoint, distance: float | None = None) -> Orbit:
-    """Return a small cycle near a boundary equilibrium; see :meth:`contfric.equilibria.events.BoundaryPoint.cycle`."""
+    """Return a small cycle near a boundary equilibrium; see :meth:`~contfric.BoundaryPoint.cycle`."""
     _check_autonomous(event)
     apart = _DISTANCE * (abs(event.value) or 1.0)
     if distance is not None:
@@ -185,13 +190,14 @@ def cycle_of_boundary(event: BoundaryPoint, distance: float | None = None) -> Or
             if any(abs(r * _NEARER / reach - 1.0) < _PROPORTIONAL for r in near):
                 return far
     raise ConvergenceError(
-        f"{event!r}: no attracting cycle was found that shrinks to the equilibrium with the distance from the event "
+        f"{event!r}: no attracting cycle was found that shrinks to the equilibrium with the distance from "
+        "the event "
         f"({apart:.3g}); try another distance=..."
     )
 
 
 def _attractors(event: BoundaryPoint, moved: float) -> Iterator[Orbit]:
-    """Yield the periodic orbits that simulations from near a boundary equilibrium come to, beside the event."""
+    """Yield the orbits that simulations from near a boundary equilibrium come to, beside the event."""
     from contfric.orbit.find import find_orbit
 
     at = event.equilibrium

@@ -1,18 +1,20 @@
-r"""Boundary equilibria: a zero of one field reaches a surface, and the branch goes on in another mode or turns back.
+r"""Boundary equilibria: a zero of one field reaches a surface, and goes on in another mode or turns back.
 
 Let ``f1`` hold where ``H > 0`` and have an equilibrium that reaches ``H = 0`` at ``p*``, ``N = f1_y``,
 ``C = H_y``, and let ``delta`` be the rate of H along its branch. On the other side holds ``f2``.
 
 * The field jumps (Filippov): with ``E = f2 - f1`` at the point, equilibria of the sliding field
   ``(1 - a) f1 + a f2`` have ``a = delta (p - p*) / (C N^{-1} E)`` to first order, and a > 0 on the surface.
-  The equilibrium of f1 is admissible where ``delta (p - p*) > 0``. So ``C N^{-1} E < 0`` is **persistence** (one turns
-  into the other) and ``C N^{-1} E > 0`` a **non-smooth fold** (both on one side, none on the other).
+  The equilibrium of f1 is admissible where ``delta (p - p*) > 0``. So ``C N^{-1} E < 0`` is **persistence**
+  (one turns into the other) and ``C N^{-1} E > 0`` a **non-smooth fold** (both on one side, none on the
+  other).
 * The field is continuous: ``f2 = f1 + E H``, and ``det N2 / det N1 = 1 + C N1^{-1} E`` decides, as
-  ``H = delta (p - p*) / (1 + C N1^{-1} E)`` along the branch of f2: positive is persistence, negative a non-smooth fold.
+  ``H = delta (p - p*) / (1 + C N1^{-1} E)`` along the branch of f2: positive is persistence, negative a
+  non-smooth fold.
 
 (M. di Bernardo, C. J. Budd, A. R. Champneys, P. Kowalczyk, Piecewise-smooth Dynamical Systems, Springer 2008,
-chapter 5.) The same is told by the two sides: where each of the two branches is admissible. That also holds for
-modes on surfaces that were typed, and is what decides here; the product is kept beside it.
+chapter 5.) The same is told by the two sides: where each of the two branches is admissible. That also holds
+for modes on surfaces that were typed, and is what decides here; the product is kept beside it.
 """
 
 from __future__ import annotations
@@ -59,7 +61,9 @@ class Partner:
 def partner_of(arc: Arc, place: Place, surface: str) -> Partner:
     """Return what meets an equilibrium on a surface; its branch arrives there along its tangent."""
     y, p = arc.state(place.x), arc.parameters(place.x)
-    others = [r for r in regions_of(arc.region.model) if r is not arc.region and _rests(r, arc, y, p)]
+    others = [
+        r for r in regions_of(arc.region.model) if r is not arc.region and _rests(r, arc, y, p)
+    ]
     if not others:
         return Partner(Unfolding.ALONE)
     if len(others) > 1 or len(arc.region.touched(y, p)) > 1:
@@ -85,7 +89,7 @@ def _rests(region: Region, arc: Arc, y: FloatArray, p: FloatArray) -> bool:
 
 
 def _inwards(arc: Arc, y: FloatArray, value: float) -> Place | None:
-    """Return the point of a region's curve at its boundary, directed into the region; None if it stays on it."""
+    """Return the point of a curve at the boundary of its region, directed inwards; None if it stays on it."""
     place = arc.start(y, value, 1.0)
     if place is None:
         return None
@@ -104,15 +108,17 @@ def height_rate(arc: Arc, place: Place, surface: str) -> float:
     k = arc.region.heights.names.index(surface)
     short = 1e-6  # the root of rounding is 1e-8; the height is smooth on the scale of the range
     ahead, behind = place.x + short * place.tangent, place.x - short * place.tangent
-    heights = [arc.region.heights.value(arc.state(x), arc.parameters(x))[k] for x in (ahead, behind)]
+    heights = [
+        arc.region.heights.value(arc.state(x), arc.parameters(x))[k] for x in (ahead, behind)
+    ]
     return float((heights[0] - heights[1]) / (2.0 * short))
 
 
 def product_of(one: Region, other: Region, surface: str, y: FloatArray, p: FloatArray) -> float:
     """Return the number whose sign tells persistence from a non-smooth fold; nan where it has no meaning.
 
-    ``det N2 / det N1`` of two modes that move, ``-C N^{-1} E`` of one that moves and one that slides: positive is
-    persistence in both.
+    ``det N2 / det N1`` of two modes that move, ``-C N^{-1} E`` of one that moves and one that slides:
+    positive is persistence in both.
     """
     if not one.on and not other.on:
         dets = [np.linalg.slogdet(r.fields.jacobian(y, p)) for r in (one, other)]

@@ -127,8 +127,8 @@ class HopfPoint(EquilibriumEvent):
         Parameters
         ----------
         amplitude : float, optional
-            Of the cycle along the unit vector of the centre subspace; by default a tenth of what the surfaces around
-            allow.
+            Of the cycle along the unit vector of the centre subspace; by default a tenth of what the surfaces
+            around allow.
 
         Raises
         ------
@@ -153,7 +153,8 @@ class BoundaryPoint(EquilibriumEvent):
     partner : str
         Mode of the equilibrium that meets it; empty if there is none.
     product : float
-        The number whose sign tells persistence (positive) from a non-smooth fold; nan where it has no meaning.
+        The number whose sign tells persistence (positive) from a non-smooth fold; nan where it has no
+        meaning.
     """
 
     surface: str

@@ -1,13 +1,15 @@
 r"""The field of one mode as functions of state and parameters, with the derivatives that equilibria need.
 
-A mode that moves freely has its own field ``f(y, p)``. A mode that lies on surfaces ``h(y, p) = 0`` has a field
-that is tangent to them there; away from them it means nothing. It is taken together with an attraction to them,
+A mode that moves freely has its own field ``f(y, p)``. A mode that lies on surfaces ``h(y, p) = 0`` has a
+field that is tangent to them there; away from them it means nothing. It is taken together with an attraction
+to them,
 
 .. math:: g = f - c N h, \qquad N = h_y^T (h_y h_y^T)^{-1}.
 
 On the surfaces g is f, and :math:`g_y = f_y - c N h_y`: directions within them keep the eigenvalues of f, and
-each direction off them adds one eigenvalue ``-c``. So equilibria, folds and Hopf points on surfaces are those of
-an ordinary field in all states, by one set of formulas, and the centre manifold of a Hopf point on surfaces lies in them.
+each direction off them adds one eigenvalue ``-c``. So equilibria, folds and Hopf points on surfaces are those
+of an ordinary field in all states, by one set of formulas, and the centre manifold of a Hopf point on
+surfaces lies in them.
 
 This module imports sympy, and is loaded where equilibria are asked for.
 """
@@ -164,7 +166,7 @@ class Fields:
             return np.array([row[0] for row in self._heights(y, p, 1.0)], dtype=np.float64)
 
     def eigenvalues(self, y: FloatArray, p: FloatArray) -> Any:
-        """Return the eigenvalues of the field within the own surfaces, largest real part first, shape (n - k,)."""
+        """Return the eigenvalues within the own surfaces, the largest real part first, shape (n - k,)."""
         basis = self.tangents(y, p)
         found = np.linalg.eigvals(basis.T @ self.jacobian(y, p) @ basis).astype(np.complex128)
         return found[np.lexsort((-found.imag, -found.real))]

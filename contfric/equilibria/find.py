@@ -25,7 +25,7 @@ def find_equilibria(
     """Find all equilibria of a model without excitation, and its pseudo-equilibria on surfaces.
 
     Where a mode is affine, they are the solution of a linear system, and all of them. Elsewhere Newton's
-    method starts from random states within twice the model's ``spread``, and zeros within five times of it count.
+    method starts from random states within twice the model's ``spread``, and some farther away.
 
     Parameters
     ----------
@@ -40,7 +40,8 @@ def find_equilibria(
     -------
     Equilibria
         ``for e in found`` goes through those that are admissible; ``found.points`` has virtual ones too,
-        ``found.sets`` whole sets (a mass that sticks), ``found.complete`` says which modes are known completely.
+        ``found.sets`` whole sets (a mass that sticks), ``found.complete`` says which modes are known
+        completely.
 
     Raises
     ------
@@ -71,7 +72,8 @@ def find_equilibria(
     kept = [
         e
         for e in points
-        if e.location is not Location.BOUNDARY or not any(holds_state(s, e.state, scale) for s in sets)
+        if e.location is not Location.BOUNDARY
+        or not any(holds_state(s, e.state, scale) for s in sets)
     ]
     return Equilibria(model, vector, tuple(kept), tuple(sets), complete)
 

@@ -1,7 +1,7 @@
 r"""Hopf points: what a pair of imaginary eigenvalues becomes, to third order.
 
-At an equilibrium with :math:`A q = i\omega q`, :math:`A^T \bar r = i\omega \bar r` normed to ``<q, q> = <r, q> = 1``
-(``<a, b>`` conjugates its first argument), the field
+At an equilibrium with :math:`A q = i\omega q`, :math:`A^T \bar r = i\omega \bar r` normed to
+``<q, q> = <r, q> = 1`` (``<a, b>`` conjugates its first argument), the field
 ``A u + B(u, u)/2 + C(u, u, u)/6 + ...`` has on its centre manifold the normal form
 
 .. math:: \dot z = (\mu + i\omega) z + c_1 z |z|^2 + O(|z|^4), \qquad u = z q + \bar z \bar q + O(|z|^2),
@@ -9,11 +9,13 @@ At an equilibrium with :math:`A q = i\omega q`, :math:`A^T \bar r = i\omega \bar
 with the first Lyapunov coefficient :math:`l_1 = \mathrm{Re}\, c_1 / \omega`,
 
 .. math:: l_1 = \frac{1}{2\omega} \mathrm{Re}\, [\langle r, C(q, q, \bar q)\rangle
-   - 2 \langle r, B(q, A^{-1} B(q, \bar q))\rangle + \langle r, B(\bar q, (2 i\omega - A)^{-1} B(q, q))\rangle]
+   - 2 \langle r, B(q, A^{-1} B(q, \bar q))\rangle + \langle r, B(\bar q, (2 i\omega - A)^{-1}
+   B(q, q))\rangle]
 
 (Yu. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., Springer 2004, eq. 5.34). Cycles have
-:math:`|z|^2 = -\mu / (\omega l_1)`: they are stable and on the side of the unstable equilibrium for ``l1 < 0``
-(supercritical), unstable and on the other side for ``l1 > 0``. The real part ``mu`` changes along the branch at the rate
+:math:`|z|^2 = -\mu / (\omega l_1)`: they are stable and on the side of the unstable equilibrium for
+``l1 < 0`` (supercritical), unstable and on the other side for ``l1 > 0``. The real part ``mu`` changes along
+the branch at the rate
 
 .. math:: \mathrm{Re} \langle r, B(q, y') + g_{yp} q \rangle, \qquad y' = -A^{-1} g_p.
 """
@@ -55,7 +57,7 @@ class Centre:
 
 
 def pair_sum(eigenvalues: ComplexArray) -> float:
-    """Return the product of the sums of two eigenvalues, each as a share of their sizes: zero at a Hopf point.
+    """Return the product of the sums of two eigenvalues, as shares of their sizes: zero at a Hopf point.
 
     Examples
     --------
@@ -90,16 +92,17 @@ def centre_of(region: Region, y: FloatArray, p: FloatArray, active: int) -> Cent
         return np.asarray(fields.second(y, p, pull, u, v))
 
     conj, one = q.conj(), np.eye(len(y))
-    steady = np.linalg.solve(a, b(q, conj))
-    doubled = np.linalg.solve(2j * omega * one - a, b(q, q))
+    steady = np.asarray(np.linalg.solve(a, b(q, conj)), dtype=np.complex128)
+    doubled = np.asarray(np.linalg.solve(2j * omega * one - a, b(q, q)), dtype=np.complex128)
     third = np.asarray(fields.third(y, p, pull, q, q, conj))
-    terms = np.array([np.vdot(r, third), -2.0 * np.vdot(r, b(q, steady)), np.vdot(r, b(conj, doubled))])
+    left = r.conj()
+    terms = np.array([left @ third, -2.0 * (left @ b(q, steady)), left @ b(conj, doubled)])
     lyapunov = float(np.sum(terms).real) / (2.0 * omega)
     if abs(lyapunov) * 2.0 * omega <= _CANCELLED * float(np.sum(np.abs(terms))):
         lyapunov = 0.0
-    drift = -np.linalg.solve(a, fields.slope(y, p, active, pull))
+    drift = np.asarray(-np.linalg.solve(a, fields.slope(y, p, active, pull)), dtype=np.float64)
     turned = b(q, drift.astype(np.complex128)) + fields.mixed(y, p, active, pull, q)
-    return Centre(omega, q, lyapunov, float(np.vdot(r, turned).real), drift)
+    return Centre(omega, q, lyapunov, float((left @ turned).real), drift)
 
 
 def _critical(values: ComplexArray, own: ComplexArray) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -70,7 +71,7 @@ def march(arc: Arc, start: Place, limits: Limits) -> Run:
             return run
         over = _over(arc, following, limits)
         if over is not None:
-            following = arc.located(last, following, lambda at: arc.parameter(at.x) - over) or last
+            following = _at_bound(arc, last, following, over)
             run.end = limits.high_end if over == limits.high else limits.low_end
         if np.max(np.abs(following.x[:-1])) > _AWAY:
             run.end = BranchEnd.AWAY
@@ -117,6 +118,11 @@ def _next(arc: Arc, last: Place, step: float) -> tuple[Place | None, float]:
     return None, step
 
 
+def _at_bound(arc: Arc, last: Place, following: Place, bound: float) -> Place:
+    """Return the point of a step at which the parameter reaches a bound."""
+    return arc.located(last, following, lambda at: arc.parameter(at.x) - bound) or last
+
+
 def _over(arc: Arc, place: Place, limits: Limits) -> float | None:
     """Return the bound of the parameter that a point lies beyond; None if it lies within."""
     value = arc.parameter(place.x)
@@ -155,12 +161,11 @@ def _tests(arc: Arc, before: Place) -> Iterator[tuple[str, Callable[[Place], flo
     for name in region.sides(domain):
         if region.bounds(domain, name):
             k = region.heights.names.index(name)
-            yield (
-                name,
-                lambda at, k=k: float(
-                    region.heights.value(arc.state(at.x), arc.parameters(at.x))[k]
-                ),
-            )
+            yield name, partial(_height, arc, k)
+
+
+def _height(arc: Arc, k: int, at: Place) -> float:
+    return float(arc.region.heights.value(arc.state(at.x), arc.parameters(at.x))[k])
 
 
 def _leaves(arc: Arc, crossing: Crossing) -> bool:

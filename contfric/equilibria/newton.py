@@ -1,4 +1,4 @@
-"""Zeros of the field of one region: Newton's method from many starts, and the linear system where it is affine."""
+"""Zeros of the field of one region: Newton's method from many starts; a linear system where it is affine."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ _STEPS, _HALVINGS = 60, 10
 _SHORT, _CONVERGED = 1e-14, 1e-9
 #: A singular value below this share of the largest is zero: rounding of a matrix of moderate size.
 _RANK = 1e-11
-#: Zeros farther than this, in natural sizes, are left out: a periodic field has them without end.
+#: Half-widths that starts are drawn from, in natural sizes: those may be far off where no one gave them.
+_WIDTHS = (2.0, 2.0, 20.0)
+#: Virtual zeros farther than this, in natural sizes, are left out: a periodic field has them without end.
 _FAR = 5.0
 #: A component below this share of its size is what rounding left of 0.
 _NOTHING = 1e-16
@@ -35,10 +37,10 @@ class Zeros:
     p: FloatArray
     scale: FloatArray
 
-    def newton(self, start: FloatArray) -> FloatArray | None:
+    def newton(self, start: FloatArray, damped: bool = True) -> FloatArray | None:
         """Return the zero that Newton's method comes to from a state; None if it comes to none.
 
-        A step is halved until the residual falls; a singular Jacobian takes the shortest step.
+        If damped, a step is halved until the residual falls. A singular Jacobian takes the shortest step.
         """
         y, fields = start.copy(), self.region.fields
         residual = fields.value(y, self.p)
@@ -49,6 +51,10 @@ class Zeros:
             length = float(np.max(np.abs(step / self.scale)))
             if length <= _SHORT * (1.0 + float(np.max(np.abs(y / self.scale)))):
                 return y + step
+            if not damped and length > _CONVERGED:  # near a zero rounding is to be seen
+                y = y + step
+                residual = fields.value(y, self.p)
+                continue
             y, residual, moved = self._damped(y, residual, step)
             if not moved:  # rounding keeps the residual from falling, or there is no zero
                 return y if length < _CONVERGED else None
@@ -83,7 +89,7 @@ class Zeros:
         return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
 
     def affine(self) -> tuple[FloatArray, FloatArray] | None:
-        """Return a zero of an affine field and the directions of all others, shape (k, n); None if it has none."""
+        """Return a zero of an affine field and the directions of all others, shape (k, n); None if none."""
         fields, origin = self.region.fields, np.zeros(len(self.scale))
         value = fields.value(origin, self.p)
         step = self._step(origin, value)
@@ -97,11 +103,17 @@ class Zeros:
         return y, self.null_space(y)
 
     def from_starts(self, starts: int, seed: int) -> Iterator[FloatArray]:
-        """Yield what Newton's method comes to from the origin and from random states."""
+        """Yield what Newton's method comes to from the origin and from random states.
+
+        By turns damped and not (which is less sure, and reaches farther), near and far.
+        """
         rng = np.random.default_rng(seed)
-        draws = rng.uniform(-2.0, 2.0, (starts, len(self.scale))) * self.scale
+        draws = rng.uniform(-1.0, 1.0, (starts, len(self.scale))) * self.scale
         draws[0] = 0.0
-        for start in draws:
-            found = self.newton(start)
-            if found is not None and np.all(np.abs(found) <= _FAR * self.scale):
+        for k, start in enumerate(draws):
+            found = self.newton(_WIDTHS[k // 2 % len(_WIDTHS)] * start, damped=k % 2 == 0)
+            if found is None:
+                continue
+            near = np.all(np.abs(found) <= _FAR * self.scale)
+            if near or not self.region.domain_of(found, self.p)[1]:
                 yield np.where(np.abs(found) < _NOTHING * self.scale, 0.0, found)

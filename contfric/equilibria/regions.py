@@ -1,7 +1,7 @@
 """Where each field of a model holds: its region, the surfaces that bound it, and whether a state is inside.
 
-Modes of one field are one mode (:mod:`contfric.models.sections`): a section through an equilibrium means nothing to
-it. A mode with kinks has a region for each combination of their sides.
+Modes of one field are one mode (:mod:`contfric.models.sections`): a section through an equilibrium means
+nothing to it. A mode with kinks has a region for each combination of their sides.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class Region:
         return dict(zip(self.heights.names, np.where(on, 0.0, values).tolist(), strict=True))
 
     def domain_of(self, y: FloatArray, p: FloatArray) -> tuple[Domain, tuple[str, ...]]:
-        """Return the domain nearest to a state, and the surfaces that the state violates there; none inside."""
+        """Return the domain nearest to a state, and the surfaces on whose wrong side it is; none inside."""
         near = self.near(y, p)
         found = []
         for domain in self.domains:
@@ -200,6 +200,6 @@ def check_no_excitation(model: Model, params: Mapping[str, float], active: str =
     every = [*itertools.chain.from_iterable(formulas.fields()), *formulas.observables()]
     if any(formulas.t in formula.subs(known).free_symbols for formula in every):
         raise ParameterError(
-            f"model '{model.name}' is excited at these parameters, and has no equilibria: switch the excitation "
-            "off (its amplitude 0), or take a model that is 'autonomous'"
+            f"model '{model.name}' is excited at these parameters, and has no equilibria: switch the "
+            "excitation off (its amplitude 0), or take a model that is 'autonomous'"
         )

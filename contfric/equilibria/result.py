@@ -125,6 +125,8 @@ class EquilibriumSet:
         One of them.
     directions : ndarray, shape (dimension, n)
         Unit vectors along the set, at that state.
+    states : ndarray, shape (k, n)
+        Along a set of dimension 1, from end to end; ``state`` alone for others.
     ends : tuple of (surface, state)
         Where a set of dimension 1 leaves the region of its mode, in both directions; empty for others, and
         where nothing bounds it.
@@ -136,6 +138,7 @@ class EquilibriumSet:
     vector: FloatArray
     state: FloatArray
     directions: FloatArray
+    states: FloatArray
     ends: tuple[tuple[str, FloatArray], ...]
     eigenvalues: ComplexArray
 
@@ -184,8 +187,8 @@ class Equilibria:
     points : tuple of Equilibrium
     sets : tuple of EquilibriumSet
     complete : mapping of mode to bool
-        Whether all equilibria of a mode are known: where its field is affine. Else those are that Newton's method
-        found from many starts.
+        Whether all equilibria of a mode are known: where its field is affine. Else those are that Newton's
+        method found from many starts.
     """
 
     model: Model
@@ -202,7 +205,8 @@ class Equilibria:
         return sum(e.admissible for e in self.points)
 
     def __getitem__(self, index: int) -> Equilibrium:
-        return [*self][index]
+        found: list[Equilibrium] = list(self)
+        return found[index]
 
     @property
     def virtual(self) -> tuple[Equilibrium, ...]:

@@ -6,14 +6,16 @@ region of its mode: a mass that sticks rests between the limits of static fricti
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from contfric.equilibria.newton import Zeros
 from contfric.equilibria.result import EquilibriumSet
 from contfric.models.definition import FloatArray
 
-#: Along a set that is no straight line: steps and how many, in natural sizes of the states; how near its end is
-#: bisected to, and how near two states of one set are.
+#: Along a set that is no straight line: steps and how many, in natural sizes of the states; how near its end
+#: is bisected to, and how near two states of one set are.
 _STEP, _STEPS, _NEAR = 0.02, 2000, 0.03
 _BISECTIONS = 60
 #: Relative: what an affine height differs by from its chord.
@@ -30,15 +32,16 @@ def sets_of_line(zeros: Zeros, y: FloatArray, direction: FloatArray) -> list[Equ
     places = _crossings(zeros, y, direction)
     if places is None:
         found = followed(zeros, y, direction)
-        return [] if found is None else [found]
+        return [found] if found is not None else []
     size = float(np.max(zeros.scale))
     cuts = sorted(places)
     edges = [cuts[0] - _BEYOND * size, *cuts, cuts[-1] + _BEYOND * size] if cuts else [-size, size]
     inside = []
-    for low, high in zip(edges, edges[1:], strict=False):
+    for low, high in itertools.pairwise(edges):
         middle = y + 0.5 * (low + high) * direction
         inside.append(high > low and not zeros.region.domain_of(middle, zeros.p)[1])
-    found, k = [], 0
+    pieces: list[EquilibriumSet] = []
+    k = 0
     while k < len(inside):
         if not inside[k]:
             k += 1
@@ -50,8 +53,9 @@ def sets_of_line(zeros: Zeros, y: FloatArray, direction: FloatArray) -> list[Equ
             (places[edges[i]], y + edges[i] * direction) for i in (first, k) if edges[i] in places
         ]
         middle = y + 0.5 * (edges[first] + edges[k]) * direction
-        found.append(_set(zeros, middle, direction[None, :], tuple(ends)))
-    return found
+        states = np.array([y + edges[i] * direction for i in (first, k)])
+        pieces.append(_set(zeros, middle, direction[None, :], states, tuple(ends)))
+    return pieces
 
 
 def _crossings(zeros: Zeros, y: FloatArray, direction: FloatArray) -> dict[float, str] | None:
@@ -74,26 +78,28 @@ def _crossings(zeros: Zeros, y: FloatArray, direction: FloatArray) -> dict[float
 
 
 def followed(zeros: Zeros, y: FloatArray, direction: FloatArray) -> EquilibriumSet | None:
-    """Return the set through a state, followed both ways until it leaves the region; None if that is outside."""
+    """Return the set through a state, followed both ways out of the region; None if that is outside."""
     if zeros.region.domain_of(y, zeros.p)[1]:
         return None
-    ends = [_end(zeros, y, sign * direction) for sign in (-1.0, 1.0)]
-    return _set(zeros, y, direction[None, :], tuple(end for end in ends if end is not None))
+    (low, down), (high, up) = (_half(zeros, y, sign * direction) for sign in (-1.0, 1.0))
+    ends = [(s, states[-1]) for s, states in ((low, down), (high, up)) if s]
+    return _set(zeros, y, direction[None, :], np.array([*down[::-1], y, *up]), tuple(ends))
 
 
-def _end(zeros: Zeros, y: FloatArray, direction: FloatArray) -> tuple[str, FloatArray] | None:
-    """Return the surface and the state at which a set leaves the region in a direction; None if it does not."""
-    region, p = zeros.region, zeros.p
+def _half(zeros: Zeros, y: FloatArray, direction: FloatArray) -> tuple[str, list[FloatArray]]:
+    """Return the surface at which a set leaves the region, empty if it does not, and states up to there."""
+    region, p, found = zeros.region, zeros.p, []
     length = _STEP * float(np.min(zeros.scale))
     for _ in range(_STEPS):
         ahead = zeros.newton(y + length * direction)
         if ahead is None:
-            return None
+            break
         if wrong := region.domain_of(ahead, p)[1]:
-            return wrong[0], _bisected(zeros, y, ahead)
+            return wrong[0], [*found, _bisected(zeros, y, ahead)]
         chord = ahead - y
         direction, y = chord / max(float(np.linalg.norm(chord)), 1e-300), ahead
-    return None
+        found.append(ahead)
+    return "", found
 
 
 def _bisected(zeros: Zeros, inside: FloatArray, outside: FloatArray) -> FloatArray:
@@ -109,9 +115,10 @@ def _bisected(zeros: Zeros, inside: FloatArray, outside: FloatArray) -> FloatArr
 
 
 def set_of_plane(zeros: Zeros, y: FloatArray, directions: FloatArray) -> EquilibriumSet | None:
-    """Return the set of dimension 2 or more through a zero, at the state farthest inside; None if none is inside.
+    """Return the set of dimension 2 or more through a zero, at the state farthest inside; None if outside.
 
-    The state is that of the largest ball (Chebyshev centre) in the region, a linear program where heights are affine.
+    The state is that of the largest ball (Chebyshev centre) in the region, a linear program where heights are
+    affine.
     """
     from scipy.optimize import linprog
 
@@ -130,30 +137,33 @@ def set_of_plane(zeros: Zeros, y: FloatArray, directions: FloatArray) -> Equilib
         if best.status == 0 and best.x[-1] > 0.0:
             inside = zeros.newton(y + best.x[:-1] @ directions)
             if inside is not None and not region.domain_of(inside, p)[1]:
-                return _set(zeros, inside, directions, ())
+                return _set(zeros, inside, directions, inside[None, :], ())
     return None
 
 
 def holds_state(found: EquilibriumSet, y: FloatArray, scale: FloatArray) -> bool:
-    """Tell whether a state is one of a set, as far as its ends and its direction tell."""
-    apart = (y - found.state) / scale
-    basis = np.linalg.qr((found.directions / scale).T)[0]
-    along = basis @ (basis.T @ apart)
-    if np.max(np.abs(apart - along)) > _NEAR * (1.0 + np.max(np.abs(along))):
-        return False
-    if found.dimension > 1 or len(found.ends) < 2:
-        return True
-    low, high = (end / scale for _, end in found.ends)
-    share = float((y / scale - low) @ (high - low)) / float((high - low) @ (high - low))
-    return -_NEAR <= share <= 1.0 + _NEAR
+    """Tell whether a state is one of a set: near a chord of its states, or in its plane."""
+    if found.dimension > 1:
+        apart = (y - found.state) / scale
+        basis = np.linalg.qr((found.directions / scale).T)[0]
+        return bool(np.max(np.abs(apart - basis @ (basis.T @ apart))) <= _NEAR)
+    states, at = found.states / scale, y / scale
+    if len(states) < 2:
+        return bool(np.max(np.abs(at - states[0])) <= _NEAR)
+    chords = np.diff(states, axis=0)
+    squares = np.maximum(np.sum(chords**2, axis=1), 1e-300)
+    shares = np.clip(np.sum((at - states[:-1]) * chords, axis=1) / squares, 0.0, 1.0)
+    apart = at - states[:-1] - shares[:, None] * chords
+    return bool(np.min(np.linalg.norm(apart, axis=1)) <= _NEAR)
 
 
 def _set(
     zeros: Zeros,
     y: FloatArray,
     directions: FloatArray,
+    states: FloatArray,
     ends: tuple[tuple[str, FloatArray], ...],
 ) -> EquilibriumSet:
     own = zeros.region.eigenvalues(y, zeros.p)
     order = np.argsort(np.abs(own), kind="stable")[len(directions) :]
-    return EquilibriumSet(zeros.region, zeros.p, y, directions, ends, own[np.sort(order)])
+    return EquilibriumSet(zeros.region, zeros.p, y, directions, states, ends, own[np.sort(order)])

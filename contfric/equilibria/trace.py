@@ -22,8 +22,8 @@ from contfric.equilibria.regions import check_no_excitation, scale_of
 from contfric.equilibria.result import Equilibrium, Location, is_stable
 from contfric.errors import ParameterError, checked_range, real_number, shown, whole_number
 
-#: Largest step in the scaled product by default: a fiftieth of the range or of a natural size. What happens twice
-#: within one step is not seen.
+#: Largest step in the scaled product by default: a fiftieth of the range or of a natural size. What happens
+#: twice within one step is not seen.
 _MAX_STEP = 0.02
 #: Share of the range within which an event cannot be told from a limit of the model.
 _AT_LIMIT = 1e-9
@@ -41,8 +41,8 @@ def continue_equilibrium(
 ) -> EquilibriumBranch:
     """Follow an equilibrium along a parameter, both ways, through folds and through the boundaries of modes.
 
-    Where it reaches a surface that bounds its mode, the branch goes on with the equilibrium of another mode that
-    meets it there: beyond (persistence) or back (non-smooth fold).
+    Where it reaches a surface that bounds its mode, the branch goes on with the equilibrium of another mode
+    that meets it there: beyond (persistence) or back (non-smooth fold).
 
     Parameters
     ----------
@@ -76,12 +76,15 @@ def continue_equilibrium(
     model, active = equilibrium.model, equilibrium.model.index_of(parameter)
     if equilibrium.location is Location.BOUNDARY:
         raise ParameterError(
-            "the equilibrium lies on the boundary of its region: move a parameter a little, find it again, and "
+            "the equilibrium lies on the boundary of its region: move a parameter a little, find it again, "
+            "and "
             "continue from there"
         )
     check_no_excitation(model, equilibrium.params, parameter)
     step = _MAX_STEP if max_step is None else real_number("max_step", max_step, least=1e-9)
-    limits = _limits(equilibrium, parameter, bounds, step, whole_number("max_points", max_points, least=10))
+    limits = _limits(
+        equilibrium, parameter, bounds, step, whole_number("max_points", max_points, least=10)
+    )
     scale = scale_of(model, equilibrium.vector)
     arc = Arc(equilibrium.region, equilibrium.vector, active, scale, limits.high - limits.low)
     halves = []
@@ -135,7 +138,13 @@ def _followed(arc: Arc, start: Place, limits: Limits) -> list[_Leg]:
             events += [] if found is None else [found]
         legs.append(_Leg(run, events))
         goes_on = run.end is BranchEnd.BOUNDARY and partner is not None
-        if not goes_on or partner is None or partner.region is None or partner.place is None or left < 2:
+        if (
+            not goes_on
+            or partner is None
+            or partner.region is None
+            or partner.place is None
+            or left < 2
+        ):
             break
         if len(legs) > 1 and _is_start(legs[0], partner):
             run.end = BranchEnd.CLOSED
@@ -177,12 +186,22 @@ def _event(arc: Arc, crossing: Crossing) -> tuple[EquilibriumEvent | None, Partn
     if arc.region.domain_of(y, p)[1]:
         return None, None  # still virtual on both sides
     partner = partner_of(arc, place, crossing.test)
-    if partner.region is not None and partner.place is not None and partner.unfolding is not Unfolding.DEGENERATE:
+    if (
+        partner.region is not None
+        and partner.place is not None
+        and partner.unfolding is not Unfolding.DEGENERATE
+    ):
         beside = Arc(partner.region, arc.vector, arc.active, arc.scale, arc.width)
         after = _stable(beside, partner.place)
     name = "" if partner.region is None else partner.region.mode
     event = BoundaryPoint(
-        EquilibriumKind.BE, *common[:3], after, crossing.test, partner.unfolding, name, partner.product
+        EquilibriumKind.BE,
+        *common[:3],
+        after,
+        crossing.test,
+        partner.unfolding,
+        name,
+        partner.product,
     )
     return event, partner
 
