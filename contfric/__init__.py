@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from contfric.curves.trace import continue_bifurcation
     from contfric.equilibria.branch import EquilibriumBranch
     from contfric.equilibria.events import BoundaryPoint, EquilibriumEvent, HopfPoint
+    from contfric.equilibria.explore import EquilibriumDiagram, explore_equilibria
     from contfric.equilibria.find import find_equilibria
     from contfric.equilibria.result import Equilibria, Equilibrium, EquilibriumSet
     from contfric.equilibria.trace import continue_equilibrium
@@ -83,6 +84,7 @@ _HOMES = {
     "Equilibria": "contfric.equilibria.result",
     "Equilibrium": "contfric.equilibria.result",
     "EquilibriumBranch": "contfric.equilibria.branch",
+    "EquilibriumDiagram": "contfric.equilibria.explore",
     "EquilibriumEvent": "contfric.equilibria.events",
     "EquilibriumSet": "contfric.equilibria.result",
     "HopfPoint": "contfric.equilibria.events",
@@ -113,6 +115,7 @@ _HOMES = {
     "continue_bifurcation": "contfric.curves.trace",
     "continue_equilibrium": "contfric.equilibria.trace",
     "continue_orbit": "contfric.continuation.trace",
+    "explore_equilibria": "contfric.equilibria.explore",
     "explore": "contfric.atlas.explore",
     "explore_plane": "contfric.atlas.plane_explore",
     "find_equilibria": "contfric.equilibria.find",
@@ -151,6 +154,7 @@ __all__ = [
     "Equilibria",
     "Equilibrium",
     "EquilibriumBranch",
+    "EquilibriumDiagram",
     "EquilibriumEvent",
     "EquilibriumSet",
     "HopfPoint",
@@ -183,6 +187,7 @@ __all__ = [
     "continue_equilibrium",
     "continue_orbit",
     "explore",
+    "explore_equilibria",
     "explore_plane",
     "find_equilibria",
     "find_orbit",

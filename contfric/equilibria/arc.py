@@ -25,6 +25,12 @@ from contfric.models.definition import FloatArray
 _STEPS, _SHORT, _CONVERGED = 12, 1e-14, 1e-10
 #: Share of a step by which an event is located: rounding of the arclength.
 _LOCATED = 1e-15
+#: Share of a step around a branch point within which Newton's method may fail: far above its rounding.
+_SINGULAR = 1e-4
+
+
+class _LostError(ArithmeticError):
+    """Newton's method finds no point at a share of a step."""
 
 
 class Place(NamedTuple):
@@ -127,21 +133,29 @@ class Arc:
         return float(sign * np.exp(size / len(place.x))) if np.isfinite(size) else 0.0
 
     def located(self, before: Place, after: Place, test: Callable[[Place], float]) -> Place | None:
-        """Return the point between two at which a test function vanishes; None if the curve is lost there."""
+        """Return the point between two at which a test function vanishes; None if the curve is lost there.
+
+        At a branch point the equations are singular: the nearest point at which they are not stands for it.
+        """
         from scipy.optimize import brentq
 
         chord = after.x - before.x
         length = float(np.linalg.norm(chord))
         normal = chord / length
+        known: list[tuple[float, float, Place]] = []
 
-        def at(share: float) -> Place:
-            found = self.corrected(before.x + share * chord, normal)
-            if found is None:
-                raise ArithmeticError
-            return found
+        def value(share: float) -> float:
+            place = self.corrected(before.x + share * chord, normal)
+            if place is None:
+                raise _LostError(share)
+            known.append((share, test(place), place))
+            return known[-1][1]
 
         try:
-            share = brentq(lambda s: test(at(s)), 0.0, 1.0, xtol=_LOCATED, rtol=4.0 * _LOCATED)
-            return at(float(share))
-        except (ArithmeticError, ValueError):
+            brentq(value, 0.0, 1.0, xtol=_LOCATED, rtol=4.0 * _LOCATED)
+        except _LostError as lost:
+            if min((abs(share - lost.args[0]) for share, *_ in known), default=1.0) > _SINGULAR:
+                return None
+        except ValueError:  # no change of sign: rounding at an end
             return None
+        return min(known, key=lambda item: abs(item[1]))[2]

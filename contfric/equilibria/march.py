@@ -16,6 +16,8 @@ from contfric.equilibria.hopf import is_oscillating, pair_sum
 _FIRST, _SHORTEST, _GROWTH = 1e-3, 1e-10, 1.6
 #: Cosine of the angle between the tangents of a step: 10 degrees at most, and it grows below 3.
 _TURN, _STRAIGHT = 0.985, 0.9986
+#: A fold and a branch point nearer than this are one point: that is located to the root of rounding.
+_VERTEX = 1e-6
 #: A state beyond this many natural sizes has left to infinity.
 _AWAY = 1e4
 
@@ -142,6 +144,13 @@ def crossings(arc: Arc, before: Place, after: Place) -> list[Crossing]:
         if name == "H" and not is_oscillating(_eigenvalues(arc, place)):
             continue
         found.append(Crossing(name, place, before, after))
+    vertex = [c for c in found if c.test == "BP"]
+    found = [  # the vertex of a pitchfork is no fold of its own
+        c
+        for c in found
+        if c.test != "SN"
+        or not any(np.max(np.abs(c.place.x - b.place.x)) < _VERTEX for b in vertex)
+    ]
     along = after.x - before.x
     return sorted(found, key=lambda c: float((c.place.x - before.x) @ along))
 

@@ -88,7 +88,8 @@ def followed(zeros: Zeros, y: FloatArray, direction: FloatArray) -> EquilibriumS
 
 def _half(zeros: Zeros, y: FloatArray, direction: FloatArray) -> tuple[str, list[FloatArray]]:
     """Return the surface at which a set leaves the region, empty if it does not, and states up to there."""
-    region, p, found = zeros.region, zeros.p, []
+    region, p = zeros.region, zeros.p
+    found: list[FloatArray] = []
     length = _STEP * float(np.min(zeros.scale))
     for _ in range(_STEPS):
         ahead = zeros.newton(y + length * direction)

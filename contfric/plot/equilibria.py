@@ -19,12 +19,14 @@ from contfric.plot.style import (
     UNSTABLE,
     YELLOW,
     Marker,
+    event_label,
     lighter,
     parameter_label,
 )
 
 if TYPE_CHECKING:
     from contfric.equilibria.branch import EquilibriumBranch
+    from contfric.equilibria.explore import EquilibriumDiagram
 
 #: Marks of the events; the kind of a boundary equilibrium is not one of smooth systems, and yellow as such.
 _MARKERS = {
@@ -81,6 +83,27 @@ def plot_equilibria(
     return ax
 
 
+def plot_equilibrium_diagram(
+    found: EquilibriumDiagram, ax: Axes | None = None, state: str | None = None
+) -> Axes:
+    r"""Draw all branches of equilibria on the same axes; parameters as for :func:`plot_equilibria`.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> plot_equilibrium_diagram(cf.explore_equilibria("belt", "vb", (0.1, 1.0))).get_xlabel()
+    '$\\mathrm{vb}$'
+    """
+    new = ax is None
+    ax = axes_or_new(ax)
+    if new:
+        ax.set_xlim(*found.bounds)
+    for branch in found.branches:
+        plot_equilibria(branch, ax=ax, state=state)
+    ax.set_xlabel(parameter_label(found.parameter), fontsize=TEXT + 1)
+    return ax
+
+
 def _draw_events(ax: Axes, branch: EquilibriumBranch, k: int) -> None:
     for event in branch.events:
         look = _MARKERS[event.kind.value]
@@ -96,3 +119,11 @@ def _draw_events(ax: Axes, branch: EquilibriumBranch, k: int) -> None:
             zorder=5,
         )
         mark.set_gid(event.label)
+        ax.annotate(
+            event_label(event.label),
+            (event.value, float(np.asarray(event.equilibrium.state)[k])),
+            xytext=(0.0, 7.0),
+            textcoords="offset points",
+            ha="center",
+            fontsize=SMALL,
+        )

@@ -1,4 +1,4 @@
-"""Equilibria, their branches and events beside closed forms, scipy and orbits that Newton's method solves for."""
+"""Equilibria, their branches and events beside closed forms, scipy, and cycles that are solved for."""
 
 from __future__ import annotations
 
@@ -229,13 +229,16 @@ def test_a_pitchfork_is_a_branch_point() -> None:
     assert (event.stable_before, event.stable_after) == (True, False)
     (bent,) = [e for e in cf.find_equilibria(model, {"mu": 0.5}) if e.state[0] > 0.1]
     arc = cf.continue_equilibrium(bent, "mu", (-1.0, 1.0))
-    assert "BP" not in [e.kind.value for e in arc.events if e.value > 1e-6]
+    (vertex,) = arc.events
+    assert vertex.kind == "BP" and abs(vertex.value) < 1e-9
+    whole = cf.explore_equilibria(model, "mu", (-1.0, 1.0), values=4)
+    assert len(whole) == 2 and [e.label for e in whole.events] == ["BP"]
     assert arc.values.min() == pytest.approx(0.0, abs=1e-6)  # a parabola over its vertex
 
 
 def test_popp_begins_to_swing_where_its_friction_falls_fast_enough() -> None:
-    """The slope at rest is a1 - 3 a2. To third order v' = -x + slope v + 3 a2 v^2 - a2 v^3; the quadratic term
-    alone is reversible, so that Re c1 = -(3/8) a2 |q_v|^2 with <q, q> = 1, twice the amplitude squared.
+    """The slope at rest is a1 - 3 a2. To third order v' = -x + slope v + 3 a2 v^2 - a2 v^3; the quadratic
+    term alone is reversible, so that Re c1 = -(3/8) a2 |q_v|^2 with <q, q> = 1, twice the amplitude squared.
     """
     (rest,) = cf.find_equilibria("popp", {"F": 0.0, "a2": 0.6})
     branch = cf.continue_equilibrium(rest, "a2", (0.3, 0.8))
@@ -304,8 +307,8 @@ modes:
 def test_cycles_have_the_size_of_the_normal_form() -> None:
     """Solved for at the parameter of the normal form, a cycle has its amplitude but for O(a^3).
 
-    Van der Pol, and Lorenz's equations, whose Hopf point is at r = sigma (sigma + b + 3) / (sigma - b - 1), where
-    unstable cycles are born (subcritical).
+    Van der Pol, and Lorenz's equations, whose Hopf point is at r = sigma (sigma + b + 3)/(sigma - b - 1),
+    where unstable cycles are born (subcritical).
     """
     pol = smooth("pol", "x, v", "mu: -0.5", "v", "x: v, v: (mu - x**2)*v - x")
     lorenz = smooth(
@@ -376,7 +379,10 @@ def test_a_smooth_cycle_ends_at_its_hopf_point() -> None:
 
 @pytest.mark.parametrize("c", [-1.0, 0.0, 0.1, 0.5, 1.0, 3.0])
 def test_the_product_tells_persistence_from_a_fold(c: float) -> None:
-    """C N^-1 E = (a - c)/(1 + a^2) for N = [[a, -1], [1, a]], E = (c, 1); the sliding rest is at mu (1 + a c)/(c - a)."""
+    """C N^-1 E = (a - c)/(1 + a^2) for N = [[a, -1], [1, a]], E = (c, 1).
+
+    The pseudo-equilibrium is at x = mu (1 + a c)/(c - a).
+    """
     model, a = typed(FOCUS), 0.2
     focus = next(e for e in cf.find_equilibria(model, {"c": c}) if not e.pseudo)
     branch = cf.continue_equilibrium(focus, "mu", (-1.0, 1.0))
@@ -437,9 +443,10 @@ def test_a_virtual_equilibrium_becomes_admissible() -> None:
     model = typed(FOCUS)
     virtual = next(e for e in cf.find_equilibria(model, {"mu": -0.5}).virtual if e.mode == "focus")
     branch = cf.continue_equilibrium(virtual, "mu", (-1.0, 1.0))
-    assert branch.admissible.tolist() == (branch.values > 0).tolist() or abs(
-        np.count_nonzero(branch.admissible) - np.count_nonzero(branch.values > 0)
-    ) <= 1
+    assert (
+        branch.admissible.tolist() == (branch.values > 0).tolist()
+        or abs(np.count_nonzero(branch.admissible) - np.count_nonzero(branch.values > 0)) <= 1
+    )
     assert [e.kind.value for e in branch.events] == ["BE"]
 
 
