@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from contfric.models import Model, load_model, model_names
     from contfric.models.check import ModelReport, check_model
     from contfric.models.oscillator import OscillatorModel
+    from contfric.models.two_folds import TwoFold, find_two_folds
     from contfric.orbit.find import find_orbit
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.simulation import simulate
@@ -108,6 +109,7 @@ _HOMES = {
     "Signature": "contfric.signature",
     "StudyError": "contfric.errors",
     "Sweep": "contfric.response.sweep",
+    "TwoFold": "contfric.models.two_folds",
     "Window": "contfric.atlas.adding",
     "basins": "contfric.response.basin_map",
     "census": "contfric.atlas.census",
@@ -119,6 +121,7 @@ _HOMES = {
     "explore": "contfric.atlas.explore",
     "explore_plane": "contfric.atlas.plane_explore",
     "find_equilibria": "contfric.equilibria.find",
+    "find_two_folds": "contfric.models.two_folds",
     "find_orbit": "contfric.orbit.find",
     "load": "contfric.results",
     "load_model": "contfric.models",
@@ -178,6 +181,7 @@ __all__ = [
     "Signature",
     "StudyError",
     "Sweep",
+    "TwoFold",
     "Window",
     "__version__",
     "basins",
@@ -191,6 +195,7 @@ __all__ = [
     "explore_plane",
     "find_equilibria",
     "find_orbit",
+    "find_two_folds",
     "load",
     "load_model",
     "load_signature",

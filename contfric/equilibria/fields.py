@@ -25,24 +25,7 @@ import numpy as np
 import sympy
 
 from contfric.models.definition import FloatArray
-
-
-def _power(base: Any, exponent: Any) -> Any:
-    return np.sign(base) * np.abs(base) ** exponent
-
-
-def _power_log(base: Any, exponent: Any) -> Any:
-    return 0.0 if base == 0.0 else _power(base, exponent) * np.log(np.abs(base))
-
-
-#: Functions of the language of expressions that numpy does not have (:mod:`contfric.models.formulas`).
-_OWN = {
-    "Sign": np.sign,
-    "Abs": np.abs,
-    "Where": lambda d, a, b: a if d > 0 else b,
-    "Power": _power,
-    "PowerLog": _power_log,
-}
+from contfric.models.numbers import function_of_numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +61,7 @@ class Fields:
 
     def _function(self, formulas: Any, *more: Sequence[Any]) -> Callable[..., Any]:
         args = [list(self.states), list(self.parameters), self._pull, *map(list, more)]
-        return sympy.lambdify(args, formulas, modules=[_OWN, "numpy"], cse=True)  # type: ignore[no-any-return]
+        return function_of_numbers(args, formulas)
 
     @cached_property
     def _values(self) -> Callable[..., Any]:

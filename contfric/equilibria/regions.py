@@ -135,6 +135,7 @@ def regions_of(model: Model) -> tuple[Region, ...]:
     import sympy
 
     from contfric.models.describe import from_text
+    from contfric.models.numbers import function_of_numbers
     from contfric.models.symbols import Formulas
 
     if not model.definition:
@@ -155,8 +156,8 @@ def regions_of(model: Model) -> tuple[Region, ...]:
     args, texts = [list(formulas.y), list(formulas.p)], list(above.values())
     heights = Heights(
         tuple(above),
-        sympy.lambdify(args, texts, modules="numpy"),
-        sympy.lambdify(args, [[h.diff(s) for s in formulas.y] for h in texts], modules="numpy"),
+        function_of_numbers(args, texts),
+        function_of_numbers(args, [[h.diff(s) for s in formulas.y] for h in texts]),
     )
     whole = {d.mode for d in model.domains}
     fields, found = formulas.fields(), []
