@@ -10,6 +10,9 @@ from contfric.models.definition import Domain, Surface
 from contfric.models.description import Description
 from contfric.models.evaluate import Sampler
 
+#: A time and a state.
+Place = tuple[float, list[float]]
+
 #: A rate this small, at a place that Newton's method found, is zero.
 _STILL = 1e-7
 #: Places at which a verdict is asked for: what a single one says may be an accident.
@@ -44,6 +47,8 @@ def turned_modes(
 
     That can only be where the mode holds on both sides of it: modes overlap there.
     """
+    if len({tuple(d.signs.items()) for d in domains}) == len(domains):
+        return frozenset()  # no modes overlap
     place = {(d.mode, *d.signs.items()) for d in domains}
     found: dict[tuple[str, str], set[bool]] = {}
     for surface, here, there in itertools.product([s.name for s in surfaces], domains, domains):
@@ -67,7 +72,7 @@ def leaves_at_rest(sampler: Sampler, description: Description, domains: tuple[Do
     That is so where the limit under which a mode slides is the very place at which the field beside it
     turns around (static and kinetic limits agree); it must be so for other parameters, too.
     """
-    found = False
+    found, places = False, _Places((sampler, _moved(sampler)))
     for domain in domains:
         on = [name for name, side in domain.signs.items() if side == 0]
         limits = {
@@ -78,38 +83,56 @@ def leaves_at_rest(sampler: Sampler, description: Description, domains: tuple[Do
             if side != 0
         }
         for limit in limits if len(on) == 1 else ():
-            verdicts = _left_at_rest(sampler, domain, on[0], limit, domains)
+            beyond = [{**domain.signs, limit: side} for side in (0, -domain.signs[limit])]
+            if any(d.signs in beyond for d in domains):
+                continue  # it goes on sliding there
+            verdicts = _left_at_rest(places, domain, on[0], limit, domains)
             if False in verdicts:  # one place decides: of many contacts there are many domains
                 return False
             found = found or bool(verdicts)
     return found
 
 
+class _Places:
+    """Places where two surfaces meet, near sampled states, with the sides of others, for all domains."""
+
+    def __init__(self, samplers: Sequence[Sampler]) -> None:
+        self.samplers = samplers
+        self._known: dict[tuple[int, str, str], list[tuple[Place, dict[str, int]]]] = {}
+
+    def at(self, k: int, on: str, limit: str) -> list[tuple[Place, dict[str, int]]]:
+        """Return those of one sampler."""
+        if (k, on, limit) not in self._known:
+            sampler, found = self.samplers[k], []
+            names = [s.name for s in sampler.evaluator.description.surfaces]
+            for t, y in sampler.states(_TRIES):
+                place = sampler.landed(on, t, y)
+                for _ in range(20):  # one after the other, until both surfaces are met
+                    second = place and sampler.landed(limit, *place)
+                    place = second and sampler.landed(on, *second)
+                    if place is None or place == second:  # at right angles: met at once
+                        break
+                sides = {} if place is None else sampler.sides(*place, names)
+                if place is not None and sides[on] == sides[limit] == 0:
+                    found.append((place, sides))
+            self._known[k, on, limit] = found
+        return self._known[k, on, limit]
+
+
 def _left_at_rest(
-    sampler: Sampler, domain: Domain, on: str, limit: str, domains: tuple[Domain, ...]
+    places: _Places, domain: Domain, on: str, limit: str, domains: tuple[Domain, ...]
 ) -> set[bool]:
     beyond = {**domain.signs, limit: -domain.signs[limit]}
     beside = [d for d in domains if d.signs[on] != 0 and {**d.signs, on: 0} == beyond]
     found: set[bool] = set()
-    for other in (sampler, _moved(sampler)):
-        places = 0
-        for t, y in other.states(_TRIES):
-            place = other.landed(on, t, y)
-            for _ in range(20):  # one after the other, until both surfaces are met
-                second = place and other.landed(limit, *place)
-                place = second and other.landed(on, *second)
-            if place is None or other.sides(*place, (on, limit)) != {on: 0, limit: 0}:
-                continue
-            rest = {k: v for k, v in domain.signs.items() if k not in (on, limit)}
-            if other.sides(*place, rest) != rest or not beside:
-                continue
-            rates = [other.rate(d.mode, on, d.signs[on], *place) for d in beside]
+    rest = {k: v for k, v in domain.signs.items() if k not in (on, limit)}
+    for k, sampler in enumerate(places.samplers if beside else ()):
+        fits = [at for at, sides in places.at(k, on, limit) if rest.items() <= sides.items()]
+        for place in fits[:_PLACES]:
+            rates = [sampler.rate(d.mode, on, d.signs[on], *place) for d in beside]
             found.add(min(abs(rate) for rate in rates) <= _STILL)
-            places += 1
             if False in found:
                 return found
-            if places == _PLACES:
-                break
     return found
 
 
