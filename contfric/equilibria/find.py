@@ -51,7 +51,7 @@ def find_equilibria(
     Examples
     --------
     >>> import contfric as cf
-    >>> cf.find_equilibria("belt", {"vb": 0.5})[0].state.tolist()
+    >>> cf.find_equilibria("belt", {"vb": 0.5})[0].state.round(9).tolist()
     [0.4, 0.0]
     """
     model, params = tied(model, params)

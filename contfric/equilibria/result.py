@@ -52,7 +52,7 @@ class Equilibrium:
     --------
     >>> import contfric as cf
     >>> [rest] = cf.find_equilibria("belt")
-    >>> rest.mode, rest.state.tolist(), rest.stable
+    >>> rest.mode, rest.state.round(9).tolist(), rest.stable
     ('rise', [0.625, 0.0], False)
     """
 

@@ -36,7 +36,7 @@ def function_of_numbers(arguments: Sequence[Any], formulas: Any) -> Callable[...
     Examples
     --------
     >>> x = sympy.Symbol("x")
-    >>> function_of_numbers([x], [x**2, sympy.cos(x)])(0.0)
+    >>> [float(value) for value in function_of_numbers([x], [x**2, sympy.cos(x)])(0.0)]
     [0.0, 1.0]
     """
     found: Callable[..., Any] = sympy.lambdify(
