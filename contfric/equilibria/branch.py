@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from contfric.equilibria.events import EquilibriumEvent
 from contfric.equilibria.regions import Region
-from contfric.equilibria.result import Equilibrium, Location, is_stable
+from contfric.equilibria.result import Equilibrium, Location
 from contfric.errors import ParameterError, did_you_mean
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
@@ -96,8 +96,7 @@ class EquilibriumBranch:
     @property
     def stable(self) -> NDArray[np.bool_]:
         """Whether each point attracts what is near; False where eigenvalues do not tell, shape (k,)."""
-        rows = (own[~np.isnan(own.real)] for own in self.eigenvalues)
-        return np.array([is_stable(own) is True for own in rows])
+        return np.array([self[k].stable is True for k in range(len(self))], dtype=bool)
 
     @property
     def params(self) -> dict[str, FloatArray | float]:

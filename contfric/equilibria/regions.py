@@ -116,6 +116,26 @@ class Region:
         """Return the eigenvalues of the field within the surfaces of the mode, shape (n - k,)."""
         return self.fields.eigenvalues(y, p)
 
+    def attracts(self, y: FloatArray, p: FloatArray) -> bool:
+        """Tell whether the fields beside the surface of the mode lead to it.
+
+        They do where sliding is derived. A static limit above the kinetic one holds what they would carry
+        off.
+        """
+        if len(self.on) != 1:
+            return True  # of two surfaces sliding is derived only where both switches drive back
+        (surface,), (domain, _) = self.on, self.domain_of(y, p)
+        slope = self.heights.slopes(y, p)[self.heights.names.index(surface)]
+        for side in (1, -1):
+            signs = {**domain.signs, surface: side}
+            modes = {d.mode for d in self.model.domains if d.signs == signs}
+            for region in regions_of(self.model):
+                if region.mode in modes and region.kinks == self.kinks and not region.on:
+                    rate = float(slope @ region.fields.value(y, p))
+                    if side * rate > _ON * float(np.abs(slope) @ scale_of(self.model, p)):
+                        return False
+        return True
+
 
 def scale_of(model: Model, p: FloatArray) -> FloatArray:
     """Return the natural size of each state: its spread, 1 where it has none."""

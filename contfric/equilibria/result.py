@@ -90,7 +90,12 @@ class Equilibrium:
 
     @property
     def stable(self) -> bool | None:
-        """Whether it attracts what is near, by its eigenvalues; None where they do not tell."""
+        """Whether it attracts what is near; None where its eigenvalues do not tell.
+
+        A pseudo-equilibrium has to attract within its surface, and the fields beside have to lead to that.
+        """
+        if self.pseudo and not self.region.attracts(self.state, self.vector):
+            return False
         return is_stable(self.eigenvalues)
 
     def __repr__(self) -> str:
@@ -169,7 +174,7 @@ class EquilibriumSet:
 
     @property
     def stable(self) -> bool | None:
-        """Whether the set attracts what is near, by its other eigenvalues; no member attracts another one."""
+        """Whether the set attracts within its surface, by its other eigenvalues."""
         return is_stable(self.eigenvalues)
 
     def __repr__(self) -> str:

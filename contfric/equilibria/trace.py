@@ -19,7 +19,7 @@ from contfric.equilibria.find import equilibrium_at
 from contfric.equilibria.hopf import centre_of
 from contfric.equilibria.march import Crossing, Limits, Run, march
 from contfric.equilibria.regions import check_no_excitation, scale_of
-from contfric.equilibria.result import Equilibrium, Location, is_stable
+from contfric.equilibria.result import Equilibrium, Location
 from contfric.errors import ParameterError, checked_range, real_number, shown, whole_number
 
 #: Largest step in the scaled product by default: a fiftieth of the range or of a natural size. What happens
@@ -207,7 +207,7 @@ def _event(arc: Arc, crossing: Crossing) -> tuple[EquilibriumEvent | None, Partn
 
 
 def _stable(arc: Arc, place: Place) -> bool | None:
-    return is_stable(arc.region.eigenvalues(arc.state(place.x), arc.parameters(place.x)))
+    return equilibrium_at(arc.region, arc.state(place.x), arc.parameters(place.x)).stable
 
 
 def _branch(

@@ -202,6 +202,30 @@ def test_a_model_whose_excitation_is_switched_off_rests() -> None:
         cf.continue_equilibrium(rest, "F", (0.0, 0.1))
 
 
+def test_what_is_held_beyond_kinetic_friction_does_not_attract() -> None:
+    """A load w relaxes to W while the mass sticks: held for |w| < S0, driven back for |w| < S."""
+    model = typed(
+        BLOCK.replace("[x, v]", "[x, v, w]")
+        .replace("S0: 0.4", "S0: 0.4, W: 0.1")
+        .replace("observable: x,", "observable: w,")
+        .replace("v: -x - S*sign(v)", "v: -w - S*sign(v), w: W - w")
+        .replace("{x: 0, v: 0}", "{x: w - x, v: 0, w: W - w}")
+    )
+    for force, stable in ((0.1, True), (0.35, False), (-0.25, True), (-0.39, False)):
+        (rest,) = [e for e in cf.find_equilibria(model, {"W": force}) if e.mode == "stick"]
+        assert np.allclose(rest.eigenvalues, -1.0) and rest.stable is stable
+    branch = cf.continue_equilibrium(rest, "W", (-0.399, 0.399))
+    assert branch.stable.tolist() == (np.abs(branch.values) < 0.3).tolist()
+
+
+def test_sliding_of_a_relay_is_degenerate_at_its_hopf_point() -> None:
+    """Its zero dynamics are linear: eigenvalues -sigma rho +- sqrt(...), and no cycle is told."""
+    (rest,) = cf.find_equilibria("relay-sliding", {"sigma": 0.5})
+    (event,) = cf.continue_equilibrium(rest, "sigma", (-0.9, 0.9)).events
+    assert isinstance(event, cf.HopfPoint) and event.label == "H0"
+    assert abs(event.value) < 1e-14 and event.frequency == pytest.approx(1.0)
+
+
 # ------------------------------------------------------------------------------ smooth events
 
 
