@@ -33,7 +33,7 @@ class _LostError(ArithmeticError):
     """Newton's method finds no point at a share of a step."""
 
 
-class Place(NamedTuple):
+class CurvePoint(NamedTuple):
     """A point of a curve: the scaled unknowns and the unit tangent, shapes (n + 1,)."""
 
     x: FloatArray
@@ -87,7 +87,7 @@ class Arc:
         by_parameter = fields.slope(y, p, self.active) * self.width
         return np.asarray(np.column_stack([by_state, by_parameter]) / self.scale[:, None])
 
-    def corrected(self, guess: FloatArray, normal: FloatArray) -> Place | None:
+    def corrected(self, guess: FloatArray, normal: FloatArray) -> CurvePoint | None:
         """Return the point in the plane through a guess normal to a direction; None if none is near."""
         x, length = guess.copy(), np.inf
         for _ in range(_STEPS):
@@ -107,7 +107,7 @@ class Arc:
             if length > _CONVERGED:
                 return None
         tangent = self.tangent(x, normal)
-        return None if tangent is None else Place(x, tangent)
+        return None if tangent is None else CurvePoint(x, tangent)
 
     def tangent(self, x: FloatArray, along: FloatArray) -> FloatArray | None:
         """Return the unit tangent at a point, on the side of a direction."""
@@ -121,18 +121,20 @@ class Arc:
         size = float(np.linalg.norm(found))
         return np.asarray(found / size) if np.isfinite(size) else None
 
-    def start(self, y: FloatArray, value: float, sign: float) -> Place | None:
+    def start(self, y: FloatArray, value: float, sign: float) -> CurvePoint | None:
         """Return the point at a parameter, with the tangent along which it grows (sign 1) or falls."""
         upwards = np.zeros(len(y) + 1)
         upwards[-1] = sign
         return self.corrected(self.unknowns(y, value), upwards)
 
-    def orientation(self, place: Place) -> float:
+    def orientation(self, place: CurvePoint) -> float:
         """Return the determinant of the bordered matrix as a geometric mean; 0 at a branch point."""
         sign, size = np.linalg.slogdet(np.vstack([self.jacobian(place.x), place.tangent]))
         return float(sign * np.exp(size / len(place.x))) if np.isfinite(size) else 0.0
 
-    def located(self, before: Place, after: Place, test: Callable[[Place], float]) -> Place | None:
+    def located(
+        self, before: CurvePoint, after: CurvePoint, test: Callable[[CurvePoint], float]
+    ) -> CurvePoint | None:
         """Return the point between two at which a test function vanishes; None if the curve is lost there.
 
         At a branch point the equations are singular: the nearest point at which they are not stands for it.
@@ -142,7 +144,7 @@ class Arc:
         chord = after.x - before.x
         length = float(np.linalg.norm(chord))
         normal = chord / length
-        known: list[tuple[float, float, Place]] = []
+        known: list[tuple[float, float, CurvePoint]] = []
 
         def value(share: float) -> float:
             place = self.corrected(before.x + share * chord, normal)

@@ -24,7 +24,7 @@ from enum import Enum
 
 import numpy as np
 
-from contfric.equilibria.arc import Arc, Place
+from contfric.equilibria.arc import Arc, CurvePoint
 from contfric.equilibria.regions import Region, regions_of
 from contfric.models.definition import FloatArray
 
@@ -54,11 +54,11 @@ class Partner:
 
     unfolding: Unfolding
     region: Region | None = None
-    place: Place | None = None
+    place: CurvePoint | None = None
     product: float = float("nan")
 
 
-def partner_of(arc: Arc, place: Place, surface: str) -> Partner:
+def partner_of(arc: Arc, place: CurvePoint, surface: str) -> Partner:
     """Return what meets an equilibrium on a surface; its branch arrives there along its tangent."""
     y, p = arc.state(place.x), arc.parameters(place.x)
     others = [
@@ -88,7 +88,7 @@ def _rests(region: Region, arc: Arc, y: FloatArray, p: FloatArray) -> bool:
     return on and bool(np.all(np.abs(rates) <= _VANISHES * size)) and not region.domain_of(y, p)[1]
 
 
-def _inwards(arc: Arc, y: FloatArray, value: float) -> Place | None:
+def _inwards(arc: Arc, y: FloatArray, value: float) -> CurvePoint | None:
     """Return the point of a curve at the boundary of its region, directed inwards; None if it stays on it."""
     place = arc.start(y, value, 1.0)
     if place is None:
@@ -100,10 +100,10 @@ def _inwards(arc: Arc, y: FloatArray, value: float) -> Place | None:
     rate = arc.region.sides(domain)[touched[0]] * height_rate(arc, place, touched[0])
     if rate == 0.0:
         return None
-    return place if rate > 0.0 else Place(place.x, -place.tangent)
+    return place if rate > 0.0 else CurvePoint(place.x, -place.tangent)
 
 
-def height_rate(arc: Arc, place: Place, surface: str) -> float:
+def height_rate(arc: Arc, place: CurvePoint, surface: str) -> float:
     """Return the rate of a height along a curve, by a central difference over a short chord of it."""
     k = arc.region.heights.names.index(surface)
     short = 1e-6  # the root of rounding is 1e-8; the height is smooth on the scale of the range

@@ -178,7 +178,7 @@ class BoundaryPoint(EquilibriumEvent):
         Parameters
         ----------
         distance : float, optional
-            Of the parameter from the event; by default a thousandth of the branch's range.
+            Of the parameter from the event; by default a hundredth of its value there, 0.01 at 0.
 
         Raises
         ------

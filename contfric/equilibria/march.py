@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from contfric.equilibria.arc import Arc, Place
+from contfric.equilibria.arc import Arc, CurvePoint
 from contfric.equilibria.branch import BranchEnd
 from contfric.equilibria.hopf import is_oscillating, pair_sum
 
@@ -34,9 +34,9 @@ class Crossing:
     """
 
     test: str
-    place: Place
-    before: Place
-    after: Place
+    place: CurvePoint
+    before: CurvePoint
+    after: CurvePoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +56,12 @@ class Run:
     """The points of a march in one region, the events among them and its end."""
 
     arc: Arc
-    places: list[Place] = field(default_factory=list)
+    places: list[CurvePoint] = field(default_factory=list)
     crossings: list[Crossing] = field(default_factory=list)
     end: BranchEnd = BranchEnd.POINTS
 
 
-def march(arc: Arc, start: Place, limits: Limits) -> Run:
+def march(arc: Arc, start: CurvePoint, limits: Limits) -> Run:
     """Follow a curve from a point along its tangent; it ends behind the first boundary of its region."""
     run, step = Run(arc, [start]), _FIRST
     closes = _Closing(start)
@@ -96,10 +96,10 @@ def march(arc: Arc, start: Place, limits: Limits) -> Run:
 class _Closing:
     """Tells whether a march passes its start again, in the same direction."""
 
-    def __init__(self, start: Place) -> None:
+    def __init__(self, start: CurvePoint) -> None:
         self.start, self.left, self.before = start, False, 0.0
 
-    def by(self, place: Place) -> bool:
+    def by(self, place: CurvePoint) -> bool:
         ahead = float((place.x - self.start.x) @ self.start.tangent)
         near = float(np.linalg.norm(place.x - self.start.x)) < 0.1
         passed = self.left and near and self.before < 0.0 <= ahead
@@ -108,7 +108,7 @@ class _Closing:
         return passed
 
 
-def _next(arc: Arc, last: Place, step: float) -> tuple[Place | None, float]:
+def _next(arc: Arc, last: CurvePoint, step: float) -> tuple[CurvePoint | None, float]:
     """Return the next point and the length of the step after it; None if the curve is lost."""
     while step > _SHORTEST:
         found = arc.corrected(last.x + step * last.tangent, last.tangent)
@@ -120,18 +120,18 @@ def _next(arc: Arc, last: Place, step: float) -> tuple[Place | None, float]:
     return None, step
 
 
-def _at_bound(arc: Arc, last: Place, following: Place, bound: float) -> Place:
+def _at_bound(arc: Arc, last: CurvePoint, following: CurvePoint, bound: float) -> CurvePoint:
     """Return the point of a step at which the parameter reaches a bound."""
     return arc.located(last, following, lambda at: arc.parameter(at.x) - bound) or last
 
 
-def _over(arc: Arc, place: Place, limits: Limits) -> float | None:
+def _over(arc: Arc, place: CurvePoint, limits: Limits) -> float | None:
     """Return the bound of the parameter that a point lies beyond; None if it lies within."""
     value = arc.parameter(place.x)
     return limits.high if value > limits.high else limits.low if value < limits.low else None
 
 
-def crossings(arc: Arc, before: Place, after: Place) -> list[Crossing]:
+def crossings(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[Crossing]:
     """Return the events of a step, in their order."""
     found = []
     for name, test in _tests(arc, before):
@@ -155,11 +155,11 @@ def crossings(arc: Arc, before: Place, after: Place) -> list[Crossing]:
     return sorted(found, key=lambda c: float((c.place.x - before.x) @ along))
 
 
-def _eigenvalues(arc: Arc, place: Place) -> np.ndarray:
+def _eigenvalues(arc: Arc, place: CurvePoint) -> np.ndarray:
     return np.asarray(arc.region.eigenvalues(arc.state(place.x), arc.parameters(place.x)))
 
 
-def _tests(arc: Arc, before: Place) -> Iterator[tuple[str, Callable[[Place], float]]]:
+def _tests(arc: Arc, before: CurvePoint) -> Iterator[tuple[str, Callable[[CurvePoint], float]]]:
     """Yield the test functions that are watched behind a point, by their names."""
     yield "SN", lambda at: float(at.tangent[-1])
     yield "BP", arc.orientation
@@ -173,7 +173,7 @@ def _tests(arc: Arc, before: Place) -> Iterator[tuple[str, Callable[[Place], flo
             yield name, partial(_height, arc, k)
 
 
-def _height(arc: Arc, k: int, at: Place) -> float:
+def _height(arc: Arc, k: int, at: CurvePoint) -> float:
     return float(arc.region.heights.value(arc.state(at.x), arc.parameters(at.x))[k])
 
 
@@ -185,5 +185,5 @@ def _leaves(arc: Arc, crossing: Crossing) -> bool:
     return inside[0] and not inside[1]
 
 
-def _wrong(arc: Arc, place: Place) -> tuple[str, ...]:
+def _wrong(arc: Arc, place: CurvePoint) -> tuple[str, ...]:
     return arc.region.domain_of(arc.state(place.x), arc.parameters(place.x))[1]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.equilibria.arc import Arc, Place
+from contfric.equilibria.arc import Arc, CurvePoint
 from contfric.equilibria.boundary import Partner, Unfolding, partner_of
 from contfric.equilibria.branch import BranchEnd, EquilibriumBranch
 from contfric.equilibria.events import (
@@ -87,10 +87,14 @@ def continue_equilibrium(
     )
     scale = scale_of(model, equilibrium.vector)
     arc = Arc(equilibrium.region, equilibrium.vector, active, scale, limits.high - limits.low)
-    halves = []
+    halves: list[list[_Leg]] = []
     for sign in (-1.0, 1.0):
         start = arc.start(equilibrium.state, float(equilibrium.vector[active]), sign)
-        halves.append([] if start is None else _followed(arc, start, limits))
+        closed = bool(halves and halves[0]) and halves[0][-1].run.end is BranchEnd.CLOSED
+        if start is None or closed:  # one half of a closed branch is all of it
+            halves.append([])
+        else:
+            halves.append(_followed(arc, start, limits))
     return _branch(equilibrium, parameter, halves[0], halves[1])
 
 
@@ -121,7 +125,7 @@ class _Leg:
         self.run, self.events = run, events
 
 
-def _followed(arc: Arc, start: Place, limits: Limits) -> list[_Leg]:
+def _followed(arc: Arc, start: CurvePoint, limits: Limits) -> list[_Leg]:
     """Follow a curve from region to region."""
     legs: list[_Leg] = []
     left = limits.max_points
@@ -154,7 +158,7 @@ def _followed(arc: Arc, start: Place, limits: Limits) -> list[_Leg]:
     return legs
 
 
-def _is_at_limit(arc: Arc, place: Place, limits: Limits) -> bool:
+def _is_at_limit(arc: Arc, place: CurvePoint, limits: Limits) -> bool:
     """Tell whether an event is at a limit of the model, where formulas may degenerate."""
     value, near = arc.parameter(place.x), _AT_LIMIT * (limits.high - limits.low)
     below = limits.low_end is BranchEnd.LIMIT and value - limits.low < near
@@ -206,7 +210,7 @@ def _event(arc: Arc, crossing: Crossing) -> tuple[EquilibriumEvent | None, Partn
     return event, partner
 
 
-def _stable(arc: Arc, place: Place) -> bool | None:
+def _stable(arc: Arc, place: CurvePoint) -> bool | None:
     return equilibrium_at(arc.region, arc.state(place.x), arc.parameters(place.x)).stable
 
 
@@ -230,6 +234,8 @@ def _branch(
         own[k, : len(found)] = found
         admissible.append(not arc.region.domain_of(y, p)[1])
     ends = [legs[-1].run.end if legs else BranchEnd.LOST for legs in (down, up)]
+    if down and ends[0] is BranchEnd.CLOSED and not up:
+        ends[1] = BranchEnd.CLOSED
     return EquilibriumBranch(
         start.model,
         parameter,

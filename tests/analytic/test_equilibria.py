@@ -245,6 +245,17 @@ def test_folds_of_a_cubic() -> None:
         assert abs(e.state[0] - e.state[0] ** 3 + e.params["h"]) < 1e-12
 
 
+def test_an_isola_closes() -> None:
+    """x^2 + p^2 = 1: folds at p = +-1, each once."""
+    model = smooth("isola", "x, v", "p: 0.0", "v", "x: v, v: -0.3*v + x**2 + p**2 - 1")
+    branch = cf.continue_equilibrium(cf.find_equilibria(model)[0], "p", (-3.0, 3.0))
+    assert {end.name for end in branch.ends} == {"CLOSED"}
+    assert sorted(e.value for e in branch.of_kind("SN")) == pytest.approx([-1.0, 1.0], abs=1e-13)
+    assert np.allclose(branch.state("x") ** 2 + branch.values**2, 1.0, atol=1e-12)
+    turn = np.unwrap(np.arctan2(branch.values, branch.state("x")))
+    assert abs(turn[-1] - turn[0]) == pytest.approx(2 * math.pi, abs=0.15)
+
+
 def test_a_pitchfork_is_a_branch_point() -> None:
     model = smooth("fork", "x, v", "mu: -0.5", "v", "x: v, v: -0.1*v + mu*x - x**3")
     straight = cf.continue_equilibrium(cf.find_equilibria(model)[0], "mu", (-1.0, 1.0))
