@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contfric.equilibria.branch import EquilibriumBranch
-from contfric.equilibria.events import EquilibriumEvent
+from contfric.equilibria.events import EquilibriumEvent, HopfPoint
 from contfric.equilibria.find import find_equilibria
 from contfric.equilibria.newton import Zeros
 from contfric.equilibria.regions import scale_of
@@ -103,6 +103,8 @@ def _one(a: EquilibriumEvent, b: EquilibriumEvent) -> bool:
     scale = scale_of(a.equilibrium.model, a.equilibrium.vector)
     apart = np.max(np.abs((a.equilibrium.state - b.equilibrium.state) / scale))
     near = abs(a.value - b.value) <= _SAME * (1.0 + abs(a.value))
+    if isinstance(a, HopfPoint) and isinstance(b, HopfPoint):  # several pairs may cross together
+        near = near and abs(a.frequency - b.frequency) <= _SAME * a.frequency
     return a.kind is b.kind and near and bool(apart <= _SAME)
 
 

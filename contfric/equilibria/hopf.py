@@ -30,7 +30,7 @@ from contfric.equilibria.regions import Region
 from contfric.equilibria.result import ComplexArray
 from contfric.models.definition import FloatArray
 
-#: Relative: an imaginary part below this is that of a neutral saddle, two real eigenvalues of opposite sign.
+#: Relative: an imaginary part below this is rounding, as that of a double eigenvalue may be: its root.
 _REAL = 1e-7
 #: Relative: a coefficient smaller than this beside its terms is zero to rounding.
 _CANCELLED = 1e-10
@@ -56,25 +56,16 @@ class Centre:
     drift: FloatArray
 
 
-def pair_sum(eigenvalues: ComplexArray) -> float:
-    """Return the product of the sums of two eigenvalues, as shares of their sizes: zero at a Hopf point.
+def is_oscillating(eigenvalues: ComplexArray, k: int) -> bool:
+    """Tell whether one of some eigenvalues is complex.
 
     Examples
     --------
-    >>> pair_sum(np.array([1 + 2j, 1 - 2j])) > 0 > pair_sum(np.array([-1 + 2j, -1 - 2j]))
-    True
+    >>> is_oscillating(np.array([1e-12 + 2j, 1e-12 - 2j, -3]), 0), is_oscillating(np.array([0j, -1]), 0)
+    (True, False)
     """
-    i, j = np.triu_indices(len(eigenvalues), 1)
-    sizes = np.abs(eigenvalues[i]) + np.abs(eigenvalues[j])
-    return float(np.prod((eigenvalues[i] + eigenvalues[j]) / np.maximum(sizes, 1e-300)).real)
-
-
-def is_oscillating(eigenvalues: ComplexArray) -> bool:
-    """Tell whether the pair whose sum is nearest to zero is complex: no neutral saddle."""
-    i, j = np.triu_indices(len(eigenvalues), 1)
-    k = int(np.argmin(np.abs(eigenvalues[i] + eigenvalues[j])))
     size = float(np.max(np.abs(eigenvalues)))
-    return bool(abs(eigenvalues[i[k]].imag) > _REAL * size)
+    return bool(abs(eigenvalues[k].imag) > _REAL * size)
 
 
 def centre_of(region: Region, y: FloatArray, p: FloatArray, active: int) -> Centre:
@@ -106,8 +97,7 @@ def centre_of(region: Region, y: FloatArray, p: FloatArray, active: int) -> Cent
 
 
 def _critical(values: ComplexArray, own: ComplexArray) -> int:
-    """Return the number of the eigenvalue i omega: that of the pair whose sum is nearest to zero."""
-    i, j = np.triu_indices(len(own), 1)
-    k = int(np.argmin(np.abs(own[i] + own[j])))
-    omega = abs(own[i[k]].imag)
+    """Return the number of the eigenvalue i omega: that of the complex pair nearest to the imaginary axis."""
+    complex_ones = own[own.imag > _REAL * float(np.max(np.abs(own)))]
+    omega = float(complex_ones[int(np.argmin(np.abs(complex_ones.real)))].imag)
     return int(np.argmin(np.abs(values - 1j * omega)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from contfric.equilibria.arc import Arc, CurvePoint
 from contfric.equilibria.branch import BranchEnd
-from contfric.equilibria.hopf import is_oscillating, pair_sum
+from contfric.equilibria.hopf import is_oscillating
 
 #: Steps in the scaled product: the first, the shortest, and how a step that turned little grows.
 _FIRST, _SHORTEST, _GROWTH = 1e-3, 1e-10, 1.6
@@ -133,15 +133,13 @@ def _over(arc: Arc, place: CurvePoint, limits: Limits) -> float | None:
 
 def crossings(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[Crossing]:
     """Return the events of a step, in their order."""
-    found = []
+    found = _pairs(arc, before, after)
     for name, test in _tests(arc, before):
         a, b = test(before), test(after)
         if a == 0.0 or not (a * b < 0.0 or b == 0.0):
             continue
         place = arc.located(before, after, test)
         if place is None:
-            continue
-        if name == "H" and not is_oscillating(_eigenvalues(arc, place)):
             continue
         found.append(Crossing(name, place, before, after))
     vertex = [c for c in found if c.test == "BP"]
@@ -159,13 +157,32 @@ def _eigenvalues(arc: Arc, place: CurvePoint) -> np.ndarray:
     return np.asarray(arc.region.eigenvalues(arc.state(place.x), arc.parameters(place.x)))
 
 
+def _pairs(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[Crossing]:
+    """Return the complex pairs that cross the imaginary axis on a step.
+
+    If m eigenvalues have a positive real part at one end and more at the other, the real part that is the
+    (m + 1)-th largest changes its sign, and so on: pairs that cross together are told apart by their rank.
+    """
+    counts = [int(np.count_nonzero(_eigenvalues(arc, at).real > 0.0)) for at in (before, after)]
+    found, k = [], min(counts)
+    while k < max(counts):
+        place = arc.located(before, after, partial(_real_part, arc, k))
+        oscillating = place is not None and is_oscillating(_eigenvalues(arc, place), k)
+        if place is not None and oscillating:
+            found.append(Crossing("H", place, before, after))
+        k += 2 if oscillating else 1
+    return found
+
+
+def _real_part(arc: Arc, k: int, at: CurvePoint) -> float:
+    return float(_eigenvalues(arc, at)[k].real)
+
+
 def _tests(arc: Arc, before: CurvePoint) -> Iterator[tuple[str, Callable[[CurvePoint], float]]]:
     """Yield the test functions that are watched behind a point, by their names."""
     yield "SN", lambda at: float(at.tangent[-1])
     yield "BP", arc.orientation
     region = arc.region
-    if len(arc.scale) - len(region.on) > 1:
-        yield "H", lambda at: pair_sum(_eigenvalues(arc, at))
     domain, _ = region.domain_of(arc.state(before.x), arc.parameters(before.x))
     for name in region.sides(domain):
         if region.bounds(domain, name):

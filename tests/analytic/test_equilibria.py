@@ -523,6 +523,25 @@ def test_neutral_saddles_are_no_hopf_points() -> None:
     assert not cf.continue_equilibrium(cf.find_equilibria(model)[0], "c", (-1, 1)).events
 
 
+def test_pairs_that_cross_together_are_seen() -> None:
+    """Two oscillators side by side: both pairs cross at mu = 0, one on each side of it where they differ."""
+    for apart in (0.0, 1e-3):
+        model = smooth(
+            "two",
+            "x, v, y, w",
+            f"mu: -0.5, d: {apart}",
+            "v",
+            "x: v, v: (mu - x**2)*v - x, y: w, w: (mu - d - y**2)*w - 2*y",
+        )
+        (rest,) = cf.find_equilibria(model)
+        events = cf.continue_equilibrium(rest, "mu", (-1, 1)).events
+        assert [e.value for e in events] == pytest.approx([0.0, apart], abs=1e-12)
+        assert [e.label for e in events] == ["H-", "H-"]
+        if apart:
+            assert [e.frequency for e in events] == pytest.approx([1.0, math.sqrt(2.0)])
+            assert events[0].lyapunov == pytest.approx(-0.25)
+
+
 def test_events_lie_where_a_root_search_by_eigenvalues_has_them() -> None:
     model = smooth(
         "three", "x, y, z", "p: 0.3", "x", "x: y, y: z, z: -p*z - y - x + 0.3*x**2 + 0.2*p*x + 0.1"
