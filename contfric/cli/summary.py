@@ -27,7 +27,12 @@ def findings(record: Record) -> Iterator[str]:
     if "lyapunov" in record:
         yield ""
         yield from _map(record["lyapunov"])
-    for key, lines in (("sweep", _sweep), ("poincare", _points), ("basins", _basins)):
+    for key, lines in (
+        ("sweep", _sweep),
+        ("poincare", _points),
+        ("basins", _basins),
+        ("equilibria", _equilibria),
+    ):
         if key in record:
             yield ""
             yield from lines(record[key])
@@ -56,6 +61,26 @@ def _basins(entry: Record) -> Iterator[str]:
     yield from table(rows)
     if not entry["complete"]:
         yield "incomplete: the same command goes on from the finished tiles"
+
+
+def _equilibria(entry: Record) -> Iterator[str]:
+    low, high = entry["range"]
+    name = entry["parameter"]
+    yield f"equilibria for {name} from {low:g} to {high:g}"
+    rows = [["branch", "modes", "points", name, "", "ends"]]
+    for number, b in enumerate(entry["branches"]):
+        span = [f"{b['from']:.8g}", f"{b['to']:.8g}"]
+        modes, ends = ", ".join(b["modes"]), "; ".join(b["ends"])
+        rows.append([str(number), modes, str(b["points"]), *span, ends])
+    yield from table(rows)
+    if entry["sets"]:
+        yield f"{entry['sets']} whole sets of equilibria, which are not followed"
+    if entry["events"]:
+        events = [["event", name, "meaning"]]
+        events += [[e["label"], f"{e['value']:.13g}", e["meaning"]] for e in entry["events"]]
+        yield from table(events)
+    if not entry["complete"]:
+        yield "incomplete: the search was stopped before it was done"
 
 
 def _sweep(entry: Record) -> Iterator[str]:

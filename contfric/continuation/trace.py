@@ -226,12 +226,13 @@ def _slows_down(side: Side, settings: Settings) -> bool:
 
 
 def _is_point(orbit: Orbit) -> bool:
-    """Tell whether an autonomous orbit has shrunk to a point."""
+    """Tell whether an autonomous orbit has shrunk to a point, and not only its joints to one place."""
     if not orbit.model.autonomous:
         return False
     states = orbit.joints[:, 1:]
     size = np.max(np.abs(states - states[0])) + np.max(np.abs(orbit.ends[-1, 1:] - states[0]))
-    return bool(size < _NO_SIZE * (1.0 + np.max(np.abs(states))))
+    least = _NO_SIZE * (1.0 + np.max(np.abs(states)))
+    return bool(size < least) and orbit.x_max - orbit.x_min < least
 
 
 def _end_of_holds(orbit: Orbit, side: Side, settings: Settings, stuck: bool) -> bool:
@@ -247,6 +248,10 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     before, after = side.before_tip, side.tip
     limit = limit_crossed(orbit, before, after, settings)
     located = locate_events(orbit, before, after, settings)
+    if any(is_on_section(b) and _is_point(b.orbit) for b, _ in located):
+        side.drop_tip()  # beyond it the same orbits come again, half a cycle later
+        side.end = End(EndReason.POINT)
+        return True
     if _comes_closer(side, located, after.arc - before.arc):
         return False
     if located and is_on_section(located[0][0]):

@@ -136,7 +136,8 @@ def _beside_limit(
     found = []
     for side in (1, -1):  # of the limit, within which there is rest
         rest = at.get(tuple(sorted({**signs, limit: side}.items())))
-        if rest is not None and rest.signs[on] == 0:
+        slides_on = any(tuple(sorted({**signs, limit: s}.items())) in at for s in (0, -side))
+        if rest is not None and rest.signs[on] == 0 and not slides_on:
             beyond = [
                 at.get(tuple(sorted({**signs, limit: -side, on: s}.items()))) for s in (1, -1)
             ]

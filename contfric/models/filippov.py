@@ -6,6 +6,8 @@ keeps h (A. F. Filippov, Differential Equations with Discontinuous Righthand Sid
 
     f = (r- f+ - r+ f-) / (r- - r+)
 
+Where two surfaces cross, see :mod:`contfric.models.crossing`.
+
 The mode, its region ``r+ < 0 < r-`` and the surfaces that end it are put into the model as if they had
 been typed. Where r- less r+ depends on parameters only, both ends are levels of one observable.
 
@@ -20,6 +22,7 @@ from typing import Any
 
 import sympy
 
+from contfric.models.crossing import crossing_parts
 from contfric.models.description import Description, ModeText
 from contfric.models.entries import EntryError
 from contfric.models.functions import as_text
@@ -54,7 +57,8 @@ def sliding_parts(
         key: dict(data.get(key) or {}) for key in ("observables", "surfaces", "modes")
     }
     pairs = [(s, above, below) for s in surfaces for above, below in _pairs(description, s)]
-    _check_no_corner(surfaces, pairs)
+    if crossing := _crossing(surfaces, pairs):
+        return crossing_parts(description, crossing, data)
     for surface, above, below in pairs:
         name = _name(surface, above, below, pairs)
         if name in found["modes"]:
@@ -65,18 +69,32 @@ def sliding_parts(
     return found
 
 
-def _check_no_corner(
+def _crossing(
     surfaces: tuple[str, ...], pairs: list[tuple[str, ModeText, ModeText]]
-) -> None:
-    """Refuse surfaces that cross each other where motion may slide on both."""
-    for surface, above, below in pairs:
-        for other in surfaces:
-            if other != surface and above.sides.get(other, below.sides.get(other, 0)) != 0:
-                raise EntryError(
-                    ("surfaces", surface, SLIDING),
-                    f"'{surface}' and '{other}' cross each other, and motion could slide on both: what it "
-                    "does there is not derived. Write the sliding modes yourself",
-                )
+) -> tuple[str, str] | None:
+    """Return the two surfaces that cross where motion may slide on both; None if none do.
+
+    Raises
+    ------
+    EntryError
+        If others slide, too: what follows a group of more than two is not derived.
+    """
+    found = {
+        tuple(sorted((surface, other), key=surfaces.index))
+        for surface, above, below in pairs
+        for other in surfaces
+        if other != surface and above.sides.get(other, below.sides.get(other, 0)) != 0
+    }
+    if not found:
+        return None
+    [(one, other), *more] = sorted(found)
+    if more or len(surfaces) > 2:
+        raise EntryError(
+            ("surfaces", one, SLIDING),
+            f"'{one}' and '{other}' cross each other, and {len(surfaces)} surfaces slide: motion on two that "
+            "cross is derived where no others slide. Write the sliding modes yourself",
+        )
+    return one, other
 
 
 def _pairs(description: Description, surface: str) -> Iterator[tuple[ModeText, ModeText]]:

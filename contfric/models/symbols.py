@@ -134,15 +134,16 @@ class Formulas:
         )
         found = []
         for mode in self.description.modes:
+            on = [
+                observables[surface.observable] - level
+                for surface, level in zip(self.description.surfaces, self.levels(), strict=True)
+                if mode.sides.get(surface.name) == 0
+            ]
             state = list(self.y)
-            for surface, level in zip(self.description.surfaces, self.levels(), strict=True):
-                if mode.sides.get(surface.name) == 0:
-                    above = (observables[surface.observable] - level).xreplace(
-                        dict(zip(self.y, state, strict=True))
-                    )
-                    slope = [above.diff(s) for s in self.y]
-                    square = sum(g**2 for g in slope)
-                    state = [s - above * g / square for s, g in zip(state, slope, strict=True)]
+            if on:  # all at once: surfaces need not be at right angles
+                slopes = sympy.Matrix([[above.diff(s) for s in self.y] for above in on])
+                back = slopes.T * (slopes * slopes.T).inv() * sympy.Matrix(on)
+                state = [s - b for s, b in zip(state, back, strict=True)]
             found.append([sympy.expand(s) for s in state])
         return found
 

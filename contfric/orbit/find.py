@@ -136,6 +136,8 @@ def _marginal(trajectory: Trajectory, done: int, turns: int, mismatch: float) ->
 
 def _grows(trajectory: Trajectory) -> bool:
     """Tell whether the last stretch of a simulation is far larger at its end than at its start."""
+    if not len(trajectory):  # it has met no surface at all
+        return False
     size = np.max(np.abs(trajectory.states), axis=1)
     tenth = max(1, len(size) // 10)
     return bool(np.max(size[-tenth:]) > _GROWTH * np.max(size[:tenth]))

@@ -22,6 +22,8 @@ from contfric.atlas.plane import Plane
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
 from contfric.curves.curve import Curve
+from contfric.equilibria.branch import EquilibriumBranch
+from contfric.equilibria.explore import EquilibriumDiagram
 from contfric.errors import ModelError, ParameterError, ResultFileError, path_of
 from contfric.files import replacing
 from contfric.models import load_model
@@ -31,6 +33,12 @@ from contfric.response.basins import Basins
 from contfric.response.returns import ReleaseMap, Returns
 from contfric.response.sweep import Sweep
 from contfric.results.curves import pack_curve, pack_plane, unpack_curve, unpack_plane
+from contfric.results.equilibria import (
+    pack_equilibria,
+    pack_equilibrium_branch,
+    unpack_equilibria,
+    unpack_equilibrium_branch,
+)
 from contfric.results.lyapunov import pack_map, unpack_map
 from contfric.results.pack import Arrays, Header, Packer
 from contfric.results.response import (
@@ -46,7 +54,18 @@ from contfric.results.response import (
 from contfric.results.unpack import Unpacker
 
 Saveable: TypeAlias = (
-    Orbit | Branch | Diagram | Curve | Plane | LyapunovMap | Sweep | Returns | ReleaseMap | Basins
+    Orbit
+    | Branch
+    | Diagram
+    | Curve
+    | Plane
+    | LyapunovMap
+    | Sweep
+    | Returns
+    | ReleaseMap
+    | Basins
+    | EquilibriumBranch
+    | EquilibriumDiagram
 )
 
 #: Version of the format; it grows when an older contfric could not read what is written. Files of version 1
@@ -169,6 +188,10 @@ def _content(x: Saveable, packer: Packer) -> Header:
         return {"kind": "release map", **pack_releases(x, packer.arrays)}
     if isinstance(x, Basins):
         return {"kind": "basins", **pack_basins(x, packer)}
+    if isinstance(x, EquilibriumBranch):
+        return {"kind": "equilibrium branch", **pack_equilibrium_branch(x, packer.arrays)}
+    if isinstance(x, EquilibriumDiagram):
+        return {"kind": "equilibria", **pack_equilibria(x, packer.arrays)}
     return {"kind": "diagram", **packer.diagram(x)}
 
 
@@ -235,6 +258,10 @@ def _restored(content: Header, pool: Unpacker) -> Saveable:
         return unpack_releases(pool.model, content, pool.arrays)
     if kind == "basins":
         return unpack_basins(pool.model, content, pool.arrays, pool.orbits)
+    if kind == "equilibrium branch":
+        return unpack_equilibrium_branch(pool.model, content, pool.arrays)
+    if kind == "equilibria":
+        return unpack_equilibria(pool.model, content, pool.arrays)
     raise ValueError(f"unknown kind of result {kind!r}")
 
 

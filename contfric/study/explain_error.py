@@ -25,6 +25,7 @@ from contfric.study.schema import (
     StudyFile,
     Want,
 )
+from contfric.study.schema_response import BasinsTask, EquilibriaTask, PoincareTask, SweepTask
 from contfric.yaml_lines import comma_hint
 
 if TYPE_CHECKING:
@@ -41,6 +42,10 @@ _PARTS: dict[str, type[BaseModel]] = {
     "lyapunov": LyapunovTask,
     "continue": ContinueTask,
     "plane": PlaneTask,
+    "sweep": SweepTask,
+    "poincare": PoincareTask,
+    "basins": BasinsTask,
+    "equilibria": EquilibriaTask,
     "figures": Figure,
 }
 #: Keys whose values are names out of a list.

@@ -12,6 +12,9 @@ from contfric.study.responses import KEYS
 from contfric.study.schema import FigureKind
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from contfric.equilibria.explore import EquilibriumDiagram
     from contfric.response.sweep import Sweep
 
 #: Size in inches: width, height, height added by each row of a diagram.
@@ -25,7 +28,10 @@ _SIZES = {
     FigureKind.SWEEP: (9.6, 5.0, 0.0),
     FigureKind.POINCARE: (6.4, 6.0, 0.0),
     FigureKind.BASINS: (8.4, 6.0, 0.0),
+    FigureKind.EQUILIBRIA: (8.4, 5.0, 0.0),
 }
+#: Rows of a diagram that show a state, which an equilibrium has, too.
+_STATES = frozenset({"x_max", "x_min", "stops"})
 #: Kinds that show a diagram.
 _OF_DIAGRAM = frozenset({FigureKind.DIAGRAM, FigureKind.BRANCHES})
 
@@ -47,6 +53,20 @@ def _behind(found: Findings, rows: list[str]) -> Sweep | None:
     if swept is None or diagram is None or swept.parameter != diagram.parameter:
         return None
     return swept if swept.section == "stops" or rows == ["stops"] else None
+
+
+def _draw_equilibria(axes: list[Axes], rows: list[str], found: Findings) -> None:
+    """Draw the equilibria of a run into the rows of a diagram along the same parameter that show a state."""
+    rest, diagram = (
+        cast("EquilibriumDiagram | None", found.responses.get("equilibria")),
+        found.diagram,
+    )
+    if rest is None or diagram is None or rest.parameter != diagram.parameter:
+        return
+    for ax, row in zip(axes, rows, strict=True):
+        if row in _STATES:
+            rest.plot(ax=ax)
+            ax.set_xlabel(ax.get_xlabel() if ax is axes[-1] else "")
 
 
 def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
@@ -87,7 +107,8 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
         assert diagram is not None
         if drawing.kind is FigureKind.DIAGRAM:
             rows = [row.value for row in drawing.rows]
-            plot_diagram(diagram, rows, figure, _behind(found, rows), title)
+            axes_of_rows = plot_diagram(diagram, rows, figure, _behind(found, rows), title)
+            _draw_equilibria(axes_of_rows, rows, found)
         else:
             axes = figure.add_subplot()
             plot_branch_graph(diagram, ax=axes)

@@ -41,6 +41,7 @@ class StepName(str, Enum):
     SWEEP = "sweep"
     POINCARE = "poincare"
     BASINS = "basins"
+    EQUILIBRIA = "equilibria"
     TABLES = "tables"
     DATA = "data"
     FIGURES = "figures"

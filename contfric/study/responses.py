@@ -1,4 +1,4 @@
-"""Steps of a run that ask for simulated responses: what they compute, check, write and say."""
+"""Steps of a run that need no orbit, simulated responses and equilibria: what they compute, check and say."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import numpy as np
 
 from contfric.errors import ContfricError
 from contfric.models.definition import Model
-from contfric.study.schema_response import BasinsTask, PoincareTask, SweepTask
+from contfric.study.schema_response import BasinsTask, EquilibriaTask, PoincareTask, SweepTask
 
 if TYPE_CHECKING:
+    from contfric.equilibria.explore import EquilibriumDiagram
     from contfric.response.basins import Basins
     from contfric.response.returns import Returns
     from contfric.response.sweep import Sweep
@@ -21,11 +22,11 @@ if TYPE_CHECKING:
     from contfric.study.schema import StudyFile
     from contfric.yaml_lines import LocatedYaml
 
-Response: TypeAlias = "Sweep | Returns | Basins"
+Response: TypeAlias = "Sweep | Returns | Basins | EquilibriumDiagram"
 Say = Callable[[str], None]
 
 #: The keys of a study that ask for a response, in the order of the steps.
-KEYS = ("sweep", "poincare", "basins")
+KEYS = ("sweep", "poincare", "basins", "equilibria")
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,9 @@ def text_of(task: Any) -> str:
     if isinstance(task, BasinsTask):
         sides = (f"{n} from {v[0]:g} to {v[1]:g} ({v[2]:g})" for n, v in task.grid.items())
         return f"what starts converge to, {' x '.join(sides)}"
+    if isinstance(task, EquilibriaTask):
+        low, high = task.range
+        return f"equilibria, {task.parameter} from {low:g} to {high:g}, and their events"
     low, high, count = task.values
     direction = "both" if task.direction is None else task.direction.value
     return (
@@ -65,6 +69,7 @@ def row_text(key: str) -> str:
         "sweep": "one row a point of the sweep",
         "poincare": "one row a point of the section",
         "basins": "one row a start of the basins",
+        "equilibria": "one row a point or event of the equilibria",
     }[key]
 
 
@@ -73,6 +78,9 @@ def check(located: LocatedYaml, content: StudyFile, model: Model) -> None:
     for key, task in tasks_of(content).items():
         if isinstance(task, BasinsTask):
             _check_basins(located, task, model)
+            continue
+        if isinstance(task, EquilibriaTask):
+            _check_equilibria(located, task, model)
             continue
         if task.state is not None and len(task.state) != len(model.states):
             located.fail(
@@ -95,6 +103,24 @@ def _check_basins(located: LocatedYaml, task: BasinsTask, model: Model) -> None:
         check_starts(model, _axes(task), task.at)
     except ContfricError as error:
         located.fail(("basins",), str(error))
+
+
+def _check_equilibria(located: LocatedYaml, task: EquilibriaTask, model: Model) -> None:
+    from contfric.errors import checked_range
+
+    try:
+        model.index_of(task.parameter)
+    except ContfricError as error:
+        located.fail(("equilibria", "parameter"), str(error))
+    try:
+        checked_range(task.parameter, task.range)
+    except ContfricError as error:
+        located.fail(("equilibria", "range"), str(error))
+    if not model.definition:
+        located.fail(
+            ("equilibria",),
+            f"equilibria are found from formulas, and '{model.name}' is not declared by formulas",
+        )
 
 
 def _axes(task: BasinsTask) -> dict[str, Any]:
@@ -144,6 +170,8 @@ def compute(study: Study, key: str, task: Any, tiles: Path, say: Say) -> Respons
         from contfric.response.poincare import poincare
 
         return poincare(study.model, study.params, **task.options())
+    if isinstance(task, EquilibriaTask):
+        return _equilibria(study, task, say)
     if isinstance(task, BasinsTask):
         found = _basins(study, task, tiles, say)
     else:
@@ -151,6 +179,20 @@ def compute(study: Study, key: str, task: Any, tiles: Path, say: Say) -> Respons
     if found.complete:
         shutil.rmtree(tiles, ignore_errors=True)
     return found
+
+
+def _equilibria(study: Study, task: EquilibriaTask, say: Say) -> EquilibriumDiagram:
+    from contfric.equilibria.explore import explore_equilibria
+
+    low, high = task.range
+    return explore_equilibria(
+        study.model,
+        task.parameter,
+        (low, high),
+        study.params,
+        progress=lambda text: say(f"equilibria: {text}"),
+        **task.options(),
+    )
 
 
 def _sweep(study: Study, task: SweepTask, tiles: Path, say: Say) -> Sweep:

@@ -16,6 +16,7 @@ from contfric.study.read import Study
 if TYPE_CHECKING:
     from contfric.atlas.plane import Plane
     from contfric.chaos.map import LyapunovMap
+    from contfric.equilibria.explore import EquilibriumDiagram
     from contfric.response.basins import Basins
     from contfric.response.returns import Returns
     from contfric.response.sweep import Sweep
@@ -90,6 +91,12 @@ class StudyResult:
         """The basins, if the study asks for them."""
         found = self.responses.get("basins")
         return None if found is None else cast("Basins", found)
+
+    @property
+    def equilibria(self) -> EquilibriumDiagram | None:
+        """The branches of equilibria, if the study asks for them."""
+        found = self.responses.get("equilibria")
+        return None if found is None else cast("EquilibriumDiagram", found)
 
     def __repr__(self) -> str:
         return f"<StudyResult {self.study.name}: {self.status.value}, in {self.out}>"

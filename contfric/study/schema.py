@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
-from contfric.study.schema_response import BasinsTask, PoincareTask, SweepTask
+from contfric.study.schema_response import BasinsTask, EquilibriaTask, PoincareTask, SweepTask
 from contfric.study.schema_response import Part as _Part
 from contfric.yaml_lines import as_truth
 
@@ -35,6 +35,7 @@ class FigureKind(str, Enum):
     SWEEP = "sweep"
     POINCARE = "poincare"
     BASINS = "basins"
+    EQUILIBRIA = "equilibria"
 
 
 class Row(str, Enum):
@@ -238,7 +239,7 @@ class Figure(_Part):
 
     kind: Annotated[FigureKind, Field(strict=False)] = Field(
         description="one of diagram, orbit, transitions, branches, lyapunov, plane, sweep, "
-        "poincare, basins"
+        "poincare, basins, equilibria"
     )
     rows: _Rows | None = Field(
         None, description="a list of rows of a diagram: any of x_max, x_min, stops, psi, period"
@@ -297,6 +298,10 @@ class StudyFile(_Part):
         None, description="a mapping with any of section, sense, state, time, periods, transient"
     )
     basins: BasinsTask | None = Field(None, description="a mapping with grid; also at, periods")
+    equilibria: EquilibriaTask | None = Field(
+        None,
+        description="a mapping with parameter and range; also values, starts, max_step",
+    )
     want: _Wants = Field([], description="a list with any of stability, asymmetry, extrema, stops")
     figures: list[Figure] = Field([], description="a list of mappings, each with its kind")
 
@@ -309,7 +314,7 @@ class StudyFile(_Part):
     def needs_orbit(self) -> bool:
         """Whether anything is asked for that needs the orbit of the start."""
         shown = {figure.kind for figure in self.figures}
-        responses = (self.lyapunov, self.sweep, self.poincare, self.basins)
+        responses = (self.lyapunov, self.sweep, self.poincare, self.basins, self.equilibria)
         simulated = any(task is not None for task in responses)
         alone = simulated and self.task is None and self.plane is None
         return (

@@ -72,6 +72,33 @@ class BasinsTask(Part):
     )
 
 
+class EquilibriaTask(Part):
+    """Equilibria over a range of a parameter, with their events."""
+
+    parameter: str = Field(description="the name of a parameter of the model")
+    range: list[float] = Field(
+        min_length=2, max_length=2, description="two finite numbers [low, high]"
+    )
+    values: int | None = Field(
+        None,
+        ge=1,
+        description="a whole number >= 1: values of the parameter at which equilibria are looked for",
+    )
+    starts: int | None = Field(
+        None, ge=1, description="a whole number >= 1: starts of Newton's method in a mode"
+    )
+    max_step: float | None = Field(
+        None,
+        gt=0.0,
+        le=1.0,
+        description="a number in (0, 1]: largest step, as a share of the range",
+    )
+
+    def options(self) -> dict[str, Any]:
+        """Return what is given beyond the parameter and the range, as arguments."""
+        return self.model_dump(exclude={"parameter", "range"}, exclude_none=True)
+
+
 class SweepTask(Part):
     """Simulations along a parameter, the state carried over."""
 

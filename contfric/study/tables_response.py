@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from contfric.chaos.status import Motion
+from contfric.equilibria.events import BoundaryPoint, EquilibriumEvent, HopfPoint
+from contfric.equilibria.explore import EquilibriumDiagram
 from contfric.response.basins import Basins
 from contfric.response.outcome import Outcome
 from contfric.response.returns import Returns
@@ -17,6 +19,9 @@ if TYPE_CHECKING:
 
 def header_of(found: Response) -> list[str]:
     """Return the columns of the table of a response."""
+    if isinstance(found, EquilibriumDiagram):
+        states = found.model.states
+        return ["branch", "event", found.parameter, "mode", *states, "stable", "admissible"]
     if isinstance(found, Basins):
         return [*found.axes, "orbit", "name", "motion"]
     if isinstance(found, Returns):
@@ -26,9 +31,37 @@ def header_of(found: Response) -> list[str]:
 
 def rows_of(found: Response) -> Iterator[tuple[Any, ...]]:
     """Yield the rows of the table of a response."""
+    if isinstance(found, EquilibriumDiagram):
+        return _equilibria(found)
     if isinstance(found, Basins):
         return _starts(found)
     return _points(found) if isinstance(found, Returns) else _swept(found)
+
+
+def _equilibria(found: EquilibriumDiagram) -> Iterator[tuple[Any, ...]]:
+    """Yield the points of each branch, and then its events."""
+    for number, branch in enumerate(found.branches):
+        looks = zip(branch.stable.tolist(), branch.admissible.tolist(), strict=True)
+        for k, look in enumerate(looks):
+            place = number, "", branch.values[k].item(), branch.regions[k].mode
+            yield *place, *branch.states[k].tolist(), *look
+        for event in branch.events:
+            at = event.equilibrium
+            yield number, event.label, event.value, at.mode, *at.state.tolist(), "", ""
+
+
+def _event_entry(event: EquilibriumEvent) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "label": event.label,
+        "meaning": event.meaning,
+        "value": event.value,
+        "state": event.equilibrium.state.tolist(),
+    }
+    if isinstance(event, HopfPoint):
+        entry |= {"frequency": event.frequency, "lyapunov": event.lyapunov}
+    if isinstance(event, BoundaryPoint):
+        entry |= {"unfolding": event.unfolding.name.lower(), "partner": event.partner}
+    return entry
 
 
 def _starts(found: Basins) -> Iterator[tuple[Any, ...]]:
@@ -65,6 +98,24 @@ def _swept(found: Sweep) -> Iterator[tuple[Any, ...]]:
 
 def entries_of(found: Response) -> dict[str, Any]:
     """Return what the record of a run says of a response."""
+    if isinstance(found, EquilibriumDiagram):
+        return {
+            "parameter": found.parameter,
+            "range": list(found.bounds),
+            "branches": [
+                {
+                    "modes": list(dict.fromkeys(branch.modes)),
+                    "points": len(branch),
+                    "from": float(branch.values.min()),
+                    "to": float(branch.values.max()),
+                    "ends": [end.value for end in branch.ends],
+                }
+                for branch in found.branches
+            ],
+            "sets": len(found.sets),
+            "events": [_event_entry(event) for event in found.events],
+            "complete": found.complete,
+        }
     if isinstance(found, Basins):
         return {
             "grid": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in found.axes.items()},

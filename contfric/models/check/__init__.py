@@ -58,6 +58,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
         check_symmetry,
         check_transitions,
     )
+    from contfric.models.check.two_folds import check_two_folds
     from contfric.models.tied import tied
 
     loaded, params = tied(model, params)
@@ -75,6 +76,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_kinks(report, loaded)
     check_sliding(report, probe)
     check_filippov(report, probe)
+    check_two_folds(report, probe)
     check_symmetry(report, probe)
     check_hidden(report, probe)
     check_period(report, probe)

@@ -22,6 +22,7 @@ class Topic(str, Enum):
     UNDECLARED = "symmetries that are not declared"
     PERIOD = "the field repeats itself after the period"
     CONSTRAINTS = "the defaults obey the constraints"
+    TWO_FOLDS = "places at which the fields of both sides are tangent to a surface (two-folds)"
     NAMES = "every parameter is used, and every state is driven"
     SCALES = "states are of sizes, and change in times, that are not far apart"
 

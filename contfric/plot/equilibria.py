@@ -1,0 +1,129 @@
+"""Branches of equilibria: one state along the parameter, stable solid, unstable dashed, events marked."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from contfric.plot.save import axes_or_new
+from contfric.plot.style import (
+    BLACK,
+    GREY,
+    LINE_WIDTH,
+    SMALL,
+    STABLE,
+    TEXT,
+    UNSTABLE,
+    YELLOW,
+    Marker,
+    event_label,
+    lighter,
+    parameter_label,
+)
+
+if TYPE_CHECKING:
+    from contfric.equilibria.branch import EquilibriumBranch
+    from contfric.equilibria.explore import EquilibriumDiagram
+
+#: Marks of the events; the kind of a boundary equilibrium is not one of smooth systems, and yellow as such.
+_MARKERS = {
+    "SN": Marker("o", size=5.5),
+    "BP": Marker("D", size=5.5),
+    "H": Marker("h", size=6.5),
+    "BE": Marker("X", face=YELLOW, size=6.5),
+}
+
+
+def plot_equilibria(
+    branch: EquilibriumBranch, ax: Axes | None = None, state: str | None = None
+) -> Axes:
+    """Draw a branch of equilibria.
+
+    Parameters
+    ----------
+    branch : EquilibriumBranch
+        What is virtual is drawn thin and grey.
+    ax : Axes, optional
+        Where to draw, such as a row of a diagram; new axes by default.
+    state : str, optional
+        Name of the state; the first of the model by default.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> branch = cf.continue_equilibrium(cf.find_equilibria("belt")[0], "vb", (0.1, 1.0))
+    >>> plot_equilibria(branch).get_ylabel()
+    '$x$'
+    """
+    ax = axes_or_new(ax)
+    name = branch.model.states[0] if state is None else state
+    values = branch.state(name)
+    looks = list(zip(branch.stable.tolist(), branch.admissible.tolist(), strict=True))
+    first = 0
+    for (stable, admissible), run in groupby(looks):
+        last = first + len(list(run))
+        part = slice(max(0, first - 1), last)  # lines of different looks meet
+        ax.plot(
+            branch.values[part],
+            values[part],
+            linestyle=STABLE if stable else UNSTABLE,
+            color=BLACK if admissible else lighter(GREY),
+            linewidth=LINE_WIDTH if admissible else 0.5 * LINE_WIDTH,
+            zorder=2,
+        )
+        first = last
+    _draw_events(ax, branch, branch.model.states.index(name))
+    ax.set_xlabel(parameter_label(branch.parameter), fontsize=TEXT + 1)
+    if not ax.get_ylabel():
+        ax.set_ylabel(parameter_label(name), fontsize=TEXT + 1)
+    ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
+    return ax
+
+
+def plot_equilibrium_diagram(
+    found: EquilibriumDiagram, ax: Axes | None = None, state: str | None = None
+) -> Axes:
+    r"""Draw all branches of equilibria on the same axes; parameters as for :func:`plot_equilibria`.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> plot_equilibrium_diagram(cf.explore_equilibria("belt", "vb", (0.1, 1.0))).get_xlabel()
+    '$\\mathrm{vb}$'
+    """
+    new = ax is None
+    ax = axes_or_new(ax)
+    if new:
+        ax.set_xlim(*found.bounds)
+    for branch in found.branches:
+        plot_equilibria(branch, ax=ax, state=state)
+    ax.set_xlabel(parameter_label(found.parameter), fontsize=TEXT + 1)
+    return ax
+
+
+def _draw_events(ax: Axes, branch: EquilibriumBranch, k: int) -> None:
+    for event in branch.events:
+        look = _MARKERS[event.kind.value]
+        (mark,) = ax.plot(
+            [event.value],
+            [float(np.asarray(event.equilibrium.state)[k])],
+            linestyle="none",
+            marker=look.shape,
+            markersize=look.size,
+            markerfacecolor=look.face,
+            markeredgecolor=look.edge,
+            markeredgewidth=0.8,
+            zorder=5,
+        )
+        mark.set_gid(event.label)
+        ax.annotate(
+            event_label(event.label),
+            (event.value, float(np.asarray(event.equilibrium.state)[k])),
+            xytext=(0.0, 7.0),
+            textcoords="offset points",
+            ha="center",
+            fontsize=SMALL,
+        )

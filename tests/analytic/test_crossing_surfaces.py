@@ -1,0 +1,179 @@
+"""Sliding where two switching surfaces cross: derived fields, what follows, and what is refused.
+
+The reference is the same system with steep slopes of width eps in the place of its switches, integrated by
+scipy (Radau): its solutions come to those of the switched system in proportion to eps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import yaml
+from scipy.integrate import solve_ivp
+
+import contfric as cf
+from contfric.models.describe import describe
+from contfric.models.entries import EntryError
+from contfric.models.files import built
+
+#: Two blocks on one belt, coupled by a spring: each switch drives its own block only.
+BLOCKS = """
+name: two-blocks
+states: [x, u, y, w]
+parameters: {vb: 0.4, S: 1.0, R: 0.7, k: 0.6, q: 0.0}
+autonomous: true
+constraints: [S > 0, R > 0]
+surfaces:
+  a: {observable: u, level: vb, sliding: filippov}
+  b: {observable: w, level: vb, sliding: filippov}
+field:
+  x: u
+  u: -x - k*(x - y) - S*sign(u - vb)
+  y: w
+  w: -y - k*(y - x) - R*sign(w - vb) + q*sign(u - vb)*sign(w - vb)
+modes:
+  pp: {in: {a: "+", b: "+"}}
+  pm: {in: {a: "+", b: "-"}}
+  mp: {in: {a: "-", b: "+"}}
+  mm: {in: {a: "-", b: "-"}}
+"""
+
+#: One block on another, which is on a belt: the upper contact drives both blocks.
+STACK = (
+    BLOCKS.replace("two-blocks", "stack")
+    .replace("R: 0.7", "R: 0.35")
+    .replace("surfaces:", "observables: {rel: w - u}\nsurfaces:")
+    .replace("{observable: w, level: vb", "{observable: rel, level: 0")
+    .replace("- k*(x - y) - S*sign(u - vb)", "- S*sign(u - vb) + R*sign(w - u)")
+    .replace("-y - k*(y - x) - R*sign(w - vb)", "-k*y - R*sign(w - u)")
+)
+
+
+def typed(text: str) -> cf.Model:
+    return built(describe(yaml.safe_load(text.replace(" + q*sign(u - vb)*sign(w - vb)", ""))))
+
+
+def steep(p: dict[str, float], name: str, eps: float):
+    def s(v: float) -> float:
+        return float(np.clip(v / eps, -1, 1))
+
+    def blocks(_, z):
+        x, u, y, w = z
+        a, b = s(u - p["vb"]), s(w - p["vb"])
+        return [u, -x - p["k"] * (x - y) - p["S"] * a, w, -y - p["k"] * (y - x) - p["R"] * b]
+
+    def stack(_, z):
+        x, u, y, w = z
+        a, b = s(u - p["vb"]), s(w - u)
+        return [u, -x - p["S"] * a + p["R"] * b, w, -p["k"] * y - p["R"] * b]
+
+    return blocks if name == "two-blocks" else stack
+
+
+@pytest.mark.parametrize(
+    "text", [BLOCKS, pytest.param(STACK, marks=pytest.mark.slow)], ids=["blocks", "stack"]
+)
+def test_solutions_are_the_limit_of_steep_slopes(text: str) -> None:
+    model = typed(text)
+    assert model.filippov
+    rng, visited = np.random.default_rng(5), set()
+    for _ in range(4):
+        start = rng.uniform(-1.5, 1.5, 4)
+        found = cf.simulate(model, {}, state=start, periods=12.0)
+        visited |= {mode for mode, _ in found.word}
+        last = len(found) - 1
+        errors = []
+        for eps in (1e-4, 1e-5):
+            rates = steep(model.defaults, model.name, eps)
+            end = float(found.times[last])
+            reference = solve_ivp(rates, (0, end), start, method="Radau", rtol=1e-8, atol=1e-10)
+            errors.append(float(np.max(np.abs(reference.y[:, -1] - found.states[last]))))
+        assert errors[1] < 3e-4 and errors[1] < 0.3 * errors[0] + 1e-6, errors
+    assert "slide_a_b" in visited  # on both
+    assert visited & {"slide_a_b_above", "slide_a_b_below"}
+    assert visited & {"slide_b_a_above", "slide_b_a_below"}
+
+
+def test_the_field_on_both_surfaces_keeps_both() -> None:
+    """Both blocks of the first model move with the belt; the stack moves as one where none slips."""
+    model = typed(BLOCKS)
+    flow = model.view(model.vector({}))
+    y = np.array([0.1, 0.4, 0.2, 0.4])
+    assert np.allclose(flow.state("slide_a_b", 0.0, y, 0.5), [0.3, 0.4, 0.4, 0.4], atol=1e-12)
+    stack = typed(STACK)
+    flow = stack.view(stack.vector({}))
+    assert np.allclose(flow.state("slide_a_b", 0.0, y, 0.5), [0.3, 0.4, 0.4, 0.4], atol=1e-12)
+    # the upper contact sticks, the lower one slips backwards: both have the mean acceleration
+    beside = np.array([0.3, 0.1, 0.2, 0.1])
+    ahead = flow.state("slide_b_a_below", 0.0, beside, 1e-6)
+    mean = 0.5 * (-0.3 + 1.0 - 0.6 * 0.2)
+    assert (ahead - beside)[[1, 3]] / 1e-6 == pytest.approx([mean, mean], abs=1e-5)
+
+
+def test_a_cycle_of_blocks_whose_friction_falls() -> None:
+    """Its segments, by scipy along the equations as they are written here, end at the next joints."""
+    text = BLOCKS.replace("S*sign(u - vb)", "S/(1 + 3*abs(u - vb))*sign(u - vb)")
+    text = text.replace("R*sign(w - vb)", "R/(1 + 3*abs(w - vb))*sign(w - vb)")
+    orbit = cf.find_orbit(typed(text), {"vb": 0.1}, state=[0.0, 0.1, 0.1, 0.1])
+    assert orbit.converged and orbit.admissible
+    modes = [mode for mode, _ in orbit.word]
+    assert "slide_a_b" in modes and len(set(modes)) > 2
+    p = orbit.params
+
+    def friction(v: float, most: float) -> float:
+        return most / (1 + 3 * abs(v - p["vb"])) * np.sign(v - p["vb"])
+
+    def rates(mode: str):
+        stuck = [mode.startswith("slide_a"), mode.startswith("slide_b") or mode == "slide_a_b"]
+
+        def field(_, z):
+            x, u, y, w = z
+            first = 0.0 if stuck[0] else -x - p["k"] * (x - y) - friction(u, p["S"])
+            return [
+                u,
+                first,
+                w,
+                0.0 if stuck[1] else -y - p["k"] * (y - x) - friction(w, p["R"]),
+            ]
+
+        return field
+
+    for mode, begin, end in zip(modes, orbit.begins, orbit.ends, strict=True):
+        found = solve_ivp(
+            rates(mode), (begin[0], end[0]), begin[1:], method="DOP853", rtol=1e-11, atol=1e-12
+        )
+        assert np.allclose(found.y[:, -1], end[1:], atol=1e-8), mode
+
+
+def test_limits_of_the_stack_keep_their_order() -> None:
+    model = typed(STACK)
+    with pytest.raises(cf.ParameterError, match="S - 2\\*R > 0"):
+        model.check_params({"R": 0.6})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("q*sign(u - vb)", "0.2*sign(u - vb)", "do not add up in 'w'"),
+        ("- R*sign(w - vb) + q*sign(u - vb)*sign(w - vb)", "- R*sign(u - vb)", "singular"),
+        ("R*sign(w - vb) + q", "R*(1 + y**2)*sign(w - vb) + 0*q", "depends on the state"),
+        ("- R*sign(w - vb) + q", "+ R*sign(w - vb) + 0*q", "not driven back"),
+    ],
+)
+def test_what_is_not_determined_is_refused(old: str, new: str, says: str) -> None:
+    assert old in BLOCKS
+    text = BLOCKS.replace(old, new)
+    with pytest.raises(EntryError, match=says) as error:
+        built(describe(yaml.safe_load(text)))
+    assert error.value.address[:2] == ("surfaces", "a")
+
+
+def test_a_third_surface_that_slides_is_refused() -> None:
+    text = BLOCKS.replace(" + q*sign(u - vb)*sign(w - vb)", "").replace(
+        "  b: {", "  c: {observable: x, level: 9, sliding: filippov}\n  b: {"
+    )
+    for mode in ("pp", "pm", "mp", "mm"):
+        text = text.replace(f"  {mode}: {{in: {{", f"  {mode}: {{in: {{c: '-', ")
+    text += "  far: {in: {c: '+'}, field: {x: -1, u: 0, y: 0, w: 0}}\n"
+    with pytest.raises(EntryError, match="where no others slide"):
+        built(describe(yaml.safe_load(text)))
