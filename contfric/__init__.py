@@ -47,9 +47,11 @@ if TYPE_CHECKING:
     from contfric.models.check import ModelReport, check_model
     from contfric.models.oscillator import OscillatorModel
     from contfric.orbit.find import find_orbit
+    from contfric.orbit.gradient import Gradient
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.simulation import simulate
     from contfric.orbit.solve import solve_orbit
+    from contfric.quantities.registry import quantity_names
     from contfric.response.basin_map import basins
     from contfric.response.basins import Basins
     from contfric.response.outcome import Outcome
@@ -74,6 +76,7 @@ _HOMES = {
     "ConvergenceError": "contfric.errors",
     "Diagram": "contfric.atlas.diagram",
     "EndReason": "contfric.continuation.events",
+    "Gradient": "contfric.orbit.gradient",
     "Kind": "contfric.continuation.events",
     "LyapunovExponents": "contfric.chaos.exponents",
     "LyapunovMap": "contfric.chaos.map",
@@ -111,6 +114,7 @@ _HOMES = {
     "model_names": "contfric.models",
     "period_adding": "contfric.atlas.adding",
     "poincare": "contfric.response.poincare",
+    "quantity_names": "contfric.quantities.registry",
     "release_map": "contfric.response.poincare",
     "run_study": "contfric.study",
     "save": "contfric.results",
@@ -133,6 +137,7 @@ __all__ = [
     "Curve",
     "Diagram",
     "EndReason",
+    "Gradient",
     "Kind",
     "LyapunovExponents",
     "LyapunovMap",
@@ -171,6 +176,7 @@ __all__ = [
     "model_names",
     "period_adding",
     "poincare",
+    "quantity_names",
     "release_map",
     "run_study",
     "save",

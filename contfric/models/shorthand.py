@@ -48,6 +48,7 @@ _MAPPINGS = (
     "surfaces",
     "modes",
     "resets",
+    "quantities",
 )
 _NESTED = ("surfaces", "modes", "resets")
 

@@ -46,6 +46,8 @@ def _behind(found: Findings, rows: list[str]) -> Sweep | None:
     swept, diagram = cast("Sweep | None", found.responses.get("sweep")), found.diagram
     if swept is None or diagram is None or swept.parameter != diagram.parameter:
         return None
+    if not all(swept.shows(row) for row in rows):
+        return None
     return swept if swept.section == "stops" or rows == ["stops"] else None
 
 
