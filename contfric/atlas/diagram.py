@@ -80,6 +80,7 @@ class Asked:
     max_periods : longest orbits, in periods; raised to that of a longer start
     copies : most copies of the shortest period that were tried at sliding events
     max_branches, max_points : most branches, and most points of each half-branch
+    stop_at : quantities, and the value at which a branch ends
     """
 
     max_step: float | None = None
@@ -89,6 +90,7 @@ class Asked:
     copies: int = 1
     max_branches: int = 200
     max_points: int = 20_000
+    stop_at: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

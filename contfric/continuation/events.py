@@ -113,6 +113,7 @@ class EndReason(str, Enum):
     BP = "the orbit has become symmetric: its mirror branch goes on from here"
     PD = "the doubled orbit meets the orbit of half its period"
     CLOSED = "the branch is a closed curve"
+    STOP = "a quantity has the value to stop at (stop_at)"
     START = "the branch starts here"
     POINTS = "the largest number of points was reached (max_points)"
     WORK = (

@@ -9,7 +9,7 @@ from contfric.results import replacing
 from contfric.study.drawings import Drawing
 from contfric.study.findings import Findings
 from contfric.study.responses import KEYS
-from contfric.study.schema import FigureKind
+from contfric.study.schema import FigureKind, row_name
 
 if TYPE_CHECKING:
     from contfric.response.sweep import Sweep
@@ -88,7 +88,7 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
     elif drawing.kind in _OF_DIAGRAM:
         assert diagram is not None
         if drawing.kind is FigureKind.DIAGRAM:
-            rows = [row.value for row in drawing.rows]
+            rows = [row_name(row) for row in drawing.rows]
             plot_diagram(diagram, rows, figure, _behind(found, rows), title)
         else:
             axes = figure.add_subplot()

@@ -177,3 +177,123 @@ def test_a_mistake_in_a_file_has_its_line(tmp_path: Path, entry: str, words: str
     with pytest.raises(ModelError) as caught:
         cf.load_model(path)
     assert words in str(caught.value)
+
+
+# ----------------------------------------------------------------------------- where branches end
+
+
+@pytest.mark.parametrize(("name", "value"), [("x_max", 1.43), ("energy", 1.75), ("rms(v)", 0.54)])
+def test_a_branch_ends_where_a_quantity_has_its_value(
+    orbit: cf.Orbit, branch: cf.Branch, name: str, value: float
+) -> None:
+    found = cf.continue_orbit(orbit, "Omega", (0.4, 0.6), stop_at={name: value})
+    end = found.ends[1]
+    assert end.reason is cf.EndReason.STOP
+    assert str(end).endswith(f"{name} = {value:g}")
+    assert found[-1].quantity(name) == pytest.approx(value, abs=1e-13)
+    assert found[-1].converged and found[-1].admissible
+    # the same place on the branch that goes on: between its points, at the parameter of the end
+    again = cf.solve_orbit("coulomb", "1a", {**FIG5, "Omega": float(found.values[-1])})
+    assert again.quantity(name) == pytest.approx(value, abs=1e-10)
+    assert np.all((found.quantity(name)[:-1] - value) * (found.quantity(name)[0] - value) > 0.0)
+    assert len(found) < len(branch)
+
+
+def test_a_value_between_two_points_and_back_is_not_missed(orbit: cf.Orbit) -> None:
+    """The energy has a maximum along the branch; points of steps lie below it."""
+    fine = cf.continue_orbit(orbit, "Omega", (0.4, 0.6), max_step=0.002).quantity("energy")
+    missed = 0
+    for step in (0.05, 0.02):
+        coarse = cf.continue_orbit(orbit, "Omega", (0.4, 0.6), max_step=step).quantity("energy")
+        if coarse.max() >= fine.max():
+            continue
+        value = 0.5 * (coarse.max() + fine.max())
+        missed += 1
+        found = cf.continue_orbit(
+            orbit, "Omega", (0.4, 0.6), max_step=step, stop_at={"energy": value}
+        )
+        assert found.ends[1].reason is cf.EndReason.STOP
+        assert found[-1].quantity("energy") == pytest.approx(value, abs=1e-13)
+    assert missed
+
+
+def test_an_event_before_the_value_is_kept_and_one_behind_it_not(orbit: cf.Orbit) -> None:
+    branch = cf.continue_orbit(orbit, "Omega", (0.4, 0.6))
+    fold = next(b for b in branch.bifurcations if b.kind.value == "SN")
+    values = branch.quantity("x_max")
+    behind = values[int(np.searchsorted(branch.arc, fold.position)) + 2]
+    found = cf.continue_orbit(orbit, "Omega", (0.4, 0.6), stop_at={"x_max": float(behind)})
+    kinds = [b.kind.value for b in found.bifurcations]
+    assert found.ends[1].reason is cf.EndReason.STOP
+    assert ("SN" in kinds) == (found.arc[-1] > fold.position)
+    assert not any(end.bifurcation for end in found.ends[1:])
+
+
+def test_a_diagram_keeps_what_it_was_asked_to_stop_at(orbit: cf.Orbit, tmp_path: Path) -> None:
+    diagram = cf.explore(orbit, "Omega", (0.4, 0.6), stop_at={"x_max": 1.43})
+    assert diagram.loose_ends == ()
+    stopped = [b for b in diagram.branches if b.ends[1].reason is cf.EndReason.STOP]
+    assert stopped and all(
+        b.quantity("x_max").max() <= 1.43 + 1e-12 for b in diagram.branches if not b.mirrored
+    )
+    cf.save(diagram, tmp_path / "diagram.npz")
+    assert cf.load(tmp_path / "diagram.npz").settings == diagram.settings
+    assert diagram.verify(restarts=2).passed
+
+
+@pytest.mark.parametrize(
+    ("stop_at", "words"),
+    [
+        ({"xmax": 1.4}, "has no quantity 'xmax'"),
+        ({"x_max": "high"}, "stop_at['x_max'] is a finite number"),
+        ("x_max", "stop_at is a mapping, such as {'x_max': 1.4}"),
+        ({len: 1.4}, "stop_at takes a quantity by name or expression"),
+        ({"stops": 1.4}, "takes a quantity that is one number"),
+    ],
+)
+def test_what_cannot_be_stopped_at_is_said(orbit: cf.Orbit, stop_at: Any, words: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        cf.continue_orbit(orbit, "Omega", (0.4, 0.6), stop_at=stop_at)
+    assert words in str(caught.value)
+
+
+STUDY = """\
+title: a study with quantities
+model: coulomb
+params: {Omega: 0.5, S: 0.32, S0: 0.4}
+start: {signature: 1a}
+continue: {parameter: Omega, range: [0.4, 0.6], stop_at: {x_max: 1.43}}
+want: [stability, energy, "rms(v)"]
+figures: [{kind: diagram, rows: [energy, "max(u)"]}]
+"""
+
+
+def test_a_study_asks_for_quantities(tmp_path: Path) -> None:
+    path = tmp_path / "study.yaml"
+    path.write_text(STUDY, encoding="utf-8")
+    result = cf.run_study(path, out=tmp_path / "out")
+    header, *rows = (tmp_path / "out" / "points.csv").read_text(encoding="utf-8").splitlines()
+    assert header.split(",")[-3:] == ["energy", "rms(v)", "stable"]
+    assert result.branch is not None and len(rows) == len(result.branch)
+    last = dict(zip(header.split(","), rows[-1].split(","), strict=True))
+    assert float(last["energy"]) == result.branch[-1].quantity("energy")
+    assert result.branch.ends[1].reason is cf.EndReason.STOP
+    assert (tmp_path / "out" / "diagram.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("energy, ", "energie, ", "6: 'want' has no 'energie'; did you mean 'energy'"),
+        ('"rms(v)"', '"rms(w)"', "6: in rms(w): model 'coulomb' has no 'w'"),
+        ("rows: [energy", "rows: [power, y_max", "7: 'rows' has no 'y_max'; did you mean 'x_max'"),
+        ("x_max: 1.43", "xmax: 1.43", "5: 'stop_at' has no 'xmax'"),
+        ("x_max: 1.43", "x_max: big", "5: 'stop_at': it must be a mapping of quantities"),
+    ],
+)
+def test_a_mistake_in_a_study_has_its_line(tmp_path: Path, old: str, new: str, words: str) -> None:
+    path = tmp_path / "study.yaml"
+    path.write_text(STUDY.replace(old, new), encoding="utf-8")
+    with pytest.raises(cf.StudyError) as caught:
+        cf.run_study(path, out=tmp_path / "out")
+    assert words in str(caught.value)
