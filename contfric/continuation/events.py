@@ -31,6 +31,7 @@ from functools import cached_property
 
 import numpy as np
 
+from contfric.continuation.measured_event import MeasuredEvent
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import Domain, Model
 from contfric.orbit.holds import Hold
@@ -162,7 +163,7 @@ class Proposal:
 
 
 @dataclass(frozen=True, eq=False)
-class Bifurcation:
+class Bifurcation(MeasuredEvent):
     """A located event on a branch.
 
     Attributes

@@ -277,3 +277,60 @@ def test_an_autonomous_cycle_has_a_period_and_a_gradient() -> None:
         values.append(beside.period)
     one, two = (values[0] - values[1]) / 2e-4, (values[2] - values[3]) / 4e-4
     assert gradient["vb"] == pytest.approx((4 * one - two) / 3, rel=1e-8)
+
+
+# ------------------------------------------------------------------------------------- events
+
+
+def test_the_onset_of_sticking_moves_as_its_formula() -> None:
+    """Den Hartog: 0s sticks where Omega^2 X = S0, X^2 = V^2 - S^2 U^2; differentiated at 40 digits."""
+    orbit = cf.solve_orbit("coulomb", "0s", {**FIG5, "Omega": 0.56})
+    branch = cf.continue_orbit(orbit, "Omega", (0.5, 0.6))
+    event = next(b for b in branch.bifurcations if b.kind is cf.Kind.CS)
+    gradient = event.gradient()
+
+    def gap(w: Any, S: Any, S0: Any) -> Any:
+        u = mp.tan(mp.pi / (2 * w)) / w
+        return w**4 * ((1 / (1 - w**2)) ** 2 - S**2 * u**2) - S0**2
+
+    with mp.workdps(DIGITS):
+        S, S0 = mpf(event.params["S"]), mpf(event.params["S0"])
+        w = mp.findroot(lambda w: gap(w, S, S0), event.params["Omega"])
+        by_w = mp.diff(lambda w: gap(w, S, S0), w)
+        by_S = -mp.diff(lambda s: gap(w, s, S0), S) / by_w
+        by_S0 = -mp.diff(lambda s: gap(w, S, s), S0) / by_w
+    assert gradient.value == pytest.approx(float(w), abs=1e-12)
+    assert gradient["S"] == pytest.approx(float(by_S), rel=1e-11)
+    assert gradient["S0"] == pytest.approx(float(by_S0), rel=1e-11)
+    assert gradient.notes == ()  # both stops reach the limit at once, by symmetry
+    assert event.gradient("S")["Omega"] == pytest.approx(1.0 / float(by_S), rel=1e-11)
+
+
+EVENTS = [
+    ("1a", ("SN",), (0.5, 0.56)),
+    ("1a", ("CS", "SS"), (0.48, 0.52)),  # one stop, on its limit: CS and SS differ in what follows
+    ("2s", ("BP",), (0.45, 0.52)),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "kinds", "bounds"), EVENTS)
+@pytest.mark.parametrize("parameter", ["S", "S0", "h", "zeta"])
+def test_events_move_as_differences_of_located_ones(
+    name: str, kinds: tuple[str, ...], bounds: tuple[float, float], parameter: str
+) -> None:
+    def located(by: float) -> cf.Bifurcation:
+        start = {"Omega": 0.5, "S": 0.32, "S0": 0.4, "h": 0.0, "zeta": 0.002}
+        if name == "2s":
+            start["Omega"] = 0.47
+        start[parameter] += by
+        branch = cf.continue_orbit(cf.solve_orbit("coulomb", name, start), "Omega", bounds)
+        return next(b for b in branch.bifurcations if b.kind.value in kinds)
+
+    step = 2e-4
+    values = [located(k * step).params["Omega"] for k in (1, -1, 2, -2)]
+    one, two = (values[0] - values[1]) / (2 * step), (values[2] - values[3]) / (4 * step)
+    gradient = located(0.0).gradient()
+    assert gradient.notes == ()
+    # events are good to 1e-12, differences to that over the step and to its fourth power
+    assert gradient[parameter] == pytest.approx((4 * one - two) / 3, rel=2e-7, abs=2e-7)

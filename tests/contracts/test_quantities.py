@@ -297,3 +297,14 @@ def test_a_mistake_in_a_study_has_its_line(tmp_path: Path, old: str, new: str, w
     with pytest.raises(cf.StudyError) as caught:
         cf.run_study(path, out=tmp_path / "out")
     assert words in str(caught.value)
+
+
+def test_an_event_from_a_file_asks_for_its_parameter(branch: cf.Branch, tmp_path: Path) -> None:
+    cf.save(branch, tmp_path / "branch.npz")
+    loaded = cf.load(tmp_path / "branch.npz").bifurcations
+    for event, again in zip(branch.bifurcations, loaded, strict=True):
+        assert again.gradient("Omega") == event.gradient()
+        with pytest.raises(ParameterError, match="does not know along which parameter"):
+            again.gradient()
+    with pytest.raises(ParameterError, match="no parameter 'omega'"):
+        branch.bifurcations[0].gradient("omega")
