@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from contfric.continuation.extrema import Extremum
     from contfric.quantities.registry import QuantityLike
 
 BoolArray = NDArray[np.bool_]
@@ -295,6 +296,31 @@ class Branch:
         from contfric.quantities.registry import quantity_of
 
         return of_branch(quantity_of(name, self.model), self)
+
+    def extrema(self, name: str) -> tuple[Extremum, ...]:
+        """Return the local extrema of a quantity along the branch, located, in its order.
+
+        Parameters
+        ----------
+        name : str
+            A quantity by its name or as an expression.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such quantity, or it has no derivatives.
+
+        Examples
+        --------
+        >>> import contfric as cf
+        >>> orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+        >>> branch = cf.continue_orbit(orbit, "Omega", (0.4, 0.6))
+        >>> [(peak.largest, round(peak.value, 6)) for peak in branch.extrema("energy")]
+        [(True, 1.806073)]
+        """
+        from contfric.continuation.extrema import extrema_of
+
+        return extrema_of(self, name)
 
     def to_dataframe(self, quantities: Sequence[str] = ()) -> pd.DataFrame:
         """Return the points as a table: parameters, x_max, x_min, psi, stops, stability (pandas).

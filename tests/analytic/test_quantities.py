@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from scipy.optimize import brentq, minimize_scalar
 
 import contfric as cf
 
@@ -334,3 +335,64 @@ def test_events_move_as_differences_of_located_ones(
     assert gradient.notes == ()
     # events are good to 1e-12, differences to that over the step and to its fourth power
     assert gradient[parameter] == pytest.approx((4 * one - two) / 3, rel=2e-7, abs=2e-7)
+
+
+# --------------------------------------------------------------------- extrema along a branch
+
+
+@pytest.mark.parametrize("quantity", ["x_max", "amplitude(x, 1)", "rms(x)*sqrt(2)"])
+def test_the_resonance_peak_lies_where_its_formula_says(quantity: str) -> None:
+    """The response of a linear oscillator is largest at sqrt(1 - 2 zeta^2): 1 / (2 zeta sqrt(1 - zeta^2))."""
+    zeta = 0.1
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.7, "S": 0.0, "S0": 0.0, "zeta": zeta})
+    branch = cf.continue_orbit(orbit, "Omega", (0.5, 1.5))
+    (peak,) = branch.extrema(quantity)
+    assert peak.largest and not peak.kink
+    assert peak.params["Omega"] == pytest.approx(np.sqrt(1 - 2 * zeta**2), abs=1e-13)
+    assert peak.value == pytest.approx(1 / (2 * zeta * np.sqrt(1 - zeta**2)), rel=1e-13)
+    # the peak moves with the damping as the quantity does at a fixed frequency (envelope theorem)
+    slope = -(1 - 2 * zeta**2) / (2 * zeta**2 * (1 - zeta**2) ** 1.5)
+    assert peak.orbit.gradient(quantity)["zeta"] == pytest.approx(slope, rel=1e-11)
+
+
+def test_extrema_of_a_branch_with_a_fold_are_those_of_fine_steps() -> None:
+    branch = cf.continue_orbit(cf.solve_orbit("coulomb", "1a", FIG5), "Omega", (0.4, 0.6))
+    fine = cf.continue_orbit(
+        cf.solve_orbit("coulomb", "1a", FIG5), "Omega", (0.4, 0.6), max_step=2e-4
+    )
+    for name in ("energy", "x_max", "psi", "max(u)"):
+        values = fine.quantity(name)
+        inner = [
+            k
+            for k in range(1, len(values) - 1)
+            if (values[k] - values[k - 1]) * (values[k + 1] - values[k]) < 0.0
+        ]
+        found = branch.extrema(name)
+        assert len(found) == len(inner), name
+        for extremum, k in zip(found, inner, strict=True):
+            bend = abs(values[k + 1] - 2.0 * values[k] + values[k - 1])
+            assert extremum.largest == (values[k] > values[k - 1])
+            assert abs(extremum.value - values[k]) <= bend
+            assert branch.arc[0] < extremum.position < branch.arc[-1]
+            assert extremum.orbit.admissible
+
+
+def test_a_pair_of_extrema_within_one_step_is_found() -> None:
+    """x_max less a line in Omega has a minimum and a maximum where its second derivative changes sign."""
+    zeta = 0.1
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.7, "S": 0.0, "S0": 0.0, "zeta": zeta})
+    branch = cf.continue_orbit(orbit, "Omega", (0.5, 1.5), max_step=0.02)
+
+    def slope(w: float) -> float:
+        bottom = (1 - w**2) ** 2 + (2 * zeta * w) ** 2
+        return float(-0.5 * (-4 * w * (1 - w**2) + 8 * zeta**2 * w) / bottom**1.5)
+
+    steepest = minimize_scalar(lambda w: -slope(w), bounds=(0.85, 0.97), method="bounded").x
+    tangent = slope(steepest) * (1 - 1e-5)  # two places near each other have this slope
+    ends = (steepest - 0.03, steepest, steepest + 0.03)
+    places = [brentq(lambda w: slope(w) - tangent, *pair, xtol=1e-15) for pair in pairwise(ends)]
+    found = [e for e in branch.extrema(f"x_max - {tangent!r}*Omega") if e.params["Omega"] < 0.95]
+    inside = (branch.values > places[0]) & (branch.values < places[1])
+    assert not np.any(inside), "no point of the branch lies between them: both are in one step"
+    assert [e.largest for e in found] == [False, True]
+    assert [e.params["Omega"] for e in found] == pytest.approx(places, abs=1e-9)
