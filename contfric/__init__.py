@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from contfric.continuation.events import Bifurcation, EndReason, Kind
     from contfric.continuation.trace import continue_orbit
     from contfric.curves.curve import Curve
+    from contfric.curves.quantity_curve import QuantityCurve
+    from contfric.curves.quantity_trace import continue_quantity
     from contfric.curves.special import CodimTwo
     from contfric.curves.trace import continue_bifurcation
     from contfric.errors import (
@@ -90,6 +92,7 @@ _HOMES = {
     "OscillatorModel": "contfric.models.oscillator",
     "Plane": "contfric.atlas.plane",
     "ParameterError": "contfric.errors",
+    "QuantityCurve": "contfric.curves.quantity_curve",
     "ReleaseMap": "contfric.response.returns",
     "ResultFileError": "contfric.errors",
     "Returns": "contfric.response.returns",
@@ -103,6 +106,7 @@ _HOMES = {
     "check_model": "contfric.models.check",
     "continue_bifurcation": "contfric.curves.trace",
     "continue_orbit": "contfric.continuation.trace",
+    "continue_quantity": "contfric.curves.quantity_trace",
     "explore": "contfric.atlas.explore",
     "explore_plane": "contfric.atlas.plane_explore",
     "find_orbit": "contfric.orbit.find",
@@ -151,6 +155,7 @@ __all__ = [
     "Outcome",
     "ParameterError",
     "Plane",
+    "QuantityCurve",
     "ReleaseMap",
     "ResultFileError",
     "Returns",
@@ -165,6 +170,7 @@ __all__ = [
     "check_model",
     "continue_bifurcation",
     "continue_orbit",
+    "continue_quantity",
     "explore",
     "explore_plane",
     "find_orbit",

@@ -396,3 +396,45 @@ def test_a_pair_of_extrema_within_one_step_is_found() -> None:
     assert not np.any(inside), "no point of the branch lies between them: both are in one step"
     assert [e.largest for e in found] == [False, True]
     assert [e.params["Omega"] for e in found] == pytest.approx(places, abs=1e-9)
+
+
+# ------------------------------------------------------------------- a quantity that is held
+
+
+@pytest.mark.parametrize("quantity", ["x_max", "amplitude(x, 1)"])
+def test_orbits_of_one_amplitude_lie_on_their_formula(quantity: str) -> None:
+    """(1 - w^2)^2 + (2 zeta w)^2 = 1/A^2 is a closed curve around the resonance, through negative damping."""
+    size = 1.25
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.7, "S": 0.0, "S0": 0.0, "zeta": 0.3})
+    ranges = {"Omega": (0.2, 1.6), "zeta": (-0.9, 0.9)}
+    curve = cf.continue_quantity(
+        orbit, quantity, size, ("Omega", "zeta"), ranges, max_step=0.03, max_points=500
+    )
+    assert [end.reason.name for end in curve.ends] == ["CLOSED", "CLOSED"]
+    w, zeta = curve.values.T
+    assert np.max(np.abs((1 - w**2) ** 2 + (2 * zeta * w) ** 2 - size**-2)) < 1e-12
+    assert np.min(zeta) < -0.3 < 0.3 < np.max(zeta)
+    assert np.array_equal(curve.stable, zeta > 0.0)
+    assert np.max(np.abs(curve.measured("rms(x)") - size / np.sqrt(2))) < 1e-12
+
+
+def test_a_curve_of_one_energy_ends_at_events_and_edges() -> None:
+    orbit = cf.solve_orbit("coulomb", "1a", FIG5)
+    ranges = {"Omega": (0.45, 0.56), "S": (0.2, 0.39)}
+    curve = cf.continue_quantity(orbit, "energy", 1.75, ("Omega", "S"), ranges)
+    assert [end.reason.name for end in curve.ends] == ["MEETS", "MEETS"]
+    assert np.max(np.abs(curve.measured("energy") - 1.75)) < 1e-12
+    for end, inside in ((curve[0], curve[3]), (curve[-1], curve[-4])):
+        assert abs(np.min(end.margins)) < 1e-11
+        # the curve of that event, started from a branch near the end, runs through the end
+        branch = cf.continue_orbit(inside, "Omega", ranges["Omega"])
+        near = [b for b in branch.bifurcations if b.kind is cf.Kind.CS]
+        event = min(near, key=lambda b: abs(b.params["Omega"] - end.params["Omega"]))
+        crossed = cf.continue_bifurcation(event, ("Omega", "S"), ranges).values
+        order = np.argsort(crossed[:, 1])
+        place = np.interp(end.params["S"], crossed[order, 1], crossed[order, 0])
+        assert place == pytest.approx(end.params["Omega"], abs=1e-4)
+    x_max = cf.continue_quantity(orbit, "x_max", 1.43, ("Omega", "S"), ranges)
+    assert [end.reason.name for end in x_max.ends] == ["RANGE", "RANGE"]
+    assert x_max.values[[0, -1], 1] == pytest.approx([0.2, 0.2], abs=1e-12)
+    assert all(other.admissible for other in x_max)

@@ -308,3 +308,36 @@ def test_an_event_from_a_file_asks_for_its_parameter(branch: cf.Branch, tmp_path
             again.gradient()
     with pytest.raises(ParameterError, match="no parameter 'omega'"):
         branch.bifurcations[0].gradient("omega")
+
+
+def test_a_curve_of_a_quantity_is_a_table_and_a_figure(orbit: cf.Orbit) -> None:
+    ranges = {"Omega": (0.48, 0.52), "S": (0.3, 0.34)}
+    curve = cf.continue_quantity(orbit, "x_max", orbit.x_max, ("Omega", "S"), ranges)
+    table = curve.to_dataframe()
+    assert len(table) == len(curve) and set(table) == {*orbit.params, "x_max", "stable"}
+    assert (curve.plot().get_xlabel(), curve.plot().get_ylabel()) == (r"$\Omega$", "$S$")
+    assert "x_max" in repr(curve)
+    few = cf.continue_quantity(
+        orbit, "x_max", orbit.x_max, ("Omega", "S"), ranges, max_points=5, max_step=0.01
+    )
+    assert len(few) == 9 and {end.reason.name for end in few.ends} == {"POINTS"}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"value": 9.0}, "no orbit of this signature with x_max = 9 was found: it is from"),
+        ({"value": "high"}, "value is a finite number"),
+        ({"quantity": "stops"}, "takes a quantity that is one number"),
+        ({"parameters": ("Omega",)}, "a curve needs a pair of parameters"),
+        ({"ranges": {"Omega": (0.48, 0.52)}}, "the range of 'S' is missing"),
+        ({"ranges": {"Omega": (0.6, 0.7), "S": (0.3, 0.34)}}, "outside of the ranges"),
+        ({"orbit": 3}, "continuation starts from an Orbit, got int"),
+    ],
+)
+def test_a_curve_that_cannot_be_says_why(orbit: cf.Orbit, change: Any, words: str) -> None:
+    asked = {"orbit": orbit, "quantity": "x_max", "value": 1.41, "parameters": ("Omega", "S")}
+    asked["ranges"] = {"Omega": (0.48, 0.52), "S": (0.3, 0.34)}
+    with pytest.raises(cf.ContfricError) as caught:
+        cf.continue_quantity(**{**asked, **change})
+    assert words in str(caught.value)
