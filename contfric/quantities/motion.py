@@ -28,6 +28,8 @@ from contfric.quantities.duals import Dual
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
 
+#: Relative rounding of the closed forms written by hand; what is above may be integrated.
+_CLOSED = 1e-14
 _NONE = np.empty(0, dtype=np.int64)
 _EMPTY, _NOTHING = np.empty(0), np.empty((0, 0))
 
@@ -83,20 +85,22 @@ class Segment:
             self._known[key] = self._moved(shares) if self.exact else self._plain(shares)
         return self._known[key]
 
+    @property
+    def _chained(self) -> bool:
+        """Whether the motion to a node starts at the node before: where it is integrated, step by step."""
+        return self.model.rounding > _CLOSED
+
     def _plain(self, shares: FloatArray) -> tuple[Dual, list[Dual]]:
         flow, m = self.model.flow, self.model.mode_index[self.mode]
         states = np.empty((len(shares), len(self.state)))
+        since, state = self.start, self.state
         for k, share in enumerate(shares):
-            flow.flow(
-                m,
-                self.start,
-                self.state,
-                share * self.lasts,
-                self.vector,
-                _NONE,
-                states[k],
-                _NOTHING,
-            )
+            at = self.start + share * self.lasts
+            if at < since:  # a node before the last one
+                since, state = self.start, self.state
+            flow.flow(m, since, state, at - since, self.vector, _NONE, states[k], _NOTHING)
+            if self._chained:
+                since, state = at, states[k]
         none = np.empty((len(shares), 0))
         time = Dual(self.start + shares * self.lasts, none)
         return time, [Dual(column, none) for column in states.T.copy()]
@@ -106,21 +110,26 @@ class Segment:
         count, every = len(shares), np.arange(len(self.vector))
         states, jac = np.empty((count, n)), np.empty((n, 2 + n + len(every)))
         slopes = np.empty((n, count, len(self.d_start) + 1))
+        begin = self.start, self.state, self.d_start, self.d_state
+        since, state, d_time, d_state = begin
         for k, share in enumerate(shares):
-            flow.flow(
-                m, self.start, self.state, share * self.lasts, self.vector, every, states[k], jac
-            )
+            at, d_at = self.start + share * self.lasts, self.d_start + share * self.d_lasts
+            if at < since:  # a node before the last one
+                since, state, d_time, d_state = begin
+            flow.flow(m, since, state, at - since, self.vector, every, states[k], jac)
             slopes[:, k, :-1] = (
-                np.outer(jac[:, 0], self.d_start)
-                + jac[:, 1 : 1 + n] @ self.d_state
-                + np.outer(jac[:, 1 + n], share * self.d_lasts)
+                np.outer(jac[:, 0], d_time)
+                + jac[:, 1 : 1 + n] @ d_state
+                + np.outer(jac[:, 1 + n], d_at - d_time)
                 + jac[:, 2 + n :] @ self.d_vector
             )
             slopes[:, k, -1] = jac[:, 1 + n]
-        d_time = np.ones((count, len(self.d_start) + 1))
-        d_time[:, :-1] = self.d_start + np.outer(shares, self.d_lasts)
-        time = Dual(self.start + shares * self.lasts, d_time)
-        return time, [Dual(column, s) for column, s in zip(states.T.copy(), slopes, strict=True)]
+            if self._chained:
+                since, state, d_time, d_state = at, states[k], d_at, slopes[:, k, :-1]
+        d_times = np.ones((count, len(self.d_start) + 1))
+        d_times[:, :-1] = self.d_start + np.outer(shares, self.d_lasts)
+        times = Dual(self.start + shares * self.lasts, d_times)
+        return times, [Dual(column, s) for column, s in zip(states.T.copy(), slopes, strict=True)]
 
     def parameter(self, index: int, count: int) -> Dual:
         """Return a parameter as a constant of so many nodes."""

@@ -27,6 +27,9 @@ _NODES = 16
 #: Last coefficients of a series, relative to the largest value: the square of it is rounding. Of an
 #: integrated flow no better than its rounding, a hundred times over.
 RESOLVED, _UNITS = 1e-9, 100.0
+#: Coefficients that no longer fall when a panel is halved are noise of the integrator, if they are below this
+#: share of the largest value; a kink or a jump that nobody noted has larger ones.
+_NOISE, _FALLS, _HALVED = 1e-4, 0.7, 4
 #: Halvings of a segment: a billionth of its duration holds nothing that a quantity could feel.
 _DEEPEST = 30
 #: An argument of a kink this small, relative to its largest value, has no sign: at a joint it is rounding.
@@ -149,11 +152,14 @@ def resolve(segment: Segment, function: Function, what: str) -> Resolved:
     """
     found = Resolved(segment, function, what)
     if segment.lasts > 0.0:
-        _resolve(found, 0.0, 1.0, 0, 0.0)
+        _resolve(found, 0.0, 1.0, 0, 0.0, np.inf)
     return found
 
 
-def _resolve(found: Resolved, low: float, high: float, depth: int, size: float) -> None:
+def _resolve(
+    found: Resolved, low: float, high: float, depth: int, size: float, before: float
+) -> None:
+    """Resolve a part of a segment; ``before`` is the share of noise of the part that it is a half of."""
     shares = low + 0.5 * (high - low) * (_POINTS + 1.0)
     kinks = Kinks()
     with np.errstate(all="ignore"):
@@ -166,12 +172,14 @@ def _resolve(found: Resolved, low: float, high: float, depth: int, size: float) 
     cut = _change(found, shares, kinks)
     if cut is not None and low < cut.share < high:
         found_size = max(size, float(np.max(np.abs(values.values))))
-        _resolve(found, low, cut.share, depth, found_size)
+        _resolve(found, low, cut.share, depth, found_size, np.inf)
         found.cuts.append(cut)
-        _resolve(found, cut.share, high, depth, found_size)
+        _resolve(found, cut.share, high, depth, found_size, np.inf)
         return
     size = max(size, float(np.max(np.abs(values.values))))
-    if _is_resolved(values, size, found.segment.model.rounding):
+    left, level = _left(values, size), max(RESOLVED, _UNITS * found.segment.model.rounding)
+    noise = depth >= _HALVED and _FALLS * before < left < _NOISE
+    if left <= level or noise:
         found.panels.append(Panel(low, high, values))
     elif depth == _DEEPEST:
         time = found.segment.start + low * found.segment.lasts
@@ -180,18 +188,17 @@ def _resolve(found: Resolved, low: float, high: float, depth: int, size: float) 
         )
     else:
         middle = 0.5 * (low + high)
-        _resolve(found, low, middle, depth + 1, size)
-        _resolve(found, middle, high, depth + 1, size)
+        _resolve(found, low, middle, depth + 1, size, left)
+        _resolve(found, middle, high, depth + 1, size, left)
 
 
-def _is_resolved(values: Dual, size: float, rounding: float) -> bool:
-    """Tell whether the last coefficients of the series are small, those of the derivatives too."""
-    level = max(RESOLVED, _UNITS * rounding)
+def _left(values: Dual, size: float) -> float:
+    """Return the last coefficients of the series, relative to the largest values; of derivatives too."""
     columns = np.column_stack([values.values, values.slopes])
     tail = np.max(np.abs(_SERIES[-2:] @ columns), axis=0)
     sizes = np.max(np.abs(columns), axis=0)
     sizes[0] = max(sizes[0], size)
-    return bool(np.all(tail <= level * np.maximum(sizes, size)))
+    return float(np.max(tail / np.maximum(np.maximum(sizes, size), 1e-300)))
 
 
 def _change(found: Resolved, shares: FloatArray, kinks: Kinks) -> Cut | None:

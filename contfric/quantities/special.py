@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,13 @@ from contfric.quantities.functionals import Measuring
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
+    from contfric.quantities.motion import Directions
+
+#: Displacement of an orbit for the derivatives of multipliers, relative to its size: its fourth power, and
+#: rounding divided by it, are both about 1e-12.
+_STEP = 1e-3
+#: Derivatives of two steps that differ by more than this are those of no smooth function.
+_UNSURE = 1e-2
 
 
 def sticking(measuring: Measuring) -> Dual:
@@ -66,15 +74,39 @@ def _speed_slopes(measuring: Measuring, i: int, grad: FloatArray) -> FloatArray:
 def multiplier(measuring: Measuring) -> Dual:
     """Return the largest modulus of a Floquet multiplier.
 
-    Raises
-    ------
-    ParameterError
-        If its derivatives are wanted: they need second derivatives of the flow, which only curves in two
-        parameters have.
+    Its derivatives are differences: the Jacobian of the equations is exact wherever joints and parameters are
+    displaced, on an orbit or beside one, so that nothing is solved for. With Richardson's extrapolation.
     """
-    if measuring.motion.count:
-        raise ParameterError(
-            "the derivatives of 'multiplier' are not available: they are those of the Jacobian itself"
-        )
-    mu = np.abs(measuring.motion.orbit.multipliers)
-    return measuring.number(float(np.max(mu, initial=0.0)), np.empty(0))
+    motion = measuring.motion
+    value = _largest_modulus(motion.orbit)
+    if motion.directions is None:
+        return measuring.number(value, np.empty(0))
+    if not np.isfinite(value):
+        raise ParameterError("the multipliers of an orbit with a hold are infinite: no derivatives")
+    pairs = [_difference(motion.orbit, motion.directions, k) for k in range(motion.count)]
+    slopes = np.array([slope for slope, _ in pairs])
+    apart = np.array([error for _, error in pairs])
+    if np.any(apart > _UNSURE * (1.0 + np.abs(slopes))):
+        measuring.kinks.append("two multipliers of one modulus part here, or meet")
+    return measuring.number(value, slopes)
+
+
+def _largest_modulus(orbit: Orbit) -> float:
+    return float(np.max(np.abs(orbit.multipliers), initial=0.0))
+
+
+def _difference(orbit: Orbit, directions: Directions, k: int) -> tuple[float, float]:
+    """Return the derivative of the largest modulus in one direction, and by how much two steps differ."""
+    joints, vector = directions.joints[:, :, k], directions.vector[:, k]
+    size = max(float(np.max(np.abs(joints))), float(np.max(np.abs(vector))))
+    if size == 0.0:
+        return 0.0, 0.0
+    step = _STEP * (1.0 + float(np.max(np.abs(orbit.joints[:, 1:])))) / size
+
+    def at(by: float) -> float:
+        moved = replace(orbit, joints=orbit.joints + by * joints, vector=orbit.vector + by * vector)
+        return _largest_modulus(moved)
+
+    wide = (at(step) - at(-step)) / (2.0 * step)
+    narrow = (at(0.5 * step) - at(-0.5 * step)) / step
+    return (4.0 * narrow - wide) / 3.0, abs(narrow - wide)

@@ -68,7 +68,16 @@ def test_harmonics_sum_to_the_mean_square(params: dict[str, float]) -> None:
     assert total == pytest.approx(orbit.quantity("mean(x**2)"), abs=1e-7)
 
 
-QUANTITIES = ("x_max", "energy", "rms(v)", "sticking", "amplitude(x, 1)", "max(u)", "mean(x**3)")
+QUANTITIES = (
+    "x_max",
+    "energy",
+    "rms(v)",
+    "sticking",
+    "amplitude(x, 1)",
+    "max(u)",
+    "mean(x**3)",
+    "multiplier",
+)
 
 
 @given(PARAMS, st.sampled_from(QUANTITIES), st.sampled_from(("Omega", "S", "S0", "h", "zeta")))
