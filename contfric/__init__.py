@@ -45,6 +45,8 @@ if TYPE_CHECKING:
         ResultFileError,
         StudyError,
     )
+    from contfric.fitting.data import Measured, Series
+    from contfric.fitting.fit import Fit, fit
     from contfric.models import Model, load_model, model_names
     from contfric.models.check import ModelReport, check_model
     from contfric.models.oscillator import OscillatorModel
@@ -77,6 +79,10 @@ _HOMES = {
     "ContfricError": "contfric.errors",
     "ConvergenceError": "contfric.errors",
     "Diagram": "contfric.atlas.diagram",
+    "Fit": "contfric.fitting.fit",
+    "Measured": "contfric.fitting.data",
+    "Series": "contfric.fitting.data",
+    "fit": "contfric.fitting.fit",
     "EndReason": "contfric.continuation.events",
     "Gradient": "contfric.orbit.gradient",
     "Kind": "contfric.continuation.events",
@@ -141,10 +147,12 @@ __all__ = [
     "Curve",
     "Diagram",
     "EndReason",
+    "Fit",
     "Gradient",
     "Kind",
     "LyapunovExponents",
     "LyapunovMap",
+    "Measured",
     "Model",
     "ModelError",
     "ModelReport",
@@ -160,6 +168,7 @@ __all__ = [
     "ResultFileError",
     "Returns",
     "Seeds",
+    "Series",
     "Signature",
     "StudyError",
     "Sweep",
@@ -174,6 +183,7 @@ __all__ = [
     "explore",
     "explore_plane",
     "find_orbit",
+    "fit",
     "load",
     "load_model",
     "load_signature",

@@ -34,8 +34,8 @@ class MeasuredOrbit:
         --------
         >>> import contfric as cf
         >>> orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
-        >>> round(orbit.quantity("mean(x)"), 6), round(orbit.quantity("sticking"), 6)
-        (0, 0)
+        >>> round(orbit.quantity("rms(v)"), 6), round(orbit.quantity("sticking"), 6)
+        (0.523284, 0.091149)
         """
         from contfric.quantities.measure import of_orbit
         from contfric.quantities.registry import quantity_of
@@ -70,8 +70,8 @@ class MeasuredOrbit:
         --------
         >>> import contfric as cf
         >>> orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
-        >>> round(orbit.gradient("x_max")["S"], 6)
-        0
+        >>> round(orbit.gradient("energy")["S"], 6)
+        5.328667
         """
         from contfric.orbit.gradient import gradient_of
 

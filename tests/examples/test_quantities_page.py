@@ -22,7 +22,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "quantities.md"
 def scope() -> dict[str, Any]:
     found: dict[str, Any] = {}
     blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    assert len(blocks) == 6
+    assert len(blocks) == 7
     for block in blocks:
         exec(compile(block, str(PAGE), "exec"), found)
     return found
@@ -34,6 +34,15 @@ def test_the_page_says_what_comes_out(scope: dict[str, Any]) -> None:
     assert np.max(np.abs(scope["curve"].measured("x_max") - 1.43)) < 1e-11
     names = set(cf.quantity_names("coulomb"))
     assert {name for name in names if f"`{name}`" not in PAGE.read_text(encoding="utf-8")} == set()
+
+
+def test_the_fits_find_the_truth(scope: dict[str, Any]) -> None:
+    again = scope["again"]
+    for name, value in (("S", 0.32), ("S0", 0.4)):
+        assert abs(again.params[name] - value) < 4.0 * again.sigma[name]
+    assert (
+        scope["found"].chi_square < 1.0
+    )  # the three data are those of S = 0.32, S0 = 0.4, rounded
 
 
 def test_the_best_damper_is_the_best(scope: dict[str, Any]) -> None:
