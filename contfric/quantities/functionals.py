@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -32,10 +32,13 @@ from contfric.quantities.panels import Function, Resolved, resolve
 
 #: Extrema that differ by less than this, relative to 1 + their size, are equal: orbits are solved to 1e-13.
 _EQUAL = 1e-10
-#: Derivatives of equal extrema that differ by more than this, relative to 1 + their size, differ.
-_APART = 1e-7
+#: Derivatives of equal extrema that differ by more than this, relative to 1 + their size, differ; or by so
+#: many units of the flow's rounding, which fast motion amplifies.
+_APART, _UNITS = 1e-7, 1e8
 #: Newton steps to a stationary point from its place in the Legendre series, which is good to 1e-9.
 _STEPS = 2
+#: Shares over which the bend is a difference: the root of rounding of a rate, and less in a boundary layer.
+_WIDTHS = (1e-4, 1e-6, 1e-8)
 
 
 @dataclass(eq=False)
@@ -116,9 +119,10 @@ class Measuring:
     def _extremum(self, asked: Functional, function: Function) -> Dual:
         sign = 1.0 if asked.kind == "max" else -1.0
         found: list[tuple[Segment, float, float]] = []
-        for segment in self.motion.segments:
-            shares = self._candidates(asked, segment, function)
-            values = function(segment, shares, Kinks()).values
+        # without derivatives: only those of the extrema themselves are wanted
+        for still, segment in zip(self._still.segments, self.motion.segments, strict=True):
+            shares = _candidates(asked, still, function)
+            values = function(still, shares, Kinks()).values
             found += [(segment, float(s), float(v)) for s, v in zip(shares, values, strict=True)]
         if not all(math.isfinite(value) for _, _, value in found):
             raise ParameterError(f"{asked.kind}({asked.text}) has no finite value")
@@ -140,29 +144,43 @@ class Measuring:
         if not self.motion.count:
             return self.number(best, np.empty(0))
         level = best - _EQUAL * (1.0 + abs(best))
-        slopes = np.array([slope() for value, slope in candidates if value >= level])
+        tied = sorted((c for c in candidates if c[0] >= level), key=lambda c: -c[0])
+        slopes = np.array([slope() for _, slope in tied])
         ahead, behind = np.max(slopes, axis=0), np.min(slopes, axis=0)
-        if np.any(ahead - behind > _APART * (1.0 + np.abs(ahead))):
+        apart = max(_APART, _UNITS * self.motion.orbit.model.rounding)
+        if np.any(ahead - behind > apart * (1.0 + np.abs(ahead))):
             self.kinks.append(f"{what} is reached at several times at once")
+        else:
+            ahead = behind = slopes[0]  # of the value that is returned
         return Dual(np.full(2, best), np.array([ahead, behind]))
 
-    def _candidates(self, asked: Functional, segment: Segment, function: Function) -> FloatArray:
-        """Return the shares of a segment at which the function can be extreme."""
-        ends = [0.0, 1.0]
-        if not segment.lasts > 0.0:
-            return np.array(ends[:1])
-        name = asked.text
-        model = segment.model
-        if name in model.observable_index:  # certified by the flow
-            view = model.view(segment.vector)
-            times, _ = view.stationary(
-                segment.mode, name, segment.start, segment.state, segment.lasts
-            )
-            return np.concatenate([ends, times / segment.lasts])
-        resolved = resolve(segment, function, asked.text)
-        inside = [panel.stationary() for panel in resolved.panels]
-        cuts = [panel.low for panel in resolved.panels[1:]]
-        return np.concatenate([ends, cuts, *inside])
+    @cached_property
+    def _still(self) -> Motion:
+        """The same motion without directions."""
+        return self.motion if self.motion.directions is None else Motion(self.motion.orbit)
+
+
+def _candidates(asked: Functional, segment: Segment, function: Function) -> FloatArray:
+    """Return the shares of a segment at which the function can be extreme.
+
+    The displacement has its extrema at joints where the model's motion is cut at its stops; observables have
+    stationary points that the flow certifies; of any other expression the resolved series has them.
+    """
+    ends, model, name = [0.0, 1.0], segment.model, asked.text
+    if not segment.lasts > 0.0:
+        return np.array(ends[:1])
+    if name == model.states[0]:
+        if model.stops_at_joints and not model.displacement:
+            return np.array(ends)
+        name = model.displacement or name
+    if name in model.observable_index:
+        view = model.view(segment.vector)
+        times, _ = view.stationary(segment.mode, name, segment.start, segment.state, segment.lasts)
+        return np.concatenate([ends, times / segment.lasts])
+    resolved = resolve(segment, function, asked.text)
+    inside = [panel.stationary() for panel in resolved.panels]
+    cuts = [panel.low for panel in resolved.panels[1:]]
+    return np.concatenate([ends, cuts, *inside])
 
 
 def _dual(number: Number) -> Dual:
@@ -204,14 +222,21 @@ def _envelope(segment: Segment, share: float, function: Function) -> FloatArray:
     A stationary point inside is sharpened first, by its rate and that of its rate (by a difference).
     """
     for _ in range(_STEPS if 0.0 < share < 1.0 else 0):
-        step = min(
-            1e-4, 0.5 * share, 0.5 * (1.0 - share)
-        )  # the root of rounding of a rate, and well inside
-        rates = function(segment, np.array([share - step, share, share + step]), Kinks()).slopes[
-            :, -1
-        ]
-        bend = (rates[2] - rates[0]) / (2.0 * step)
-        if bend == 0.0 or abs(rates[1]) > abs(bend) * step:  # a kink is no stationary point
-            break
-        share -= float(rates[1] / bend)
+        share = _sharper(segment, share, function)
     return np.asarray(function(segment, np.array([share]), Kinks()).slopes[0, :-1])
+
+
+def _sharper(segment: Segment, share: float, function: Function) -> float:
+    """Return a stationary point by one step of Newton's method on the rate; as it was at a kink.
+
+    The bend is a difference over shares as wide as it is the same on: a step that is not inside of them
+    says that it is not.
+    """
+    for width in _WIDTHS:
+        step = min(width, 0.5 * share, 0.5 * (1.0 - share))
+        around = np.array([share - step, share, share + step])
+        rates = function(segment, around, Kinks()).slopes[:, -1]
+        bend = (rates[2] - rates[0]) / (2.0 * step)
+        if bend != 0.0 and abs(rates[1]) < abs(bend) * step:
+            return share - float(rates[1] / bend)
+    return share
