@@ -64,6 +64,9 @@ def marks_of(
         there = [b for b in regular if _coincide(b, event, parameter)]
         images = [*there, *(b for b in bridges if _coincide(b, event, parameter))]
         y = np.concatenate([quantity(b.orbit, row) for b in (event, *images)])
+        y = y[np.isfinite(y)]
+        if not len(y):
+            continue
         label = event.label if event in there or not there else there[0].label
         if not any(m.label == label and abs(m.x - x) <= _SAME * abs(x) for m in found):
             only = bool(images) and not there

@@ -42,10 +42,14 @@ class _Vertex:
 
 
 def quantity(source: Branch | Orbit, row: QuantityLike) -> FloatArray:
-    """Return a quantity of a branch, shape (k, numbers), or of an orbit, (numbers,)."""
+    """Return a quantity of a branch, shape (k, numbers), or of an orbit, (numbers,).
+
+    What is not finite, such as multipliers of orbits with holds, is nan: nothing is drawn.
+    """
     attribute = NAMED[row].attribute if isinstance(row, str) and row in NAMED else ""
     found = getattr(source, attribute) if attribute else source.quantity(row)
     values = np.asarray(found, dtype=np.float64)
+    values = np.where(np.isfinite(values), values, np.nan)
     if hasattr(source, "values"):
         return values.reshape(len(values), -1)
     return np.atleast_1d(values)

@@ -94,6 +94,20 @@ def test_rows_show_any_quantity(branch: cf.Branch) -> None:
         branch.plot(row="x")
 
 
+def test_what_is_not_finite_is_not_drawn(orbit: cf.Orbit) -> None:
+    """Orbits with holds have infinite multipliers, and their bridge has no line in that row."""
+    diagram = cf.explore(orbit, "Omega", (0.48, 0.55))
+    bridge = next(b for b in diagram.branches if b.bridge)
+    assert np.all(np.isinf(bridge.quantity("multiplier")))
+    lines = {line.get_gid(): line for line in diagram.plot(row="multiplier").lines}
+    inner = np.asarray(lines[bridge.name].get_ydata(), dtype=float)[
+        1:-1
+    ]  # its ends are other orbits
+    assert len(inner) and np.all(np.isnan(inner))
+    assert np.any(np.isfinite(np.asarray(lines["1a"].get_ydata(), dtype=float)))
+    assert np.all(np.isfinite(bridge.quantity("energy")))
+
+
 def test_gradients_say_where_they_are_one_sided(orbit: cf.Orbit) -> None:
     smooth = orbit.gradient("x_max")
     assert not smooth.one_sided and smooth.ahead == smooth.behind
