@@ -106,30 +106,49 @@ class Segment:
         return time, [Dual(column, none) for column in states.T.copy()]
 
     def _moved(self, shares: FloatArray) -> tuple[Dual, list[Dual]]:
-        flow, m, n = self.model.flow, self.model.mode_index[self.mode], len(self.state)
-        count, every = len(shares), np.arange(len(self.vector))
-        states, jac = np.empty((count, n)), np.empty((n, 2 + n + len(every)))
-        slopes = np.empty((n, count, len(self.d_start) + 1))
-        begin = self.start, self.state, self.d_start, self.d_state
-        since, state, d_time, d_state = begin
-        for k, share in enumerate(shares):
-            at, d_at = self.start + share * self.lasts, self.d_start + share * self.d_lasts
-            if at < since:  # a node before the last one
-                since, state, d_time, d_state = begin
-            flow.flow(m, since, state, at - since, self.vector, every, states[k], jac)
-            slopes[:, k, :-1] = (
-                np.outer(jac[:, 0], d_time)
-                + jac[:, 1 : 1 + n] @ d_state
-                + np.outer(jac[:, 1 + n], d_at - d_time)
-                + jac[:, 2 + n :] @ self.d_vector
-            )
-            slopes[:, k, -1] = jac[:, 1 + n]
-            if self._chained:
-                since, state, d_time, d_state = at, states[k], d_at, slopes[:, k, :-1]
-        d_times = np.ones((count, len(self.d_start) + 1))
+        count, columns = len(shares), len(self.d_start) + 1
+        d_times = np.ones((count, columns))
         d_times[:, :-1] = self.d_start + np.outer(shares, self.d_lasts)
         times = Dual(self.start + shares * self.lasts, d_times)
-        return times, [Dual(column, s) for column, s in zip(states.T.copy(), slopes, strict=True)]
+        states, jacobians = self._jacobians(times.values)
+        n = len(self.state)
+        slopes = np.empty((count, n, columns))
+        slopes[:, :, -1] = jacobians[:, :, 1 + n]
+        begin = first = np.vstack([self.d_start, self.d_state])
+        if not self._chained:
+            slopes[:, :, :-1] = self._carried(jacobians, begin, d_times)
+        for k in range(count if self._chained else 0):
+            slopes[k, :, :-1] = self._carried(jacobians[k : k + 1], begin, d_times[k : k + 1])[0]
+            onward = k + 1 < count and times.values[k + 1] >= times.values[k]
+            begin = np.vstack([d_times[k, :-1], slopes[k, :, :-1]]) if onward else first
+        return times, [Dual(states[:, i].copy(), slopes[:, i].copy()) for i in range(n)]
+
+    def _carried(self, jacobians: FloatArray, begin: FloatArray, d_times: FloatArray) -> FloatArray:
+        """Return how states move whose motion starts where time and state move by ``begin``, (1 + n, D)."""
+        n = len(self.state)
+        lasts = d_times[:, None, :-1] - begin[0]
+        return np.asarray(
+            jacobians[:, :, : 1 + n] @ begin
+            + jacobians[:, :, 1 + n, None] * lasts
+            + jacobians[:, :, 2 + n :] @ self.d_vector
+        )
+
+    def _jacobians(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return states at some times, (k, n), and their derivatives by where the motion to each starts.
+
+        By its time, state and duration and by all parameters, shape (k, n, 2 + n + parameters).
+        """
+        flow, m, n = self.model.flow, self.model.mode_index[self.mode], len(self.state)
+        every = np.arange(len(self.vector))
+        states, found = np.empty((len(times), n)), np.empty((len(times), n, 2 + n + len(every)))
+        since, state = self.start, self.state
+        for k, at in enumerate(times):
+            if at < since:  # a node before the last one
+                since, state = self.start, self.state
+            flow.flow(m, since, state, at - since, self.vector, every, states[k], found[k])
+            if self._chained:
+                since, state = at, states[k]
+        return states, found
 
     def parameter(self, index: int, count: int) -> Dual:
         """Return a parameter as a constant of so many nodes."""
