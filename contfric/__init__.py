@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from contfric.continuation.events import Bifurcation, EndReason, Kind
     from contfric.continuation.trace import continue_orbit
     from contfric.curves.curve import Curve
+    from contfric.curves.quantity_curve import QuantityCurve
+    from contfric.curves.quantity_trace import continue_quantity
     from contfric.curves.special import CodimTwo
     from contfric.curves.trace import continue_bifurcation
     from contfric.equilibria.branch import EquilibriumBranch
@@ -49,15 +51,19 @@ if TYPE_CHECKING:
         ResultFileError,
         StudyError,
     )
+    from contfric.fitting.data import Measured, Series
+    from contfric.fitting.fit import Fit, fit
     from contfric.models import Model, load_model, model_names
     from contfric.models.check import ModelReport, check_model
     from contfric.models.mechanism import Mechanism
     from contfric.models.oscillator import OscillatorModel
     from contfric.models.two_folds import TwoFold, find_two_folds
     from contfric.orbit.find import find_orbit
+    from contfric.orbit.gradient import Gradient
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.simulation import simulate
     from contfric.orbit.solve import solve_orbit
+    from contfric.quantities.registry import quantity_names
     from contfric.response.basin_map import basins
     from contfric.response.basins import Basins
     from contfric.response.outcome import Outcome
@@ -82,6 +88,10 @@ _HOMES = {
     "ConvergenceError": "contfric.errors",
     "Curve": "contfric.curves.curve",
     "Diagram": "contfric.atlas.diagram",
+    "Fit": "contfric.fitting.fit",
+    "Measured": "contfric.fitting.data",
+    "Series": "contfric.fitting.data",
+    "fit": "contfric.fitting.fit",
     "EndReason": "contfric.continuation.events",
     "Equilibria": "contfric.equilibria.result",
     "Equilibrium": "contfric.equilibria.result",
@@ -90,6 +100,7 @@ _HOMES = {
     "EquilibriumEvent": "contfric.equilibria.events",
     "EquilibriumSet": "contfric.equilibria.result",
     "HopfPoint": "contfric.equilibria.events",
+    "Gradient": "contfric.orbit.gradient",
     "Kind": "contfric.continuation.events",
     "LyapunovExponents": "contfric.chaos.exponents",
     "LyapunovMap": "contfric.chaos.map",
@@ -104,6 +115,7 @@ _HOMES = {
     "Outcome": "contfric.response.outcome",
     "ParameterError": "contfric.errors",
     "Plane": "contfric.atlas.plane",
+    "QuantityCurve": "contfric.curves.quantity_curve",
     "ReleaseMap": "contfric.response.returns",
     "ResultFileError": "contfric.errors",
     "Returns": "contfric.response.returns",
@@ -120,6 +132,7 @@ _HOMES = {
     "continue_equilibrium": "contfric.equilibria.trace",
     "continue_orbit": "contfric.continuation.trace",
     "explore_equilibria": "contfric.equilibria.explore",
+    "continue_quantity": "contfric.curves.quantity_trace",
     "explore": "contfric.atlas.explore",
     "explore_plane": "contfric.atlas.plane_explore",
     "find_equilibria": "contfric.equilibria.find",
@@ -133,6 +146,7 @@ _HOMES = {
     "model_names": "contfric.models",
     "period_adding": "contfric.atlas.adding",
     "poincare": "contfric.response.poincare",
+    "quantity_names": "contfric.quantities.registry",
     "release_map": "contfric.response.poincare",
     "run_study": "contfric.study",
     "save": "contfric.results",
@@ -162,10 +176,13 @@ __all__ = [
     "EquilibriumDiagram",
     "EquilibriumEvent",
     "EquilibriumSet",
+    "Fit",
+    "Gradient",
     "HopfPoint",
     "Kind",
     "LyapunovExponents",
     "LyapunovMap",
+    "Measured",
     "Mechanism",
     "Model",
     "ModelError",
@@ -177,10 +194,12 @@ __all__ = [
     "Outcome",
     "ParameterError",
     "Plane",
+    "QuantityCurve",
     "ReleaseMap",
     "ResultFileError",
     "Returns",
     "Seeds",
+    "Series",
     "Signature",
     "StudyError",
     "Sweep",
@@ -193,12 +212,14 @@ __all__ = [
     "continue_bifurcation",
     "continue_equilibrium",
     "continue_orbit",
+    "continue_quantity",
     "explore",
     "explore_equilibria",
     "explore_plane",
     "find_equilibria",
     "find_orbit",
     "find_two_folds",
+    "fit",
     "load",
     "load_model",
     "load_signature",
@@ -207,6 +228,7 @@ __all__ = [
     "model_names",
     "period_adding",
     "poincare",
+    "quantity_names",
     "release_map",
     "run_study",
     "save",

@@ -255,7 +255,7 @@ def _sum(
 
 def index_sums(diagram: Diagram) -> Iterator[IndexSum]:
     """Yield the sums of the indices of all orbits of one period, between the events."""
-    if not diagram.settings.bridges:
+    if not diagram.settings.bridges or diagram.settings.stop_at:  # branches end before events
         return
     low, high = _covered(diagram)
     places = sorted({low, high, *(b.params[diagram.parameter] for b in diagram.bifurcations)})

@@ -29,6 +29,7 @@ FINAL = frozenset(
             "RANGE",
             "LIMIT",
             "CLOSED",
+            "STOP",
             "UNBOUNDED",
             "REST",
             "CONTINUUM",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from contfric.atlas.scenario import Scenario
     from contfric.atlas.verification import Verification
+    from contfric.quantities.registry import QuantityLike
     from contfric.response.sweep import Sweep
 
 
@@ -78,6 +80,7 @@ class Asked:
     max_periods : longest orbits, in periods; raised to that of a longer start
     copies : most copies of the shortest period that were tried at sliding events
     max_branches, max_points : most branches, and most points of each half-branch
+    stop_at : quantities, and the value at which a branch ends
     """
 
     max_step: float | None = None
@@ -87,6 +90,7 @@ class Asked:
     copies: int = 1
     max_branches: int = 200
     max_points: int = 20_000
+    stop_at: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,21 +222,27 @@ class Diagram:
                 graph.add_edge(i - 1, i)
         return len(graph) == 0 or bool(nx.is_connected(graph))
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return the points of all branches as one table, with the branch's number and name."""
+    def to_dataframe(self, quantities: Sequence[str] = ()) -> pd.DataFrame:
+        """Return the points of all branches as one table, with the branch's number and name.
+
+        Parameters
+        ----------
+        quantities : sequence of str
+            More columns: quantities by name or as expressions.
+        """
         need_pandas()
         import pandas as pd
 
         tables = []
         for i, branch in enumerate(self.branches):
-            table = branch.to_dataframe()
+            table = branch.to_dataframe(quantities)
             table.insert(0, "branch", i + 1)
             table.insert(1, "signature", branch.name)
             tables.append(table)
         return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
     def plot(
-        self, ax: Axes | None = None, row: str = "x_max", overlay: Sweep | None = None
+        self, ax: Axes | None = None, row: QuantityLike = "x_max", overlay: Sweep | None = None
     ) -> Axes:
         """Draw one quantity of all branches with the bifurcations; behind them the points of a sweep."""
         from contfric.plot.diagram import plot_diagram_row

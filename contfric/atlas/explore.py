@@ -6,6 +6,7 @@ those already known, and a new one puts what leaves it into the queue (:mod:`con
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -41,6 +42,7 @@ def explore(
     copies: int | None = None,
     max_branches: int = 200,
     max_points: int = MOST_POINTS,
+    stop_at: Mapping[str, float] | None = None,
     seeds: Seeds | None = None,
     progress: Progress | None = None,
 ) -> Diagram:
@@ -48,7 +50,7 @@ def explore(
 
     Parameters
     ----------
-    parameter, range, max_step, stability, max_points
+    parameter, range, max_step, stability, max_points, stop_at
         As for :func:`contfric.continue_orbit`.
     bridges : bool
         Whether the jumps of the flow (SS, AS, GS) are bridged by orbits with holds; without them
@@ -87,7 +89,7 @@ def explore(
     >>> sorted({b.name for b in cf.explore(orbit, "Omega", (0.48, 0.55)).branches})
     ['0s', '1a', '1a, 7seg, 1hold', '2a', '2s']
     """
-    settings = settings_of(orbit, parameter, range, max_step, stability, max_points)
+    settings = settings_of(orbit, parameter, range, max_step, stability, max_points, stop_at)
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
     if copies is not None:
@@ -138,6 +140,7 @@ def explore(
             state.copies,
             max_branches,
             max_points,
+            settings.stop_at,
         ),
     )
 
@@ -181,6 +184,7 @@ def _follow_seeds(state: Exploration, orbit: Orbit, seeds: Seeds) -> None:
                 max_step=settings.largest,
                 stability=settings.stability,
                 max_points=settings.most_points,
+                stop_at=dict(settings.stop_at),
             )
         except ConvergenceError as error:  # one orbit of a continuum
             state.notes.append(f"seed at {attractor.params[settings.parameter]:.6g}: {error}")

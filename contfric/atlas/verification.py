@@ -207,6 +207,7 @@ def _explored(diagram: Diagram, start: Orbit, step: float) -> Diagram:
         copies=asked.copies,
         max_branches=asked.max_branches,
         max_points=max(asked.max_points, int(asked.max_points / step)),
+        stop_at=dict(asked.stop_at),
     )
 
 

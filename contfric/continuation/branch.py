@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
@@ -23,6 +23,9 @@ from contfric.orbit.words import decode, encode, mirror_pairs
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
+
+    from contfric.continuation.extrema import Extremum
+    from contfric.quantities.registry import QuantityLike
 
 BoolArray = NDArray[np.bool_]
 
@@ -268,21 +271,81 @@ class Branch:
         at_ends = [end.bifurcation for end in self.ends if end.bifurcation is not None]
         return [*self.bifurcations, *at_ends]
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return the points as a table: parameters, x_max, x_min, psi, stops, stability (pandas)."""
+    def quantity(self, name: QuantityLike) -> FloatArray:
+        """Return a quantity at every point, shape (k,); nan-padded (k, stops) for ``"stops"``.
+
+        Parameters
+        ----------
+        name : str or callable
+            As for :meth:`contfric.Orbit.quantity`.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such quantity.
+
+        Examples
+        --------
+        >>> import contfric as cf
+        >>> orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+        >>> branch = cf.continue_orbit(orbit, "Omega", (0.49, 0.51))
+        >>> branch.quantity("energy").shape == branch.values.shape
+        True
+        """
+        from contfric.quantities.measure import of_branch
+        from contfric.quantities.registry import quantity_of
+
+        return of_branch(quantity_of(name, self.model), self)
+
+    def extrema(self, name: str) -> tuple[Extremum, ...]:
+        """Return the local extrema of a quantity along the branch, located, in its order.
+
+        Parameters
+        ----------
+        name : str
+            A quantity by its name or as an expression.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such quantity, or it has no derivatives.
+
+        Examples
+        --------
+        >>> import contfric as cf
+        >>> orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+        >>> branch = cf.continue_orbit(orbit, "Omega", (0.4, 0.6))
+        >>> [(peak.largest, round(peak.value, 6)) for peak in branch.extrema("energy")]
+        [(True, 1.806073)]
+        """
+        from contfric.continuation.extrema import extrema_of
+
+        return extrema_of(self, name)
+
+    def to_dataframe(self, quantities: Sequence[str] = ()) -> pd.DataFrame:
+        """Return the points as a table: parameters, x_max, x_min, psi, stops, stability (pandas).
+
+        Parameters
+        ----------
+        quantities : sequence of str
+            More columns: quantities by name or as expressions.
+        """
         need_pandas()
         import pandas as pd
+
+        more = {name: self.quantity(name) for name in quantities}
 
         columns: dict[str, Any] = dict(self.params)
         if self.model.autonomous:
             columns["period"] = self.period
         columns |= {"x_max": self.x_max, "x_min": self.x_min, "psi": self.asymmetry}
         columns |= {f"stop_{k + 1}": x for k, x in enumerate(self.stops.T)}
+        columns |= more
         if self.stable is not None:
             columns["stable"] = self.stable
         return pd.DataFrame(columns)
 
-    def plot(self, ax: Axes | None = None, row: str = "x_max") -> Axes:
+    def plot(self, ax: Axes | None = None, row: QuantityLike = "x_max") -> Axes:
         """Draw one quantity of the branch against its parameter."""
         from contfric.plot.diagram import plot_branches
 

@@ -31,6 +31,7 @@ from functools import cached_property
 
 import numpy as np
 
+from contfric.continuation.measured_event import MeasuredEvent
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import Domain, Model
 from contfric.orbit.holds import Hold
@@ -113,6 +114,7 @@ class EndReason(str, Enum):
     BP = "the orbit has become symmetric: its mirror branch goes on from here"
     PD = "the doubled orbit meets the orbit of half its period"
     CLOSED = "the branch is a closed curve"
+    STOP = "a quantity has the value to stop at (stop_at)"
     START = "the branch starts here"
     POINTS = "the largest number of points was reached (max_points)"
     WORK = (
@@ -161,7 +163,7 @@ class Proposal:
 
 
 @dataclass(frozen=True, eq=False)
-class Bifurcation:
+class Bifurcation(MeasuredEvent):
     """A located event on a branch.
 
     Attributes

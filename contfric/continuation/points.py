@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.errors import ParameterError, checked_range, real_number, truth, whole_number
-from contfric.models.definition import FloatArray
+from contfric.errors import (
+    ParameterError,
+    checked_range,
+    mapping_of,
+    real_number,
+    truth,
+    whole_number,
+)
+from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System
+from contfric.quantities.registry import number_quantity
 
 if TYPE_CHECKING:
     from contfric.continuation.geometry import Points
@@ -49,6 +58,7 @@ class Settings:
     stability : whether multipliers are evaluated (and PD detected)
     most_points : most points of one side
     copies : most copies of its shortest period that an orbit of the diagram has at a sliding event
+    stop_at : quantities, and the value at which a branch ends
     """
 
     parameter: str
@@ -61,6 +71,7 @@ class Settings:
     stability: bool = True
     most_points: int = MOST_POINTS
     copies: int = 1
+    stop_at: tuple[tuple[str, float], ...] = ()
 
     @property
     def scale(self) -> float:
@@ -208,6 +219,7 @@ def settings_of(
     max_step: float | None,
     stability: bool,
     max_points: int,
+    stop_at: Mapping[str, float] | None = None,
 ) -> Settings:
     """Check what the user asked for and clip the range to the model's limits.
 
@@ -259,4 +271,19 @@ def settings_of(
         max_step or model.max_step or LARGEST_STEP,
         stability and not orbit.system.holds,
         max_points,
+        stop_at=_stops(orbit.model, stop_at),
+    )
+
+
+def _stops(model: Model, stop_at: object) -> tuple[tuple[str, float], ...]:
+    """Return the quantities to stop at with their values, checked."""
+    if stop_at is None:
+        return ()
+    given = mapping_of("stop_at", stop_at, "{'x_max': 1.4}")
+    return tuple(
+        (
+            number_quantity(name, model, "stop_at").name,
+            real_number(f"stop_at['{name}']", value),
+        )
+        for name, value in given.items()
     )

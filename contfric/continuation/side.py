@@ -167,6 +167,14 @@ class Side:
         self.count -= self.last - row
         self.last = row
 
+    def end_at(self, row: int, point: Point, end: End) -> None:
+        """End with a point behind a row."""
+        self.rewind(row)
+        self.last += 1
+        self.count += 1
+        self.rows.put(self.last, point)
+        self.end = end
+
     def drop_crowd(self, arc: float) -> None:
         """Take away the points behind a place, but for the last one."""
         while self.last > 1 and self.rows.arc[self.last - 1] > arc:

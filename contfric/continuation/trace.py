@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from contfric.continuation.side import Side
 from contfric.continuation.sliding import nearly_reached
 from contfric.continuation.smooth import SAME_PLACE
 from contfric.continuation.start import start_of
+from contfric.continuation.stopping import stop_among, stop_between
 from contfric.continuation.vertex_ends import (
     CROSSED,
     NEAREST,
@@ -73,6 +74,7 @@ def continue_orbit(
     max_step: float | None = None,
     stability: bool = True,
     max_points: int = MOST_POINTS,
+    stop_at: Mapping[str, float] | None = None,
     progress: Progress | None = None,
 ) -> Branch:
     """Continue an orbit in one parameter, both ways, to the ends of its branch.
@@ -93,6 +95,9 @@ def continue_orbit(
         asymmetric branch turns.
     max_points : int
         Most points of each side; a branch that reaches it says so.
+    stop_at : mapping, optional
+        Quantities by name or expression, and a value of each, such as ``{"x_max": 1.4}``: a branch ends
+        where the first of them is taken, exactly there, with the reason STOP.
 
     Raises
     ------
@@ -116,7 +121,7 @@ def continue_orbit(
     ['SS', 'CS']
     """
     function_of("progress", progress)
-    settings = settings_of(orbit, parameter, range, max_step, stability, max_points)
+    settings = settings_of(orbit, parameter, range, max_step, stability, max_points, stop_at)
     return follow_orbit(orbit, settings, progress, keep=True)
 
 
@@ -185,6 +190,10 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     overshoot = overshoots_vertex(orbit, side, settings, side.count - count)
     if overshoot is not Overshoot.NONE:
         return overshoot is Overshoot.ENDED, step
+    unresolved = why in (kernels.EVENT, kernels.OUTSIDE)  # what is in the last step may come first
+    last, fresh = side.last - int(unresolved), side.count - count
+    if settings.stop_at and stop_among(orbit, side, settings, fresh, last):
+        return True, step
     if why in (kernels.STEP, kernels.BROKEN) and move_joints(orbit, side, settings):
         return False, FIRST_STEP * settings.largest
     reasons = {
@@ -247,6 +256,9 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     """Locate what happened over the last step; True if the side ends there."""
     before, after = side.before_tip, side.tip
     limit = limit_crossed(orbit, before, after, settings)
+    stop = stop_between(orbit, before, after, settings) if settings.stop_at else None
+    if stop is not None and (limit is None or stop.point.arc <= limit[0].arc):
+        limit = stop.point, ""
     located = locate_events(orbit, before, after, settings)
     if any(is_on_section(b) and _is_point(b.orbit) for b, _ in located):
         side.drop_tip()  # beyond it the same orbits come again, half a cycle later
@@ -317,6 +329,8 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         return False
     side.put_tip(limit[0])
     side.end = limit_end(after.value > settings.high, settings)
+    if stop is not None and limit[0] is stop.point:
+        side.end = stop.end
     return True
 
 

@@ -109,6 +109,13 @@ coulomb = Model(
     rounding=1e-15,  # of its closed form: a few units in the last place
     flow_factory=_flow,
     spread=_spread,
+    quantities=(
+        (
+            "energy",
+            "integral(S*abs(v) + 2*zeta*v**2)",
+        ),  # dissipated in a period of the orbit, k/F_0^2
+        ("power", "energy/period"),
+    ),
     references=(
         "Asymmetric and chaotic responses of dry friction oscillators with different static and "
         "kinetic coefficients of friction, Meccanica (2021), doi:10.1007/s11012-021-01382-8",

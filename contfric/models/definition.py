@@ -108,6 +108,8 @@ class Model(TransitionMaps):
     displacement : str
         The displacement as an observable, where it may have extrema inside of segments; empty where they
         are at joints, as they are with a joint wherever the mass stops.
+    quantities : tuple of (str, str)
+        Name and expression of each quantity of its own (:mod:`contfric.quantities`), such as an energy.
     definition : str
         Text from which the model can be built; empty if it is known by its name only.
     """
@@ -135,6 +137,7 @@ class Model(TransitionMaps):
     max_step: float | None = None
     rounding: float = 1e-13
     displacement: str = ""
+    quantities: tuple[tuple[str, str], ...] = ()
     definition: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:

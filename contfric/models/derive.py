@@ -102,6 +102,7 @@ def model_from(description: Description) -> Model:
         filippov=leaves_at_rest(sampler, description, declared),
         turned=turned_modes(sampler, surfaces, declared),
         max_step=description.max_step,
+        quantities=description.quantities,
         definition=description.text,
     )
     if undecided := model.undecided():

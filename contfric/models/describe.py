@@ -12,6 +12,7 @@ from contfric.models.description import Description, DomainText, ModeText
 from contfric.models.entries import Part
 from contfric.models.measuring import measured
 from contfric.models.names import Names
+from contfric.models.quantity_entries import check_quantities, read_quantities
 from contfric.models.shorthand import expanded
 
 KEYS = (
@@ -28,6 +29,7 @@ KEYS = (
         "integration",
     ),
     "max_step",
+    "quantities",
 )
 _PARAMETER = ("default", "meaning")
 _SURFACE = ("observable", "level", "switching")
@@ -108,6 +110,7 @@ def _described(data: dict[str, Any]) -> Description:
         method=method,
         tolerance=tolerance,
         max_step=_max_step(top),
+        quantities=read_quantities(top),
     )
     _check_expressions(found, names)
     return measured(found)
@@ -379,3 +382,4 @@ def _check_expressions(found: Description, names: Names) -> None:
         names.check(("spread", state), width, only_parameters=True)
     if found.period:
         names.check(("period",), found.period, only_parameters=True)
+    check_quantities(found.quantities, names, timed)

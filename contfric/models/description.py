@@ -57,6 +57,7 @@ class Description:
     spread : expression of the half-width of starts, one a state
     method, tolerance : how motion is integrated (:mod:`contfric.flow.integrated`)
     max_step : largest step of a continuation where the user gives none; None for the engine's
+    quantities : (name, expression) of each quantity that the file declares
     """
 
     name: str
@@ -83,6 +84,7 @@ class Description:
     method: str = "explicit"
     tolerance: float = 1e-12
     max_step: float | None = None
+    quantities: tuple[tuple[str, str], ...] = ()
 
     def data(self) -> dict[str, Any]:
         """Return the description in the schema of the YAML files, with nothing left out."""
@@ -131,6 +133,8 @@ class Description:
             found["stop_surface"] = self.stop_surface
         if self.max_step is not None:
             found["max_step"] = self.max_step
+        if self.quantities:
+            found["quantities"] = dict(self.quantities)
         return found
 
     def _mode(self, mode: ModeText) -> dict[str, Any]:
@@ -147,8 +151,10 @@ class Description:
 
     @cached_property
     def motion(self) -> str:
-        """The same of what motion depends on: how a continuation steps is left out."""
-        return self.text if self.max_step is None else replace(self, max_step=None).text
+        """The same of what motion depends on: without steps of a continuation, and what is measured."""
+        if self.max_step is None and not self.quantities:
+            return self.text
+        return replace(self, max_step=None, quantities=()).text
 
     @cached_property
     def names(self) -> Names:

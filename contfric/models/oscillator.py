@@ -57,8 +57,8 @@ class OscillatorModel:
        sides of the mode decide are replaced by what they are there.
     7. Write :meth:`period` if there is an excitation, :meth:`reset` if a surface maps the state (impact).
     8. If there is a symmetry, set ``symmetry``, such as ``"x -> -x, v -> -v, t -> t + T/2"``; ``spread``
-       is how far from 0 motion can start. ``kinks``, ``angles``, ``integration`` and ``max_step`` are as in a
-       file.
+       is how far from 0 motion can start. ``kinks``, ``angles``, ``integration``, ``max_step`` and
+       ``quantities`` are as in a file.
     9. Load it with ``contfric.load_model(MyClass)``, and verify it with ``contfric.check_model(MyClass)``.
 
     Formulas are written with the functions of :mod:`contfric.models.functions` (or sympy's own); arguments
@@ -107,6 +107,7 @@ class OscillatorModel:
     spread: ClassVar[Mapping[str, Any]] = {}
     integration: ClassVar[Mapping[str, Any]] = {}
     max_step: ClassVar[float | None] = None
+    quantities: ClassVar[Mapping[str, str]] = {}
 
     def period(self, p: Symbols) -> Any:
         """Return the period of the excitation; None (as here) if there is none."""
@@ -188,6 +189,7 @@ def _data(oscillator: OscillatorModel) -> dict[str, Any]:
         "spread": dict(oscillator.spread),
         "integration": dict(oscillator.integration),
         "max_step": oscillator.max_step,
+        "quantities": dict(oscillator.quantities),
     }
     data.update({"autonomous": True} if period is None else {"period": _text(period)})
     return data

@@ -50,6 +50,7 @@ _MAPPINGS = (
     "surfaces",
     "modes",
     "resets",
+    "quantities",
 )
 _NESTED = ("surfaces", "modes", "resets")
 

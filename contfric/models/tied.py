@@ -164,6 +164,8 @@ def _substituted(data: dict[str, Any], ties: Mapping[str, str]) -> dict[str, Any
     found["constraints"] = {put.condition(text): why for text, why in data["constraints"].items()}
     for key in ("define", "observables", "spread"):
         found[key] = put.each(data[key])
+    if "quantities" in data:
+        found["quantities"] = put.each(data["quantities"])
     if "period" in data:
         found["period"] = put.text(data["period"])
     if "field" in data:

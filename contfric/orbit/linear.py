@@ -46,16 +46,16 @@ def equations_at(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return residuals and Jacobians by joints and parameters: (N m,), (N m, N m), (N m, parameters)."""
     a, b, c, close, correction = linearised(system, joints, vector)
-    return -correction, _stacked(a, b, close), c.reshape(joints.size, -1)
+    return -correction, stacked(a, b, close), c.reshape(joints.size, -1)
 
 
 def assembled(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:
     """Return the Jacobian with respect to all joints, shape (N m, N m)."""
     a, b, _, close = jacobian_blocks(system, joints, vector, parameters=False)
-    return _stacked(a, b, close)
+    return stacked(a, b, close)
 
 
-def _stacked(a: FloatArray, b: FloatArray, close: FloatArray) -> FloatArray:
+def stacked(a: FloatArray, b: FloatArray, close: FloatArray) -> FloatArray:
     """Return the cyclic blocks as one matrix."""
     count, m = a.shape[:2]
     full = np.zeros((count * m, count * m))

@@ -16,6 +16,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import pencil_of_turn
+from contfric.orbit.measured import MeasuredOrbit
 from contfric.orbit.reading import read_signature
 from contfric.orbit.samples import samples, state_within
 from contfric.orbit.slack import margin_slack, no_time
@@ -61,7 +62,7 @@ def of_two_halves(mu: ComplexArray) -> ComplexArray:
 
 
 @dataclass(frozen=True, eq=False)
-class Orbit:
+class Orbit(MeasuredOrbit):
     """A periodic orbit of a piecewise-smooth model.
 
     Attributes

@@ -26,7 +26,6 @@ from contfric.plot.style import (
     MARKERS,
     MIRROR_WIDTH,
     OTHER_MARKER,
-    ROWS,
     SMALL,
     STABLE,
     TEXT,
@@ -45,12 +44,14 @@ if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
     from contfric.continuation.branch import Branch
     from contfric.continuation.events import Bifurcation
+    from contfric.models.definition import Model
+    from contfric.quantities.registry import QuantityLike
     from contfric.response.sweep import Sweep
 
 
 def plot_branches(
     branches: Sequence[Branch],
-    row: str = "x_max",
+    row: QuantityLike = "x_max",
     ax: Axes | None = None,
     *,
     events: bool = True,
@@ -64,8 +65,8 @@ def plot_branches(
     Parameters
     ----------
     branches : sequence of Branch
-    row : {"x_max", "x_min", "stops", "psi"}
-        The quantity.
+    row : str or callable
+        The quantity, as for :meth:`contfric.Branch.quantity`.
     ax : Axes, optional
         Where to draw; new axes by default.
     events : bool
@@ -82,14 +83,14 @@ def plot_branches(
     >>> plot_branches([branch], "psi").get_ylabel()
     '$\\psi$'
     """
-    row_of(row)  # before a figure is opened for it
+    row_of(row, _model_of(branches))  # before a figure is opened for it
     found = [b for branch in branches for b in branch.bifurcations] if events else []
     return _plot_row(axes_or_new(ax), branches, found, row, legend, outside=ax is None)
 
 
 def plot_diagram_row(
     diagram: Diagram,
-    row: str = "x_max",
+    row: QuantityLike = "x_max",
     ax: Axes | None = None,
     events: bool = True,
     legend: bool = True,
@@ -100,8 +101,8 @@ def plot_diagram_row(
     Parameters
     ----------
     diagram : Diagram
-    row : {"x_max", "x_min", "stops", "psi"}
-        The quantity.
+    row : str or callable
+        The quantity, as for :meth:`contfric.Branch.quantity`.
     ax : Axes, optional
         Where to draw; new axes by default.
     events : bool
@@ -117,7 +118,7 @@ def plot_diagram_row(
     >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     >>> ax = plot_diagram_row(cf.explore(orbit, "Omega", (0.4, 0.6)), "psi")
     """
-    row_of(row)  # before a figure is opened for it
+    row_of(row, _model_of(diagram.branches))  # before a figure is opened for it
     found = diagram.bifurcations if events else ()
     new = axes_or_new(ax)
     new.set_xlim(*diagram.range)
@@ -127,7 +128,7 @@ def plot_diagram_row(
 
 def plot_diagram(
     diagram: Diagram,
-    rows: Sequence[str] = ("x_max", "stops", "psi"),
+    rows: Sequence[QuantityLike] = ("x_max", "stops", "psi"),
     fig: Figure | None = None,
     overlay: Sweep | None = None,
     title: str = "",
@@ -137,8 +138,8 @@ def plot_diagram(
     Parameters
     ----------
     diagram : Diagram
-    rows : sequence of {"x_max", "x_min", "stops", "psi"}
-        The quantities from top to bottom.
+    rows : sequence of str or callable
+        The quantities from top to bottom, as for :meth:`contfric.Branch.quantity`.
     fig : Figure, optional
         An empty figure to draw in; a new one by default.
     overlay : Sweep, optional
@@ -157,8 +158,7 @@ def plot_diagram(
     >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     >>> axes = plot_diagram(cf.explore(orbit, "Omega", (0.4, 0.6)), rows=("x_max", "psi"))
     """
-    for row in rows:
-        row_of(row)
+    looks = [row_of(row, _model_of(diagram.branches)) for row in rows]
     fig = figure_or_new(fig, 8.4, 1.2 + 2.4 * len(rows))
     axes = list(fig.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0])
     axes[0].set_xlim(*diagram.range)
@@ -169,14 +169,13 @@ def plot_diagram(
         text = full_title(title, diagram.model.parameter_names, fixed)
     axes[0].set_title(text, fontsize=TEXT)
     marks = [
-        marks_of(diagram.bifurcations, diagram.branches, ROWS[row].attribute, diagram.parameter)
-        for row in rows
+        marks_of(diagram.bifurcations, diagram.branches, row, diagram.parameter) for row in rows
     ]
     for ax, row, found in zip(axes, rows, marks, strict=True):
         _draw_row(ax, diagram.branches, found, row)
         ax.label_outer()
     fig.align_ylabels(axes)
-    mirrors = any(not row_of(row).even for row in rows)
+    mirrors = any(not look.even for look in looks)
     handles = _handles(diagram.branches, marks[0], mirrors=mirrors)
     if fig.get_layout_engine() is None:
         axes[0].legend(handles=handles, fontsize=SMALL, **BESIDE)
@@ -186,6 +185,10 @@ def plot_diagram(
     for ax, found in zip(axes, marks, strict=True):
         label_marks(ax, found)
     return axes
+
+
+def _model_of(branches: Sequence[Branch]) -> Model | None:
+    return branches[0].model if branches else None
 
 
 def fixed_parameters(branches: Sequence[Branch]) -> dict[str, float]:
@@ -202,15 +205,14 @@ def _plot_row(
     ax: Axes,
     branches: Sequence[Branch],
     events: Sequence[Bifurcation],
-    row: str,
+    row: QuantityLike,
     legend: bool,
     *,
     outside: bool,
 ) -> Axes:
-    attribute = row_of(row).attribute
     parameter = branches[0].parameter if branches else ""
-    marks = marks_of(events, branches, attribute, parameter)
-    mirrors = not row_of(row).even
+    marks = marks_of(events, branches, row, parameter)
+    mirrors = not row_of(row, _model_of(branches)).even
     _draw_row(ax, branches, marks, row)
     if legend and outside:
         handles = _handles(branches, marks, mirrors=mirrors)
@@ -223,29 +225,32 @@ def _plot_row(
     return ax
 
 
-def _draw_row(ax: Axes, branches: Sequence[Branch], marks: Sequence[Mark], row: str) -> None:
+def _draw_row(
+    ax: Axes, branches: Sequence[Branch], marks: Sequence[Mark], row: QuantityLike
+) -> None:
     colours = _colours(branches)
-    twins = {b.name for b in branches if not b.mirrored} if row_of(row).even else set()
+    look = row_of(row, _model_of(branches))
+    twins = {b.name for b in branches if not b.mirrored} if look.even else set()
     for branch in sorted(branches, key=lambda b: not b.mirrored):
         if branch.mirrored and branch.name in twins:
             continue  # it lies on its original
         if branch.bridge:
-            _draw_bridge(ax, branch, row_of(row).attribute)
+            _draw_bridge(ax, branch, row)
         else:
-            _draw_branch(ax, branch, row_of(row).attribute, colours[branch.name])
+            _draw_branch(ax, branch, row, colours[branch.name])
     draw_marks(ax, marks)
     ax.margins(y=0.12)
     displacement = branches[0].model.states[0] if branches else "x"
-    ax.set_ylabel(row_of(row).name(displacement), fontsize=TEXT + 1)
+    ax.set_ylabel(look.name(displacement), fontsize=TEXT + 1)
     if branches:
         ax.set_xlabel(parameter_label(branches[0].parameter), fontsize=TEXT + 1)
     ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
 
 
-def _draw_branch(ax: Axes, branch: Branch, attribute: str, colour: str) -> None:
+def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, colour: str) -> None:
     width = MIRROR_WIDTH if branch.mirrored else LINE_WIDTH
     colour = lighter(colour) if branch.mirrored else colour
-    for run in stability_runs(branch, attribute):
+    for run in stability_runs(branch, row):
         known = run.stable is not None
         lines = ax.plot(
             run.x,
@@ -260,8 +265,8 @@ def _draw_branch(ax: Axes, branch: Branch, attribute: str, colour: str) -> None:
             line.set_gid(branch.name)
 
 
-def _draw_bridge(ax: Axes, branch: Branch, attribute: str) -> None:
-    for run in stability_runs(branch, attribute):
+def _draw_bridge(ax: Axes, branch: Branch, row: QuantityLike) -> None:
+    for run in stability_runs(branch, row):
         lines = ax.plot(
             run.x,
             run.y,

@@ -17,6 +17,7 @@ from contfric.plot.style import MARKERS, OTHER_MARKER, event_label
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
     from contfric.continuation.events import Bifurcation, Kind
+    from contfric.quantities.registry import QuantityLike
 
 #: Relative: events of one kind this near in the parameter are images of one another.
 _SAME = 1e-9
@@ -48,7 +49,7 @@ class Mark:
 def marks_of(
     events: Sequence[Bifurcation],
     branches: Sequence[Branch],
-    attribute: str,
+    row: QuantityLike,
     parameter: str,
 ) -> list[Mark]:
     """Return the marks of a row, with the images of each event on all branches.
@@ -62,7 +63,10 @@ def marks_of(
         x = event.params[parameter]
         there = [b for b in regular if _coincide(b, event, parameter)]
         images = [*there, *(b for b in bridges if _coincide(b, event, parameter))]
-        y = np.concatenate([quantity(b.orbit, attribute) for b in (event, *images)])
+        y = np.concatenate([quantity(b.orbit, row) for b in (event, *images)])
+        y = y[np.isfinite(y)]
+        if not len(y):
+            continue
         label = event.label if event in there or not there else there[0].label
         if not any(m.label == label and abs(m.x - x) <= _SAME * abs(x) for m in found):
             only = bool(images) and not there

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from matplotlib.axes import Axes
 
@@ -13,6 +13,7 @@ from contfric.plot.save import axes_or_new
 from contfric.plot.style import GREY, SMALL, TEXT, lighter, parameter_label
 
 if TYPE_CHECKING:
+    from contfric.quantities.registry import QuantityLike
     from contfric.response.sweep import Sweep
 
 #: Colours of the directions: both read in grey.
@@ -54,7 +55,7 @@ def plot_sweep(sweep: Sweep, ax: Axes | None = None, state: str | None = None) -
 
 
 def draw_overlay(
-    axes: Sequence[Axes], rows: Sequence[str], parameter: str, overlay: Sweep | None
+    axes: Sequence[Axes], rows: Sequence[QuantityLike], parameter: str, overlay: Sweep | None
 ) -> None:
     """Draw the points of a sweep behind the rows of a diagram; nothing if there is none.
 
@@ -65,13 +66,14 @@ def draw_overlay(
     """
     if overlay is None:
         return
-    if not hasattr(overlay, "quantity"):
+    if not hasattr(overlay, "runs"):
         raise ParameterError(f"overlay is a sweep (cf.sweep), got a {type(overlay).__name__}")
     if overlay.parameter != parameter:
         raise ParameterError(
             f"the sweep is along '{overlay.parameter}', and the diagram along '{parameter}'"
         )
-    found = [list(overlay.quantity(row)) for row in rows]  # all of them, before anything is drawn
+    # all of them, before anything is drawn; it says itself what it does not have
+    found = [list(overlay.quantity(cast("str", row))) for row in rows]
     for ax, points in zip(axes, found, strict=True):
         for _, x, y in points:
             _draw(ax, x, y, lighter(GREY, 0.2), 0.5, None)

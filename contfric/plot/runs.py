@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.models.definition import FloatArray
+from contfric.quantities.registry import NAMED
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
     from contfric.continuation.events import Bifurcation
+    from contfric.orbit.orbit import Orbit
+    from contfric.quantities.registry import QuantityLike
 
 #: In units of the length of the branch: a point this near to an event is the event.
 _SAME = 1e-9
@@ -38,22 +41,28 @@ class _Vertex:
     located: bool
 
 
-def quantity(source: object, attribute: str) -> FloatArray:
-    """Return a quantity of a branch, shape (k, quantities), or of an orbit, (quantities,)."""
-    values = np.asarray(getattr(source, attribute), dtype=np.float64)
+def quantity(source: Branch | Orbit, row: QuantityLike) -> FloatArray:
+    """Return a quantity of a branch, shape (k, numbers), or of an orbit, (numbers,).
+
+    What is not finite, such as multipliers of orbits with holds, is nan: nothing is drawn.
+    """
+    attribute = NAMED[row].attribute if isinstance(row, str) and row in NAMED else ""
+    found = getattr(source, attribute) if attribute else source.quantity(row)
+    values = np.asarray(found, dtype=np.float64)
+    values = np.where(np.isfinite(values), values, np.nan)
     if hasattr(source, "values"):
         return values.reshape(len(values), -1)
     return np.atleast_1d(values)
 
 
-def stability_runs(branch: Branch, attribute: str) -> list[Run]:
+def stability_runs(branch: Branch, row: QuantityLike) -> list[Run]:
     """Cut a branch where its stability changes.
 
     Consecutive runs share the point of change, which is the located bifurcation. A branch whose
     stability was not computed is one run with ``stable`` None; a bridge, which is nowhere stable,
     is one run too.
     """
-    vertices = _vertices(branch, attribute)
+    vertices = _vertices(branch, row)
     runs: list[Run] = []
     start = 0
     states = [False] * (len(vertices) - 1) if branch.bridge else list(_between(vertices))
@@ -66,11 +75,11 @@ def stability_runs(branch: Branch, attribute: str) -> list[Run]:
     return runs
 
 
-def _vertices(branch: Branch, attribute: str) -> list[_Vertex]:
+def _vertices(branch: Branch, row: QuantityLike) -> list[_Vertex]:
     """Return points and located events in the order of the branch."""
-    columns = quantity(branch, attribute)
+    columns = quantity(branch, row)
     tolerance = _SAME * max(float(np.ptp(branch.arc)), 1e-300)
-    events = [_event_vertex(branch, b, columns, attribute) for b in branch.bifurcations]
+    events = [_event_vertex(branch, b, columns, row) for b in branch.bifurcations]
     taken = np.array([v.arc for v in events])
     points = [v for v in _points(branch, columns) if not np.any(np.abs(taken - v.arc) <= tolerance)]
     return sorted([*events, *points], key=lambda v: v.arc)
@@ -100,11 +109,11 @@ def _change(branch: Branch, columns: FloatArray, k: int) -> _Vertex:
 
 
 def _event_vertex(
-    branch: Branch, event: Bifurcation, columns: FloatArray, attribute: str
+    branch: Branch, event: Bifurcation, columns: FloatArray, row: QuantityLike
 ) -> _Vertex:
     arc = _position(branch, event)
     near = np.array([np.interp(arc, branch.arc, column) for column in columns.T])
-    y = aligned(quantity(event.orbit, attribute), near)
+    y = aligned(quantity(event.orbit, row), near)
     x = event.params[branch.parameter]
     sides = event.stable_before, event.stable_after
     if event.kind.value != "SN" and _falls(branch, arc):  # told upward, but drawn along the branch

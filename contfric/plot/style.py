@@ -11,6 +11,7 @@ from matplotlib.colors import to_hex, to_rgb
 
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models import Model
+from contfric.quantities.registry import NAMED, QuantityLike, quantity_of
 
 #: Palette that stays distinguishable to colour-blind readers (M. Okabe and K. Ito, 2008).
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -66,12 +67,8 @@ OTHER_MARKER = Marker("*", face="white", size=7.0)
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity of a diagram: the attribute of branch and orbit, and the name on the axis.
+    """One quantity of a diagram: the name on the axis, in which %s is the displacement as mathematics."""
 
-    In the label %s is the displacement as mathematics.
-    """
-
-    attribute: str
     label: str
     even: bool = False  # the same for an orbit and its mirror image
 
@@ -84,13 +81,10 @@ class Row:
         return self.label.replace("%s", symbol)
 
 
-#: What a row of a diagram can show.
+#: The rows that need the joints of orbits only; any other quantity is measured when it is asked for.
 ROWS = {
-    "x_max": Row("x_max", r"$%s_{\max}$"),
-    "x_min": Row("x_min", r"$%s_{\min}$"),
-    "stops": Row("stops", r"$%s$ at stops"),
-    "psi": Row("asymmetry", r"$\psi$", even=True),
-    "period": Row("period", "period", even=True),
+    name: Row(NAMED[name].label, NAMED[name].even)
+    for name in ("x_max", "x_min", "stops", "psi", "period")
 }
 
 _GREEK = frozenset(
@@ -102,18 +96,23 @@ _GREEK = frozenset(
 )
 
 
-def row_of(name: str) -> Row:
-    """Return a row by its name.
+def row_of(asked: QuantityLike, model: Model | None) -> Row:
+    """Return a row: any quantity of the model; without a model, one of :data:`ROWS`.
 
     Raises
     ------
     ParameterError
-        If there is no such row.
+        If there is no such quantity.
     """
-    given: object = name  # whatever the user gave
-    if not isinstance(given, str) or given not in ROWS:
-        raise ParameterError(f"no row '{given}' in a diagram{did_you_mean(given, ROWS)}")
-    return ROWS[name]
+    if isinstance(asked, str) and asked in ROWS:
+        return ROWS[asked]
+    names = [*NAMED, *(n for n, _ in model.quantities)] if model is not None else [*ROWS]
+    word = isinstance(asked, str) and asked.isidentifier()
+    if model is None or (word and asked not in names):
+        raise ParameterError(f"no row '{asked}' in a diagram{did_you_mean(asked, names)}")
+    found = quantity_of(asked, model)
+    label = found.name if found.named is None else found.named.label
+    return Row(label, found.even)
 
 
 def parameter_label(name: str) -> str:

@@ -145,6 +145,11 @@ class Sweep:
             )
         return self.model.states.index(state)
 
+    @staticmethod
+    def shows(row: object) -> bool:
+        """Tell whether an overlay has a row of a diagram."""
+        return row in ROWS
+
     def quantity(self, row: str) -> Iterator[tuple[str, FloatArray, FloatArray]]:
         """Yield (direction, parameter, what a diagram shows in one of its rows), for an overlay.
 

@@ -157,7 +157,7 @@ class Unpacker:
             ),
             complete=entry["complete"],
             notes=tuple(entry["notes"]),
-            settings=Asked(**entry.get("settings", {})),
+            settings=_asked(entry.get("settings", {})),
             verification=_verification(entry.get("verification")),
         )
 
@@ -175,6 +175,12 @@ def _labelled(system: System, parameter: str, arrays: Arrays) -> IntArray:
         vector[active] = value
         rows.append(Orbit(system, joints.copy(), vector, 0.0, Status.CONVERGED).labels)
     return np.array(rows, dtype=np.int64).reshape(len(rows), len(system.layout.labels))
+
+
+def _asked(entry: Header) -> Asked:
+    """Return what a diagram was asked for; JSON has lists where it has pairs."""
+    stops = tuple((name, value) for name, value in entry.get("stop_at", ()))
+    return Asked(**{**entry, "stop_at": stops})
 
 
 def _verification(entry: Header | None) -> Verification | None:

@@ -19,7 +19,7 @@ class Drawing:
     """A figure to draw: its kind, the rows of a diagram, and the name of its file."""
 
     kind: FigureKind
-    rows: tuple[Row, ...]
+    rows: tuple[Row | str, ...]
     file: str
 
 
@@ -33,7 +33,7 @@ def drawings_of(located: LocatedYaml, content: StudyFile) -> tuple[Drawing, ...]
     return tuple(drawings)
 
 
-def _rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row, ...]:
+def _rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row | str, ...]:
     figure = content.figures[index]
     if figure.kind is not FigureKind.DIAGRAM:
         if figure.rows is not None:
@@ -52,7 +52,7 @@ def _rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row, ..
     if figure.rows is None:
         return _default_rows(located, content, index)
     for place, row in enumerate(figure.rows):
-        if row.needs is not None and row.needs not in content.want:
+        if isinstance(row, Row) and row.needs is not None and row.needs not in content.want:
             located.fail(
                 ("figures", index, "rows", place),
                 f"row '{row.value}' shows {row.needs.value}: add {row.needs.value} to 'want'",
@@ -65,7 +65,7 @@ def _check_task(located: LocatedYaml, content: StudyFile, index: int, what: str)
         located.fail(("figures", index), f"{what} needs 'explore' or 'continue'")
 
 
-def _default_rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row, ...]:
+def _default_rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row | str, ...]:
     rows = tuple(r for r in (Row.X_MAX, Row.STOPS, Row.PSI) if r.needs in content.want)
     if not rows:
         located.fail(

@@ -9,7 +9,7 @@ from contfric.results import replacing
 from contfric.study.drawings import Drawing
 from contfric.study.findings import Findings
 from contfric.study.responses import KEYS
-from contfric.study.schema import FigureKind
+from contfric.study.schema import FigureKind, row_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,6 +51,8 @@ def _behind(found: Findings, rows: list[str]) -> Sweep | None:
     """Return the sweep that is drawn behind a diagram: along its parameter, with what its rows show."""
     swept, diagram = cast("Sweep | None", found.responses.get("sweep")), found.diagram
     if swept is None or diagram is None or swept.parameter != diagram.parameter:
+        return None
+    if not all(swept.shows(row) for row in rows):
         return None
     return swept if swept.section == "stops" or rows == ["stops"] else None
 
@@ -106,7 +108,7 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
     elif drawing.kind in _OF_DIAGRAM:
         assert diagram is not None
         if drawing.kind is FigureKind.DIAGRAM:
-            rows = [row.value for row in drawing.rows]
+            rows = [row_name(row) for row in drawing.rows]
             axes_of_rows = plot_diagram(diagram, rows, figure, _behind(found, rows), title)
             _draw_equilibria(axes_of_rows, rows, found)
         else:

@@ -8,7 +8,14 @@ from enum import Enum
 
 from contfric.study import responses
 from contfric.study.read import Study
-from contfric.study.schema import ContinueTask, ExploreTask, LyapunovTask, PlaneTask, Want
+from contfric.study.schema import (
+    ContinueTask,
+    ExploreTask,
+    LyapunovTask,
+    PlaneTask,
+    Want,
+    row_name,
+)
 
 RECORD = "run.json"
 POINTS = "points.csv"
@@ -124,7 +131,7 @@ def _steps(study: Study) -> Iterator[Step]:
     yield Step(StepName.DATA, "all that a restart needs", _data_files(study))
     if study.drawings:
         shown = [
-            f"{d.kind.value} ({', '.join(row.value for row in d.rows)})" if d.rows else d.kind.value
+            f"{d.kind.value} ({', '.join(map(row_name, d.rows))})" if d.rows else d.kind.value
             for d in study.drawings
         ]
         files = tuple(drawing.file for drawing in study.drawings)
@@ -157,6 +164,8 @@ def _task_text(study: Study, task: ExploreTask | ContinueTask) -> str:
             text += f", of up to {task.max_periods} period(s)"
         if task.verify:
             text += ", explored again from its own branches"
+    for name, value in (task.stop_at or {}).items():
+        text += f", to {name} = {value:g}"
     return text + (", with multipliers" if study.wants(Want.STABILITY) else "")
 
 
@@ -224,7 +233,8 @@ COLUMNS = {
 
 def table_quantities(study: Study) -> list[str]:
     """Return the columns that a study wants beyond the parameters."""
-    return [columns for want, columns in COLUMNS.items() if study.wants(want)]
+    found = [columns for want, columns in COLUMNS.items() if study.wants(want)]
+    return [*found, *study.content.quantities]
 
 
 def _skipped(study: Study) -> Iterator[Skipped]:

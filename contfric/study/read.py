@@ -20,13 +20,14 @@ from contfric.models.definition import Model
 from contfric.models.files import relative_model
 from contfric.models.tied import tied
 from contfric.orbit.orbit import Orbit
+from contfric.quantities.registry import number_quantity, quantity_names
 from contfric.signature import Signature, load_signature
 from contfric.study import responses
 from contfric.study.drawings import Drawing, drawings_of
 from contfric.study.explain_error import fail_with
 from contfric.study.library import SUFFIXES, study_path
-from contfric.study.schema import ContinueTask, ExploreTask, StudyFile, Want
-from contfric.yaml_lines import LocatedYaml, read_yaml
+from contfric.study.schema import ContinueTask, ExploreTask, Row, StudyFile, Want
+from contfric.yaml_lines import Address, LocatedYaml, read_yaml
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +134,7 @@ def _checked(located: LocatedYaml, content: StudyFile) -> Study:
     _check_task(located, content, model, params)
     _check_grid(located, content, model)
     _check_plane(located, content, model)
+    _check_quantities(located, content, model)
     responses.check(located, content, model)
     return Study(
         located.path,
@@ -259,6 +261,36 @@ def _check_task(
     fault = _range_fault(model, params, task)
     if fault is not None:
         located.fail((key, "range"), fault)
+
+
+def _check_quantities(located: LocatedYaml, content: StudyFile, model: Model) -> None:
+    """Refuse columns, rows and values to stop at of quantities that the model does not have."""
+    asked: list[tuple[Address, str, list[str]]] = [
+        (("want", k), name, [want.value for want in Want])
+        for k, name in enumerate(content.want)
+        if not isinstance(name, Want)
+    ]
+    for i, figure in enumerate(content.figures):
+        rows = figure.rows or []
+        named = [row.value for row in Row]
+        asked += [
+            (("figures", i, "rows", k), row, named)
+            for k, row in enumerate(rows)
+            if not isinstance(row, Row)
+        ]
+    key = "explore" if content.explore else "continue"
+    stops = content.task.stop_at if content.task and content.task.stop_at else {}
+    asked += [((key, "stop_at", name), name, []) for name in stops]
+    known = quantity_names(model)
+    for address, name, others in asked:
+        place = next(str(part) for part in reversed(address[:-1]) if isinstance(part, str))
+        valid = list(dict.fromkeys((*others, *known)))
+        if name.isidentifier() and name not in known:
+            located.fail(address, f"'{place}' has no '{name}'{did_you_mean(name, valid)}")
+        try:
+            number_quantity(name, model, f"'{place}'")
+        except ParameterError as error:
+            located.fail(address, str(error))
 
 
 def _check_grid(located: LocatedYaml, content: StudyFile, model: Model) -> None:

@@ -61,6 +61,11 @@ _NEEDS = {
 }
 
 
+def row_name(row: Row | str) -> str:
+    """Return the name of a row."""
+    return row.value if isinstance(row, Row) else row
+
+
 class Format(str, Enum):
     """Formats of figures."""
 
@@ -70,8 +75,19 @@ class Format(str, Enum):
 
 
 # YAML has texts where Python has enumerations: these fields alone are converted
-_Wants = Annotated[list[Annotated[Want, Field(strict=False)]], Field()]
-_Rows = Annotated[list[Annotated[Row, Field(strict=False)]], Field(min_length=1)]
+# (a text that is none of them is a quantity, which the model has or has not)
+_Quantity = Annotated[str, Field(min_length=1)]
+_Wants = list[
+    Annotated[Annotated[Want, Field(strict=False)] | _Quantity, Field(union_mode="left_to_right")]
+]
+_Rows = Annotated[
+    list[
+        Annotated[
+            Annotated[Row, Field(strict=False)] | _Quantity, Field(union_mode="left_to_right")
+        ]
+    ],
+    Field(min_length=1),
+]
 
 
 class Simulated(_Part):
@@ -114,6 +130,11 @@ class _Task(_Part):
     )
     max_points: int | None = Field(
         None, ge=10, description="a whole number >= 10: most points of each side of a branch"
+    )
+
+    stop_at: dict[str, float] | None = Field(
+        None,
+        description="a mapping of quantities to the value at which a branch ends, such as {x_max: 1.4}",
     )
 
     def options(self) -> dict[str, Any]:
@@ -242,7 +263,8 @@ class Figure(_Part):
         "poincare, basins, equilibria"
     )
     rows: _Rows | None = Field(
-        None, description="a list of rows of a diagram: any of x_max, x_min, stops, psi, period"
+        None,
+        description="a list of rows of a diagram: x_max, x_min, stops, psi, period, or any quantity",
     )
     file: str | None = Field(None, min_length=1, description="the name of the figure's file")
     format: Annotated[Format, Field(strict=False)] | None = Field(
@@ -272,12 +294,12 @@ class StudyFile(_Part):
     explore: ExploreTask | None = Field(
         None,
         description="a mapping with parameter and range; also bridges, seeds, max_step, "
-        "max_points, max_periods, copies, max_branches, verify",
+        "max_points, stop_at, max_periods, copies, max_branches, verify",
     )
     continue_: ContinueTask | None = Field(
         None,
         alias="continue",
-        description="a mapping with parameter and range; also max_step, max_points",
+        description="a mapping with parameter and range; also max_step, max_points, stop_at",
     )
     lyapunov: LyapunovTask | None = Field(
         None,
@@ -302,8 +324,16 @@ class StudyFile(_Part):
         None,
         description="a mapping with parameter and range; also values, starts, max_step",
     )
-    want: _Wants = Field([], description="a list with any of stability, asymmetry, extrema, stops")
+    want: _Wants = Field(
+        [],
+        description="a list with any of stability, asymmetry, extrema, stops, and of quantities",
+    )
     figures: list[Figure] = Field([], description="a list of mappings, each with its kind")
+
+    @property
+    def quantities(self) -> list[str]:
+        """The quantities that it wants a column of, beyond those that have a name of their own."""
+        return [name for name in self.want if not isinstance(name, Want)]
 
     @property
     def task(self) -> ExploreTask | ContinueTask | None:

@@ -51,6 +51,8 @@ def _columns(study: Study, source: Branch | Orbit) -> dict[str, list[Any]]:
         columns["x_min"] = np.atleast_1d(source.x_min).tolist()
     if study.wants(Want.ASYMMETRY):
         columns["psi"] = np.atleast_1d(source.asymmetry).tolist()
+    for name in study.content.quantities:
+        columns[name] = np.atleast_1d(np.asarray(source.quantity(name))).tolist()
     if study.wants(Want.STOPS):
         stops = np.atleast_2d(source.stops)
         columns |= {f"stop_{k}": x.tolist() for k, x in enumerate(stops.T, start=1)}

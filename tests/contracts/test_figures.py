@@ -212,11 +212,11 @@ def test_stable_is_solid_and_unstable_dashed_up_to_the_fold(branch: Any) -> None
 
 
 def test_every_event_is_marked_at_its_coordinates(branch: Any) -> None:
-    for row, look in ROWS.items():
+    for row in (*ROWS, "energy"):
         ax = plot_branches([branch], row)
         for bif in branch.bifurcations:
             points = np.vstack([m.get_xydata() for m in markers(ax, bif.label)])
-            for value in np.atleast_1d(getattr(bif.orbit, look.attribute)):
+            for value in np.atleast_1d(bif.orbit.quantity(row)):
                 distance = np.abs(points - (bif.params["Omega"], value)).max(axis=1)
                 assert distance.min() < 1e-7
 
@@ -323,7 +323,7 @@ def test_an_event_of_branch_and_bridge_is_one_mark(diagram: Any) -> None:
 def test_what_lies_on_bridges_only_gives_way() -> None:
     start = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.22, "S0": 0.4})
     found = cf.explore(start, "Omega", (0.4, 0.56))
-    marks = marks_of(found.bifurcations, found.branches, "asymmetry", "Omega")
+    marks = marks_of(found.bifurcations, found.branches, "psi", "Omega")
     (alone,) = (m for m in marks if m.on_bridges)
     assert alone.kind.value == "T"
     fig = new_figure()

@@ -83,7 +83,7 @@ def _row(diagram: Diagram, name: str) -> dict[str, Any]:
     twins = [
         row.even and branch.mirrored and branch.name in originals for branch in diagram.branches
     ]
-    found = marks_of(diagram.bifurcations, diagram.branches, row.attribute, diagram.parameter)
+    found = marks_of(diagram.bifurcations, diagram.branches, name, diagram.parameter)
     return {
         "name": name,
         "label": {"stops": "x at stops", "psi": "ψ"}.get(name, name),
@@ -125,7 +125,7 @@ def _branch(branch: Branch, colours: dict[str, str]) -> dict[str, Any]:
 def _runs(diagram: Diagram, i: int, detail: Detail) -> Iterator[dict[str, Any]]:
     """Yield the pieces of one stability of a branch: x once, y of every row."""
     branch = diagram.branches[i]
-    of_rows = [stability_runs(branch, row.attribute) for row in ROWS.values()]
+    of_rows = [stability_runs(branch, name) for name in ROWS]
     width = diagram.range[1] - diagram.range[0]
     for pieces in zip(*of_rows, strict=True):
         x = pieces[0].x
@@ -186,7 +186,7 @@ def _on_branch(diagram: Diagram, i: int, k: int) -> dict[str, Any]:
     multipliers = None if branch.bridge or branch.multipliers is None else branch.multipliers[k]
     stable = None if branch.stable is None else bool(branch.stable[k])
     orbit = branch[k]
-    y = {name: quantity(orbit, row.attribute) for name, row in ROWS.items()}
+    y = {name: quantity(orbit, name) for name in ROWS}
     return _point(diagram, i, orbit, multipliers, y) | {"stable": stable, "event": ""}
 
 
@@ -195,7 +195,7 @@ def _at_event(diagram: Diagram, i: int, event: Bifurcation) -> dict[str, Any]:
     branch = diagram.branches[i]
     known = not branch.bridge and branch.multipliers is not None
     multipliers = event.orbit.multipliers if known else None
-    y = {name: quantity(event.orbit, row.attribute) for name, row in ROWS.items()}
+    y = {name: quantity(event.orbit, name) for name in ROWS}
     found = _point(diagram, i, event.orbit, multipliers, y)
     return found | {"stable": None, "event": event.label}
 

@@ -1,0 +1,49 @@
+"""How the location of an event moves with the other parameters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, cast
+
+if TYPE_CHECKING:
+    from contfric.continuation.events import Bifurcation
+    from contfric.orbit.gradient import Gradient
+
+
+class MeasuredEvent:
+    """The derivatives of an event: a part of :class:`contfric.continuation.events.Bifurcation`."""
+
+    def gradient(self, parameter: str | None = None) -> Gradient:
+        """Return the derivatives of the parameter at which the event happens by every other parameter.
+
+        Exact: the implicit function theorem on the equations of the orbit and the condition of the event,
+        as its curves in two parameters solve them.
+
+        Parameters
+        ----------
+        parameter : str, optional
+            The parameter whose value is differentiated; that of the branch by default. An event that was read
+            from a file does not know it.
+
+        Returns
+        -------
+        Gradient
+            A mapping of the other parameters to derivatives.
+
+        Raises
+        ------
+        ParameterError
+            If the event has no curve of its own, such as NS, or one on a bridge.
+        ConvergenceError
+            If its curve has no unique direction there.
+
+        Examples
+        --------
+        >>> import contfric as cf
+        >>> orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+        >>> fold = cf.continue_orbit(orbit, "Omega", (0.4, 0.6)).bifurcations[-2]
+        >>> sorted(fold.gradient())
+        ['S', 'S0', 'h', 'zeta']
+        """
+        from contfric.curves.gradient import event_gradient
+
+        return event_gradient(cast("Bifurcation", self), parameter)

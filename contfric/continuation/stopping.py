@@ -1,0 +1,177 @@
+"""A branch that ends where a quantity takes a value: between which points, and where exactly.
+
+Between two points at which the quantity lies on both sides of the value the place is located by Brent's
+method, each trial a solved orbit. Where it comes near and goes away again, the cubic through values and
+slopes of both ends of a step says whether it reaches the value between them; the solved orbit at the
+extremum of that cubic decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from contfric.continuation.events import End, EndReason
+from contfric.continuation.hermite import along, point_between
+from contfric.continuation.points import Point, Settings
+from contfric.continuation.side import Side
+from contfric.orbit.orbit import Orbit
+from contfric.quantities.measure import differentiated
+from contfric.quantities.registry import Quantity, number_quantity
+
+#: A start whose quantity is this near to the value (relative to 1 + its size) is at it, and leaves it.
+_AT_VALUE = 1e-9
+#: How near to the value the cubic has to come, as a share of the nearer end of a step, to be looked at.
+_NEAR = 0.1
+#: Resolution of the place, as a share of a step: that of the arithmetic.
+_SHORTEST = 1e-15
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Where a branch ends: the point, and the end."""
+
+    point: Point
+    end: End
+
+
+@dataclass(frozen=True, eq=False)
+class _Sought:
+    """The value of a quantity that a branch is to end at."""
+
+    orbit: Orbit
+    settings: Settings
+    quantity: Quantity
+    value: float
+
+    def miss(self, point: Point) -> float:
+        """Return by how much the quantity is above the value."""
+        return float(differentiated(self.quantity, self._orbit(point), None).value - self.value)
+
+    def slope(self, point: Point) -> float:
+        """Return how fast it grows along the branch."""
+        orbit, settings = self._orbit(point), self.settings
+        return float(
+            differentiated(self.quantity, orbit, along(point, orbit, settings.parameter)).ahead[0]
+        )
+
+    def _orbit(self, point: Point) -> Orbit:
+        active = self.orbit.model.index_of(self.settings.parameter)
+        return point.orbit(self.orbit.system, self.orbit.vector, active)
+
+    def crossing(self, before: Point, after: Point) -> Stop | None:
+        """Return the place between two points on both sides of the value."""
+        from scipy.optimize import brentq
+
+        last = before
+
+        def miss_at(share: float) -> float:
+            nonlocal last
+            if share in (0.0, 1.0):
+                return self.miss(before if share == 0.0 else after)
+            point = point_between(self.orbit, before, after, self.settings, share)
+            if point is None:
+                raise ArithmeticError
+            last = point
+            return self.miss(point)
+
+        reached = f"{self.quantity.name} = {self.value:g}"
+        try:
+            share = float(brentq(miss_at, 0.0, 1.0, xtol=_SHORTEST, rtol=4.0 * _SHORTEST))
+            point = point_between(self.orbit, before, after, self.settings, share)
+        except ArithmeticError:
+            point = None
+        if point is None:
+            lies = f"{reached} lies beyond this point, and Newton fails on the way"
+            return Stop(last, End(EndReason.STOP, lies))
+        return Stop(point, End(EndReason.STOP, f"{EndReason.STOP.value}: {reached}"))
+
+
+def stop_between(orbit: Orbit, before: Point, after: Point, settings: Settings) -> Stop | None:
+    """Return the first place of a step at which a quantity takes the value to stop at; None if none does."""
+    stops = [
+        _reached(sought, before, after, sought.miss(before), sought.miss(after), may_dip=True)
+        for sought in _all_sought(orbit, settings)
+    ]
+    return min(filter(None, stops), key=lambda stop: stop.point.arc, default=None)
+
+
+def stop_among(orbit: Orbit, side: Side, settings: Settings, fresh: int, last: int) -> bool:
+    """End a side at the first of its new steps in which a value to stop at is taken; True if one is.
+
+    Parameters
+    ----------
+    fresh : points that were added since it was last asked
+    last : the last row that is looked at
+    """
+    stops = [
+        _first_stop(sought, side, max(side.last - fresh, 0), last)
+        for sought in _all_sought(orbit, settings)
+    ]
+    found = min(filter(None, stops), key=lambda pair: pair[1].point.arc, default=None)
+    if found is not None:
+        row, stop = found
+        side.end_at(row, stop.point, stop.end)
+    return found is not None
+
+
+def _all_sought(orbit: Orbit, settings: Settings) -> Iterator[_Sought]:
+    for name, value in settings.stop_at:
+        yield _Sought(orbit, settings, number_quantity(name, orbit.model, "stop_at"), value)
+
+
+def _first_stop(sought: _Sought, side: Side, first: int, last: int) -> tuple[int, Stop] | None:
+    """Return the first step between two rows in which the value is taken, by its first row."""
+    points = [side.rows.point(row) for row in range(first, last + 1)]
+    misses = [sought.miss(point) for point in points]
+    if side.count - (side.last - first) == 1 and misses and _is_zero(misses[0], sought):
+        points, misses, first = points[1:], misses[1:], first + 1  # it starts at the value
+    far = [np.inf, *np.abs(misses), np.inf]  # beyond the rows anything may lie
+    for k in range(len(points) - 1):
+        near = far[k] >= far[k + 1] and far[k + 2] <= far[k + 3]
+        stop = _reached(sought, points[k], points[k + 1], misses[k], misses[k + 1], may_dip=near)
+        if stop is not None:
+            return first + k, stop
+    return None
+
+
+def _is_zero(miss: float, sought: _Sought) -> bool:
+    return abs(miss) < _AT_VALUE * (1.0 + abs(sought.value))
+
+
+def _reached(
+    sought: _Sought, before: Point, after: Point, a: float, b: float, *, may_dip: bool
+) -> Stop | None:
+    """Return where a step takes the value: at a change of sign, or where it dips across and back."""
+    if a * b <= 0.0:
+        return sought.crossing(before, after)
+    share = _dip(a, b, before, after, sought) if may_dip else None
+    if share is None:
+        return None
+    middle = point_between(sought.orbit, before, after, sought.settings, share)
+    if middle is None or a * sought.miss(middle) > 0.0:
+        return None
+    return sought.crossing(before, middle)
+
+
+def _dip(a: float, b: float, before: Point, after: Point, sought: _Sought) -> float | None:
+    """Return the share of a step at which a quantity comes nearest to the value, if it turns there.
+
+    By the cubic that has values a and b, of one sign, and the slopes at both ends. It is asked for where
+    it comes within a tenth of the nearer end, as a cubic is no more than that.
+    """
+    sign, length = float(np.sign(a)), after.arc - before.arc
+    p = length * sought.slope(before)
+    if sign * p >= 0.0:
+        return None
+    q = length * sought.slope(after)
+    if sign * q <= 0.0:
+        return None
+    cubic = np.polynomial.Polynomial([a, p, 3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q])
+    roots = np.asarray(cubic.deriv().roots(), dtype=np.complex128)
+    inside = [float(r.real) for r in roots if abs(r.imag) < 1e-12 and 0.0 < float(r.real) < 1.0]
+    heights = {share: sign * float(np.asarray(cubic(share))) for share in inside}
+    share = min(inside, key=heights.__getitem__, default=None)
+    return None if share is None or heights[share] > _NEAR * min(abs(a), abs(b)) else share

@@ -1,0 +1,109 @@
+"""A curve in two parameters on which a quantity of the orbits has one value."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.curves.special import CurveEnd
+from contfric.extras import need_pandas
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import System
+from contfric.quantities.measure import of_orbits
+from contfric.quantities.registry import quantity_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+    from contfric.quantities.registry import QuantityLike
+
+
+@dataclass(frozen=True, eq=False)
+class QuantityCurve:
+    """Orbits of one signature on which a quantity has one value, in the plane of two parameters.
+
+    Attributes
+    ----------
+    quantity, value : str, float
+        What is held, and at what.
+    parameters : (str, str)
+        The two that vary.
+    system : System
+        The boundary-value problem of the orbits.
+    vector : ndarray, shape (parameters,)
+        The other parameters.
+    values : ndarray, shape (k, 2)
+        Both parameters at each point.
+    joints : ndarray, shape (k, N, 1 + n)
+    arc : ndarray, shape (k,)
+        Arclength, each range counting 1.
+    stable : ndarray of bool, shape (k,)
+    ends : (CurveEnd, CurveEnd)
+        Why it ends at its first and at its last point.
+    """
+
+    quantity: str
+    value: float
+    parameters: tuple[str, str]
+    system: System
+    vector: FloatArray
+    values: FloatArray
+    joints: FloatArray
+    arc: FloatArray
+    stable: NDArray[np.bool_]
+    ends: tuple[CurveEnd, CurveEnd]
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, index: int) -> Orbit:
+        """Return the orbit at one point."""
+        index = operator.index(index)
+        vector = self.vector.copy()
+        vector[[self.model.index_of(name) for name in self.parameters]] = self.values[index]
+        return Orbit(self.system, self.joints[index], vector, 0.0)
+
+    def __iter__(self) -> Iterator[Orbit]:
+        return (self[k] for k in range(len(self)))
+
+    @property
+    def model(self) -> Model:
+        """The model that moves."""
+        return self.system.model
+
+    @property
+    def params(self) -> dict[str, FloatArray]:
+        """Every parameter at every point, shape (k,) each."""
+        columns = {n: np.full(len(self), v) for n, v in self.model.mapping(self.vector).items()}
+        for k, name in enumerate(self.parameters):
+            columns[name] = self.values[:, k]
+        return columns
+
+    def measured(self, name: QuantityLike) -> FloatArray:
+        """Return another quantity at every point, shape (k,)."""
+        return of_orbits(quantity_of(name, self.model), self)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the points as a table: parameters, the quantity, stability (needs pandas)."""
+        need_pandas()
+        import pandas as pd
+
+        columns: dict[str, Any] = dict(self.params)
+        return pd.DataFrame({**columns, self.quantity: self.value, "stable": self.stable})
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the curve in its plane, dashed where orbits are unstable."""
+        from contfric.plot.held import plot_quantity_curve
+
+        return plot_quantity_curve(self, ax=ax)
+
+    def __repr__(self) -> str:
+        ends = " and ".join(end.reason.name for end in self.ends)
+        return f"<QuantityCurve {self.quantity} = {self.value:g}: {len(self)} points, ends {ends}>"

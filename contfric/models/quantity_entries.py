@@ -1,0 +1,82 @@
+"""The quantities that a model's file declares: read, and checked in their place.
+
+    quantities:
+      energy: integral(c*v**2 + S*abs(v))
+      power: energy/period
+
+A quantity may use those above it, the bundled names and parameters; inside of a functional stand the names
+that any expression of the model may have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from contfric.errors import ModelError, did_you_mean
+from contfric.models.entries import EntryError, Part
+from contfric.models.grammar import PI, check_name
+from contfric.models.names import Names
+from contfric.models.quantity_texts import BUNDLED, FUNCTIONALS, LIST, read
+from contfric.yaml_lines import Address
+
+KEY = "quantities"
+
+
+def read_quantities(top: Part) -> tuple[tuple[str, str], ...]:
+    """Return the names and expressions of a model's quantities, in their order."""
+    part = top.part(KEY, "a mapping of names to expressions, such as {energy: integral(c*v**2)}")
+    found = []
+    for name, text in part.data.items():
+        if isinstance(text, bool) or not isinstance(text, (str, int, float)):
+            part.fail(name, f"'{name}' must be an expression, got {text!r}")
+        found.append((name, " ".join(str(text).split())))
+    return tuple(found)
+
+
+def check_quantities(quantities: tuple[tuple[str, str], ...], names: Names, timed: bool) -> None:
+    """Read every quantity and look all of its names up.
+
+    Parameters
+    ----------
+    timed : whether the model is autonomous, so that no expression has the time in it
+
+    Raises
+    ------
+    EntryError
+        For the first mistake, with the address of its entry.
+    """
+    above: dict[str, str] = {}
+    for name, text in quantities:
+        address: Address = (KEY, name)
+        try:
+            _check_own_name(name, names)
+            parsed = read(text)
+        except ModelError as error:
+            raise EntryError(address, str(error)) from None
+        for functional in parsed.functionals.values():
+            names.check(address, functional.text, timed)
+        known = [*(b for b in BUNDLED if b != LIST), *above, *names.parameters]
+        for used in sorted(parsed.names - {*known, PI}):
+            raise EntryError(address, _unknown(used, names, known))
+        above[name] = text
+
+
+def _check_own_name(name: str, names: Names) -> None:
+    check_name(name, "quantity")
+    groups: tuple[tuple[str, Mapping[str, str] | tuple[str, ...]], ...] = (
+        ("bundled quantity", BUNDLED),
+        ("functional", FUNCTIONALS),
+        ("state", names.states),
+        ("parameter", names.parameters),
+        ("definition", names.define),
+        ("observable", names.observables),
+    )
+    for what, taken in groups:
+        if name in taken:
+            raise ModelError(f"the quantity '{name}' has the name of a {what}")
+
+
+def _unknown(name: str, names: Names, known: list[str]) -> str:
+    if name in (*names.states, *names.parts, "t"):
+        return f"'{name}' varies along an orbit: write a functional of it, such as mean({name})"
+    return f"unknown name '{name}'{did_you_mean(name, known)} (quantities may use those above them)"

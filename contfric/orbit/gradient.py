@@ -1,0 +1,110 @@
+r"""Derivatives of a quantity of an orbit by the parameters.
+
+A quantity Q depends on the joints z and on the parameters p, and z on p through the equations of the orbit:
+
+.. math:: \frac{dQ}{dp} = Q_p + Q_z \frac{dz}{dp}, \qquad F_z \frac{dz}{dp} = -F_p .
+
+The derivatives dz/dp are solved for once an orbit, and every quantity is differentiated in those directions
+(:mod:`contfric.quantities`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.sensitivity import joint_sensitivities
+from contfric.quantities.measure import differentiated
+from contfric.quantities.motion import Directions
+from contfric.quantities.registry import number_quantity
+
+#: A margin below this (nondimensional) vanishes: the orbit is at an event. Located events are good to 1e-12.
+_AT_EVENT = 1e-9
+
+
+@dataclass(frozen=True)
+class Gradient(Mapping[str, float]):
+    """Derivatives of a quantity by every parameter; a mapping of names to numbers.
+
+    Attributes
+    ----------
+    quantity : str
+        What is differentiated.
+    value : float
+        The quantity itself.
+    ahead : dict
+        Derivatives as each parameter grows: those of the mapping.
+    behind : dict
+        Derivatives seen from smaller values; the same where the quantity is smooth.
+    notes : tuple of str
+        Where the derivatives are those of one side only, and why; empty where they are not.
+
+    Examples
+    --------
+    >>> Gradient("x_max", 1.4, {"S": -2.0}, {"S": -2.0})["S"]
+    -2.0
+    """
+
+    quantity: str
+    value: float
+    ahead: Mapping[str, float]
+    behind: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether there is no derivative, but one on each side, or one only."""
+        return bool(self.notes)
+
+    def __getitem__(self, name: str) -> float:
+        return self.ahead[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.ahead)
+
+    def __len__(self) -> int:
+        return len(self.ahead)
+
+
+def gradient_of(orbit: Orbit, name: str) -> Gradient:
+    """Return the derivatives of a quantity by every parameter; see :meth:`contfric.Orbit.gradient`."""
+    quantity = number_quantity(name, orbit.model, "a gradient")
+    found = differentiated(quantity, orbit, by_parameters(orbit))
+    names = orbit.model.parameter_names
+    notes = (*found.kinks, *_events(orbit))
+    return Gradient(
+        name, found.value, _named(names, found.ahead), _named(names, found.behind), notes
+    )
+
+
+def by_parameters(orbit: Orbit) -> Directions:
+    """Return how an orbit moves with each of its parameters.
+
+    Raises
+    ------
+    ConvergenceError
+        If it has no derivative.
+    """
+    known: Directions | None = vars(orbit).get("_by_parameters")
+    if known is None:
+        known = Directions(joint_sensitivities(orbit), np.eye(len(orbit.vector)))
+        vars(orbit)["_by_parameters"] = known  # as a cached property of the orbit
+    return known
+
+
+def _named(names: tuple[str, ...], slopes: FloatArray) -> dict[str, float]:
+    return {name: float(slope) for name, slope in zip(names, slopes, strict=True)}
+
+
+def _events(orbit: Orbit) -> tuple[str, ...]:
+    """Return the margins that vanish: orbits of the signature exist on one side only."""
+    return tuple(
+        f"the orbit is at an event: the {test.margin.value} margin at {test.surface} of segment "
+        f"{test.segment + 1} vanishes, and orbits of this signature exist on one side"
+        for test, margin in zip(orbit.system.tests, orbit.margins, strict=True)
+        if abs(margin) < _AT_EVENT
+    )

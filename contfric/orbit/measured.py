@@ -1,0 +1,78 @@
+"""What is measured of an orbit by name: quantities, and their derivatives by the parameters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, cast
+
+if TYPE_CHECKING:
+    from contfric.orbit.gradient import Gradient
+    from contfric.orbit.orbit import Orbit
+    from contfric.quantities.registry import QuantityLike
+
+
+class MeasuredOrbit:
+    """The quantities of an orbit: a part of :class:`contfric.orbit.orbit.Orbit`."""
+
+    def quantity(self, name: QuantityLike) -> Any:
+        """Return a quantity: by its name, as an expression, or as a function of an orbit.
+
+        Integrals are exact to the rounding of the flow, extrema are those of stationary points; nothing is
+        sampled. The names are those of :func:`contfric.quantity_names`.
+
+        Parameters
+        ----------
+        name : str or callable
+            Such as ``"x_max"``, ``"energy"`` (where the model declares it), ``"rms(v)"``,
+            ``"amplitude(x, 3)/amplitude(x, 1)"``, or a function that takes an orbit and returns a number.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such quantity.
+
+        Examples
+        --------
+        >>> import contfric as cf
+        >>> orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+        >>> round(orbit.quantity("rms(v)"), 6), round(orbit.quantity("sticking"), 6)
+        (0.523284, 0.091149)
+        """
+        from contfric.quantities.measure import of_orbit
+        from contfric.quantities.registry import quantity_of
+
+        orbit = cast("Orbit", self)
+        return of_orbit(quantity_of(name, orbit.model), orbit)
+
+    def gradient(self, name: str) -> Gradient:
+        """Return the derivatives of a quantity by every parameter, along orbits of this signature.
+
+        Exact: by the implicit function theorem on the solved equations, and the flow's own derivatives.
+
+        Parameters
+        ----------
+        name : str
+            A quantity by its name or as an expression.
+
+        Returns
+        -------
+        Gradient
+            A mapping of parameters to derivatives. At a kink of the quantity, or at an event of the orbit,
+            they are those of one side, and ``notes`` says so.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such quantity, or it has no derivatives.
+        ConvergenceError
+            If the orbit is not solved, or is at a fold.
+
+        Examples
+        --------
+        >>> import contfric as cf
+        >>> orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+        >>> round(orbit.gradient("energy")["S"], 6)
+        5.328667
+        """
+        from contfric.orbit.gradient import gradient_of
+
+        return gradient_of(cast("Orbit", self), name)

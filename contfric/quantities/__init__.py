@@ -1,0 +1,1 @@
+"""Quantities of periodic orbits: integrals, extrema, harmonics, expressions of them, and derivatives."""

@@ -1,0 +1,215 @@
+"""The one list of quantities: what rows, tables, stop values and gradients call by the same names.
+
+A quantity is one of the bundled names, one that the model's file declares, an expression
+(:mod:`contfric.models.quantity_texts`), or a function of an orbit. It is looked up and checked here, before
+anything is computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from contfric.errors import ModelError, ParameterError, did_you_mean, shown
+from contfric.models.definition import Model
+from contfric.models.grammar import PI
+from contfric.models.quantity_texts import FUNCTIONALS, Parsed, read
+from contfric.quantities.inside import Inside
+
+if TYPE_CHECKING:
+    from contfric.orbit.orbit import Orbit
+
+#: What a quantity is asked for by: a name, an expression, or a function of an orbit.
+QuantityLike = str | Callable[["Orbit"], float]
+
+
+@dataclass(frozen=True)
+class Named:
+    """A bundled quantity.
+
+    Attributes
+    ----------
+    meaning : what it is, in one line
+    label : its name on an axis; %s is the displacement as mathematics
+    attribute : of orbits and branches, where they have it
+    text : the expression that it stands for, %s the displacement; empty for what is measured otherwise
+    even : whether it is the same for an orbit and its mirror image
+    several : whether it is a list of numbers
+    """
+
+    meaning: str
+    label: str
+    attribute: str = ""
+    text: str = ""
+    even: bool = True
+    several: bool = False
+
+
+NAMED = {
+    "x_max": Named("largest displacement", r"$%s_{\max}$", "x_max", "max(%s)", even=False),
+    "x_min": Named("smallest displacement", r"$%s_{\min}$", "x_min", "min(%s)", even=False),
+    "stops": Named(
+        "displacements at the stops", r"$%s$ at stops", "stops", even=False, several=True
+    ),
+    "psi": Named(
+        "asymmetry", r"$\psi$", "asymmetry", "abs(max(%s) + min(%s))/abs(max(%s) - min(%s))"
+    ),
+    "period": Named("duration of the orbit", "period", "period"),
+    "multiplier": Named("largest modulus of a Floquet multiplier", r"$\max|\mu|$"),
+    "sticking": Named("share of the period spent sliding on a surface, at rest", "sticking share"),
+    "impact_velocity": Named(
+        "largest speed at which a wall is met; 0 without impacts", "impact velocity"
+    ),
+}
+#: Those that are measured by code of their own inside of expressions.
+MEASURED = ("period", "multiplier", "sticking", "impact_velocity")
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """A quantity of the orbits of one model, read and checked.
+
+    Attributes
+    ----------
+    name : as it was asked for
+    model : the model
+    parsed : its expression; None of a function, and of a list of numbers
+    function : the function of an orbit, if it is one
+    label : its name on an axis
+    """
+
+    name: str
+    model: Model
+    parsed: Parsed | None
+    function: Callable[[Orbit], Any] | None = None
+
+    @property
+    def named(self) -> Named | None:
+        """The bundled quantity that it is, if it is one."""
+        return NAMED.get(self.name) if self.function is None else None
+
+    @property
+    def several(self) -> bool:
+        """Whether it is a list of numbers."""
+        return self.named is not None and self.named.several
+
+    @property
+    def even(self) -> bool:
+        """Whether it is known to be the same for an orbit and its mirror image."""
+        return self.named is not None and self.named.even
+
+    @property
+    def attribute(self) -> str:
+        """The attribute of orbits and branches that holds it; empty if none does."""
+        return self.named.attribute if self.named is not None else ""
+
+
+def quantity_of(asked: QuantityLike, model: Model) -> Quantity:
+    """Return a quantity by its name, expression or function.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be read, or names what the model does not have.
+
+    Examples
+    --------
+    >>> from contfric.models import load_model
+    >>> quantity_of("x_max", load_model("coulomb")).attribute
+    'x_max'
+    """
+    if isinstance(asked, str):
+        return _quantity_of(asked.strip(), model)
+    if callable(asked):
+        return Quantity(getattr(asked, "__name__", "function"), model, None, asked)
+    raise ParameterError(
+        f"a quantity is a name, an expression such as 'max(x) - min(x)', or a function of an orbit; got "
+        f"{shown(asked)}"
+    )
+
+
+def number_quantity(asked: object, model: Model, what: str) -> Quantity:
+    """Return a quantity that is one number given by name or expression; ``what`` asks for it.
+
+    Raises
+    ------
+    ParameterError
+        If it is a function, or a list of numbers.
+    """
+    if not isinstance(asked, str):
+        raise ParameterError(
+            f"{what} takes a quantity by name or expression, such as 'x_max' or 'rms(v)', got {shown(asked)}"
+        )
+    found = quantity_of(asked, model)
+    if found.several:
+        raise ParameterError(f"{what} takes a quantity that is one number, and '{asked}' is a list")
+    return found
+
+
+def quantity_names(model: Any) -> list[str]:
+    """Return the names of a model's quantities: the bundled ones, then those that its file declares.
+
+    Parameters
+    ----------
+    model : str, path or Model
+        As for :func:`contfric.load_model`.
+
+    Examples
+    --------
+    >>> quantity_names("coulomb")[-2:]
+    ['energy', 'power']
+    """
+    from contfric.models import load_model
+
+    return [*NAMED, *(name for name, _ in load_model(model).quantities)]
+
+
+@lru_cache(maxsize=512)
+def _quantity_of(text: str, model: Model) -> Quantity:
+    named = NAMED.get(text)
+    if named is not None and named.several:
+        return Quantity(text, model, None)
+    source = text if named is None or not named.text else named.text.replace("%s", model.states[0])
+    try:
+        parsed = read(source)
+        check(parsed, model, ())
+    except ModelError as error:
+        raise ParameterError(f"quantity '{text}': {error}") from None
+    return Quantity(text, model, parsed)
+
+
+def check(parsed: Parsed, model: Model, above: tuple[str, ...]) -> None:
+    """Refuse an expression whose names a model does not have, or that is defined by itself.
+
+    Raises
+    ------
+    ParameterError
+        If that is so.
+    """
+    inside, own = Inside(model), dict(model.quantities)
+    for functional in parsed.functionals.values():
+        inside.check(functional)
+    for name in sorted(parsed.names):
+        if name in above:
+            raise ParameterError(f"'{name}' is defined by itself: {' -> '.join((*above, name))}")
+        if name in own:
+            check(read(own[name]), model, (*above, name))
+        elif name in NAMED and NAMED[name].several:
+            raise ParameterError(f"'{name}' is a list of numbers: it cannot stand in an expression")
+        elif name not in NAMED and name not in model.parameter_names and name != PI:
+            _unknown(name, model, inside)
+
+
+def _unknown(name: str, model: Model, inside: Inside) -> None:
+    if name in inside.known:
+        raise ParameterError(
+            f"'{name}' varies along an orbit: write one of "
+            f"{', '.join(f'{kind}({name})' for kind in FUNCTIONALS[:5])}"
+        )
+    known = [*NAMED, *(n for n, _ in model.quantities), *model.parameter_names]
+    raise ParameterError(
+        f"model '{model.name}' has no quantity '{name}'{did_you_mean(name, known)}; or an expression "
+        "such as max(x) - min(x)"
+    )

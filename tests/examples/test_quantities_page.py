@@ -1,0 +1,55 @@
+"""The code of the page on quantities runs, and says what the page says."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import numpy as np
+import pytest
+
+import contfric as cf
+
+PAGE = Path(__file__).parents[2] / "docs" / "quantities.md"
+
+
+@pytest.fixture(scope="module")
+def scope() -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert len(blocks) == 7
+    for block in blocks:
+        exec(compile(block, str(PAGE), "exec"), found)
+    return found
+
+
+def test_the_page_says_what_comes_out(scope: dict[str, Any]) -> None:
+    assert scope["low"][-1].x_max == pytest.approx(1.43, abs=1e-13)
+    assert str(scope["low"].ends[1]) in PAGE.read_text(encoding="utf-8")
+    assert np.max(np.abs(scope["curve"].measured("x_max") - 1.43)) < 1e-11
+    names = set(cf.quantity_names("coulomb"))
+    assert {name for name in names if f"`{name}`" not in PAGE.read_text(encoding="utf-8")} == set()
+
+
+def test_the_fits_find_the_truth(scope: dict[str, Any]) -> None:
+    again = scope["again"]
+    for name, value in (("S", 0.32), ("S0", 0.4)):
+        assert abs(again.params[name] - value) < 4.0 * again.sigma[name]
+    assert (
+        scope["found"].chi_square < 1.0
+    )  # the three data are those of S = 0.32, S0 = 0.4, rounded
+
+
+def test_the_best_damper_is_the_best(scope: dict[str, Any]) -> None:
+    """The gradient's zero is a minimum of the peaks: a parabola through neighbours has its vertex there."""
+    best, highest, step = scope["best"], scope["highest"], 2e-3
+    left, middle, right = (highest(best + by).value for by in (-step, 0.0, step))
+    assert middle < left and middle < right
+    vertex = 0.5 * step * (left - right) / (left - 2.0 * middle + right)
+    assert abs(vertex) < 1e-5  # what the cubic term of the peaks moves it by
+    assert abs(highest(best).orbit.gradient("x_max")["muN"]) < 1e-9

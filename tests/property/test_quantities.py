@@ -1,0 +1,101 @@
+"""Quantities of random orbits: balances that hold whatever the orbit, and derivatives against differences."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import contfric as cf
+from contfric.errors import ContfricError
+from contfric.orbit.solve import polish
+
+PARAMS = st.fixed_dictionaries(
+    {
+        "Omega": st.floats(0.3, 1.6),
+        "S": st.floats(0.02, 0.35),
+        "S0": st.floats(0.36, 0.6),
+        "h": st.floats(-0.2, 0.2),
+        "zeta": st.floats(0.01, 0.2),
+    }
+)
+
+
+def found(params: dict[str, float]) -> cf.Orbit | None:
+    try:
+        return cf.find_orbit("coulomb", params)
+    except ContfricError:
+        return None
+
+
+@given(PARAMS)
+@settings(max_examples=25)
+def test_what_the_force_gives_is_dissipated(params: dict[str, float]) -> None:
+    orbit = found(params)
+    if orbit is None:
+        return
+    work = orbit.quantity("integral(v*(cos(Omega*t) + h*cos(3*Omega*t)))")
+    assert work == pytest.approx(orbit.quantity("energy"), abs=1e-11)
+    assert orbit.quantity("integral(v)") == pytest.approx(0.0, abs=1e-11)
+    assert orbit.quantity("integral(x*v)") == pytest.approx(0.0, abs=1e-11)
+
+
+@given(PARAMS)
+@settings(max_examples=25)
+def test_extrema_by_any_way_agree(params: dict[str, float]) -> None:
+    orbit = found(params)
+    if orbit is None:
+        return
+    assert orbit.quantity("max(x)") == pytest.approx(orbit.quantity("x_max"), abs=1e-13)
+    assert orbit.quantity("min(x)") == pytest.approx(orbit.quantity("x_min"), abs=1e-13)
+    # the same function, once as an observable (the flow's own search), once as an expression
+    assert orbit.quantity("max(u)") == pytest.approx(orbit.quantity("max(1*u)"), abs=1e-12)
+    assert orbit.quantity("min(v)") == pytest.approx(-orbit.quantity("max(-v)"), abs=1e-12)
+
+
+@given(PARAMS)
+@settings(max_examples=10)
+def test_harmonics_sum_to_the_mean_square(params: dict[str, float]) -> None:
+    """Parseval; x has a continuous rate, so that what 40 harmonics leave out is of the order 40**-5."""
+    orbit = found(params)
+    if orbit is None or orbit.periods > 1:
+        return
+    total = orbit.quantity("mean(x)") ** 2
+    total += 0.5 * sum(orbit.quantity(f"amplitude(x, {k})") ** 2 for k in range(1, 40))
+    assert total == pytest.approx(orbit.quantity("mean(x**2)"), abs=1e-7)
+
+
+QUANTITIES = (
+    "x_max",
+    "energy",
+    "rms(v)",
+    "sticking",
+    "amplitude(x, 1)",
+    "max(u)",
+    "mean(x**3)",
+    "multiplier",
+)
+
+
+@given(PARAMS, st.sampled_from(QUANTITIES), st.sampled_from(("Omega", "S", "S0", "h", "zeta")))
+@settings(max_examples=40)
+def test_gradients_are_differences_of_orbits(params: dict[str, float], name: str, by: str) -> None:
+    orbit = found(params)
+    if orbit is None or np.min(np.abs(orbit.margins)) < 1e-2:
+        return  # an event would lie between the neighbours
+    values = []
+    for k in (1, -1, 2, -2):
+        vector = orbit.vector.copy()
+        vector[orbit.model.index_of(by)] += 1e-4 * k
+        beside = polish(replace(orbit, vector=vector), damped=False)
+        if not (beside.converged and beside.admissible):
+            return
+        values.append(beside.quantity(name))
+    one, two = (values[0] - values[1]) / 2e-4, (values[2] - values[3]) / 4e-4
+    slope, error = (4 * one - two) / 3, abs(one - two)
+    gradient = orbit.gradient(name)
+    assert gradient[by] == pytest.approx(slope, rel=1e-6, abs=1e-7 + error)
+    assert gradient.value == pytest.approx(orbit.quantity(name), abs=1e-13)
