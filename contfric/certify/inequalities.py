@@ -1,0 +1,136 @@
+"""The inequalities of an orbit over the whole of every segment.
+
+They are those of :mod:`contfric.orbit.system`. Inside of a segment the surfaces that bound its mode are
+not met, so that its end is the *first* meeting with the exit surface; there the observables are in the
+domain that the next mode follows. A hold is left with an acceleration that is not negative, and on the
+way no limit of rest is passed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from flint import arb_mat
+
+from contfric.certify.chain import Chain
+from contfric.certify.sign import Path, positive
+from contfric.certify.verdict import Finding, Verdict
+from contfric.certify.zeros import Closing, at_start, order_at_start, zeros_at_joints
+from contfric.models.balls.numbers import Vector, column, numbers
+from contfric.orbit.system import System
+
+
+@dataclass(frozen=True)
+class Inequality:
+    """An inequality of one segment, and what became of it."""
+
+    segment: int
+    surface: str
+    what: str
+    finding: Finding
+
+    def named(self, system: System) -> Finding:
+        """Return the finding with its place in words."""
+        if self.finding.proved:
+            return self.finding
+        mode = system.word[self.segment][0]
+        text = f"segment {self.segment + 1} ({mode}): {self.what} at {self.surface}: {self.finding.why}"
+        return Finding(self.finding.verdict, text)
+
+
+def inequalities(
+    chain: Chain, system: System, joints: list[Vector], closing: Closing
+) -> Iterator[Inequality]:
+    """Return all inequalities of a chain, joint by joint.
+
+    Parameters
+    ----------
+    joints : enclosures of joints 0 .. N
+    closing : how rows at the last joint read at the first one
+    """
+    model, segments = chain.model, chain.segments
+    known = zeros_at_joints(segments, model, closing)
+    surfaces = [s.name for s in system.model.surfaces]
+    for i in range(segments.count):
+        move = chain.move(i, joints)
+        duration = joints[i + 1][0] - joints[i][0]
+        if not duration > 0:
+            verdict = Verdict.REFUTED if duration < 0 else Verdict.UNDECIDED
+            yield Inequality(i, segments.exits[i], "duration", Finding(verdict, "not positive"))
+            continue
+        zeros = at_start(segments, model, i, known[i])
+        path = Path(move.field, move.start, duration.upper())
+        for surface, sign in _inside(system, i, surfaces):
+            row = model.surfaces[surface] * sign
+            ends = (
+                segments.exits[i] == surface or segments.pins[(i + 1) % segments.count] == surface
+            )
+            order = order_at_start(model.rows[surface], path.field, zeros)
+            if order and _stays(row, path.field):
+                continue
+            yield Inequality(i, surface, "inside", positive(path, row, order, ends))
+        yield from _held(chain, system, i, path, zeros)
+    yield from _at_joints(chain, system, joints, surfaces)
+    yield from _exits(chain, system, joints)
+
+
+def _held(
+    chain: Chain, system: System, i: int, path: Path, zeros: list[Vector]
+) -> Iterator[Inequality]:
+    """Return that a hold could be left at any time: the acceleration that it would be left with."""
+    for hold in system.holds:
+        if hold.segment == i:
+            sign = int(system.layout.exit_signs[i])
+            row = chain.model.surfaces[hold.leaves] * chain.model.fields[hold.departs] * sign
+            order = order_at_start(numbers(row), path.field, zeros)
+            yield Inequality(i, hold.leaves, "acceleration", positive(path, row, order, False))
+
+
+def _stays(row: arb_mat, field: arb_mat) -> bool:
+    return all(x.is_zero() for x in numbers(row * field))
+
+
+def _inside(system: System, i: int, surfaces: list[str]) -> list[tuple[str, int]]:
+    """Return the surfaces that a segment must not meet inside, each with the sign of its side."""
+    layout = system.layout
+    found = [(surfaces[k], int(s)) for at, k, s in layout.interior if at == i]
+    exit_, sign = surfaces[layout.exits[i]], -int(layout.exit_signs[i])
+    if layout.pins[i] == -1 and sign and exit_ not in [name for name, _ in found]:
+        found.append((exit_, sign))
+    return found
+
+
+def _at_joints(
+    chain: Chain, system: System, joints: list[Vector], surfaces: list[str]
+) -> Iterator[Inequality]:
+    model = chain.model
+    for i, k, sign, where in system.layout.joint:
+        if where == 1:  # behind a reset
+            state = chain.move(int(i), joints).start
+        else:
+            after = joints[int(i) + 1]
+            state = column(model.extended(after[0], after[1:]))
+        value = int(sign) * (model.surfaces[surfaces[k]] * state)[0, 0]
+        yield Inequality(int(i), surfaces[k], "joint", _sign(value))
+
+
+def _exits(chain: Chain, system: System, joints: list[Vector]) -> Iterator[Inequality]:
+    """Rates at the exits: transversal, so that the end of a segment depends smoothly on its start."""
+    model, segments = chain.model, chain.segments
+    for i in range(segments.count):
+        sign, exit_ = int(system.layout.exit_signs[i]), segments.exits[i]
+        if not exit_ or sign == 0:
+            continue
+        after = joints[i + 1]
+        state = column(model.extended(after[0], after[1:]))
+        row = model.surfaces[exit_] * model.fields[segments.modes[i]]
+        yield Inequality(i, exit_, "exit", _sign(sign * (row * state)[0, 0]))
+
+
+def _sign(value: object) -> Finding:
+    if value > 0:  # type: ignore[operator]
+        return Finding(Verdict.PROVED)
+    if value < 0:  # type: ignore[operator]
+        return Finding(Verdict.REFUTED, f"{value} is negative")
+    return Finding(Verdict.UNDECIDED, f"{value} has no sign")
