@@ -163,16 +163,46 @@ class Chain:
             self._flow_rows(i, move, rows[first : first + self.n], sigma)
             residual += [move.end[j, 0] - z[i + 1][1 + j] for j in range(self.n)]
             self._by_parameter(i, z, move, rows[first : first + self.n])
-            at, row, slope = self._condition(i)
-            w = column(model.extended(z[at][0], z[at][1:]))
-            residual.append((row * w)[0, 0])
-            last = rows[first + self.n]
-            by_time = (row * column(model.by_time(z[at][0], 1)))[0, 0]
-            self._add(last, at, [by_time, *(row[0, k] for k in range(self.n))], sigma)
-            if slope is not None:
-                by_slope = row * column(model.by_parameter(z[at][0], 0))
-                last[-1] += (slope * w + by_slope)[0, 0]
+            value, rows[first + self.n] = self.observed(z, *self._condition(i), sigma)
+            residual.append(value)
         return residual, rows
+
+    def observed(
+        self, z: list[Vector], at: int, row: arb_mat, slope: arb_mat | None, sigma: int = 1
+    ) -> tuple[arb, Vector]:
+        """Return an observable at a joint, and its derivatives by the unknowns and the parameter.
+
+        Parameters
+        ----------
+        row, slope : the observable, and its derivative by the parameter if one is free
+        """
+        model = self.model
+        t, w = z[at][0], column(model.extended(z[at][0], z[at][1:]))
+        found = [arb(0)] * (self.size + (model.slopes is not None))
+        by_time = (row * column(model.by_time(t, 1)))[0, 0]
+        self._add(found, at, [by_time, *(row[0, k] for k in range(self.n))], sigma)
+        if slope is not None:
+            found[-1] += (slope * w + row * column(model.by_parameter(t, 0)))[0, 0]
+        return (row * w)[0, 0], found
+
+    def observed_within(
+        self, z: list[Vector], i: int, after: arb, row: arb_mat, slope: arb_mat
+    ) -> tuple[arb, Vector, arb]:
+        """Return an observable some time after the start of segment i, with its derivatives.
+
+        They are those by the unknowns and the parameter, and by that time.
+        """
+        move = self.move(i, z)
+        flow = (move.field * after).exp()
+        end, found = flow * move.start, [arb(0)] * (self.size + 1)
+        by_state = flow if move.reset is None else flow * move.reset
+        on_state = row * by_state
+        by_time = (row * flow * move.by_time)[0, 0]
+        self._add(found, i, [by_time, *(on_state[0, k] for k in range(self.n))], 1)
+        _, by_parameter, start = self._slope_of(i, [z[i], [z[i][0] + after]], move)
+        change = by_parameter * move.start + flow * start
+        found[-1] += (slope * end + row * change)[0, 0]
+        return (row * end)[0, 0], found, (row * move.field * end)[0, 0]
 
     def _condition(self, i: int) -> tuple[int, arb_mat, arb_mat | None]:
         """Return the last equation of a segment: at which joint which row vanishes, and its slope."""
@@ -212,7 +242,7 @@ class Chain:
             other = [move.speed[j, 0], *(arb(-1 if k == j else 0) for k in range(n))]
             self._add(rows[j], i + 1, other, sigma)
 
-    def _slope_of(self, i: int, z: list[Vector], move: Move) -> tuple[arb_mat, arb_mat, arb_mat]:
+    def _slope_of(self, i: int, ends: list[Vector], move: Move) -> tuple[arb_mat, arb_mat, arb_mat]:
         """Return the derivatives by the parameter of M, of exp(M d) at fixed d, and of the start."""
         model = self.model
         assert model.slopes is not None
@@ -223,18 +253,18 @@ class Chain:
             for b in range(size):
                 block[a][b] = block[size + a][size + b] = move.field[a, b]
                 block[a][size + b] = slope[a, b]
-        whole = (arb_mat(block) * (z[i + 1][0] - z[i][0])).exp()
+        whole = (arb_mat(block) * (ends[1][0] - ends[0][0])).exp()
         flow = arb_mat([[whole[a, size + b] for b in range(size)] for a in range(size)])
-        start = column(model.by_parameter(z[i][0], 0))
+        start = column(model.by_parameter(ends[0][0], 0))
         if move.reset is not None:
-            before = column(model.extended(z[i][0], z[i][1:]))
+            before = column(model.extended(ends[0][0], ends[0][1:]))
             start = move.reset * start + model.slopes.resets[self.segments.resets[i]] * before
         return slope, flow, start
 
     def _by_parameter(self, i: int, z: list[Vector], move: Move, rows: list[Vector]) -> None:
         if self.model.slopes is None:
             return
-        _, flow, start = self._slope_of(i, z, move)
+        _, flow, start = self._slope_of(i, z[i : i + 2], move)
         change = flow * move.start + move.flow * start
         for j in range(self.n):
             rows[j][-1] += change[j, 0]
@@ -279,7 +309,7 @@ class Chain:
         early = move.flow * column(model.by_time(t, 2)) * late  # dL/dt at fixed d
         early = early + move.field * (move.flow * move.by_time) * delta
         by_state = move.field * move.flow * delta
-        slope, flow, start = self._slope_of(i, z, move)
+        slope, flow, start = self._slope_of(i, z[i : i + 2], move)
         own = slope * move.end + move.field * (flow * move.start + move.flow * start)
         mixed = column([late * c for c in model.by_parameter(t, 1)])
         by_parameter = flow * a + move.flow * mixed + own * delta

@@ -74,17 +74,18 @@ def certificate_data(certificate: Certificate) -> dict[str, Any]:
 
 def _printed(x: arb) -> str:
     """Return a ball as a text, which contains it."""
-    wide = x + arb(0, (_WIDER * 1e-5) * (1 + abs(x).upper()))
-    return str(wide.str(_DIGITS, more=True)).strip("[]")
+    return _text(x + arb(0, (_WIDER * 1e-5) * (1 + abs(x).upper())))
+
+
+def _text(x: arb) -> str:
+    """Return ``centre +/- radius`` in decimals that contain a ball."""
+    return str(x.str(_DIGITS, more=True)).strip("[]")
 
 
 def _disc(mu: acb) -> dict[str, str]:
     width = _WIDER * (1 + abs(mu).upper())
     parts = (mu.real + arb(0, width), mu.imag + arb(0, width))
-    return {
-        name: str(part.str(_DIGITS, more=True)).strip("[]")
-        for name, part in zip(("re", "im"), parts, strict=True)
-    }
+    return {name: _text(part) for name, part in zip(("re", "im"), parts, strict=True)}
 
 
 def write_certificate(certificate: Certificate, path: Any) -> None:

@@ -11,14 +11,30 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from flint import arb_mat
+from flint import arb, arb_mat
 
-from contfric.certify.chain import Chain
-from contfric.certify.sign import Path, positive
+from contfric.certify.chain import Chain, Segments
+from contfric.certify.extended import Condition
+from contfric.certify.sign import Path, positive, touched
 from contfric.certify.verdict import Finding, Verdict
 from contfric.certify.zeros import Closing, at_start, order_at_start, zeros_at_joints
+from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, numbers
 from contfric.orbit.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """Where an orbit at an event meets a surface: the one inequality that does not hold strictly there.
+
+    Attributes
+    ----------
+    condition : the segment and the surface
+    after : time of a touch after the start of its segment; None at a joint
+    """
+
+    condition: Condition
+    after: arb | None = None
 
 
 @dataclass(frozen=True)
@@ -40,7 +56,11 @@ class Inequality:
 
 
 def inequalities(
-    chain: Chain, system: System, joints: list[Vector], closing: Closing
+    chain: Chain,
+    system: System,
+    joints: list[Vector],
+    closing: Closing,
+    touch: Touch | None = None,
 ) -> Iterator[Inequality]:
     """Return all inequalities of a chain, joint by joint.
 
@@ -48,9 +68,10 @@ def inequalities(
     ----------
     joints : enclosures of joints 0 .. N
     closing : how rows at the last joint read at the first one
+    touch : the inequality that does not hold strictly, of an orbit at an event
     """
     model, segments = chain.model, chain.segments
-    known = zeros_at_joints(segments, model, closing)
+    known = zeros_at_joints(segments, model, closing, _met(touch, segments.modes, model))
     surfaces = [s.name for s in system.model.surfaces]
     for i in range(segments.count):
         move = chain.move(i, joints)
@@ -69,10 +90,51 @@ def inequalities(
             order = order_at_start(model.rows[surface], path.field, zeros)
             if order and _stays(row, path.field):
                 continue
-            yield Inequality(i, surface, "inside", positive(path, row, order, ends))
+            if _is_event(touch, i, surface):
+                finding = touched(path, row, order, touch.after if touch is not None else None)
+            elif _is_left_held(segments, i, surface):
+                finding = touched(path, row, order, None)
+            else:
+                finding = positive(path, row, order, ends)
+            yield Inequality(i, surface, "inside", finding)
         yield from _held(chain, system, i, path, zeros)
-    yield from _at_joints(chain, system, joints, surfaces)
-    yield from _exits(chain, system, joints)
+    for found in (*_at_joints(chain, system, joints, surfaces), *_exits(chain, system, joints)):
+        if touch is None or not _is_of(touch.condition, found):
+            yield found
+
+
+def _is_event(touch: Touch | None, i: int, surface: str) -> bool:
+    """Tell whether the event is that a segment touches a surface."""
+    if touch is None or not (touch.condition.rate or touch.condition.within):
+        return False
+    return (touch.condition.segment, touch.condition.surface) == (i, surface)
+
+
+def _is_left_held(segments: Segments, i: int, surface: str) -> bool:
+    """Tell whether a segment ends with a touch, at which a hold begins."""
+    pin = segments.pins[(i + 1) % segments.count]
+    return isinstance(pin, tuple) and segments.exits[i] == surface
+
+
+def _met(touch: Touch | None, modes: tuple[str, ...], model: BallModel) -> dict[int, list[Vector]]:
+    """Return the rows that vanish at the ends of segments at an event, beside the exits."""
+    if touch is None or touch.condition.within:
+        return {}
+    met = touch.condition
+    if not met.rate:
+        return {met.segment: [model.rows[met.surface]]}
+    row = model.surfaces[met.surface] * model.fields[modes[met.segment]]
+    return {met.segment: [numbers(row)]}
+
+
+def _is_of(met: Condition, found: Inequality) -> bool:
+    """Tell whether an inequality at a joint is the one that vanishes at an event."""
+    what = "exit" if met.rate else "joint"
+    return not met.within and (met.segment, met.surface, what) == (
+        found.segment,
+        found.surface,
+        found.what,
+    )
 
 
 def _held(

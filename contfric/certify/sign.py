@@ -113,6 +113,24 @@ def positive(path: Path, row: arb_mat, start_order: int, ends: bool) -> Finding:
     return Finding(Verdict.UNDECIDED, "the segment needs too many pieces")
 
 
+def touched(path: Path, row: arb_mat, start_order: int, after: arb | None) -> Finding:
+    """Find whether an observable is positive inside of a segment but for a touch of zero, at a known time.
+
+    There it vanishes with its rate, and its second derivative is positive.
+
+    Parameters
+    ----------
+    after : time of the touch after the start; None for the end of the segment
+    """
+    at = path.duration if after is None else after
+    state = (path.field * at).exp() * path.start
+    back = Path(-path.field, state, at.upper())
+    found = positive(back, row, 2, start_order == 1)
+    if after is None or not found.proved:
+        return found
+    return positive(Path(path.field, state, (path.duration - at).upper()), row, 2, True)
+
+
 def _power(path: Path, row: arb_mat, order: int) -> arb_mat:
     for _ in range(order):
         row = row * path.field

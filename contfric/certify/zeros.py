@@ -26,12 +26,23 @@ MOST_ORDER = 4
 Closing = Callable[[Vector], Vector]
 
 
-def zeros_at_joints(segments: Segments, model: BallModel, closing: Closing) -> list[list[Vector]]:
-    """Return the rows that vanish at joints 0 .. N - 1 (before a reset)."""
+def zeros_at_joints(
+    segments: Segments,
+    model: BallModel,
+    closing: Closing,
+    more: dict[int, list[Vector]] | None = None,
+) -> list[list[Vector]]:
+    """Return the rows that vanish at joints 0 .. N - 1 (before a reset).
+
+    Parameters
+    ----------
+    more : further rows that vanish at the ends of segments
+    """
     count = segments.count
     found: list[list[Vector]] = [[] for _ in range(count)]
     for i in [*range(count), *range(count)]:  # what the last segment keeps is known after one round
         rows = _at_end(segments, model, (i - 1) % count, found)
+        rows += (more or {}).get((i - 1) % count, [])
         if i == 0:
             rows = [closing(row) for row in rows]
         pin = segments.pins[i]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from flint import arb, arb_mat, ctx
 
 #: Most segments: a file that has more is refused, not worked on.
 MOST_SEGMENTS = 400
+_NUMBER = r"\d{1,99}([.]\d{1,99})?(e[+-]?\d{1,4})?"
 
 
 class Refused(Exception):
@@ -27,8 +29,8 @@ def number(value: Any) -> arb:
 
 def ball(value: Any) -> arb:
     """Return the ball of a text such as ``1.25 +/- 1e-30``."""
-    if not isinstance(value, str) or len(value) > 2000:
-        raise Refused("a ball is no text")
+    if not isinstance(value, str) or not re.fullmatch(f"(-?{_NUMBER} )?[+]/- {_NUMBER}", value):
+        raise Refused("a ball is no text such as '1.25 +/- 1e-30'")
     return _finite(arb(value))
 
 
