@@ -44,16 +44,29 @@ def closing_of(segments: Segments, model: BallModel, half: bool) -> Closing:
 
 
 def is_symmetry(orbit: Orbit, segments: Segments, model: BallModel) -> bool:
-    """Tell whether the declared symmetry of a half problem is one, exactly."""
+    """Tell whether the declared symmetry of a half problem is one, exactly.
+
+    Of a model with slopes that are exact too, over the ball of the parameter, it is one for all its values.
+    """
     symmetry = orbit.model.symmetry
     if symmetry is None or symmetry.fraction != 0.5 or orbit.periods % 2 == 0 or model.resets:
         return False
+    if model.slopes is not None and not _keeps(orbit, segments, model, model.slopes):
+        return False
+    return _keeps(orbit, segments, model, model)
+
+
+def _keeps(orbit: Orbit, segments: Segments, model: BallModel, matrices: BallModel) -> bool:
+    """Tell whether the images of fields and surfaces (or of their slopes) are those of the image mode."""
+    symmetry = orbit.model.symmetry
+    assert symmetry is not None
     matrix, image = closure_matrix(segments, model, True), mirror_mode(orbit.model)
     gaps = [
-        model.fields[image[mode]] * matrix - matrix * model.fields[mode]
+        matrices.fields[image[mode]] * matrix - matrix * matrices.fields[mode]
         for mode in {mode for mode, _ in orbit.system.word}
     ]
     gaps += [
-        model.surfaces[to] * matrix + model.surfaces[name] for name, to in symmetry.surfaces.items()
+        matrices.surfaces[to] * matrix + matrices.surfaces[name]
+        for name, to in symmetry.surfaces.items()
     ]
     return all(x.is_zero() for gap in gaps for x in gap.entries())

@@ -20,7 +20,7 @@ from contfric.certify.inequalities import Touch, inequalities
 from contfric.certify.krawczyk import Equations, Inclusion, approximate_inverse, enclosed
 from contfric.certify.locating import Location, NotLocatedError, location_of
 from contfric.certify.verdict import Finding, Verdict, all_of
-from contfric.continuation.events import Bifurcation, Kind, resting_domain
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind, resting_domain
 from contfric.errors import ParameterError
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
@@ -149,13 +149,18 @@ def _attempt(event: Bifurcation, location: Location, parameter: str, bits: int) 
     def build(value: arb) -> BallModel:
         return ball_model(orbit.model, params, parameter, value)
 
-    if orbit.system.half and not is_symmetry(orbit, segments, build(arb(params[parameter]))):
-        return _undecided(event, parameter, "the symmetry is not exact")
     equations, start = _extended(event, location, segments, build)
     inclusion = enclosed(equations, [*start, arb(params[parameter])], arb(2) ** (_SPARE - bits))
     if inclusion.verdict is not Verdict.PROVED:
         return _undecided(event, parameter, "the extended system is singular")
     value, z = inclusion.zero[-1], inclusion.zero[: orbit.joints.size]
+    exact = build(arb(params[parameter]))  # at one value, and its slopes from there to the event
+    between = replace(exact, slopes=build(value.union(arb(params[parameter]))).slopes)
+    if orbit.system.half and not is_symmetry(orbit, segments, between):
+        return _undecided(event, parameter, "the symmetry is not exact")
+    off = float(abs(value.mid() - arb(params[parameter])).upper())
+    if off > ACCURACY * (1.0 + abs(params[parameter])):
+        return _undecided(event, parameter, f"the extended system leads {off:.1e} away")
     chain = Chain(segments, build(value))
     touch = _touch(location, inclusion)
     return EventCertificate(

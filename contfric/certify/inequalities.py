@@ -87,7 +87,7 @@ def inequalities(
             ends = (
                 segments.exits[i] == surface or segments.pins[(i + 1) % segments.count] == surface
             )
-            order = order_at_start(model.rows[surface], path.field, zeros)
+            order = order_at_start(model, model.rows[surface], segments.modes[i], zeros, surface)
             if order and _stays(row, path.field):
                 continue
             if _is_event(touch, i, surface):
@@ -123,8 +123,7 @@ def _met(touch: Touch | None, modes: tuple[str, ...], model: BallModel) -> dict[
     met = touch.condition
     if not met.rate:
         return {met.segment: [model.rows[met.surface]]}
-    row = model.surfaces[met.surface] * model.fields[modes[met.segment]]
-    return {met.segment: [numbers(row)]}
+    return {met.segment: [model.rate(met.surface, modes[met.segment])]}
 
 
 def _is_of(met: Condition, found: Inequality) -> bool:
@@ -144,9 +143,10 @@ def _held(
     for hold in system.holds:
         if hold.segment == i:
             sign = int(system.layout.exit_signs[i])
-            row = chain.model.surfaces[hold.leaves] * chain.model.fields[hold.departs] * sign
-            order = order_at_start(numbers(row), path.field, zeros)
-            yield Inequality(i, hold.leaves, "acceleration", positive(path, row, order, False))
+            row = chain.model.rate(hold.leaves, hold.departs)
+            order = order_at_start(chain.model, row, chain.segments.modes[i], zeros)
+            finding = positive(path, arb_mat([row]) * sign, order, False)
+            yield Inequality(i, hold.leaves, "acceleration", finding)
 
 
 def _stays(row: arb_mat, field: arb_mat) -> bool:

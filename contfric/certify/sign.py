@@ -98,7 +98,7 @@ def positive(path: Path, row: arb_mat, start_order: int, ends: bool) -> Finding:
             return Finding(Verdict.PROVED)
         level, index = waiting.pop()
         value = _range(path, rows, level, index)
-        if value < 0:
+        if value < 0 or (row * path.middle(level, index))[0, 0] < 0:
             return Finding(Verdict.REFUTED, f"negative after {_share(level, index)} of it")
         at_start, at_end = index == 0 and start_order > 0, index == 2**level - 1 and ends
         if value > 0:

@@ -49,7 +49,7 @@ def zeros_at_joints(
         if isinstance(pin, str):
             rows.append(model.rows[pin])
         elif pin is not None:  # a touch: the rate along the mode before vanishes
-            rows.append(numbers(model.surfaces[pin[1]] * model.fields[pin[0]]))
+            rows.append(model.rate(pin[1], pin[0]))
         found[i] = rows
     return found
 
@@ -114,10 +114,19 @@ def _without(row: Vector, pivot: Vector, at: int) -> Vector:
     ]
 
 
-def order_at_start(row: Vector, field: arb_mat, known: list[Vector]) -> int:
-    """Return how many of an observable and its derivatives vanish at a start by construction."""
+def order_at_start(
+    model: BallModel, row: Vector, mode: str, known: list[Vector], surface: str = ""
+) -> int:
+    """Return how many of an observable and its derivatives along a mode vanish at a start by construction.
+
+    Parameters
+    ----------
+    row : the observable
+    surface : that it is the distance to, if it is one: its derivatives are then known as such
+    """
     for order in range(MOST_ORDER):
+        row = model.rate(surface, mode, order) if surface else row
         if not in_span(row, known):
             return order
-        row = numbers(arb_mat([row]) * field)
+        row = numbers(arb_mat([row]) * model.fields[mode])
     return MOST_ORDER

@@ -61,6 +61,20 @@ class BallModel:
         """The row of each surface as a list, always the same one: so equal rows are known as such."""
         return {name: numbers(row) for name, row in self.surfaces.items()}
 
+    @cached_property
+    def _rates(self) -> dict[tuple[str, str, int], Vector]:
+        return {}
+
+    def rate(self, surface: str, mode: str, order: int = 1) -> Vector:
+        """Return the row of a derivative of a surface's observable along a mode; always the same list."""
+        if order == 0:
+            return self.rows[surface]
+        key = (surface, mode, order)
+        if key not in self._rates:
+            below = arb_mat([self.rate(surface, mode, order - 1)])
+            self._rates[key] = numbers(below * self.fields[mode])
+        return self._rates[key]
+
     @property
     def size(self) -> int:
         """Number of entries of the extended state."""
