@@ -29,7 +29,7 @@ from contfric.models.balls.numbers import Vector
 
 #: Bits: rounding of 1e-24 is nothing to boxes that are 1e-7 long.
 _BITS = 80
-#: Shortest box, as a share of the step of the branch that it is in: events are left with as little about them.
+#: Halvings of a step of the branch: events are left with as little about them.
 _HALVINGS = 12
 #: Most boxes of a branch.
 _MOST = 4000
@@ -206,7 +206,8 @@ class _Tracer:
         box = box_between(self.segments, self.build, first, last)
         admissible = Finding(Verdict.UNDECIDED, "no box") if box is None else self._admissible(box)
         whole = box is not None and admissible.proved and box.monotone and box.no_flip
-        if not whole and level < _HALVINGS and self.count < _MOST:
+        refuted = admissible.verdict is Verdict.REFUTED  # by all orbits of the box
+        if not (whole or refuted) and level < _HALVINGS and self.count < _MOST:
             halves = self._halves(first, last, arcs, level)
             if halves is not None:
                 return halves

@@ -104,11 +104,32 @@ class Move:
     speed: arb_mat
 
 
-class Chain:
-    """The equations of a chain at a model in balls."""
+@dataclass(frozen=True, eq=False)
+class Wide:
+    """What is known of a wide box: durations, and the model at the middle of the parameter.
 
-    def __init__(self, segments: Segments, model: BallModel) -> None:
-        self.segments, self.model = segments, model
+    Attributes
+    ----------
+    durations : of the segments, narrower than the differences of the joints
+    middle : the model at the middle of the parameter, with slopes
+    offset : the parameter less its middle
+    """
+
+    durations: Vector
+    middle: BallModel
+    offset: arb
+
+
+class Chain:
+    """The equations of a chain at a model in balls.
+
+    Parameters
+    ----------
+    wide : what is known of a wide box, so that its dependences are not lost; None for narrow ones
+    """
+
+    def __init__(self, segments: Segments, model: BallModel, wide: Wide | None = None) -> None:
+        self.segments, self.model, self.wide = segments, model, wide
         self.n = segments.states
         self.m = self.n + 1
         self.size = segments.count * self.m
@@ -141,9 +162,43 @@ class Chain:
         if reset is not None:
             start, by_time = reset * start, reset * by_time
         field = model.fields[self.segments.modes[i]]
-        flow = (field * (z[i + 1][0] - t)).exp()
+        flow = self._flow(self.segments.modes[i], self.duration(i, z))
         end = flow * start
         return Move(field, start, by_time, reset, flow, end, field * end)
+
+    def _flow(self, mode: str, duration: arb) -> arb_mat:
+        """Return exp(M d).
+
+        For a wide box by the mean value theorem in the parameter, at the middle d_m of the durations, times
+        exp(M (d - d_m)): the exponential of a wide matrix loses much, that of a small one little.
+        """
+        field = self.model.fields[mode]
+        if self.wide is None:
+            return (field * duration).exp()
+        middle = duration.mid()
+        slope = self._exponential(mode, middle)[1]
+        flow = (self.wide.middle.fields[mode] * middle).exp() + slope * self.wide.offset
+        return flow * (field * (duration - middle)).exp()
+
+    def _exponential(self, mode: str, duration: arb) -> tuple[arb_mat, arb_mat]:
+        """Return exp(M d) and its derivative by the parameter, from the exponential of the block matrix."""
+        assert self.model.slopes is not None
+        size, field = self.model.size, self.model.fields[mode]
+        slope = self.model.slopes.fields[mode]
+        block = zeros(2 * size, 2 * size)
+        for a in range(size):
+            for b in range(size):
+                block[a][b] = block[size + a][size + b] = field[a, b]
+                block[a][size + b] = slope[a, b]
+        whole = (arb_mat(block) * duration).exp()
+        return (
+            arb_mat([[whole[a, b] for b in range(size)] for a in range(size)]),
+            arb_mat([[whole[a, size + b] for b in range(size)] for a in range(size)]),
+        )
+
+    def duration(self, i: int, z: list[Vector]) -> arb:
+        """Return the duration of segment i."""
+        return z[i + 1][0] - z[i][0] if self.wide is None else self.wide.durations[i]
 
     # ------------------------------------------------------------------ first derivatives
 
@@ -199,7 +254,7 @@ class Chain:
         on_state = row * by_state
         by_time = (row * flow * move.by_time)[0, 0]
         self._add(found, i, [by_time, *(on_state[0, k] for k in range(self.n))], 1)
-        _, by_parameter, start = self._slope_of(i, [z[i], [z[i][0] + after]], move)
+        _, by_parameter, start = self._slope_of(i, z[i], after, move)
         change = by_parameter * move.start + flow * start
         found[-1] += (slope * end + row * change)[0, 0]
         return (row * end)[0, 0], found, (row * move.field * end)[0, 0]
@@ -242,29 +297,29 @@ class Chain:
             other = [move.speed[j, 0], *(arb(-1 if k == j else 0) for k in range(n))]
             self._add(rows[j], i + 1, other, sigma)
 
-    def _slope_of(self, i: int, ends: list[Vector], move: Move) -> tuple[arb_mat, arb_mat, arb_mat]:
+    def _slope_of(
+        self, i: int, joint: Vector, duration: arb, move: Move
+    ) -> tuple[arb_mat, arb_mat, arb_mat]:
         """Return the derivatives by the parameter of M, of exp(M d) at fixed d, and of the start."""
         model = self.model
         assert model.slopes is not None
-        size = model.size
-        slope = model.slopes.fields[self.segments.modes[i]]
-        block = zeros(2 * size, 2 * size)
-        for a in range(size):
-            for b in range(size):
-                block[a][b] = block[size + a][size + b] = move.field[a, b]
-                block[a][size + b] = slope[a, b]
-        whole = (arb_mat(block) * (ends[1][0] - ends[0][0])).exp()
-        flow = arb_mat([[whole[a, size + b] for b in range(size)] for a in range(size)])
-        start = column(model.by_parameter(ends[0][0], 0))
+        mode = self.segments.modes[i]
+        slope, middle = model.slopes.fields[mode], duration.mid()
+        whole, flow = self._exponential(mode, middle if self.wide is not None else duration)
+        if self.wide is not None:  # exp(M d) = exp(M d_m) exp(M (d - d_m))
+            rest = duration - middle
+            short, by_parameter = self._exponential(mode, rest)
+            flow = flow * short + whole * by_parameter
+        start = column(model.by_parameter(joint[0], 0))
         if move.reset is not None:
-            before = column(model.extended(ends[0][0], ends[0][1:]))
+            before = column(model.extended(joint[0], joint[1:]))
             start = move.reset * start + model.slopes.resets[self.segments.resets[i]] * before
         return slope, flow, start
 
     def _by_parameter(self, i: int, z: list[Vector], move: Move, rows: list[Vector]) -> None:
         if self.model.slopes is None:
             return
-        _, flow, start = self._slope_of(i, z[i : i + 2], move)
+        _, flow, start = self._slope_of(i, z[i], self.duration(i, z), move)
         change = flow * move.start + move.flow * start
         for j in range(self.n):
             rows[j][-1] += change[j, 0]
@@ -309,7 +364,7 @@ class Chain:
         early = move.flow * column(model.by_time(t, 2)) * late  # dL/dt at fixed d
         early = early + move.field * (move.flow * move.by_time) * delta
         by_state = move.field * move.flow * delta
-        slope, flow, start = self._slope_of(i, z[i : i + 2], move)
+        slope, flow, start = self._slope_of(i, z[i], self.duration(i, z), move)
         own = slope * move.end + move.field * (flow * move.start + move.flow * start)
         mixed = column([late * c for c in model.by_parameter(t, 1)])
         by_parameter = flow * a + move.flow * mixed + own * delta

@@ -24,10 +24,11 @@ from dataclasses import dataclass
 
 from flint import arb, arb_mat
 
-from contfric.certify.chain import Chain, Segments
+from contfric.certify.chain import Chain, Segments, Wide
 from contfric.certify.extended import Builder
 from contfric.certify.krawczyk import approximate_inverse, krawczyk
 from contfric.certify.verdict import Verdict
+from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, around, column, numbers, row_norm
 
 #: How far a box reaches beyond its two orbits, as a share of it: boxes of a tube overlap.
@@ -46,6 +47,7 @@ class Box:
     Attributes
     ----------
     first, last : the orbits A and B, (z, p)
+    normal : of the planes that are its sections
     all : enclosure of all solutions in it
     radii : half-widths R about the chord
     monotone : whether the parameter is monotone along it
@@ -54,6 +56,7 @@ class Box:
 
     first: Vector
     last: Vector
+    normal: Vector
     all: Vector
     radii: Vector
     monotone: bool
@@ -62,9 +65,12 @@ class Box:
     def holds(self, point: Vector) -> bool:
         """Tell whether a solution that is known to lie in some balls is on the curve of this box."""
         difference = [b - a for a, b in zip(self.first, self.last, strict=True)]
-        square = sum((c * c for c in difference), arb(0))
         off = [p - a for p, a in zip(point, self.first, strict=True)]
-        s = sum((c * o for c, o in zip(difference, off, strict=True)), arb(0)) / square
+        whole, part = (
+            sum((n * c for n, c in zip(self.normal, other, strict=True)), arb(0))
+            for other in (difference, off)
+        )
+        s = part / whole
         if not (s > -OVERLAP and s < 1 + OVERLAP):
             return False
         return all(abs(o - s * c) < r for o, c, r in zip(off, difference, self.radii, strict=True))
@@ -103,7 +109,8 @@ def box_between(segments: Segments, build: Builder, first: Vector, last: Vector)
         return None
     normal = [(c / square).mid() for c in difference]
     middle = [((a + b) / 2).mid() for a, b in zip(first, last, strict=True)]
-    residual, rows = Chain(segments, build(middle[-1])).linearised(middle[:-1])
+    central = build(middle[-1])
+    residual, rows = Chain(segments, central).linearised(middle[:-1])
     inverse = approximate_inverse(arb_mat([*rows, normal]))
     if inverse is None:
         return None
@@ -117,7 +124,10 @@ def box_between(segments: Segments, build: Builder, first: Vector, last: Vector)
     ]
     for _ in range(_TRIES):
         box = [around(c, r) for c, r in zip(chord, radii, strict=True)]
-        _, wide = Chain(segments, build(box[-1])).linearised(box[:-1])
+        model = build(box[-1])
+        lasting = _durations(segments, model, middle, difference, shares - 0.5, radii)
+        whole = Chain(segments, model, Wide(lasting, central, box[-1] - middle[-1]))
+        _, wide = whole.linearised(box[:-1])
         jacobian = arb_mat([*wide, normal])
         drift = numbers(arb_mat(wide) * column(difference))
         moved = column(
@@ -130,11 +140,36 @@ def box_between(segments: Segments, build: Builder, first: Vector, last: Vector)
         if all(k.abs_upper() < r for k, r in zip(image, radii, strict=True)):
             found = [c + k for c, k in zip(chord, image, strict=True)]
             monotone = _is_monotone(inverse, jacobian, gap, difference)
-            return Box(first, last, found, radii, monotone, _has_no_flip(segments, build, found))
+            return Box(first, last, normal, found, radii, monotone, _has_no_flip(whole, found))
         if not all(k.is_finite() for k in image):
             return None
         radii = [max(2 * k.abs_upper(), r, key=float) for k, r in zip(image, radii, strict=True)]
     return None
+
+
+def _durations(
+    segments: Segments,
+    model: BallModel,
+    middle: Vector,
+    difference: Vector,
+    shares: arb,
+    radii: Vector,
+) -> Vector:
+    """Return the durations of segments in a box: along the chord the joints move together."""
+    m, found = segments.states + 1, []
+    for i in range(segments.count):
+        at, after = i * m, (i + 1) * m
+        if i + 1 < segments.count:
+            rest, change = middle[after] - middle[at], difference[after] - difference[at]
+            spread = radii[at] + radii[after]
+        elif segments.turn != 0.0:  # by the closure, t_N = t_0 + turn T
+            rest = middle[0] + arb(segments.turn) * model.period - middle[at]
+            change = difference[0] - difference[at]
+            spread = radii[0] + radii[at] if i else arb(0)
+        else:
+            rest, change, spread = -middle[at], -difference[at], radii[at]
+        found.append(around(rest + shares * change, spread))
+    return found
 
 
 def are_linked(segments: Segments, build: Builder, before: Box, after: Box) -> bool:
@@ -154,18 +189,22 @@ def are_linked(segments: Segments, build: Builder, before: Box, after: Box) -> b
 
 
 def _is_monotone(inverse: arb_mat, jacobian: arb_mat, gap: arb_mat, difference: Vector) -> bool:
-    """Tell whether the parameter is monotone along a box, from an enclosure of the direction of the curve."""
+    """Tell whether the parameter is monotone along a box, from an enclosure of the direction T of the curve.
+
+    ``T - d = e' + (I - C G_X) (T - d)`` with ``e' = -C (G_X d - (0, 1))`` bounds all entries of T - d
+    together, and put in once more the last one.
+    """
     contraction = row_norm(gap)
     if not contraction < 1:
         return False
     wanted = column([*[arb(0)] * (len(difference) - 1), arb(1)])
     error = numbers(inverse * (jacobian * column(difference) - wanted))
-    worst = max((c.abs_upper() for c in error), key=float)
-    return bool(abs(difference[-1]) > worst / (1 - contraction))
+    worst = max((c.abs_upper() for c in error), key=float) / (1 - contraction)
+    last = sum((gap[gap.nrows() - 1, j].abs_upper() for j in range(gap.ncols())), arb(0))
+    return bool(abs(difference[-1]) > error[-1].abs_upper() + last * worst)
 
 
-def _has_no_flip(segments: Segments, build: Builder, box: Vector) -> bool:
-    chain = Chain(segments, build(box[-1]))
+def _has_no_flip(chain: Chain, box: Vector) -> bool:
     _, rows = chain.linearised(box[:-1], -1)
     jacobian = arb_mat([row[: chain.size] for row in rows])
     inverse = approximate_inverse(jacobian)

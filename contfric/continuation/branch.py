@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from contfric.continuation.events import Bifurcation, End, Kind
 from contfric.errors import ParameterError
-from contfric.extras import need_pandas
+from contfric.extras import need_flint, need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit, Status, of_two_halves
 from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
@@ -23,6 +23,8 @@ from contfric.orbit.words import decode, encode, mirror_pairs
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
+
+    from contfric.certify.branch import BranchCertificate
 
 BoolArray = NDArray[np.bool_]
 
@@ -267,6 +269,19 @@ class Branch:
     def _all_bifurcations(self) -> list[Bifurcation]:
         at_ends = [end.bifurcation for end in self.ends if end.bifurcation is not None]
         return [*self.bifurcations, *at_ends]
+
+    def certify(self) -> BranchCertificate:
+        """Prove the branch: one curve of admissible orbits in a tube of boxes, without events but the listed.
+
+        Raises
+        ------
+        ParameterError
+            If proofs are not offered for the model.
+        """
+        need_flint()
+        from contfric.certify.branch import certify_branch
+
+        return certify_branch(self)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the points as a table: parameters, x_max, x_min, psi, stops, stability (pandas)."""
