@@ -101,21 +101,24 @@ class Scene:
             total += amplitude * w**order * (cosine, -sine, -cosine, sine)[order % 4]
         return total
 
-    def _particular(self, t: arb) -> tuple[arb, arb]:
-        """Return the forced response and its velocity at a time, without friction."""
+    def forced(self, t: arb, tau: arb) -> tuple[arb, arb]:
+        """Return what f adds to displacement and velocity some time after t, from rest at 0."""
         x, v = arb(0), arb(0)
         for w, amplitude in ((self.omega, arb(1)), (3 * self.omega, self.h)):
             if amplitude.is_zero():
                 continue
-            sine, cosine = (w * t).sin_cos()
-            near, lost = 1 - w * w, 2 * self.zeta * w
-            if near.is_zero() and lost.is_zero():  # resonance without damping
-                x += amplitude * t * sine / 2
-                v += amplitude * (sine + t * cosine) / 2
+            (sine, cosine), (later, end) = (w * t).sin_cos(), (w * (t + tau)).sin_cos()
+            if self.zeta.is_zero():  # also at resonance
+                near, far = ((1 - w) * tau / 2).sinc(), (1 + w) * tau / 2
+                p, q = tau * tau / 2 * far.sinc() * near, tau * far.cos() * near
+                x += amplitude * (cosine * p - sine * (tau.sin() - q) / (1 + w))
+                v += amplitude * (cosine * (q + (w * tau).sin()) / (1 + w) - sine * w * p)
                 continue
-            size = amplitude / (near * near + lost * lost)
-            x += size * (near * cosine + lost * sine)
-            v += size * w * (lost * cosine - near * sine)
+            near, lost = 1 - w * w, 2 * self.zeta * w
+            size, (c, dc, d, dd) = amplitude / (near * near + lost * lost), self.free(tau)
+            from_x, from_v = near * cosine + lost * sine, w * (lost * cosine - near * sine)
+            x += size * (near * end + lost * later - from_x * c - from_v * d)
+            v += size * (w * (lost * end - near * later) - from_x * dc - from_v * dd)
         return x, v
 
     def free(self, tau: arb) -> tuple[arb, arb, arb, arb]:
@@ -133,12 +136,9 @@ class Scene:
 
     def slide(self, direction: int, t: arb, x: arb, tau: arb) -> tuple[arb, arb]:
         """Return displacement and velocity of a slide that starts with velocity 0."""
-        from_x, from_v = self._particular(t)
-        to_x, to_v = self._particular(t + tau)
-        c, dc, d, dd = self.free(tau)
-        offset = -direction * self.s
-        alpha, beta = x - from_x - offset, -from_v
-        return to_x + offset + alpha * c + beta * d, to_v + alpha * dc + beta * dd
+        c, dc, _, _ = self.free(tau)
+        (forced, speed), offset = self.forced(t, tau), -direction * self.s
+        return offset + (x - offset) * c + forced, (x - offset) * dc + speed
 
     def acceleration(self, direction: int, t: arb, x: arb, v: arb) -> arb:
         """Return the acceleration in a slide."""
@@ -192,7 +192,7 @@ class Scene:
             if not all(s.is_finite() for s in step):
                 raise Undecided("the equations are singular")
             centre = [(c - s).mid() for c, s in zip(centre, step, strict=True)]
-        tiny = arb(2) ** (30 - ctx.prec)
+        tiny = arb(2) ** (-ctx.prec // 2)  # rounding is its square, and so is what is left of it
         widths = [tiny * (1 + abs(c)).upper() for c in centre]
         zero = self._enclosed(centre, widths, "a solution near the printed joints")
         for found, p, r in zip(zero, printed, radii, strict=True):
