@@ -259,7 +259,7 @@ def _other_params(data: dict[str, Any], rng: np.random.Generator) -> None:
 def _other_segment(data: dict[str, Any], rng: np.random.Generator) -> None:
     kinds = [["slide+", "v"], ["slide-", "v"], ["stick", "F+"], ["stick", "F-"]]
     i = int(rng.integers(len(data["segments"])))
-    if rng.uniform() < 0.5:
+    if rng.uniform() < 0.5 or len(data["segments"]) == 1:
         data["segments"][i] = kinds[int(rng.integers(4))]
         return
     for name in ("segments", "joints", "radius", "enclosure"):

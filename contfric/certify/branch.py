@@ -31,8 +31,8 @@ from contfric.models.balls.numbers import Vector
 _BITS = 80
 #: Halvings of a step of the branch: events are left with as little about them.
 _HALVINGS = 12
-#: Most boxes of a branch.
-_MOST = 4000
+#: Most boxes that are tried along a branch: some minutes of work.
+_MOST = 30_000
 
 
 @dataclass(frozen=True, eq=False)
