@@ -40,3 +40,14 @@ def need_bokeh() -> None:
         If it is not installed.
     """
     _need("bokeh", "live diagrams", "live")
+
+
+def need_flint() -> None:
+    """See that python-flint can be imported.
+
+    Raises
+    ------
+    MissingPackageError
+        If it is not installed.
+    """
+    _need("flint", "proofs", "certify")

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from contfric.cli import commands, doctor, view
+from contfric.cli import commands, doctor, verify, view
 from contfric.errors import ContfricError, did_you_mean
 from contfric.models import DEFAULT_MODEL
 
 _COMMANDS = (
     *("run", "explain", "info", "signatures", "check", "graph", "simulate", "census", "view"),
-    "doctor",
+    *("doctor", "verify"),
 )
 _DEBUG = "show the traceback of an error"
 
@@ -89,6 +89,7 @@ def _parser() -> _Parser:
     _fill_simulate(add("simulate", commands.simulate, "print the events of a trajectory as CSV"))
     _fill_census(add("census", commands.census, "list all periodic orbits, stable or not"))
     _fill_view(add("view", view.view, "write the diagram of a run folder as a page to click on"))
+    _fill_verify(add("verify", verify.verify, "check a certificate file, independently"))
     _fill_doctor(add("doctor", doctor.doctor, "say what is compiled, and compile what is not"))
     return parser
 
@@ -121,6 +122,10 @@ def _fill_info(parser: argparse.ArgumentParser) -> None:
 def _fill_view(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", metavar="DIR", type=Path, help="folder of a run")
     parser.add_argument("--open", action="store_true", help="open the page in a browser")
+
+
+def _fill_verify(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", type=Path, help="a certificate (JSON)")
 
 
 def _fill_doctor(parser: argparse.ArgumentParser) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from contfric.continuation.events import Bifurcation, End, Kind
 from contfric.errors import ParameterError
-from contfric.extras import need_pandas
+from contfric.extras import need_flint, need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit, Status, of_two_halves
 from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from contfric.certify.branch import BranchCertificate
     from contfric.continuation.extrema import Extremum
     from contfric.quantities.registry import QuantityLike
 
@@ -321,6 +322,19 @@ class Branch:
         from contfric.continuation.extrema import extrema_of
 
         return extrema_of(self, name)
+
+    def certify(self) -> BranchCertificate:
+        """Prove the branch: one curve of admissible orbits in a tube of boxes, without events but the listed.
+
+        Raises
+        ------
+        ParameterError
+            If proofs are not offered for the model.
+        """
+        need_flint()
+        from contfric.certify.branch import certify_branch
+
+        return certify_branch(self)
 
     def to_dataframe(self, quantities: Sequence[str] = ()) -> pd.DataFrame:
         """Return the points as a table: parameters, x_max, x_min, psi, stops, stability (pandas).

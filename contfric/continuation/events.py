@@ -28,17 +28,22 @@ from collections.abc import Callable, Set
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contfric.continuation.measured_event import MeasuredEvent
 from contfric.errors import ParameterError, did_you_mean
+from contfric.extras import need_flint
 from contfric.models.definition import Domain, Model
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import Outline, outline_of
 from contfric.orbit.system import Margin, System, Test, inside_sign
 from contfric.stored import made_of
+
+if TYPE_CHECKING:
+    from contfric.certify.events import EventCertificate
 
 
 class Kind(str, Enum):
@@ -241,6 +246,19 @@ class Bifurcation(MeasuredEvent):
     def meaning(self) -> str:
         """What happens, in words: that of its kind, but only where something slides it is a sliding."""
         return meaning_of(self.kind, self.orbit.model, {test.surface for test in self.tests})
+
+    def certify(self, parameter: str = "") -> EventCertificate:
+        """Prove the event to 30 digits in its parameter; which one must be said of a saved event.
+
+        Raises
+        ------
+        ParameterError
+            If proofs are not offered for the model, or the parameter is not known.
+        """
+        need_flint()
+        from contfric.certify.events import certify_event
+
+        return certify_event(self, parameter)
 
     def mirror(self) -> Bifurcation:
         """Return the mirror image, at the same parameters."""

@@ -11,7 +11,7 @@ The seven domains are those of Table 1 of the reference.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from contfric.models.definition import (
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
+    from contfric.models.balls.model import BallModel
 
 #: Signs of (u - S0) and (u + S0) for the three positions of the load in Table 1.
 _LOAD = {"+": (1, 1), "0": (-1, 1), "-": (-1, -1)}
@@ -50,6 +51,12 @@ def _flow() -> CompiledFlow:
     from contfric.flow.forced_oscillator import compiled_flow
 
     return compiled_flow()
+
+
+def _balls(params: Mapping[str, Any], free: str | None) -> BallModel:
+    from contfric.models.balls.coulomb import coulomb_balls
+
+    return coulomb_balls(params, free)
 
 
 def _spread(params: Mapping[str, float]) -> FloatArray:
@@ -116,6 +123,7 @@ coulomb = Model(
         ),  # dissipated in a period of the orbit, k/F_0^2
         ("power", "energy/period"),
     ),
+    ball_factory=_balls,
     references=(
         "Asymmetric and chaotic responses of dry friction oscillators with different static and "
         "kinetic coefficients of friction, Meccanica (2021), doi:10.1007/s11012-021-01382-8",

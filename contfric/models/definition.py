@@ -51,6 +51,7 @@ from contfric.stored import given
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
+    from contfric.models.balls.model import BallModel
     from contfric.models.view import FlowView
 
 __all__ = [
@@ -110,6 +111,9 @@ class Model(TransitionMaps):
         are at joints, as they are with a joint wherever the mass stops.
     quantities : tuple of (str, str)
         Name and expression of each quantity of its own (:mod:`contfric.quantities`), such as an energy.
+    ball_factory : callable or None
+        ``ball_factory(params, free)`` returns the model in balls (:mod:`contfric.models.balls`), of a
+        model that is not declared by its equations; None if it has none.
     definition : str
         Text from which the model can be built; empty if it is known by its name only.
     """
@@ -138,6 +142,9 @@ class Model(TransitionMaps):
     rounding: float = 1e-13
     displacement: str = ""
     quantities: tuple[tuple[str, str], ...] = ()
+    ball_factory: Callable[[Mapping[str, Any], str | None], BallModel] | None = field(
+        default=None, repr=False
+    )
     definition: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:

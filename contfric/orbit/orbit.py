@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.errors import ParameterError
-from contfric.extras import need_pandas
+from contfric.extras import need_flint, need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.counts import TALLY
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from contfric.certify.certificate import Certificate
     from contfric.models.view import FlowView
 
 ComplexArray = NDArray[np.complex128]
@@ -367,6 +368,19 @@ class Orbit(MeasuredOrbit):
         columns: dict[str, Any] = {"t": times}
         columns |= {name: states[:, k] for k, name in enumerate(self.model.states)}
         return pd.DataFrame({**columns, "domain": names})
+
+    def certify(self) -> Certificate:
+        """Prove that the orbit exists, is alone, admissible, stable or not (needs python-flint).
+
+        Raises
+        ------
+        ParameterError
+            If proofs are not offered for the model.
+        """
+        need_flint()
+        from contfric.certify.orbit import certify_orbit
+
+        return certify_orbit(self)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the orbit in the phase plane, coloured by domain."""

@@ -1,0 +1,153 @@
+"""Proofs: how many random orbits, which events and how much of a branch are proved, and what no cheat passes.
+
+python -m benchmarks.certificates orbits 1000      random scenes of coulomb: share proved, by class
+python -m benchmarks.certificates events           the events of several diagrams, by kind
+python -m benchmarks.certificates branches         the branches of Fig. 5, share of the arclength
+python -m benchmarks.certificates cheats 10000     changed certificates: how many are verified
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+import contfric as cf
+from contfric.certify.files import certificate_data
+from contfric.errors import ContfricError
+from contfric.verify.file import check_text
+
+SCENES: dict[str, tuple[dict[str, float], str, tuple[float, float]]] = {
+    "Omega (Fig. 5)": ({"Omega": 0.5, "S": 0.32, "S0": 0.4}, "Omega", (0.4, 0.6)),
+    "S": ({"Omega": 0.5, "S": 0.3, "S0": 0.4}, "S", (0.03, 0.39)),
+    "h": ({"Omega": 0.5, "S": 0.3, "S0": 0.4}, "h", (-0.3, 0.3)),
+    "zeta": ({"Omega": 0.5, "S": 0.3, "S0": 0.4}, "zeta", (-0.1, 1.3)),
+    "S0": ({"Omega": 0.6, "S": 0.3, "S0": 0.35}, "S0", (0.3, 0.8)),
+    "large limits": ({"Omega": 0.6, "S": 0.3, "S0": 0.5}, "Omega", (0.35, 0.9)),
+    "three periods": ({"Omega": 0.4, "S": 0.1, "S0": 0.25}, "Omega", (0.2, 0.9)),
+}
+
+
+def random_params(rng: np.random.Generator) -> dict[str, float]:
+    """Return a scene: resonances, no damping and S = S0 among them."""
+    limit = rng.uniform(0.02, 0.9)
+    omegas = [rng.uniform(0.1, 2.0), 1.0, 0.5, 1 / 3, 0.25]
+    dampings = [0.0, rng.uniform(0.0, 0.3), 1.0, rng.uniform(1.0, 5.0)]
+    return {
+        "Omega": float(rng.choice(omegas, p=[0.7, 0.1, 0.1, 0.05, 0.05])),
+        "S": float(limit * rng.choice([1.0, rng.uniform(0.3, 1.0)])),
+        "S0": float(limit),
+        "h": float(rng.choice([0.0, rng.uniform(-0.5, 0.5)])),
+        "zeta": float(rng.choice(dampings, p=[0.4, 0.4, 0.05, 0.15])),
+    }
+
+
+def orbits(count: int) -> None:
+    """Random orbits of random scenes: proved, and checked."""
+    rng = np.random.default_rng(19)
+    found: Counter[str] = Counter()
+    proving, checking = [], []
+    while sum(found.values()) < count:
+        params = random_params(rng)
+        try:
+            orbit = cf.find_orbit("coulomb", params, state=rng.normal(size=2), longest=2000)
+        except ContfricError:
+            continue
+        begin = time.perf_counter()
+        certificate = orbit.certify()
+        proving.append(time.perf_counter() - begin)
+        if not certificate.proved:
+            found[certificate.why.split(";")[0]] += 1
+            print(params, orbit.name, certificate.why)
+            continue
+        text = json.dumps(certificate_data(certificate))
+        begin = time.perf_counter()
+        answer = check_text(text)
+        checking.append(time.perf_counter() - begin)
+        found["proved and verified" if answer.yes else f"proved, but: {answer.why}"] += 1
+    for what, number in found.most_common():
+        print(f"{number:6d}  {what}")
+    for name, seconds in (("prover", proving), ("checker", checking)):
+        print(f"{name}: median {1e3 * np.median(seconds):.1f} ms, most {max(seconds):.3f} s")
+
+
+def events() -> None:
+    """Events of diagrams, by kind."""
+    found: Counter[tuple[str, str]] = Counter()
+    widest, off = 0.0, 0.0
+    for name, (params, parameter, span) in SCENES.items():
+        diagram = cf.explore(cf.find_orbit("coulomb", params), parameter, span)
+        begin = time.perf_counter()
+        certificates = [event.certify(parameter) for event in diagram.bifurcations]
+        seconds = time.perf_counter() - begin
+        for c in certificates:
+            holds = ", orbit with holds" if c.event.orbit.system.holds else ""
+            found[c.event.kind.value, "proved" if c.proved else f"{c.why}{holds}"] += 1
+            if c.proved:
+                widest, off = max(widest, c.radius), max(off, c.error)
+        proved = sum(c.proved for c in certificates)
+        print(f"{name}: {proved} of {len(certificates)} events proved in {seconds:.2f} s")
+    for (kind, what), number in sorted(found.items()):
+        print(f"{number:6d}  {kind:3s} {what}")
+    print(f"widest ball {widest:.1e}; printed parameters are off by {off:.1e} at most")
+
+
+def branches() -> None:
+    """Branches of Fig. 5: boxes, and the share of the arclength that they cover."""
+    params, parameter, span = SCENES["Omega (Fig. 5)"]
+    whole, covered = 0.0, 0.0
+    for branch in cf.explore(cf.find_orbit("coulomb", params), parameter, span).branches:
+        begin = time.perf_counter()
+        certificate = branch.certify()
+        seconds = time.perf_counter() - begin
+        length = float(branch.arc[-1] - branch.arc[0])
+        whole, covered = whole + length, covered + length * certificate.covered
+        print(f"{certificate!r}, {100 * certificate.regular:.4g} % without events, {seconds:.1f} s")
+        for gap in certificate.gaps[:3] + certificate.gaps[3:][-2:]:
+            print("   ", gap)
+    print(f"{100 * covered / whole:.3f} % of the arclength of the diagram")
+
+
+def cheats(count: int) -> None:
+    """Change true certificates, and decide by 60 digits those that are verified."""
+    from tests.certificate_oracle import false_statements, mutated
+
+    rng = np.random.default_rng(23)
+    texts = _certificates(rng)
+    found: Counter[str] = Counter()
+    for k in range(count):
+        data: dict[str, Any] = mutated(json.loads(texts[k % len(texts)]), rng)
+        if not check_text(json.dumps(data)).yes:
+            found["refused"] += 1
+        elif false_statements(data):
+            found["VERIFIED, BUT FALSE"] += 1
+            print(json.dumps(data))
+        else:
+            found["verified, and true"] += 1
+    print(dict(found))
+
+
+def _certificates(rng: np.random.Generator) -> list[str]:
+    found: list[str] = []
+    while len(found) < 40:
+        try:
+            orbit = cf.find_orbit("coulomb", random_params(rng), longest=2000)
+        except ContfricError:
+            continue
+        certificate = orbit.certify()
+        if certificate.proved and len(orbit.joints) < 9:
+            found.append(json.dumps(certificate_data(certificate)))
+    return found
+
+
+if __name__ == "__main__":
+    task, *counts = sys.argv[1:] or ["orbits"]
+    tasks = {"orbits": orbits, "cheats": cheats}
+    if task in tasks:
+        tasks[task](int(counts[0]) if counts else 100)
+    else:
+        {"events": events, "branches": branches}[task]()

@@ -1,0 +1,1 @@
+"""Proofs by interval arithmetic: orbits, events and branches become theorems."""

@@ -1,0 +1,272 @@
+"""Turn a located event into a theorem: its parameter to 30 digits, that it is a simple one, and of its kind.
+
+The extended system of :mod:`contfric.certify.extended` has exactly one zero in a thin box around Newton's
+limit, and its Jacobian is regular there. The orbit at the event obeys every inequality, but for the one
+that is the event. What tells kinds apart is a sign: at a stop on ``|u| = S0`` the load grows (CS) or
+falls (SS), a touch has a second derivative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from flint import arb, arb_mat, ctx
+
+from contfric.certify.chain import Chain, Segments, segments_of
+from contfric.certify.closing import closing_of, is_symmetry
+from contfric.certify.extended import Builder, at_joint, rows_of, touched_within, with_multiplier
+from contfric.certify.inequalities import Touch, inequalities
+from contfric.certify.krawczyk import Equations, Inclusion, approximate_inverse, enclosed
+from contfric.certify.locating import Location, NotLocatedError, location_of
+from contfric.certify.verdict import Finding, Verdict, all_of
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind, resting_domain
+from contfric.errors import ParameterError
+from contfric.models.balls.build import ball_model
+from contfric.models.balls.model import BallModel
+from contfric.models.balls.numbers import Vector, column, row_norm
+from contfric.orbit.margins import Margin, Test
+from contfric.orbit.orbit import Orbit
+
+#: Bits tried one after the other: 160 leave 30 digits where the condition is 1e10.
+_BITS = (160, 320)
+#: Bits of the working precision that rounding may take.
+_SPARE = 30
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EventCertificate:
+    """What was proved of an event.
+
+    Attributes
+    ----------
+    event : Bifurcation
+        The printed event.
+    parameter : str
+        The parameter that is free; the others are the exact binary numbers that they are.
+    value : arb or None
+        A ball that contains the parameter at the event.
+    exists : Finding
+        There is such an orbit, and no other one near it.
+    simple : Finding
+        The event is passed with speed: transversality, and a quadratic term at a fold or a touch.
+    kind : Finding
+        The event is of its kind.
+    admissible : Finding
+        The orbit obeys every other inequality over the whole of every segment.
+    """
+
+    event: Bifurcation
+    parameter: str
+    value: arb | None
+    exists: Finding
+    simple: Finding
+    kind: Finding
+    admissible: Finding
+
+    @property
+    def proved(self) -> bool:
+        """Whether all of it is proved."""
+        return self._whole.proved
+
+    @property
+    def why(self) -> str:
+        """What is not proved, and why; empty if all is."""
+        return "" if self.proved else str(self._whole)
+
+    @property
+    def _whole(self) -> Finding:
+        return all_of([self.exists, self.simple, self.kind, self.admissible])
+
+    @property
+    def radius(self) -> float:
+        """How well the parameter is known; infinite if it is not."""
+        return float("inf") if self.value is None else float(self.value.rad())
+
+    @property
+    def error(self) -> float:
+        """How far the printed parameter is off."""
+        if self.value is None:
+            return float("inf")
+        return float(abs(self.value.mid() - arb(self.event.params[self.parameter])).mid())
+
+    def __repr__(self) -> str:
+        if self.value is None:
+            return f"<{self.event.label}: {self.why}>"
+        text = self.value.str(40, more=True, radius=True)
+        return f"<{self.event.label} at {self.parameter} = {text}: {self.why or 'proved'}>"
+
+
+def certify_event(event: Bifurcation, parameter: str = "") -> EventCertificate:
+    """Prove what can be proved of an event.
+
+    Parameters
+    ----------
+    parameter : that is free; by default the one along which the event was located
+
+    Raises
+    ------
+    ParameterError
+        If the parameter is not known, or proofs are not offered for the model.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.54})
+    >>> branch = cf.continue_orbit(orbit, "Omega", (0.538, 0.545))
+    >>> certify_event(branch.bifurcations[0]).proved
+    True
+    """
+    parameter = parameter or getattr(event.bound, "parameter", "")
+    if not parameter:
+        raise ParameterError("say in which parameter the event is located: certify('Omega')")
+    event.orbit.model.index_of(parameter)
+    ball_model(event.orbit.model, event.params)  # whether proofs are offered
+    try:
+        location = location_of(event)
+    except NotLocatedError as error:
+        return _undecided(event, parameter, str(error))
+    found = None
+    for bits in _BITS:
+        with ctx.workprec(bits):
+            found = _attempt(event, location, parameter, bits)
+        if found.proved:
+            break
+    assert found is not None
+    return found
+
+
+def _undecided(event: Bifurcation, parameter: str, why: str) -> EventCertificate:
+    finding = Finding(Verdict.UNDECIDED, why)
+    return EventCertificate(event, parameter, None, finding, finding, finding, finding)
+
+
+def _attempt(event: Bifurcation, location: Location, parameter: str, bits: int) -> EventCertificate:
+    orbit = location.orbit
+    segments = segments_of(orbit.system)
+    params = dict(event.params)
+
+    def build(value: arb) -> BallModel:
+        return ball_model(orbit.model, params, parameter, value)
+
+    equations, start = _extended(event, location, segments, build)
+    inclusion = enclosed(equations, [*start, arb(params[parameter])], arb(2) ** (_SPARE - bits))
+    if inclusion.verdict is not Verdict.PROVED:
+        return _undecided(event, parameter, "the extended system is singular")
+    value, z = inclusion.zero[-1], inclusion.zero[: orbit.joints.size]
+    exact = build(arb(params[parameter]))  # at one value, and its slopes from there to the event
+    between = replace(exact, slopes=build(value.union(arb(params[parameter]))).slopes)
+    if orbit.system.half and not is_symmetry(orbit, segments, between):
+        return _undecided(event, parameter, "the symmetry is not exact")
+    off = float(abs(value.mid() - arb(params[parameter])).upper())
+    if off > ACCURACY * (1.0 + abs(params[parameter])):
+        return _undecided(event, parameter, f"the extended system leads {off:.1e} away")
+    chain = Chain(segments, build(value))
+    touch = _touch(location, inclusion)
+    return EventCertificate(
+        event,
+        parameter,
+        value,
+        Finding(Verdict.PROVED),
+        _simple(event, location, chain, z, touch),
+        _of_kind(event, location, chain, z, touch),
+        _admissible(orbit, chain, z, touch),
+    )
+
+
+def _extended(
+    event: Bifurcation, location: Location, segments: Segments, build: Builder
+) -> tuple[Equations, Vector]:
+    """Return the extended system of an event, and where to start but for the parameter."""
+    joints = [arb(float(x)) for x in location.orbit.joints.ravel()]
+    if location.condition is None:
+        sigma = 1 if event.kind is Kind.SN else -1
+        phi = _null_vector(location.orbit, segments, sigma)
+        return with_multiplier(segments, build, sigma, phi), [*joints, *phi]
+    if location.condition.within:
+        after = arb(location.after)
+        return touched_within(segments, build, location.condition), [*joints, after]
+    return at_joint(segments, build, location.condition), joints
+
+
+def _null_vector(orbit: Orbit, segments: Segments, sigma: int) -> Vector:
+    """Return the unit vector that the linearised chain at the printed orbit maps nearest to zero."""
+    model = ball_model(orbit.model, orbit.params)
+    printed = [arb(float(x)) for x in orbit.joints.ravel()]
+    _, rows = Chain(segments, model).linearised(printed, sigma)
+    matrix = np.array([[float(x.mid()) for x in row] for row in rows])
+    return [arb(float(x)) for x in np.linalg.svd(matrix)[2][-1]]
+
+
+def _touch(location: Location, inclusion: Inclusion) -> Touch | None:
+    if location.condition is None:
+        return None
+    return Touch(location.condition, inclusion.zero[-2] if location.condition.within else None)
+
+
+def _simple(
+    event: Bifurcation, location: Location, chain: Chain, z: Vector, touch: Touch | None
+) -> Finding:
+    """Find whether the event is passed with speed.
+
+    The extended system is regular. With a regular chain a margin, or the multiplier -1, has a slope along
+    the branch; a fold is simple by the extended system alone, and so is a tangential stop, at which the
+    chain is singular: there the second derivative counts.
+    """
+    if event.kind is Kind.SN:
+        return Finding(Verdict.PROVED)
+    if touch is not None and (touch.condition.within or touch.condition.rate):
+        if _second(chain, z, touch).contains(0):
+            return Finding(Verdict.UNDECIDED, "the second derivative of the touch may vanish")
+        if touch.condition.rate:
+            return Finding(Verdict.PROVED)
+    _, rows = chain.linearised(z)
+    jacobian = arb_mat([row[: chain.size] for row in rows])
+    inverse = approximate_inverse(jacobian)
+    if inverse is not None:
+        size = chain.size
+        identity = arb_mat([[int(i == j) for j in range(size)] for i in range(size)])
+        if row_norm(identity - inverse * jacobian) < 1:
+            return Finding(Verdict.PROVED)
+    return Finding(Verdict.UNDECIDED, "the orbit may have a multiplier 1 at the event")
+
+
+def _second(chain: Chain, z: Vector, touch: Touch) -> arb:
+    """Return the second derivative of an observable where it is touched."""
+    joints, condition = chain.joints(z), touch.condition
+    move = chain.move(condition.segment, joints)
+    row, _ = rows_of(chain.model, chain.segments, condition, 2)
+    state = move.end if touch.after is None else (move.field * touch.after).exp() * move.start
+    return (row * state)[0, 0]
+
+
+def _of_kind(
+    event: Bifurcation, location: Location, chain: Chain, z: Vector, touch: Touch | None
+) -> Finding:
+    """Find whether the event is of its kind: at a stop on the limit of rest, by the rate of the load."""
+    if touch is None or touch.condition.rate or touch.condition.within or event.kind is Kind.T:
+        return Finding(Verdict.PROVED)
+    condition = touch.condition
+    test = Test(Margin.JOINT, condition.segment, condition.surface)
+    resting = resting_domain(location.orbit.system, test)
+    if resting is None:
+        proved = event.kind is Kind.CS
+        return Finding(Verdict.PROVED if proved else Verdict.UNDECIDED, "nothing rests there")
+    after = chain.joints(z)[condition.segment + 1]
+    state = column(chain.model.extended(after[0], after[1:]))
+    row = chain.model.surfaces[condition.surface] * chain.model.fields[resting.mode]
+    outward = -resting.signs[condition.surface] * (row * state)[0, 0]
+    wanted = outward > 0 if event.kind is Kind.CS else outward < 0
+    if wanted:
+        return Finding(Verdict.PROVED)
+    decided = outward > 0 or outward < 0
+    return Finding(
+        Verdict.REFUTED if decided else Verdict.UNDECIDED, f"the load moves outward at {outward}"
+    )
+
+
+def _admissible(orbit: Orbit, chain: Chain, z: Vector, touch: Touch | None) -> Finding:
+    closing = closing_of(chain.segments, chain.model, orbit.system.half)
+    plain = Chain(chain.segments, replace(chain.model, slopes=None))
+    found = inequalities(plain, orbit.system, chain.joints(z), closing, touch)
+    return all_of([inequality.named(orbit.system) for inequality in found])

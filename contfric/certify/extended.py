@@ -1,0 +1,124 @@
+r"""Events as regular zeros of extended systems, with one parameter p free.
+
+The unknowns are the joints z of the chain ``F(z, p) = 0``, p, and what the event needs beside them:
+
+* an observable g on a surface, or a rate that vanishes, at a joint: ``g(z_k, p) = 0``;
+* a touch inside of a segment, a time tau after its start: ``q(tau) = 0, q'(tau) = 0``;
+* a multiplier 1 (SN) or -1 of a turn (PD; BP of the half of a symmetric orbit), with its disturbance phi:
+  ``F_z phi = 0, c phi = 1``, the closure of phi with the sign of the multiplier (G. Moore and A. Spence,
+  SIAM J. Numer. Anal. 17 (1980) 567-576; B. Werner and A. Spence, SIAM J. Numer. Anal. 21 (1984)
+  388-399).
+
+That the Jacobian of the extended system is regular is what makes the event a simple one: a fold is quadratic
+and passed with a speed that does not vanish, a multiplier -1 is simple and passes with speed, a margin
+changes its sign with speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from flint import arb, arb_mat
+
+from contfric.certify.chain import Chain, Segments
+from contfric.certify.krawczyk import Equations
+from contfric.models.balls.model import BallModel
+from contfric.models.balls.numbers import Vector
+
+#: Returns the model at a value of the free parameter.
+Builder = Callable[[arb], BallModel]
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What vanishes at an event beside the chain.
+
+    Attributes
+    ----------
+    segment : the segment that it belongs to
+    surface : the surface whose observable is meant
+    rate : whether the rate of the observable along the segment is meant, at its end
+    within : whether it is touched inside of the segment; else it is met at its end
+    """
+
+    segment: int
+    surface: str
+    rate: bool = False
+    within: bool = False
+
+
+def rows_of(
+    model: BallModel, segments: Segments, condition: Condition, order: int
+) -> tuple[arb_mat, arb_mat]:
+    """Return the row of a condition's observable or of its derivative, and its slope by the parameter."""
+    assert model.slopes is not None
+    mode = segments.modes[condition.segment]
+    row, slope = model.surfaces[condition.surface], model.slopes.surfaces[condition.surface]
+    for _ in range(order):
+        slope = slope * model.fields[mode] + row * model.slopes.fields[mode]
+        row = row * model.fields[mode]
+    return row, slope
+
+
+def at_joint(segments: Segments, build: Builder, condition: Condition) -> Equations:
+    """Return the equations for the unknowns (z, p) of an event at a joint."""
+
+    def equations(x: Vector) -> tuple[Vector, arb_mat]:
+        model = build(x[-1])
+        chain = Chain(segments, model)
+        residual, rows = chain.linearised(x[:-1])
+        row, slope = rows_of(model, segments, condition, int(condition.rate))
+        joints = chain.joints(x[:-1])
+        value, last = chain.observed(joints, condition.segment + 1, row, slope)
+        return [*residual, value], arb_mat([*rows, last])
+
+    return equations
+
+
+def touched_within(segments: Segments, build: Builder, condition: Condition) -> Equations:
+    """Return the equations for the unknowns (z, tau, p) of a touch inside of a segment."""
+
+    def equations(x: Vector) -> tuple[Vector, arb_mat]:
+        model, tau = build(x[-1]), x[-2]
+        chain = Chain(segments, model)
+        residual, rows = chain.linearised(x[:-2])
+        matrix = [[*row[:-1], arb(0), row[-1]] for row in rows]
+        joints = chain.joints(x[:-2])
+        for order in (0, 1):
+            observable = rows_of(model, segments, condition, order)
+            value, row, by_tau = chain.observed_within(joints, condition.segment, tau, *observable)
+            residual.append(value)
+            matrix.append([*row[:-1], by_tau, row[-1]])
+        return residual, arb_mat(matrix)
+
+    return equations
+
+
+def with_multiplier(
+    segments: Segments, build: Builder, sigma: int, functional: Vector
+) -> Equations:
+    """Return the equations for the unknowns (z, phi, p) of a multiplier sigma, 1 or -1."""
+
+    def equations(x: Vector) -> tuple[Vector, arb_mat]:
+        model = build(x[-1])
+        chain = Chain(segments, model)
+        size = chain.size
+        z, phi = x[:size], x[size : 2 * size]
+        residual, rows = chain.linearised(z)
+        turned = rows if sigma == 1 else chain.linearised(z, sigma)[1]
+        bent = chain.bent(z, phi, sigma)
+        nothing = [arb(0)] * size
+        residual = list(residual)
+        for row in turned:
+            residual.append(sum((a * b for a, b in zip(row[:size], phi, strict=True)), arb(0)))
+        residual.append(sum((a * b for a, b in zip(functional, phi, strict=True)), arb(0)) - 1)
+        matrix = [[*row[:size], *nothing, row[-1]] for row in rows]
+        matrix += [
+            [*curved[:size], *row[:size], curved[-1]]
+            for curved, row in zip(bent, turned, strict=True)
+        ]
+        matrix.append([*nothing, *functional, arb(0)])
+        return residual, arb_mat(matrix)
+
+    return equations

@@ -1,0 +1,121 @@
+"""Certificates as files, and their check."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flint import acb, arb, ctx
+
+from contfric.certify.verdict import Verdict
+from contfric.errors import ParameterError, ResultFileError, path_of
+from contfric.files import replacing
+from contfric.verify.file import CHECKED_MODELS, Answer, check_text
+
+if TYPE_CHECKING:
+    from contfric.certify.certificate import Certificate
+
+#: Digits of a printed ball: more than the 30 that an enclosure has.
+_DIGITS = 40
+#: Discs of multipliers are printed this much wider: another way to compute them rounds otherwise.
+_WIDER = 1e-25
+#: Larger certificate files are none: 400 segments take 200 kB.
+_LARGEST = 10_000_000
+
+
+def certificate_data(certificate: Certificate) -> dict[str, Any]:
+    """Return a certificate as plain data.
+
+    Raises
+    ------
+    ParameterError
+        If it is none that a file can state: of a model that the checker does not know, or with holds.
+    """
+    orbit = certificate.orbit
+    if orbit.model.name not in CHECKED_MODELS or orbit.system.holds:
+        raise ParameterError(
+            f"certificate files are for orbits without holds of {', '.join(CHECKED_MODELS)}: "
+            "that is what the checker knows"
+        )
+    if not certificate.exists.proved:
+        raise ParameterError(f"there is nothing to write: {certificate.why}")
+    m = orbit.joints.shape[1]
+    with ctx.workprec(certificate.precision):
+        radii = [float(r.upper()) * (1 + 1e-12) for r in certificate.radii]
+        balls = [_printed(x) for x in certificate.enclosure]
+        multipliers = [_disc(mu) for mu in certificate.multipliers]
+    statements = {
+        "exists": certificate.exists.verdict,
+        "unique": certificate.unique.verdict,
+        "admissible": certificate.admissible.verdict,
+        "stable": certificate.stable.verdict,
+    }
+    return {
+        "certificate": "orbit",
+        "format": 1,
+        "model": orbit.model.name,
+        "params": orbit.params,
+        "periods": orbit.periods,
+        "half": bool(orbit.system.half),
+        "segments": [list(pair) for pair in orbit.system.word],
+        "joints": orbit.joints.tolist(),
+        "radius": [radii[i : i + m] for i in range(0, len(radii), m)],
+        "enclosure": [balls[i : i + m] for i in range(0, len(balls), m)],
+        "multipliers": multipliers,
+        "statements": {
+            name: verdict.value
+            if verdict is not Verdict.REFUTED or name == "stable"
+            else Verdict.UNDECIDED.value
+            for name, verdict in statements.items()
+        },
+    }
+
+
+def _printed(x: arb) -> str:
+    """Return a ball as a text, which contains it."""
+    return _text(x + arb(0, (_WIDER * 1e-5) * (1 + abs(x).upper())))
+
+
+def _text(x: arb) -> str:
+    """Return ``centre +/- radius`` in decimals that contain a ball."""
+    return str(x.str(_DIGITS, more=True)).strip("[]")
+
+
+def _disc(mu: acb) -> dict[str, str]:
+    width = _WIDER * (1 + abs(mu).upper())
+    parts = (mu.real + arb(0, width), mu.imag + arb(0, width))
+    return {name: _text(part) for name, part in zip(("re", "im"), parts, strict=True)}
+
+
+def write_certificate(certificate: Certificate, path: Any) -> None:
+    """Write a certificate as a JSON file.
+
+    Raises
+    ------
+    ResultFileError
+        If it cannot be written.
+    """
+    text = json.dumps(certificate_data(certificate), indent=1)
+    with replacing(path_of("a certificate file", path)) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def verify(path: Any) -> Answer:
+    """Check a certificate file by the independent checker.
+
+    Raises
+    ------
+    ResultFileError
+        If the file cannot be read.
+    """
+    file: Path = path_of("a certificate file", path)
+    try:
+        if file.stat().st_size > _LARGEST:
+            raise ResultFileError(f"{file} is too large for a certificate")
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ResultFileError(
+            f"cannot read {file}: {error}; give the path of a certificate"
+        ) from error
+    return check_text(text)

@@ -1,0 +1,198 @@
+"""The inequalities of an orbit over the whole of every segment.
+
+They are those of :mod:`contfric.orbit.system`. Inside of a segment the surfaces that bound its mode are
+not met, so that its end is the *first* meeting with the exit surface; there the observables are in the
+domain that the next mode follows. A hold is left with an acceleration that is not negative, and on the
+way no limit of rest is passed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from flint import arb, arb_mat
+
+from contfric.certify.chain import Chain, Segments
+from contfric.certify.extended import Condition
+from contfric.certify.sign import Path, positive, touched
+from contfric.certify.verdict import Finding, Verdict
+from contfric.certify.zeros import Closing, at_start, order_at_start, zeros_at_joints
+from contfric.models.balls.model import BallModel
+from contfric.models.balls.numbers import Vector, column, numbers
+from contfric.orbit.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """Where an orbit at an event meets a surface: the one inequality that does not hold strictly there.
+
+    Attributes
+    ----------
+    condition : the segment and the surface
+    after : time of a touch after the start of its segment; None at a joint
+    """
+
+    condition: Condition
+    after: arb | None = None
+
+
+@dataclass(frozen=True)
+class Inequality:
+    """An inequality of one segment, and what became of it."""
+
+    segment: int
+    surface: str
+    what: str
+    finding: Finding
+
+    def named(self, system: System) -> Finding:
+        """Return the finding with its place in words."""
+        if self.finding.proved:
+            return self.finding
+        mode = system.word[self.segment][0]
+        text = f"segment {self.segment + 1} ({mode}): {self.what} at {self.surface}: {self.finding.why}"
+        return Finding(self.finding.verdict, text)
+
+
+def inequalities(
+    chain: Chain,
+    system: System,
+    joints: list[Vector],
+    closing: Closing,
+    touch: Touch | None = None,
+) -> Iterator[Inequality]:
+    """Return all inequalities of a chain, joint by joint.
+
+    Parameters
+    ----------
+    joints : enclosures of joints 0 .. N
+    closing : how rows at the last joint read at the first one
+    touch : the inequality that does not hold strictly, of an orbit at an event
+    """
+    model, segments = chain.model, chain.segments
+    known = zeros_at_joints(segments, model, closing, _met(touch, segments.modes, model))
+    surfaces = [s.name for s in system.model.surfaces]
+    for i in range(segments.count):
+        move = chain.move(i, joints)
+        duration = joints[i + 1][0] - joints[i][0]
+        if not duration > 0:
+            verdict = Verdict.REFUTED if duration < 0 else Verdict.UNDECIDED
+            yield Inequality(i, segments.exits[i], "duration", Finding(verdict, "not positive"))
+            continue
+        zeros = at_start(segments, model, i, known[i])
+        path = Path(move.field, move.start, duration.upper())
+        for surface, sign in _inside(system, i, surfaces):
+            row = model.surfaces[surface] * sign
+            ends = (
+                segments.exits[i] == surface or segments.pins[(i + 1) % segments.count] == surface
+            )
+            order = order_at_start(model, model.rows[surface], segments.modes[i], zeros, surface)
+            if order and _stays(row, path.field):
+                continue
+            if _is_event(touch, i, surface):
+                finding = touched(path, row, order, touch.after if touch is not None else None)
+            elif _is_left_held(segments, i, surface):
+                finding = touched(path, row, order, None)
+            else:
+                finding = positive(path, row, order, ends)
+            yield Inequality(i, surface, "inside", finding)
+        yield from _held(chain, system, i, path, zeros)
+    for found in (*_at_joints(chain, system, joints, surfaces), *_exits(chain, system, joints)):
+        if touch is None or not _is_of(touch.condition, found):
+            yield found
+
+
+def _is_event(touch: Touch | None, i: int, surface: str) -> bool:
+    """Tell whether the event is that a segment touches a surface."""
+    if touch is None or not (touch.condition.rate or touch.condition.within):
+        return False
+    return (touch.condition.segment, touch.condition.surface) == (i, surface)
+
+
+def _is_left_held(segments: Segments, i: int, surface: str) -> bool:
+    """Tell whether a segment ends with a touch, at which a hold begins."""
+    pin = segments.pins[(i + 1) % segments.count]
+    return isinstance(pin, tuple) and segments.exits[i] == surface
+
+
+def _met(touch: Touch | None, modes: tuple[str, ...], model: BallModel) -> dict[int, list[Vector]]:
+    """Return the rows that vanish at the ends of segments at an event, beside the exits."""
+    if touch is None or touch.condition.within:
+        return {}
+    met = touch.condition
+    if not met.rate:
+        return {met.segment: [model.rows[met.surface]]}
+    return {met.segment: [model.rate(met.surface, modes[met.segment])]}
+
+
+def _is_of(met: Condition, found: Inequality) -> bool:
+    """Tell whether an inequality at a joint is the one that vanishes at an event."""
+    what = "exit" if met.rate else "joint"
+    return not met.within and (met.segment, met.surface, what) == (
+        found.segment,
+        found.surface,
+        found.what,
+    )
+
+
+def _held(
+    chain: Chain, system: System, i: int, path: Path, zeros: list[Vector]
+) -> Iterator[Inequality]:
+    """Return that a hold could be left at any time: the acceleration that it would be left with."""
+    for hold in system.holds:
+        if hold.segment == i:
+            sign = int(system.layout.exit_signs[i])
+            row = chain.model.rate(hold.leaves, hold.departs)
+            order = order_at_start(chain.model, row, chain.segments.modes[i], zeros)
+            finding = positive(path, arb_mat([row]) * sign, order, False)
+            yield Inequality(i, hold.leaves, "acceleration", finding)
+
+
+def _stays(row: arb_mat, field: arb_mat) -> bool:
+    return all(x.is_zero() for x in numbers(row * field))
+
+
+def _inside(system: System, i: int, surfaces: list[str]) -> list[tuple[str, int]]:
+    """Return the surfaces that a segment must not meet inside, each with the sign of its side."""
+    layout = system.layout
+    found = [(surfaces[k], int(s)) for at, k, s in layout.interior if at == i]
+    exit_, sign = surfaces[layout.exits[i]], -int(layout.exit_signs[i])
+    if layout.pins[i] == -1 and sign and exit_ not in [name for name, _ in found]:
+        found.append((exit_, sign))
+    return found
+
+
+def _at_joints(
+    chain: Chain, system: System, joints: list[Vector], surfaces: list[str]
+) -> Iterator[Inequality]:
+    model = chain.model
+    for i, k, sign, where in system.layout.joint:
+        if where == 1:  # behind a reset
+            state = chain.move(int(i), joints).start
+        else:
+            after = joints[int(i) + 1]
+            state = column(model.extended(after[0], after[1:]))
+        value = int(sign) * (model.surfaces[surfaces[k]] * state)[0, 0]
+        yield Inequality(int(i), surfaces[k], "joint", _sign(value))
+
+
+def _exits(chain: Chain, system: System, joints: list[Vector]) -> Iterator[Inequality]:
+    """Rates at the exits: transversal, so that the end of a segment depends smoothly on its start."""
+    model, segments = chain.model, chain.segments
+    for i in range(segments.count):
+        sign, exit_ = int(system.layout.exit_signs[i]), segments.exits[i]
+        if not exit_ or sign == 0:
+            continue
+        after = joints[i + 1]
+        state = column(model.extended(after[0], after[1:]))
+        row = model.surfaces[exit_] * model.fields[segments.modes[i]]
+        yield Inequality(i, exit_, "exit", _sign(sign * (row * state)[0, 0]))
+
+
+def _sign(value: object) -> Finding:
+    if value > 0:  # type: ignore[operator]
+        return Finding(Verdict.PROVED)
+    if value < 0:  # type: ignore[operator]
+        return Finding(Verdict.REFUTED, f"{value} is negative")
+    return Finding(Verdict.UNDECIDED, f"{value} has no sign")

@@ -1,0 +1,141 @@
+r"""The sign of an observable over the whole of a segment.
+
+Along a segment ``w(tau) = exp(M tau) w_0``, and an observable less its level is ``q(tau) = g w(tau)``; its
+derivatives are ``g M^k w``. On a piece of half-width r around c, Taylor's theorem gives
+
+    |q(c + s) - sum_{k<K} g M^k w(c) s^k / k!|  <=  |g M^K|_1 exp(|M| r) |w(c)| r^K / K!
+
+with the maximum norm: ``|w(c + s)| <= exp(|M| r) |w(c)|``. Pieces that do not show the sign are halved.
+
+At an end where q vanishes by construction (a slide starts and stops with v = 0) no piece can show its
+sign. There the first derivative that does not vanish does: if ``q = q' = .. = 0`` up to the order k - 1
+at the start and the k-th derivative is positive on [0, b], q is positive on (0, b]. At an exit q vanishes
+and q' < 0. Which derivatives vanish is not a question of rounding: it is read off the rows
+(:mod:`contfric.certify.zeros`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from flint import arb, arb_mat
+
+from contfric.certify.verdict import Finding, Verdict
+from contfric.models.balls.numbers import row_norm
+
+#: Terms of Taylor's polynomial: with |M| r <= 1/2 the remainder is 1e-6 of the state.
+_TERMS = 8
+#: Most pieces of one observable along one segment: a stiff mode (|M| d above this) is undecided.
+_MOST = 4000
+#: Narrowest piece, as a power of 1/2 of the segment: a touch within 1e-24 of it is undecided.
+_NARROW = 80
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """One segment of a solution: its field, its extended state at the start, its longest duration."""
+
+    field: arb_mat
+    start: arb_mat
+    duration: arb
+
+    @cached_property
+    def norm(self) -> arb:
+        """Upper bound of the norm of the field."""
+        return row_norm(self.field)
+
+    @cached_property
+    def _states(self) -> dict[tuple[int, int], arb_mat]:
+        return {}
+
+    def middle(self, level: int, index: int) -> arb_mat:
+        """Return the extended state at the middle of piece ``index`` of 2^level."""
+        key = (level, index)
+        if key not in self._states:
+            time = self.duration * arb(2 * index + 1) / 2 ** (level + 1)
+            self._states[key] = (self.field * time).exp() * self.start
+        return self._states[key]
+
+    def derivatives(self, row: arb_mat) -> list[arb_mat]:
+        """Return the rows of an observable and of its derivatives, each over its factorial."""
+        found = [row]
+        for k in range(1, _TERMS + 1):
+            found.append(found[-1] * self.field / k)
+        return found
+
+
+def _range(path: Path, rows: list[arb_mat], level: int, index: int) -> arb:
+    """Return an enclosure of an observable over a piece."""
+    half = (path.duration / 2 ** (level + 1)).upper()
+    state = path.middle(level, index)
+    size = max((x.abs_upper() for x in state.entries()), key=float)
+    total = sum((x.abs_upper() for x in rows[_TERMS].entries()), arb(0))
+    spread = total * (path.norm * half).exp() * size * half**_TERMS
+    for k in range(_TERMS - 1, 0, -1):
+        spread += (rows[k] * state)[0, 0].abs_upper() * half**k
+    return (rows[0] * state)[0, 0] + arb(0, spread.upper())
+
+
+def positive(path: Path, row: arb_mat, start_order: int, ends: bool) -> Finding:
+    """Find whether an observable is positive inside of a segment.
+
+    Parameters
+    ----------
+    row : the observable less its level, times the sign that is wanted
+    start_order : how many of q, q', q'' vanish at the start by construction; 0 if q does not
+    ends : whether q vanishes at the end by construction
+    """
+    rows = path.derivatives(row)
+    first = path.derivatives(_power(path, row, start_order)) if start_order else rows
+    last = path.derivatives(-row * path.field) if ends else rows
+    level = 0
+    while (path.norm * path.duration).upper() > 2**level and 2**level < _MOST:
+        level += 1
+    waiting = [(level, index) for index in range(2**level)]
+    for _ in range(_MOST):
+        if not waiting:
+            return Finding(Verdict.PROVED)
+        level, index = waiting.pop()
+        value = _range(path, rows, level, index)
+        if value < 0 or (row * path.middle(level, index))[0, 0] < 0:
+            return Finding(Verdict.REFUTED, f"negative after {_share(level, index)} of it")
+        at_start, at_end = index == 0 and start_order > 0, index == 2**level - 1 and ends
+        if value > 0:
+            continue
+        if at_start and not at_end and _range(path, first, level, index) > 0:
+            continue
+        if at_end and not at_start and _range(path, last, level, index) > 0:
+            continue
+        if level >= _NARROW:
+            return Finding(Verdict.UNDECIDED, f"no sign after {_share(level, index)} of it")
+        waiting += [(level + 1, 2 * index + 1), (level + 1, 2 * index)]
+    return Finding(Verdict.UNDECIDED, "the segment needs too many pieces")
+
+
+def touched(path: Path, row: arb_mat, start_order: int, after: arb | None) -> Finding:
+    """Find whether an observable is positive inside of a segment but for a touch of zero, at a known time.
+
+    There it vanishes with its rate, and its second derivative is positive.
+
+    Parameters
+    ----------
+    after : time of the touch after the start; None for the end of the segment
+    """
+    at = path.duration if after is None else after
+    state = (path.field * at).exp() * path.start
+    back = Path(-path.field, state, at.upper())
+    found = positive(back, row, 2, start_order == 1)
+    if after is None or not found.proved:
+        return found
+    return positive(Path(path.field, state, (path.duration - at).upper()), row, 2, True)
+
+
+def _power(path: Path, row: arb_mat, order: int) -> arb_mat:
+    for _ in range(order):
+        row = row * path.field
+    return row
+
+
+def _share(level: int, index: int) -> str:
+    return f"{(2 * index + 1) / 2 ** (level + 1):.3g}"

@@ -1,0 +1,22 @@
+"""``contfric verify FILE``: the independent check of a certificate."""
+
+from __future__ import annotations
+
+import argparse
+
+from contfric.cli.exits import Exit
+
+
+def verify(options: argparse.Namespace) -> int:
+    """Print yes or no, with what was checked or what does not hold; the exit code is 0 or 1."""
+    from contfric.extras import need_flint
+
+    need_flint()
+    from contfric.certify.files import verify as check
+
+    answer = check(options.file)
+    if answer.yes:
+        print(f"yes: {', '.join(answer.statements)} ({answer.bits} bits)")
+        return Exit.DONE
+    print(f"no: {answer.why}")
+    return Exit.FAILED

@@ -1,0 +1,1 @@
+"""Models in balls: their matrices at given parameters, enclosed (python-flint)."""

@@ -1,0 +1,41 @@
+"""A model in balls, whichever way it is defined."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from flint import arb
+
+from contfric.models.balls.model import BallModel
+from contfric.models.definition import Model
+
+
+def ball_model(
+    model: Model, params: Mapping[str, float], free: str | None = None, value: arb | None = None
+) -> BallModel:
+    """Return a model's matrices in balls, at parameters that are the exact binary numbers given.
+
+    Parameters
+    ----------
+    free, value : a parameter that is free, and the ball that it is in
+
+    Raises
+    ------
+    ParameterError
+        If the model moves in no closed form: the message names the modes.
+
+    Examples
+    --------
+    >>> from contfric.models import load_model
+    >>> model = load_model("coulomb")
+    >>> ball_model(model, model.defaults).states
+    2
+    """
+    balls = {name: arb(float(number)) for name, number in params.items()}
+    if free is not None and value is not None:
+        balls[free] = value
+    if model.ball_factory is not None:
+        return model.ball_factory(balls, free)
+    from contfric.models.balls.declared import declared_balls
+
+    return declared_balls(model, balls, free)

@@ -1,0 +1,221 @@
+"""Models that are declared by their equations, as matrices in balls.
+
+A mode is affine if its formulas are (:mod:`contfric.models.affine`). The frequencies of all formulas are the
+harmonics of the extended state. That the period is one of the formulas is no statement of the author:
+``w T / (2 pi)`` must be a whole number, for every frequency w, identically in the parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import sympy
+from flint import arb, arb_mat
+
+from contfric.errors import ParameterError
+from contfric.models.affine import AffineForm
+from contfric.models.balls.model import BallModel
+from contfric.models.balls.numbers import zeros
+from contfric.models.balls.symbols import NotEnclosedError, in_balls
+from contfric.models.definition import Model
+from contfric.models.describe import from_text
+from contfric.models.symbols import Formulas
+
+
+@dataclass(frozen=True, eq=False)
+class AffineModel:
+    """A declared model whose modes, surfaces and resets are affine, in symbols.
+
+    Attributes
+    ----------
+    parameters : symbols of the parameters by name
+    frequencies : distinct frequencies of all formulas, in symbols
+    fields, surfaces, resets : rows of the extended state, in symbols
+    period : in symbols; 0 without excitation
+    turns : how often each frequency turns in a period
+    """
+
+    states: int
+    parameters: dict[str, Any]
+    frequencies: tuple[Any, ...]
+    fields: dict[str, list[list[Any]]]
+    surfaces: dict[str, list[list[Any]]]
+    resets: dict[str, list[list[Any]]]
+    period: Any
+    turns: tuple[int, ...]
+
+
+def declared_balls(model: Model, params: Mapping[str, arb], free: str | None = None) -> BallModel:
+    """Return a declared model at given parameters; with slopes if one of them is free.
+
+    Raises
+    ------
+    ParameterError
+        If the model is not affine, or has a function that is not enclosed.
+    """
+    if not model.definition:
+        raise not_offered(model.name, "it is not declared by its equations")
+    if model.integrated:
+        named = "; ".join(f"mode {mode}: {why}" for mode, why in model.integrated.items())
+        raise not_offered(model.name, f"it is integrated numerically ({named})")
+    affine = affine_model(model.definition)
+    values = {affine.parameters[name]: ball for name, ball in params.items()}
+    try:
+        if free is None:
+            return _evaluated(affine, values)
+        symbol = affine.parameters[free]
+        slopes = _evaluated(_differentiated(affine, symbol), values, one=0)
+        return _evaluated(affine, values, slopes)
+    except NotEnclosedError as error:
+        raise not_offered(model.name, f"{error} is not enclosed") from None
+
+
+def not_offered(name: str, why: str) -> ParameterError:
+    """Return the error for a model that proofs are not offered for."""
+    return ParameterError(
+        f"model '{name}': no proof is offered, as {why}; "
+        "proofs are for models whose modes all move in closed form"
+    )
+
+
+@lru_cache(maxsize=32)
+def affine_model(definition: str) -> AffineModel:
+    """Return a declared model in symbols.
+
+    Raises
+    ------
+    ParameterError
+        If it is not affine: the message names what is not.
+    """
+    description = from_text(definition)
+    formulas, name = Formulas(description), description.name
+    if description.kinks:
+        raise not_offered(name, f"its fields have kinks ({', '.join(description.kinks)})")
+    fields = {}
+    for mode, rates in zip(description.modes, formulas.fields(), strict=True):
+        fields[mode.name] = _affine(formulas, rates, f"mode {mode.name}", name)
+    observables = dict(
+        zip((o.name for o in description.observables), formulas.observables(), strict=True)
+    )
+    surfaces = {
+        surface.name: _affine(
+            formulas, [observables[surface.observable] - level], surface.name, name
+        )
+        for surface, level in zip(description.surfaces, formulas.levels(), strict=True)
+    }
+    resets = {
+        surface.name: _affine(formulas, image, f"the reset at {surface.name}", name)
+        for surface, image in zip(description.surfaces, formulas.resets(), strict=True)
+        if surface.name in description.resets
+    }
+    period = formulas.period()
+    every = [
+        form for group in (fields, surfaces, resets) for forms in group.values() for form in forms
+    ]
+    frequencies = _frequencies(every)
+    turns = _turns(frequencies, period, name)
+    symbols = {p.name: s for p, s in zip(description.parameters, formulas.p, strict=True)}
+    n = len(description.states)
+
+    def rows(group: Mapping[str, Sequence[AffineForm]]) -> dict[str, list[list[Any]]]:
+        return {key: [_row(form, n, frequencies) for form in forms] for key, forms in group.items()}
+
+    return AffineModel(
+        n, symbols, frequencies, rows(fields), rows(surfaces), rows(resets), period, turns
+    )
+
+
+def _affine(formulas: Formulas, texts: list[Any], what: str, name: str) -> list[AffineForm]:
+    found = formulas.affine(texts)
+    if isinstance(found, str):
+        raise not_offered(name, f"{what} is not affine ({found})")
+    return found
+
+
+def _frequencies(forms: list[AffineForm]) -> tuple[Any, ...]:
+    found: list[Any] = []
+    for form in forms:
+        for w, _, _ in form.waves:
+            if w != 0 and w not in found:
+                found.append(w)
+    return tuple(found)
+
+
+def _turns(frequencies: tuple[Any, ...], period: Any, name: str) -> tuple[int, ...]:
+    found = []
+    for w in frequencies:
+        turns = sympy.simplify(w * period / (2 * sympy.pi))
+        if not turns.is_Integer:
+            raise not_offered(name, f"its period is not shown to be one of the frequency {w}")
+        found.append(int(turns))
+    return tuple(found)
+
+
+def _row(form: AffineForm, n: int, frequencies: tuple[Any, ...]) -> list[Any]:
+    row = [*form.slopes, *[sympy.Integer(0)] * (1 + 2 * len(frequencies))]
+    for w, cosine, sine in form.waves:
+        if w == 0:
+            row[n] += cosine
+        else:
+            at = n + 1 + 2 * frequencies.index(w)
+            row[at] += cosine
+            row[at + 1] += sine
+    return row
+
+
+def _differentiated(affine: AffineModel, symbol: Any) -> AffineModel:
+    def derivative(group: dict[str, list[list[Any]]]) -> dict[str, list[list[Any]]]:
+        return {
+            key: [[sympy.diff(e, symbol) for e in row] for row in rows]
+            for key, rows in group.items()
+        }
+
+    return AffineModel(
+        affine.states,
+        affine.parameters,
+        tuple(sympy.diff(w, symbol) for w in affine.frequencies),
+        derivative(affine.fields),
+        derivative(affine.surfaces),
+        derivative(affine.resets),
+        sympy.diff(affine.period, symbol),
+        affine.turns,
+    )
+
+
+def _evaluated(
+    affine: AffineModel, values: Mapping[Any, arb], slopes: BallModel | None = None, one: int = 1
+) -> BallModel:
+    n, frequencies = affine.states, [in_balls(w, values) for w in affine.frequencies]
+    size = n + 1 + 2 * len(frequencies)
+
+    def balls(rows: list[list[Any]]) -> list[list[arb]]:
+        return [[in_balls(sympy.sympify(e), values) for e in row] for row in rows]
+
+    def field(rows: list[list[Any]]) -> arb_mat:
+        found = zeros(size, size)
+        found[:n] = balls(rows)
+        for k, w in enumerate(frequencies):
+            at = n + 1 + 2 * k
+            found[at][at + 1], found[at + 1][at] = -w, w
+        return arb_mat(found)
+
+    def reset(rows: list[list[Any]]) -> arb_mat:
+        found = zeros(size, size)
+        found[:n] = balls(rows)
+        for k in range(n, size):  # the harmonics stay, at every value of a parameter
+            found[k][k] = arb(one)
+        return arb_mat(found)
+
+    return BallModel(
+        n,
+        frequencies,
+        {name: field(rows) for name, rows in affine.fields.items()},
+        {name: arb_mat(balls(rows)) for name, rows in affine.surfaces.items()},
+        in_balls(sympy.sympify(affine.period), values),
+        list(affine.turns),
+        {name: reset(rows) for name, rows in affine.resets.items()},
+        slopes,
+    )

@@ -1,0 +1,114 @@
+"""A piecewise-affine model at given parameters, in balls.
+
+In a mode the state follows ``y' = A y + b + sum_k (p_k cos(w_k t) + q_k sin(w_k t))``. With the extended
+state
+
+    w = (y, 1, cos w_1 t, sin w_1 t, cos w_2 t, ...)
+
+that is ``w' = M w``, so that ``w(t + d) = exp(M d) w(t)``: the flow of every affine mode is one exponential
+of a matrix, which Arb encloses. Nothing is divided by, so that resonance (Omega = 1, 1/3), zeta = 0 and
+critical damping are ordinary points. Surfaces are rows: ``observable - level = g w``; resets are matrices.
+
+The derivative of all of it by one parameter is a model of the same form (``slopes``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from flint import arb, arb_mat
+
+from contfric.models.balls.numbers import Vector, numbers
+
+
+@dataclass(frozen=True, eq=False)
+class BallModel:
+    """The matrices of a model; or, as ``slopes`` of another, their derivatives by a parameter.
+
+    Attributes
+    ----------
+    states : int
+        Number of states, n.
+    frequencies : list of arb
+        The frequencies w_k.
+    fields : dict
+        The matrix M of each mode, shape (D, D), D = n + 1 + 2 len(frequencies).
+    surfaces : dict
+        The row of each surface, shape (1, D).
+    resets : dict
+        The map of the extended state at each surface that has one, shape (D, D).
+    period : arb
+        Period of the excitation, T; 0 if there is none.
+    turns : list of int
+        The whole numbers ``w_k T / (2 pi)``.
+    slopes : BallModel or None
+        Derivatives by the free parameter, if there is one.
+    """
+
+    states: int
+    frequencies: list[arb]
+    fields: dict[str, arb_mat]
+    surfaces: dict[str, arb_mat]
+    period: arb
+    turns: list[int]
+    resets: dict[str, arb_mat] = field(default_factory=dict)
+    slopes: BallModel | None = None
+
+    @cached_property
+    def rows(self) -> dict[str, Vector]:
+        """The row of each surface as a list, always the same one: so equal rows are known as such."""
+        return {name: numbers(row) for name, row in self.surfaces.items()}
+
+    @cached_property
+    def _rates(self) -> dict[tuple[str, str, int], Vector]:
+        return {}
+
+    def rate(self, surface: str, mode: str, order: int = 1) -> Vector:
+        """Return the row of a derivative of a surface's observable along a mode; always the same list."""
+        if order == 0:
+            return self.rows[surface]
+        key = (surface, mode, order)
+        if key not in self._rates:
+            below = arb_mat([self.rate(surface, mode, order - 1)])
+            self._rates[key] = numbers(below * self.fields[mode])
+        return self._rates[key]
+
+    @property
+    def size(self) -> int:
+        """Number of entries of the extended state."""
+        return self.states + 1 + 2 * len(self.frequencies)
+
+    def extended(self, t: arb, y: Vector) -> Vector:
+        """Return the extended state at a time."""
+        waves = []
+        for w in self.frequencies:
+            sine, cosine = (w * t).sin_cos()
+            waves += [cosine, sine]
+        return [*y, arb(1), *waves]
+
+    def by_time(self, t: arb, order: int) -> Vector:
+        """Return the derivative of the extended state by time, of first or second order, y held fixed."""
+        found = [arb(0)] * (self.states + 1)
+        for w in self.frequencies:
+            sine, cosine = (w * t).sin_cos()
+            first, second = [-w * sine, w * cosine], [-w * w * cosine, -w * w * sine]
+            found += first if order == 1 else second
+        return found
+
+    def by_parameter(self, t: arb, order: int) -> Vector:
+        """Return the derivative of the extended state by the parameter; of order 1 that of its rate by t."""
+        assert self.slopes is not None
+        found = [arb(0)] * (self.states + 1)
+        for w, dw in zip(self.frequencies, self.slopes.frequencies, strict=True):
+            sine, cosine = (w * t).sin_cos()
+            if order == 0:
+                found += [-dw * t * sine, dw * t * cosine]
+            else:
+                found += [-dw * (sine + w * t * cosine), dw * (cosine - w * t * sine)]
+        return found
+
+
+#: Returns the model at a value of the free parameter (with slopes), or, without one, as it is.
+Builder = Callable[[arb | None], BallModel]

@@ -1,0 +1,284 @@
+"""What a certificate file states, decided in 60 digits by brute force; and ways to falsify it.
+
+The motion is integrated by Taylor's series of the equation of motion (mpmath), with no closed form; the
+stops are found by Newton's method with differences; inequalities are sampled, multipliers are differences.
+None of it is shared with the prover (exponentials in balls) or with the checker (closed forms in balls).
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+from mpmath import mp, mpf
+
+DIGITS = 60
+#: Terms and longest step of Taylor's series: 0.5^70 / 70! is far below 60 digits, and so for 3 Omega = 6.
+TERMS, STEP = 70, 0.5
+#: Differences for derivatives.
+SMALL = mpf(10) ** -25
+SAMPLES = 60
+
+
+class Truth:
+    """The parameters and segments of a file in 60 digits."""
+
+    def __init__(self, data: dict[str, Any]) -> None:
+        with mp.workdps(DIGITS):
+            p = {name: mpf(value) for name, value in data["params"].items()}
+            self.omega, self.s, self.s0, self.h, self.zeta = (
+                p[k] for k in ("Omega", "S", "S0", "h", "zeta")
+            )
+            self.half = bool(data["half"])
+            self.turn = data["periods"] * mp.pi * (1 if self.half else 2) / self.omega
+        self.segments = [tuple(row) for row in data["segments"]]
+
+    def force(self, t: mpf, order: int = 0) -> mpf:
+        shift = order * mp.pi / 2
+        first = self.omega**order * mp.cos(self.omega * t + shift)
+        return first + self.h * (3 * self.omega) ** order * mp.cos(3 * self.omega * t + shift)
+
+    def step(self, sign: int, t: mpf, x: mpf, v: mpf, tau: mpf) -> tuple[mpf, mpf]:
+        """One Taylor step."""
+        c = [x, v]
+        factorial = mpf(1)
+        waves = [
+            (a, w, (mp.cos(w * t), -mp.sin(w * t), -mp.cos(w * t), mp.sin(w * t)))
+            for a, w in ((mpf(1), self.omega), (self.h, 3 * self.omega))
+        ]
+        for k in range(TERMS):
+            force = sum(a * w**k * wave[k % 4] for a, w, wave in waves) / factorial
+            force -= sign * self.s if k == 0 else 0
+            c.append((force - c[k] - 2 * self.zeta * (k + 1) * c[k + 1]) / ((k + 1) * (k + 2)))
+            factorial *= k + 1
+        x = sum(a * tau**k for k, a in enumerate(c))
+        return x, sum(k * a * tau ** (k - 1) for k, a in enumerate(c) if k)
+
+    def slide(self, sign: int, t: mpf, x: mpf, tau: mpf) -> tuple[mpf, mpf, list[mpf]]:
+        """Displacement and velocity after a slide, and the velocities on the way."""
+        count = max(1, int(mp.ceil(abs(tau) / STEP)))
+        v, passed = mpf(0), []
+        for _ in range(count):
+            x, v = self.step(sign, t, x, v, tau / count)
+            t += tau / count
+            passed.append(v)
+        return x, v, passed[:-1]
+
+    def residuals(self, i: int, t: mpf, x: mpf, end: mpf, y: mpf) -> list[mpf]:
+        mode, exit_ = self.segments[i]
+        if mode == "stick":
+            return [x - y, y - self.force(end) - (1 if exit_ == "F+" else -1) * self.s0]
+        reached, v, _ = self.slide(1 if mode == "slide+" else -1, t, x, end - t)
+        return [reached - y, v]
+
+    def joint(self, z: list[mpf], i: int) -> tuple[mpf, mpf]:
+        if i < len(self.segments):
+            return z[2 * i], z[2 * i + 1]
+        return z[0] + self.turn, -z[1] if self.half else z[1]
+
+    def newton(self, z: list[mpf], steps: int = 6) -> list[mpf]:
+        n = len(self.segments)
+        for _ in range(steps):
+            f, jacobian = mp.matrix(2 * n, 1), mp.zeros(2 * n)
+            for i in range(n):
+                args = [*self.joint(z, i), *self.joint(z, i + 1)]
+                base = self.residuals(i, *args)
+                for k, r in enumerate(base):
+                    f[2 * i + k] = r
+                for a in range(4):
+                    moved = [c + (SMALL if b == a else 0) for b, c in enumerate(args)]
+                    wrap = i + 1 == n and a >= 2
+                    at = (2 * i + a) % (2 * n)
+                    factor = -1 if wrap and a == 3 and self.half else 1
+                    for k, r in enumerate(self.residuals(i, *moved)):
+                        jacobian[2 * i + k, at] += factor * (r - base[k]) / SMALL
+            change = mp.lu_solve(jacobian, f)
+            z = [c - d for c, d in zip(z, change, strict=True)]
+            if max(abs(d) for d in change) < mpf(10) ** -45:
+                return z
+        raise ValueError("Newton's method does not converge")
+
+    def admissible(self, z: list[mpf]) -> bool:
+        n = len(self.segments)
+        for i, (mode, exit_) in enumerate(self.segments):
+            (t, x), (end, y) = self.joint(z, i), self.joint(z, i + 1)
+            after = self.segments[(i + 1) % n][0]
+            if self.half and i + 1 == n:
+                after = {"slide+": "slide-", "slide-": "slide+"}.get(after, after)
+            if end <= t:
+                return False
+            if mode == "stick":
+                inner = [t + (end - t) * k / SAMPLES for k in range(SAMPLES)]
+                out = 1 if exit_ == "F+" else -1
+                if any(abs(x - self.force(s)) >= self.s0 for s in inner):
+                    return False
+                if -out * self.force(end, 1) <= 0 or after != ("slide-" if out > 0 else "slide+"):
+                    return False
+                continue
+            sign = 1 if mode == "slide+" else -1
+            _, _, passed = self.slide(sign, t, x, end - t)
+            near = [
+                self.slide(sign, t, x, (end - t) * s)[1] for s in (mpf("1e-9"), 1 - mpf("1e-9"))
+            ]
+            if any(sign * v <= 0 for v in [*passed, *near]):
+                return False
+            load = y - self.force(end)
+            if after == "stick" and not abs(load) < self.s0:
+                return False
+            if after != "stick" and (after == mode or (load > 0) != (after == "slide-")):
+                return False
+            if after != "stick" and not abs(load) > self.s0:
+                return False
+        return True
+
+    def advance(self, t: mpf, x: mpf, ends: list[mpf]) -> tuple[mpf, mpf]:
+        """Follow the segments from a start, with the ends nearby."""
+        for i, (mode, _) in enumerate(self.segments):
+            end = ends[i]
+            for _ in range(6):
+                if mode == "stick":
+                    value, slope, y = self.residuals(i, t, x, end, x)[1], -self.force(end, 1), x
+                else:
+                    sign = 1 if mode == "slide+" else -1
+                    y, value, _ = self.slide(sign, t, x, end - t)
+                    slope = self.force(end) - y - 2 * self.zeta * value - sign * self.s
+                end -= value / slope
+            if mode != "stick":
+                y = self.slide(1 if mode == "slide+" else -1, t, x, end - t)[0]
+            t, x = end, y
+        return t - self.turn, -x if self.half else x
+
+    def multipliers(self, z: list[mpf]) -> list[mp.mpc]:
+        ends = [self.joint(z, i + 1)[0] for i in range(len(self.segments))]
+        base = self.advance(z[0], z[1], ends)
+        columns = [self.advance(z[0] + SMALL, z[1], ends), self.advance(z[0], z[1] + SMALL, ends)]
+        m = [[(c[k] - base[k]) / SMALL for c in columns] for k in range(2)]
+        trace, det = m[0][0] + m[1][1], m[0][0] * m[1][1] - m[0][1] * m[1][0]
+        root = mp.sqrt(trace**2 / 4 - det)
+        return [trace / 2 + root, trace / 2 - root]
+
+
+def ball(text: str) -> tuple[mpf, mpf]:
+    """Return centre and radius of a ball's text."""
+    centre, _, radius = text.partition("+/-")
+    return mpf(centre.strip() or 0), mpf(radius.strip())
+
+
+def false_statements(data: dict[str, Any]) -> list[str]:
+    """Return what a file states that is not so, by brute force (uniqueness is not decided)."""
+    with mp.workdps(DIGITS):
+        truth = Truth(data)
+        start = [mpf(c) for joint in data["joints"] for c in joint[:2]]
+        try:
+            z = truth.newton(start)
+        except (ValueError, ZeroDivisionError):
+            return ["exists"]
+        wrong = []
+        radii = [mpf(r) for row in data["radius"] for r in row[:2]]
+        if any(abs(a - b) > r for a, b, r in zip(z, start, radii, strict=True)):
+            wrong.append("exists")
+        for i, row in enumerate(data["enclosure"]):
+            for text, value in zip(row, [*truth.joint(z, i), mpf(0)], strict=True):
+                centre, radius = ball(text)
+                if abs(value - centre) > radius + mpf(10) ** -40:
+                    wrong.append("enclosure")
+        claims = data["statements"]
+        if claims["admissible"] == "proved" and not truth.admissible(z):
+            wrong.append("admissible")
+        mu = truth.multipliers(z)
+        if claims["stable"] != "undecided":
+            stable = all(abs(m) < 1 for m in mu)
+            if stable != (claims["stable"] == "proved"):
+                wrong.append("stable")
+        return wrong + _discs(data["multipliers"], mu)
+
+
+def _discs(stated: list[dict[str, str]], mu: list[mp.mpc]) -> list[str]:
+    def inside(disc: dict[str, str], m: mp.mpc) -> bool:
+        parts = (ball(disc["re"]), mp.re(m)), (ball(disc["im"]), mp.im(m))
+        # differences of 1e-25 know a multiplier to about 1e-22
+        return all(abs(value - c) <= r + mpf(10) ** -18 for (c, r), value in parts)
+
+    orders = (mu, mu[::-1])
+    fits = any(all(inside(d, m) for d, m in zip(stated, order, strict=True)) for order in orders)
+    return [] if fits or not stated else ["multipliers"]
+
+
+# ------------------------------------------------------------------------- false certificates
+
+
+def mutated(data: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """Return a certificate that states something else, by one to three changes."""
+    found = copy.deepcopy(data)
+    for _ in range(int(rng.integers(1, 4))):
+        change = _CHANGES[int(rng.integers(len(_CHANGES)))]
+        change(found, rng)
+    return found
+
+
+def _move_joint(data: dict[str, Any], rng: np.random.Generator) -> None:
+    i, k = int(rng.integers(len(data["joints"]))), int(rng.integers(3))
+    data["joints"][i][k] += rng.choice([-1, 1]) * data["radius"][i][k] * 10 ** rng.uniform(-1, 6)
+
+
+def _shrink(data: dict[str, Any], rng: np.random.Generator) -> None:
+    factor = 10 ** rng.uniform(-9, 3)
+    data["radius"] = [[r * factor for r in row] for row in data["radius"]]
+
+
+def _moved(text: str, rng: np.random.Generator, least: float) -> str:
+    with mp.workdps(DIGITS):
+        centre, radius = ball(text)
+        return f"{mp.nstr(centre + mpf(10) ** rng.uniform(least, 0), 45)} +/- {mp.nstr(radius, 5)}"
+
+
+def _move_ball(data: dict[str, Any], rng: np.random.Generator) -> None:
+    row = data["enclosure"][int(rng.integers(len(data["enclosure"])))]
+    k = int(rng.integers(3))
+    row[k] = _moved(row[k], rng, -28)
+
+
+def _move_disc(data: dict[str, Any], rng: np.random.Generator) -> None:
+    if data["multipliers"]:
+        disc = data["multipliers"][int(rng.integers(2))]
+        part = str(rng.choice(["re", "im"]))
+        disc[part] = _moved(disc[part], rng, -17)
+
+
+def _other_side(data: dict[str, Any], rng: np.random.Generator) -> None:
+    claims = data["statements"]
+    claims["stable"] = "refuted" if claims["stable"] == "proved" else "proved"
+
+
+def _other_params(data: dict[str, Any], rng: np.random.Generator) -> None:
+    name = str(rng.choice(list(data["params"])))
+    data["params"][name] += rng.choice([-1, 1]) * 10 ** rng.uniform(-14, -1)
+
+
+def _other_segment(data: dict[str, Any], rng: np.random.Generator) -> None:
+    kinds = [["slide+", "v"], ["slide-", "v"], ["stick", "F+"], ["stick", "F-"]]
+    i = int(rng.integers(len(data["segments"])))
+    if rng.uniform() < 0.5 or len(data["segments"]) == 1:
+        data["segments"][i] = kinds[int(rng.integers(4))]
+        return
+    for name in ("segments", "joints", "radius", "enclosure"):
+        del data[name][i]
+
+
+def _turned(data: dict[str, Any], rng: np.random.Generator) -> None:
+    for name in ("segments", "joints", "radius", "enclosure"):
+        data[name] = data[name][1:] + data[name][:1]
+
+
+def _other_turn(data: dict[str, Any], rng: np.random.Generator) -> None:
+    if rng.uniform() < 0.5:
+        data["half"] = not data["half"]
+    else:
+        data["periods"] += 1
+
+
+_CHANGES = (
+    *(_move_joint, _shrink, _move_ball, _move_disc, _other_side, _other_params, _other_segment),
+    *(_turned, _other_turn),
+)

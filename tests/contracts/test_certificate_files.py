@@ -1,0 +1,154 @@
+"""Certificate files: written, checked, and refused where what they state is not so.
+
+Cheating is caught by mathematics: whatever is changed in a file, the checker says yes only to statements
+that 60 digits of brute force (``tests/certificate_oracle.py``) agree with.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.certify.files import certificate_data, verify
+from contfric.certify.orbit import certify_orbit
+from contfric.cli import main
+from contfric.extras import MissingPackageError
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.solve import polish
+from contfric.verify.file import check_text
+from tests.certificate_oracle import false_statements, mutated
+
+CHECKER = Path(cf.__file__).parent / "verify"
+SCENES: list[tuple[str, dict[str, float]]] = [
+    ("1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4}),
+    ("2s", {"Omega": 0.5, "S": 0.32, "S0": 0.4}),
+    ("0s", {"Omega": 1.0, "S": 0.5, "S0": 0.6, "zeta": 0.1}),
+    ("0s", {"Omega": 0.55, "S": 0.3, "S0": 0.4}),
+]
+
+
+@cache
+def orbit(index: int) -> Orbit:
+    name, params = SCENES[index]
+    return cf.solve_orbit("coulomb", name, params)
+
+
+@cache
+def certificate(index: int) -> str:
+    return json.dumps(certificate_data(orbit(index).certify()))
+
+
+def forced(found: Orbit, **claims: str) -> dict[str, Any]:
+    """Return the file of an orbit, with statements that nobody has proved."""
+    data = certificate_data(certify_orbit(found))
+    data["statements"] |= claims
+    return data
+
+
+@pytest.mark.parametrize("index", range(len(SCENES)))
+def test_true_certificates_are_verified(index: int) -> None:
+    data = json.loads(certificate(index))
+    answer = check_text(certificate(index))
+    assert answer.yes, answer.why
+    stable = "stable" if orbit(index).stable else "unstable"
+    assert answer.statements == ("exists", "unique", "admissible", stable, "multipliers")
+    assert not false_statements(data)
+
+
+@pytest.mark.parametrize("index", range(len(SCENES)))
+def test_no_false_certificate_is_verified(index: int) -> None:
+    rng = np.random.default_rng(index)
+    refused = 0
+    for _ in range(25):
+        data = mutated(json.loads(certificate(index)), rng)
+        if check_text(json.dumps(data)).yes:
+            assert not false_statements(data)
+        else:
+            refused += 1
+    assert refused > 12
+
+
+@pytest.mark.parametrize(
+    ("name", "params", "beyond"),
+    [  # the equations are solved beyond the SS or CS at which the branch ends
+        ("1a", {"Omega": 0.49182, "S": 0.32, "S0": 0.4}, {"Omega": 0.4916}),
+        ("1a", {"Omega": 0.5, "S": 0.33, "S0": 0.4}, {"S": 0.3330}),
+        ("2s", {"Omega": 0.535, "S": 0.32, "S0": 0.4}, {"Omega": 0.5354}),
+        ("0s", {"Omega": 0.55, "S": 0.3, "S0": 0.4}, {"S0": 0.9}),
+    ],
+)
+def test_inadmissible_orbits_are_refused(
+    name: str, params: dict[str, float], beyond: dict[str, float]
+) -> None:
+    found = cf.solve_orbit("coulomb", name, params)
+    vector = found.model.vector({**params, **beyond})
+    wrong = polish(replace(found, vector=vector))
+    assert wrong.converged
+    assert not wrong.admissible
+    assert wrong.certify().admissible.verdict == "refuted"
+    answer = check_text(json.dumps(forced(wrong, admissible="proved")))
+    assert not answer.yes
+    assert "false" in answer.why
+
+
+@pytest.mark.parametrize("index", range(len(SCENES)))
+def test_a_multiplier_on_the_wrong_side_is_refused(index: int) -> None:
+    claim = "refuted" if orbit(index).stable else "proved"
+    answer = check_text(json.dumps(forced(orbit(index), stable=claim)))
+    assert not answer.yes
+    assert "multiplier" in answer.why
+
+
+def test_damaged_files_are_no_crash() -> None:
+    rng = np.random.default_rng(7)
+    text = certificate(0)
+    for _ in range(80):
+        at = int(rng.integers(len(text)))
+        junk = str(rng.choice(["", "[", "null", "-", "1e400", '"', "NaN", "{}", "9" * 50]))
+        broken = text[:at] + junk + text[at + int(rng.integers(6)) :]
+        if check_text(broken).yes:
+            assert not false_statements(json.loads(broken))
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"certificate": "orbit"}', "[" * 100_000])
+def test_what_is_no_certificate_is_refused(text: str) -> None:
+    assert not check_text(text).yes
+
+
+def test_files_and_exit_codes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, wrong = tmp_path / "a.json", tmp_path / "b.json"
+    orbit(0).certify().save(path)
+    assert verify(path).yes
+    assert main(["verify", str(path)]) == 0
+    assert capsys.readouterr().out.startswith("yes: exists")
+    data = json.loads(path.read_text())
+    data["params"]["S"] += 1e-6
+    wrong.write_text(json.dumps(data))
+    assert main(["verify", str(wrong)]) == 1
+    assert capsys.readouterr().out.startswith("no: false")
+    assert main(["verify", str(tmp_path / "none.json")]) == 1
+
+
+def test_other_models_have_no_file(tmp_path: Path) -> None:
+    found = cf.find_orbit("dead-band")
+    with pytest.raises(cf.ParameterError, match="the checker knows"):
+        found.certify().save(tmp_path / "a.json")
+
+
+def test_without_flint_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = orbit(0)
+    monkeypatch.setitem(sys.modules, "flint", None)
+    with pytest.raises(MissingPackageError, match=r"pip install 'contfric\[certify\]'"):
+        found.certify()
+
+
+def test_the_checker_is_small() -> None:
+    assert sum(len(m.read_text().splitlines()) for m in CHECKER.glob("*.py")) <= 500

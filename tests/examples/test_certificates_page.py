@@ -1,0 +1,51 @@
+"""The page on proofs: its code runs, and its numbers are those of the proofs."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from contfric.certify.files import verify
+
+PAGE = Path(__file__).parents[2] / "docs" / "certificates.md"
+TEXT = PAGE.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def scope() -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for block in re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL):
+        exec(compile(block, "certificates.md", "exec"), found)
+    return found
+
+
+def test_what_the_page_proves(scope: dict[str, Any]) -> None:
+    assert scope["certificate"].proved
+    assert scope["proof"].proved
+    assert scope["proof"].radius < 1e-30
+
+
+def test_its_file_is_verified(scope: dict[str, Any]) -> None:
+    answer = verify(scope["path"])
+    assert answer.yes
+    printed = re.search(r"yes: (.*) \((\d+) bits\)", TEXT)
+    assert printed is not None
+    assert printed[1] == ", ".join(answer.statements)
+    assert int(printed[2]) == answer.bits
+
+
+def test_its_digits_are_those_of_the_proof(scope: dict[str, Any]) -> None:
+    digits = re.search(r"The fold of 1a in Fig. 5 is at Omega = ([\d.]+?)\.\.\.", TEXT)
+    assert digits is not None
+    value = scope["proof"].value.str(60, more=True)
+    assert value.strip("[]").startswith(digits[1])
+
+
+def test_the_certificate_is_printed_as_on_the_page(scope: dict[str, Any]) -> None:
+    shown = TEXT.split("```text\n")[1].split("```")[0].splitlines()
+    own = str(scope["certificate"]).splitlines()
+    # radii and enclosures are rounding; all else is the same
+    assert [line[:20] for line in shown] == [line[:20] for line in own]

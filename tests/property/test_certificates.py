@@ -1,0 +1,201 @@
+"""Proofs of random orbits, of all models that move in closed form, and the parts that they are made of."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from flint import arb, arb_mat, ctx
+
+import contfric as cf
+from contfric.certify.multipliers import stability, turn_multipliers
+from contfric.certify.orbit import certify_orbit
+from contfric.certify.sign import Path, positive, touched
+from contfric.certify.verdict import Verdict
+from contfric.certify.zeros import in_span
+from contfric.errors import ContfricError
+from contfric.orbit.orbit import Orbit
+
+#: Models that are declared by affine equations, and those that are not.
+CLOSED = (
+    *("buck", "coulomb-yaml", "dead-band", "impact", "integrate-and-fire", "jenkins", "relay"),
+    *("relay-sliding", "rocking-block", "thermostat"),
+)
+OTHERS = {"stribeck": "not linear in v", "lugre": "integrated", "rimless-wheel": "not linear"}
+
+
+def random_orbit(rng: np.random.Generator) -> Orbit | None:
+    limit = rng.uniform(0.02, 0.9)
+    params = {
+        "Omega": rng.choice([rng.uniform(0.1, 2.0), 1.0, 1 / 3], p=[0.8, 0.1, 0.1]),
+        "S": limit * rng.choice([1.0, rng.uniform(0.3, 1.0)]),
+        "S0": limit,
+        "h": rng.choice([0.0, rng.uniform(-0.5, 0.5)]),
+        "zeta": rng.choice([0.0, rng.uniform(0.0, 0.3), 1.0, rng.uniform(1.0, 5.0)]),
+    }
+    try:
+        return cf.find_orbit("coulomb", params, state=rng.normal(size=2), longest=2000)
+    except ContfricError:
+        return None
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_orbits_are_proved(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    found = [orbit for _ in range(12) if (orbit := random_orbit(rng)) is not None]
+    assert len(found) > 6
+    for orbit in found:
+        certificate = orbit.certify()
+        assert certificate.proved, (orbit, certificate.why)
+        assert certificate.width < 1e-30
+        centres = [complex(disc.mid()) for disc in certificate.multipliers]
+        for mu in orbit.turn_multipliers:  # the engine's own lie at the discs
+            assert min(abs(c - mu) for c in centres) < 1e-7 * (1.0 + abs(mu))
+
+
+@functools.cache
+def diagram() -> cf.Diagram:
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    return cf.explore(orbit, "Omega", (0.4, 0.6))
+
+
+def test_orbits_of_branches_are_proved_stable_or_not_with_holds_or_without() -> None:
+    seen = set()
+    for branch in diagram().branches:
+        for k in range(2, len(branch) - 2, 9):
+            certificate = branch[k].certify()
+            assert certificate.proved or "nearly singular" in certificate.why, certificate
+            seen.add((bool(branch.system.holds), branch[k].stable, certificate.proved))
+    assert {(False, True, True), (False, False, True), (True, False, True)} <= seen
+
+
+def test_an_orbit_beyond_an_event_is_refuted_with_the_place() -> None:
+    ends = [branch for branch in diagram().branches if branch.name == "2s"]
+    certificate = ends[0][0].certify()  # at the CS: its stick has no time
+    assert certificate.admissible.verdict is Verdict.REFUTED
+    assert "stick" in certificate.why
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_declared_models_are_proved(name: str) -> None:
+    certificate = cf.find_orbit(name, longest=3000).certify()
+    assert certificate.proved, certificate.why
+
+
+def test_the_declared_coulomb_has_the_same_proof() -> None:
+    params = {"Omega": 0.5, "S": 0.32, "S0": 0.4, "h": 0.1, "zeta": 0.05}
+    own, declared = (cf.find_orbit(name, params).certify() for name in ("coulomb", "coulomb-yaml"))
+    assert own.proved
+    assert declared.proved
+    matching = [abs(a) for a in declared.multipliers]
+    assert all(any(abs(abs(mu)).overlaps(size) for size in matching) for mu in own.multipliers)
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_models_are_named(name: str) -> None:
+    orbit = cf.find_orbit(name)
+    with pytest.raises(cf.ParameterError, match=f"model '{name}': no proof is offered.*"):
+        certify_orbit(orbit)
+
+
+def test_a_continuum_is_undecided() -> None:
+    orbit = cf.find_orbit(
+        "coulomb", {"Omega": 0.5, "S": 0.1614435056325586, "S0": 0.1614435056325586}
+    )
+    found = orbit.certify()
+    assert not found.proved
+    assert Verdict.UNDECIDED in {found.exists.verdict, found.unique.verdict, found.stable.verdict}
+
+
+# ---------------------------------------------------------------------------------- signs
+
+
+def oscillation(level: str, *, start: float = 0.0, duration: float = 6.5) -> tuple[Path, arb_mat]:
+    """Return ``cos t - level`` along a harmonic motion: w = (1, cos, sin)."""
+    field = arb_mat([[0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    sine, cosine = arb(start).sin_cos()
+    row = arb_mat([[-arb(level), 1, 0]])
+    return Path(field, arb_mat([[1], [cosine], [sine]]), arb(duration)), row
+
+
+@pytest.mark.parametrize("gap", ["1e-3", "1e-12", "1e-25"])
+def test_a_graze_is_told_from_a_miss(gap: str) -> None:
+    """``cos t + 1 + gap`` nearly touches zero at pi, or just does not."""
+    with ctx.workprec(256):
+        path, row = oscillation(f"-1.{'0' * (int(gap[3:]) - 1)}1")
+        assert positive(path, row, 0, False).proved
+        path, row = oscillation(f"-0.{'9' * int(gap[3:])}")
+        assert positive(path, row, 0, False).verdict is Verdict.REFUTED
+
+
+def test_an_exact_touch_is_undecided_unless_it_is_known() -> None:
+    with ctx.workprec(256):
+        path, row = oscillation("-1")
+        assert positive(path, row, 0, False).verdict is Verdict.UNDECIDED
+        assert touched(path, row, 0, arb.pi()).proved
+        assert touched(path, -row, 0, arb.pi()).verdict is not Verdict.PROVED
+
+
+@pytest.mark.parametrize(("first", "duration", "wanted"), [(1, 3.0, True), (1, 3.2, False)])
+def test_zeros_at_the_start_are_read_off_the_derivatives(
+    first: int, duration: float, wanted: bool
+) -> None:
+    """``sin t`` is positive up to pi, though it vanishes at its start."""
+    field = arb_mat([[0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    path = Path(field, arb_mat([[1], [1], [0]]), arb(duration))
+    row = arb_mat([[0, 0, 1]])
+    with ctx.workprec(128):
+        assert positive(path, row, first, False).proved is wanted
+        assert not positive(path, row, 0, False).proved  # the start alone decides nothing
+
+
+def test_random_sums_of_harmonics_against_a_grid() -> None:
+    rng = np.random.default_rng(3)
+    decided = 0
+    for _ in range(60):
+        w = rng.uniform(0.3, 3.0, size=2)
+        a = rng.normal(size=5)
+        field = arb_mat(5, 5)
+        for k in range(2):
+            field[1 + 2 * k, 2 + 2 * k], field[2 + 2 * k, 1 + 2 * k] = -w[k], w[k]
+        start = arb_mat([[1], [1], [0], [1], [0]])
+        duration = float(rng.uniform(0.1, 12.0))
+        t = np.linspace(0.0, duration, 4001)
+        values = a[0] + sum(
+            a[1 + 2 * k] * np.cos(w[k] * t) + a[2 + 2 * k] * np.sin(w[k] * t) for k in range(2)
+        )
+        found = positive(
+            Path(field, start, arb(duration)), arb_mat([list(map(float, a))]), 0, False
+        )
+        if abs(values.min()) > 1e-3:
+            assert found.proved is bool(values.min() > 0.0)
+            decided += 1
+    assert decided > 50
+
+
+# ---------------------------------------------------------------------------- small parts
+
+
+def test_a_nilpotent_map_has_discs_about_zero() -> None:
+    with ctx.workprec(128):
+        matrix = arb_mat([[arb(0, 1e-30), 1], [arb(0, 1e-30), arb(0, 1e-30)]])
+        discs = turn_multipliers(matrix, 3)
+        assert len(discs) == 3
+        assert stability(discs).proved
+
+
+@pytest.mark.parametrize(
+    ("size", "verdict"), [("0.999", "proved"), ("1", "undecided"), ("1.001", "refuted")]
+)
+def test_stability_is_decided_by_discs(size: str, verdict: str) -> None:
+    with ctx.workprec(128):
+        discs = turn_multipliers(arb_mat([[arb(size) + arb(0, 1e-20)]]), 2)
+    assert stability(discs).verdict == verdict
+
+
+def test_in_span_is_exact() -> None:
+    one, two = [arb(1), arb(2), arb(0)], [arb(0), arb(1), arb(1)]
+    assert in_span([arb(2), arb(5), arb(1)], [one, two])
+    assert not in_span([arb(2), arb(5), arb(1) + arb(2) ** -40], [one, two])
+    assert not in_span([arb(2), arb(5), arb(1, 1e-30)], [one, two])  # a ball is not its centre
