@@ -263,14 +263,12 @@ class Branch:
 
     def _period_shift(self) -> FloatArray:
         assert self.model.symmetry is not None
-        if self.model.autonomous:
-            return np.zeros(len(self))
-        fraction = self.model.symmetry.fraction
+        fraction = 0.0 if self.model.autonomous else self.model.symmetry.fraction
         return np.array([fraction * orbit.period / orbit.periods for orbit in self])
 
     def _all_bifurcations(self) -> list[Bifurcation]:
-        at_ends = [end.bifurcation for end in self.ends if end.bifurcation is not None]
-        return [*self.bifurcations, *at_ends]
+        at_ends = (end.bifurcation for end in self.ends)
+        return [*self.bifurcations, *(b for b in at_ends if b is not None)]
 
     def quantity(self, name: QuantityLike) -> FloatArray:
         """Return a quantity at every point, shape (k,); nan-padded (k, stops) for ``"stops"``.

@@ -16,15 +16,12 @@ from typing import Any
 import sympy
 
 from contfric.models.formulas import kinks_in
+from contfric.models.not_affine import NotAffineError
 
 #: A harmonic: its frequency (0: a constant), and the factors of cosine and sine.
 Wave = tuple[Any, Any, Any]
 #: Most products that a formula is multiplied out to: one with more is no sum of a few harmonics.
 _MOST = 200
-
-
-class NotAffineError(Exception):
-    """Says why a formula is not affine."""
 
 
 @dataclass(frozen=True)

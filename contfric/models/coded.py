@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contfric.models.affine import NotAffineError
 from contfric.models.coefficients import (
     AFFINE,
     CONSTANT,
@@ -30,6 +29,7 @@ from contfric.models.coefficients import (
 )
 from contfric.models.description import Description, ModeText
 from contfric.models.grammar import parse
+from contfric.models.not_affine import NotAffineError
 from contfric.models.regions import engine_order, known_sides
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from contfric.models.affine import NotAffineError
 from contfric.models.grammar import FLOATS, UNARY, Algebra
+from contfric.models.not_affine import NotAffineError
 
 #: What a coefficient is a sum over: a product of atoms to whole powers.
 Product = tuple[tuple["Atom", int], ...]

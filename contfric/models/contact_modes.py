@@ -13,13 +13,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from contfric.errors import ModelError
-from contfric.models.affine import NotAffineError
 from contfric.models.coefficient_texts import text_of
 from contfric.models.coefficients import AFFINE, symbols
 from contfric.models.contacts import Contact, ContactKind, drift
 from contfric.models.entries import EntryError, Part, mapping_in
 from contfric.models.grammar import Scope, names_in, number_of, parse
 from contfric.models.matrices import is_zero, summed, times
+from contfric.models.not_affine import NotAffineError
 from contfric.models.structure import COORDINATES, Structure, defaults_of
 
 #: What a model of a structure has of its own; everything else is as in any model.

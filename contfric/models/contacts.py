@@ -26,11 +26,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from contfric.errors import ModelError
-from contfric.models.affine import NotAffineError
 from contfric.models.coefficient_texts import text_of
 from contfric.models.coefficients import AFFINE, CONSTANT, Affine, symbols
 from contfric.models.entries import Part
 from contfric.models.grammar import Scope, parse
+from contfric.models.not_affine import NotAffineError
 
 
 class ContactKind(str, Enum):

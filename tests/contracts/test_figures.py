@@ -543,7 +543,7 @@ def test_names_as_mathematics() -> None:
     assert parameter_label("zeta") == r"$\zeta$"
     assert parameter_label("sigma_0") == r"$\sigma_{0}$"
     assert parameter_label("rate") == r"$\mathrm{rate}$"
-    assert parameter_label("v_rel") == "v_rel"
+    assert parameter_label("v_rel") == r"$v_{\mathrm{rel}}$"
     assert event_label("CS_s") == r"$\mathrm{CS}_{s}$"
     assert event_label("GS_2a, 14seg") == r"$\mathrm{GS}_{2a,\,14\mathrm{seg}}$"
 

@@ -11,12 +11,12 @@ import pytest
 
 import contfric as cf
 from contfric.errors import ModelError
-from contfric.models.affine import NotAffineError
 from contfric.models.build import load_module
 from contfric.models.coded import Forms, forms_of, functions_from
 from contfric.models.coefficients import AFFINE, Affine, symbols
 from contfric.models.describe import describe, from_text
 from contfric.models.grammar import FLOATS, Scope, parse
+from contfric.models.not_affine import NotAffineError
 from contfric.orbit.simulation import simulate
 from contfric.orbit.tables import tables
 
