@@ -249,7 +249,8 @@ class Branch:
         word = mirror_pairs(self.model, self.system.word)
         system = build_system(self.model, word, self.system.periods, self.system.half)
         joints = self.joints @ _block(symmetry.array()).T
-        joints[:, :, 0] += self._period_shift()[:, None]
+        fraction = 0.0 if self.model.autonomous else symmetry.fraction
+        joints[:, :, 0] += np.array([[fraction * o.period / o.periods] for o in self])
         images = {id(b): b.mirror() for b in self._all_bifurcations()}
         return replace(
             self,
@@ -260,11 +261,6 @@ class Branch:
             ends=(_mirror_end(self.ends[0], images), _mirror_end(self.ends[1], images)),
             mirrored=not self.mirrored,
         )
-
-    def _period_shift(self) -> FloatArray:
-        assert self.model.symmetry is not None
-        fraction = 0.0 if self.model.autonomous else self.model.symmetry.fraction
-        return np.array([fraction * orbit.period / orbit.periods for orbit in self])
 
     def _all_bifurcations(self) -> list[Bifurcation]:
         at_ends = (end.bifurcation for end in self.ends)
