@@ -28,15 +28,17 @@ _GROUPS = (
     ("flow.general.*-plain",),
     ("flow.general.*-stiff",),
     ("chaos",),
+    ("flow.coded",),
 )
 
 
 @cache
 def every_kernel() -> dict[str, Kernel]:
     """Return the kernels of the package by the names of their folders in the cache."""
+    from contfric.flow.coded.kernels import KERNELS
     from contfric.flow.general import Kind, kernels_of
 
-    found = [kernel for kind in Kind for kernel in kernels_of(kind)]
+    found = [*(kernel for kind in Kind for kernel in kernels_of(kind)), *KERNELS.values()]
     root = Path(__file__).parent
     for file in sorted(root.rglob("*.py")):
         if _MARK not in file.read_text(encoding="utf-8"):
