@@ -24,7 +24,7 @@ from contfric.orbit.equations import (
     segment_rows,
 )
 from contfric.orbit.followed import followed_values, keep_end, keep_levels, keep_values
-from contfric.orbit.holds import NO_PIN
+from contfric.orbit.holds import NO_PIN, TOUCH_PIN
 from contfric.orbit.newton import CHECKS
 
 #: Most interior stationary points of one observable in one segment; beyond it the orbit is reported
@@ -39,6 +39,9 @@ _TOUCH = 2e-15
 #: stationary point is the joint itself: what it misses is the square of it, 1e-12.
 _AT_PIN = 1e-6
 
+#: Maxima of equal height of a load at rest (under an even excitation, or one period apart) differ by
+#: rounding: by less than this, relative to 1 + the level.
+_SAME_HEIGHT = 1e-13
 #: Duration below which rounding hides what is left of a margin without its double zero: at this one it is
 #: known to 1e-3, and a curvature of the load is larger.
 _CLEAR = 1e-6
@@ -107,7 +110,17 @@ def interior_margin(functions, layout, k, found, z, p, workspace, stationary):  
     if layout.pins[i] != NO_PIN or layout.pins[(i + 1) % count] != NO_PIN:
         last = duration - _AT_PIN * (1.0 + duration)
     target = functions.level(layout.interior[k, 1], p, workspace.none, workspace.empty)
-    return least_distance(found, float(layout.interior[k, 2]), target, stationary, first, last)
+    least = least_distance(found, float(layout.interior[k, 2]), target, stationary, first, last)
+    if (
+        layout.pins[i] == TOUCH_PIN
+    ):  # what it touched at its start it may touch at the same height again
+        least += _SAME_HEIGHT * (1.0 + abs(target))
+    if layout.pins[i] == layout.interior[k, 1]:  # its load falls from the limit on which it starts
+        c = layout.observables[layout.interior[k, 1]]
+        none, empty = workspace.none, workspace.empty
+        rate = functions.rate(layout.modes[i], c, z[i, 0], z[i, 1:], p, none, empty)
+        least = least if math.isnan(least) else min(least, float(layout.interior[k, 2]) * rate)
+    return least
 
 
 @helper
@@ -130,9 +143,10 @@ def joint_margin(functions, layout, k, z, p, workspace):  # type: ignore[no-unty
         value = start_value(functions, layout, i, c, z, p, workspace)
     else:
         value = functions.observe(c, after[0], after[1:], p, workspace.none, workspace.empty)
-    return layout.joint[k, 2] * (
-        value - functions.level(surface, p, workspace.none, workspace.empty)
-    )
+    level = functions.level(surface, p, workspace.none, workspace.empty)
+    margin = layout.joint[k, 2] * (value - level)
+    # a hold behind a touch may be left where its load has the same height again: it does not end there
+    return margin + _SAME_HEIGHT * (1.0 + abs(level)) if layout.pins[i] == TOUCH_PIN else margin
 
 
 @helper
