@@ -9,7 +9,6 @@ A candidate is accepted when it is solved, and admissible beyond the event in on
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from itertools import chain
 
@@ -18,6 +17,7 @@ import numpy as np
 from contfric.atlas.collect import Event
 from contfric.atlas.crossings import follow_crossing, whole_branch
 from contfric.atlas.exploration import Exploration
+from contfric.atlas.faults import fault_of, never_lasts
 from contfric.atlas.folds import follow_fold
 from contfric.atlas.leaving_event import (
     first_end,
@@ -52,7 +52,6 @@ from contfric.continuation.switching import (
     settings_value,
 )
 from contfric.continuation.trace import trace_side
-from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish
@@ -70,15 +69,6 @@ _NO_WIDTH = 1e-3
 _ROUNDED = 1e-5
 #: Where rounding moves an event by this share of the range its orbits hold for every value of the parameter.
 _UNKNOWN = 0.1
-#: A hold shorter than this share of the arclength is rounding: on a bridge joints move as its length does, by
-#: 300 times it where one of four periods is held beside a doubling.
-_NO_TIME = 1e-4
-#: A segment this short is known to the root of rounding only, where it touches a surface; and one that comes
-#: in at an event is longer than this share of the arclength.
-_NO_LENGTH, _NO_SHARE = 1e-6, 1e-2
-#: Places on a branch, as shares of its points, that are asked whether its segments last: a segment that does
-#: not vanish all along lasts at one of them.
-_ASKED = (0.25, 0.5, 0.75)
 
 
 def follow(state: Exploration, event: Event) -> None:
@@ -137,7 +127,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
         guess = replace(found, vector=orbit.vector)
         branch = _through(state, guess)
         ends = [] if branch is None else [e for e in branch.ends if _meets(e, event, settings)]
-        if branch is None or not ends or _never_lasts(branch):
+        if branch is None or not ends or never_lasts(branch):
             why = f"no orbit of {show(guess.word)} meets the event"
             state.judge(event, reason, Verdict.REFUSED, why=why)
         elif (known := state.known(branch[len(branch) // 2])) is not None:
@@ -191,7 +181,7 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         assert candidate.orbit is not None
         own = settings_for(candidate.orbit, state.settings)
         branch = leave_singular(state, candidate.orbit, event, own) or branch
-    fault = None if branch is None else next((why for is_so, why in _FAULTS if is_so(branch)), None)
+    fault = None if branch is None else fault_of(branch)
     if fault is not None:
         state.judge(event, candidate.reason, Verdict.REFUSED, why=fault)
         return False
@@ -215,61 +205,6 @@ def _begins_continuum(state: Exploration, orbit: Orbit | None, event: Event) -> 
     active = orbit.model.index_of(state.settings.parameter)
     found = in_continuum(orbit, active)
     event.final = EndReason.CONTINUUM if found else event.final
-    return found
-
-
-def _never_held(branch: Branch) -> bool:
-    """Tell whether a hold has no length at any point of a branch: the equations hold, and nothing is held.
-
-    Where orbits are a continuum, those of them that touch rest solve the equations of a hold for every value
-    of the parameter. On a bridge a hold grows at least with the distance from its event.
-    """
-    holds = [hold.segment for hold in branch.system.holds]
-    if not holds:
-        return False
-    lasts = _longest(branch, range(len(branch)))[holds]
-    return bool(np.any(lasts < _NO_TIME * min(1.0, branch.arc[-1])))
-
-
-def _never_lasts(branch: Branch) -> bool:
-    """Tell whether a segment has no length at any point of a branch: the orbits are those without it.
-
-    Where orbits are a continuum those of them that touch a surface solve the equations of a word with a
-    segment there, of no length. A segment that comes in at an event grows at least with the distance.
-    """
-    asked = {round(share * (len(branch) - 1)) for share in _ASKED}
-    return bool(np.any(_longest(branch, asked) < min(_NO_LENGTH, _NO_SHARE * branch.arc[-1])))
-
-
-def _repeats(branch: Branch) -> bool:
-    """Tell whether the orbits of a branch are shorter ones that are run through several times.
-
-    Where an orbit begins at a graze its rounding is the root of rounding, and does not tell; the branch does.
-    """
-    if branch.system.periods == 1:
-        return False
-    asked = {round(share * (len(branch) - 1)) for share in _ASKED}
-    return all(shortest(orbit) is not orbit for orbit in (branch[k] for k in asked))
-
-
-#: What a branch must not be, and why it is refused then.
-_FAULTS = (
-    (
-        _never_held,
-        "its hold has no length anywhere: the motion of another word, that only touches rest",
-    ),
-    (
-        _never_lasts,
-        "a segment of it has no length anywhere: the motion of another word, that touches a surface",
-    ),
-    (_repeats, "its orbits are shorter ones, run through several times"),
-)
-
-
-def _longest(branch: Branch, asked: Iterable[int]) -> FloatArray:
-    """Return the longest duration of each segment at some points of a branch, shape (segments,)."""
-    lasts = [(o := branch[k]).ends[:, 0] - o.cycle[:, 0] for k in asked]
-    found: FloatArray = np.max(lasts, axis=0)
     return found
 
 
