@@ -156,7 +156,7 @@ def watched_value(way, sought, points, row):  # type: ignore[no-untyped-def]
     if sought.kind == BY_PARAMETER:
         return w - sought.target
     if sought.kind == BY_LABEL:
-        code, nearest, _, _ = crossings(
+        code, nearest = crossings(
             functions, layout, index, z, p, workspace.equations, workspace.stationary
         )
         # the distance of the nearest stationary point to a surface vanishes where the label changes;
@@ -319,8 +319,7 @@ def locate(  # type: ignore[no-untyped-def]
         position of the last good point if it is Newton that fails behind it.
     """
     zs, ws, tzs, tws, arc, tests, labels, mu = points
-    followed = min(index, 0)  # nothing, but no literal
-    workspace = step_workspace(zs.shape[1], zs.shape[2], p.shape[0], followed, followed)
+    workspace = step_workspace(zs.shape[1], zs.shape[2], p.shape[0])
     way = Along(functions, layout, p.copy(), which, scale, stability, counts, workspace)
     sought, margins = Sought(kind, index, target), count_margins(layout)
     ends = values_at_ends(way, sought, points)

@@ -23,8 +23,7 @@ from contfric.orbit.equations import (
     equation_workspace,
     segment_rows,
 )
-from contfric.orbit.followed import followed_values, keep_end, keep_levels, keep_values
-from contfric.orbit.holds import NO_PIN, TOUCH_PIN
+from contfric.orbit.holds import NO_PIN
 from contfric.orbit.newton import CHECKS
 
 #: Most interior stationary points of one observable in one segment; beyond it the orbit is reported
@@ -39,9 +38,6 @@ _TOUCH = 2e-15
 #: stationary point is the joint itself: what it misses is the square of it, 1e-12.
 _AT_PIN = 1e-6
 
-#: Maxima of equal height of a load at rest (under an even excitation, or one period apart) differ by
-#: rounding: by less than this, relative to 1 + the level.
-_SAME_HEIGHT = 1e-13
 #: Duration below which rounding hides what is left of a margin without its double zero: at this one it is
 #: known to 1e-3, and a curvature of the load is larger.
 _CLEAR = 1e-6
@@ -110,17 +106,7 @@ def interior_margin(functions, layout, k, found, z, p, workspace, stationary):  
     if layout.pins[i] != NO_PIN or layout.pins[(i + 1) % count] != NO_PIN:
         last = duration - _AT_PIN * (1.0 + duration)
     target = functions.level(layout.interior[k, 1], p, workspace.none, workspace.empty)
-    least = least_distance(found, float(layout.interior[k, 2]), target, stationary, first, last)
-    if (
-        layout.pins[i] == TOUCH_PIN
-    ):  # what it touched at its start it may touch at the same height again
-        least += _SAME_HEIGHT * (1.0 + abs(target))
-    if layout.pins[i] == layout.interior[k, 1]:  # its load falls from the limit on which it starts
-        c = layout.observables[layout.interior[k, 1]]
-        none, empty = workspace.none, workspace.empty
-        rate = functions.rate(layout.modes[i], c, z[i, 0], z[i, 1:], p, none, empty)
-        least = least if math.isnan(least) else min(least, float(layout.interior[k, 2]) * rate)
-    return least
+    return least_distance(found, float(layout.interior[k, 2]), target, stationary, first, last)
 
 
 @helper
@@ -143,18 +129,17 @@ def joint_margin(functions, layout, k, z, p, workspace):  # type: ignore[no-unty
         value = start_value(functions, layout, i, c, z, p, workspace)
     else:
         value = functions.observe(c, after[0], after[1:], p, workspace.none, workspace.empty)
-    level = functions.level(surface, p, workspace.none, workspace.empty)
-    margin = layout.joint[k, 2] * (value - level)
-    # a hold behind a touch may be left where its load has the same height again: it does not end there
-    return margin + _SAME_HEIGHT * (1.0 + abs(level)) if layout.pins[i] == TOUCH_PIN else margin
+    return layout.joint[k, 2] * (
+        value - functions.level(surface, p, workspace.none, workspace.empty)
+    )
 
 
 @helper
-def margins(functions, layout, z, p, workspace, stationary, out, followed):  # type: ignore[no-untyped-def]
+def margins(functions, layout, z, p, workspace, stationary, out):  # type: ignore[no-untyped-def]
     """Fill the margins in the order interior, exit, joint, entry, lasting, held.
 
     An interior margin is infinite without stationary points, that of a tangential exit always. The
-    closure and the rates at the exits are in ``workspace``; stationary values are kept in ``followed``.
+    closure and the rates at the exits are in ``workspace``.
     """
     interior, observables = layout.interior, layout.observables
     segment, watched, found = -1, -1, 0
@@ -166,7 +151,6 @@ def margins(functions, layout, z, p, workspace, stationary, out, followed):  # t
             else:
                 found = find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
             segment, watched = i, c
-            keep_values(followed, k, found, stationary)
         out[k] = interior_margin(functions, layout, k, found, z, p, workspace, stationary)
     at = interior.shape[0]
     for i in range(z.shape[0]):
@@ -287,8 +271,7 @@ def side_of(value, target):  # type: ignore[no-untyped-def]
 def crossings(functions, layout, k, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
     """Return the surfaces that the segment of row k crosses, as digits of one integer.
 
-    And the distance to the nearest change, of a stationary point or a joint from a surface, and the number
-    of stationary points.
+    And the distance to the nearest change: of a stationary point or a joint from a surface.
     """
     i, c, on, to = (
         layout.labels[k, 0],
@@ -301,7 +284,7 @@ def crossings(functions, layout, k, z, p, workspace, stationary):  # type: ignor
     else:
         found = find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
     if found < 0:
-        return -1, np.inf, found, np.nan
+        return -1, np.inf
     value, final = ends_of(functions, layout, k, z, p, workspace)
     surfaces = layout.observables.shape[0]
     code, nearest, sides = 0, np.inf, 0  # two bits of ``sides`` a surface
@@ -326,24 +309,19 @@ def crossings(functions, layout, k, z, p, workspace, stationary):  # type: ignor
             if before != 0:
                 code = code * (surfaces + 1) + surface + 1
         value = following
-    return code, nearest, found, final
+    return code, nearest
 
 
 @helper
-def watch(functions, layout, z, p, workspace, stationary, out, labels, followed):  # type: ignore[no-untyped-def]
+def watch(functions, layout, z, p, workspace, stationary, out, labels):  # type: ignore[no-untyped-def]
     """Fill margins and labels of an orbit, and behind the margins the distances of the labels.
 
-    Stationary values are kept in ``followed``, if it has space for any. False if something is not finite.
+    False if something is not finite.
     """
-    keep_levels(functions, p, followed, workspace)
-    margins(functions, layout, z, p, workspace, stationary, out, followed)
-    count, interior = count_margins(layout), layout.interior.shape[0]
+    margins(functions, layout, z, p, workspace, stationary, out)
+    count = count_margins(layout)
     for k in range(layout.labels.shape[0]):
-        labels[k], out[count + k], found, end = crossings(
-            functions, layout, k, z, p, workspace, stationary
-        )
-        keep_values(followed, interior + k, found, stationary)
-        keep_end(followed, interior + k, end)
+        labels[k], out[count + k] = crossings(functions, layout, k, z, p, workspace, stationary)
     for k in range(count):
         if math.isnan(out[k]):
             return False
@@ -363,5 +341,4 @@ def examine(functions, layout, z, p, out, labels, counts):  # type: ignore[no-un
     for i in range(count):  # for the rates at the exits
         after = z[i + 1] if i + 1 < count else workspace.last
         segment_rows(functions, layout, i, m, z[i], after, p, workspace.none, workspace, rows)
-    stationary, followed = stationary_workspace(), followed_values(free, free, m)
-    return watch(functions, layout, z, p, workspace, stationary, out, labels, followed)
+    return watch(functions, layout, z, p, workspace, stationary_workspace(), out, labels)
