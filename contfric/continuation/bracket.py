@@ -48,6 +48,7 @@ from contfric.orbit.monitor import (
 )
 from contfric.orbit.newton import ALONG, CHECKS, INTEGRATED, MULTIPLIERS
 from contfric.orbit.spectrum import multipliers
+from contfric.references import by_reference
 
 #: What locate() follows: a column of the tests, a label, or the parameter itself.
 BY_TEST, BY_LABEL, BY_PARAMETER = range(3)
@@ -241,6 +242,7 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
         tuple
             (position in the step, value there, whether trials fail behind it, whether any did not).
         """
+        way = by_reference(way)
         zs, ws, tzs, tws = points.joints, points.w, points.tangents, points.directions
         accuracy, two_sided, noise, narrowest, given_up = rules
         sign = -1.0 if two_sided and ends[0] < 0.0 else 1.0
@@ -284,6 +286,37 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
 _bracket = bracketing(correct_branch, watched_value)
 
 
+@helper
+def located(way, sought, kinked, points):  # type: ignore[no-untyped-def]
+    """Find where the value that is sought changes sign; what :func:`locate` returns."""
+    way = by_reference(way)
+    layout, workspace, kind, index = way.layout, way.workspace, sought.kind, sought.number
+    zs, ws, tzs, tws, arc, tests, labels, mu = points
+    margins = count_margins(layout)
+    ends = values_at_ends(way, sought, points)
+    # margins and distances are positive before the event, the others have the sign that they have
+    two_sided = kind == BY_PARAMETER or (kind == BY_TEST and index >= margins)
+    noise = 0.1 * _NOISE if two_sided else _NOISE  # slopes and products of multipliers have less
+    accuracy = AT_EVENT
+    if kinked and kind == BY_TEST and index >= margins:
+        # slopes and multipliers are those of the last Jacobian. Beside a touch of a kink it changes with the
+        # root of a distance: it must be that of the orbit, not one from which Newton is known to end there
+        accuracy = ALONG
+    narrowest = resolution(layout.rounding, abs(arc[1] - arc[0]), largest_state(zs[0]))
+    given_up = _LOST if two_sided and layout.rounding > INTEGRATED else 0.0
+    rules = accuracy, two_sided, noise, narrowest, given_up
+    best, _, lost, _ = _bracket(way, sought, points, ends, rules)
+    # the last Jacobian at the located point, for its rates and multipliers; the point itself stays
+    copy_row(points, 2, 3)
+    fine, _ = correct_branch(way, zs[2], ws[2], tzs[2], tws[2], AT_EVENT)
+    if not fine:
+        return -1.0
+    way.p[way.which[0]] = ws[3, 0]
+    close_chain(way.functions, layout, zs[3], way.p, workspace.equations.none, workspace.equations)
+    observe_branch(way, zs[3], ws[3], tws[3], tests[3], labels[3], mu[3])
+    return -2.0 - best if lost else best
+
+
 @kernel(
     f8(
         FlowType,
@@ -318,29 +351,6 @@ def locate(  # type: ignore[no-untyped-def]
         Position in the step, from 0 to 1; -1 if no trial point could be solved; -2 minus the
         position of the last good point if it is Newton that fails behind it.
     """
-    zs, ws, tzs, tws, arc, tests, labels, mu = points
-    workspace = step_workspace(zs.shape[1], zs.shape[2], p.shape[0])
+    workspace = step_workspace(points.joints.shape[1], points.joints.shape[2], p.shape[0])
     way = Along(functions, layout, p.copy(), which, scale, stability, counts, workspace)
-    sought, margins = Sought(kind, index, target), count_margins(layout)
-    ends = values_at_ends(way, sought, points)
-    # margins and distances are positive before the event, the others have the sign that they have
-    two_sided = kind == BY_PARAMETER or (kind == BY_TEST and index >= margins)
-    noise = 0.1 * _NOISE if two_sided else _NOISE  # slopes and products of multipliers have less
-    accuracy = AT_EVENT
-    if kinked and kind == BY_TEST and index >= margins:
-        # slopes and multipliers are those of the last Jacobian. Beside a touch of a kink it changes with the
-        # root of a distance: it must be that of the orbit, not one from which Newton is known to end there
-        accuracy = ALONG
-    narrowest = resolution(layout.rounding, abs(arc[1] - arc[0]), largest_state(zs[0]))
-    given_up = _LOST if two_sided and layout.rounding > INTEGRATED else 0.0
-    rules = accuracy, two_sided, noise, narrowest, given_up
-    best, _, lost, _ = _bracket(way, sought, points, ends, rules)
-    # the last Jacobian at the located point, for its rates and multipliers; the point itself stays
-    copy_row(points, 2, 3)
-    fine, _ = correct_branch(way, zs[2], ws[2], tzs[2], tws[2], AT_EVENT)
-    if not fine:
-        return -1.0
-    way.p[which[0]] = ws[3, 0]
-    close_chain(functions, layout, zs[3], way.p, workspace.equations.none, workspace.equations)
-    observe_branch(way, zs[3], ws[3], tws[3], tests[3], labels[3], mu[3])
-    return -2.0 - best if lost else best
+    return located(way, Sought(kind, index, target), kinked, points)

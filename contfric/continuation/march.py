@@ -47,6 +47,7 @@ from contfric.continuation.steps import (
 from contfric.flow.layouts import FlowType
 from contfric.orbit.equations import LayoutType
 from contfric.orbit.newton import ALONG, INTEGRATED, ON_THE_WAY
+from contfric.references import by_reference
 
 #: Why a march stopped.
 FULL, EVENT, OUTSIDE, STEP, CLOSED, BROKEN, UNBOUNDED, ENDLESS, MORE = range(9)
@@ -107,6 +108,7 @@ def marching(correct_at: Any, observe_at: Any, accept: Any) -> Any:
         guess : a prediction (joints, parameters), overwritten
         others : those of :func:`march`
         """
+        way = by_reference(way)
         zs, ws, tzs, tws, arc, tests, labels, mu = points
         guess_z, guess_w = guess
         step, largest, smallest, gives_way, budget, lost = options

@@ -25,6 +25,7 @@ from contfric.orbit.equations import (
 )
 from contfric.orbit.holds import NO_PIN
 from contfric.orbit.newton import CHECKS
+from contfric.references import by_reference
 
 #: Most interior stationary points of one observable in one segment; beyond it the orbit is reported
 #: as not finite. A stick of 30 excitation periods has 180 of them with a third harmonic.
@@ -328,6 +329,18 @@ def watch(functions, layout, z, p, workspace, stationary, out, labels):  # type:
     return True
 
 
+@helper
+def examined(functions, layout, z, p, workspace, rows, stationary, out, labels):  # type: ignore[no-untyped-def]
+    """Fill margins and labels of a solved orbit; what :func:`examine` returns."""
+    layout, workspace = by_reference(layout), by_reference(workspace)
+    count, m = z.shape
+    close_chain(functions, layout, z, p, workspace.none, workspace)
+    for i in range(count):  # for the rates at the exits
+        after = z[i + 1] if i + 1 < count else workspace.last
+        segment_rows(functions, layout, i, m, z[i], after, p, workspace.none, workspace, rows)
+    return watch(functions, layout, z, p, workspace, by_reference(stationary), out, labels)
+
+
 @kernel(types.boolean(FlowType, LayoutType, matrix, vector, vector, indices, indices))
 def examine(functions, layout, z, p, out, labels, counts):  # type: ignore[no-untyped-def]
     """Fill margins and labels of a solved orbit; False if something is not finite."""
@@ -337,8 +350,5 @@ def examine(functions, layout, z, p, out, labels, counts):  # type: ignore[no-un
         count, 0
     )  # no parameter, and no literal: the workspace would be compiled once for each
     workspace, rows = equation_workspace(count, m, free), np.empty((2 * m, 3 * m + 1))
-    close_chain(functions, layout, z, p, workspace.none, workspace)
-    for i in range(count):  # for the rates at the exits
-        after = z[i + 1] if i + 1 < count else workspace.last
-        segment_rows(functions, layout, i, m, z[i], after, p, workspace.none, workspace, rows)
-    return watch(functions, layout, z, p, workspace, stationary_workspace(), out, labels)
+    stationary = stationary_workspace()
+    return examined(functions, layout, z, p, workspace, rows, stationary, out, labels)

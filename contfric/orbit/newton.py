@@ -45,6 +45,7 @@ from contfric.orbit.equations import (
     mismatch,
     segment_rows,
 )
+from contfric.references import by_reference
 
 #: Places in the array of counts that kernels add to.
 SOLVES, MULTIPLIERS, CHECKS, EVENTS = range(4)
@@ -325,6 +326,20 @@ class OrbitWorkspace(NamedTuple):
     s: FloatArray
 
 
+@helper
+def solved(functions, layout, z, p, trust, workspace):  # type: ignore[no-untyped-def]
+    """Solve for the orbit at fixed parameters; what :func:`solve` returns."""
+    layout, workspace = by_reference(layout), by_reference(workspace)
+    work, none = workspace.elimination, workspace.equations.none
+    status, steps, first, _ = _correct_orbit(
+        functions, layout, z, p, none, trust, FLOOR, layout.rounding, workspace, 0
+    )
+    if status == CONVERGED and correction_size(work.z, work.w, z, p, none, 1) > _UNDETERMINED:
+        status = SINGULAR
+    last = mismatch(functions, layout, z, p, workspace.equations)
+    return float(status), float(steps), first, last
+
+
 @kernel(types.UniTuple(f8, 4)(FlowType, LayoutType, matrix, vector, f8, blocks, indices))
 def solve(functions, layout, z, p, trust, pencil, counts):  # type: ignore[no-untyped-def]
     """Solve for the orbit at fixed parameters, in place; (status, steps, first, residual).
@@ -339,12 +354,5 @@ def solve(functions, layout, z, p, trust, pencil, counts):  # type: ignore[no-un
         elimination_workspace(count, m, free, right),
     )
     d, e, s = np.empty((0, count, m)), np.empty((0, 0)), np.empty((0, 2))
-    workspace, none = OrbitWorkspace(equations, work, pencil, d, e, s), equations.none
-    status, steps, first, _ = _correct_orbit(
-        functions, layout, z, p, none, trust, FLOOR, layout.rounding, workspace, 0
-    )
-    if status == CONVERGED:
-        moved = correction_size(work.z, work.w, z, p, none, 1)
-        if moved > _UNDETERMINED:
-            status = SINGULAR
-    return float(status), float(steps), first, mismatch(functions, layout, z, p, equations)
+    workspace = OrbitWorkspace(equations, work, pencil, d, e, s)
+    return solved(functions, layout, z, p, trust, workspace)
