@@ -5,8 +5,8 @@ hundreds, which every call that is not inlined writes to the stack and reads bac
 cost of a branch, and it grew with each member. A reference is the address of the tuple, and
 ``way.layout.modes`` loads what it names. A member that is a named tuple is a reference itself.
 
-Nothing counts references here: :func:`by_reference` belongs into a helper, whose caller holds the tuple as
-long as the helper runs.
+Nothing counts references here: :func:`by_reference` belongs into a helper (:mod:`contfric.compiled`), whose
+caller holds the tuple as long as the helper runs.
 """
 
 from __future__ import annotations
