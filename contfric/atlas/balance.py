@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.atlas.matching import same_event
+from contfric.atlas.matching import ROUNDING, same_event, same_place
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import Bifurcation, EndReason, Kind
@@ -95,7 +95,8 @@ class IndexSum:
 def balances(diagram: Diagram) -> Iterator[Balance]:
     """Yield the sums of indices beside every event that is no tangency.
 
-    Events at the two ends of a continuum are one place: all that leaves them is summed together.
+    Events at the two ends of a continuum are one place, and so are those whose parameters are not to be told
+    apart: all that leaves them is summed together.
     """
     width = diagram.range[1] - diagram.range[0]
     for number, node in enumerate(diagram.nodes):
@@ -108,9 +109,10 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
         period = unit_of(b.orbit.as_whole()).periods if not b.orbit.model.autonomous else 0
         if period == 0:
             continue
+        nodes, slack = _joined(diagram, number)
         families = [
             found
-            for joined in _joined(diagram, number)
+            for joined in nodes
             for found in _families(diagram, diagram.nodes[joined], value, slack)
         ]
         most = min(diagram.settings.copies, diagram.settings.max_periods // period)
@@ -149,18 +151,34 @@ def _rests(orbit: Orbit, parameter: str, value: float) -> bool:
     return all(model.mode_by_name[mode].sliding for mode, _ in run.word)
 
 
-def _joined(diagram: Diagram, number: int) -> list[int]:
-    """Return a node and those that continua of orbits join it to."""
-    continua = {i for i, branch in enumerate(diagram.branches) if is_continuum(branch)}
+def _joined(diagram: Diagram, number: int) -> tuple[list[int], float]:
+    """Return a node with those that have the same place, and how near to it orbits are on no side of it.
+
+    Those that agree to their accuracies, and those that branches join to them on which there is no orbit on
+    either side: continua, and branches on which the parameter changes by less than it is known to.
+    """
+    b, width = diagram.nodes[number].bifurcation, diagram.range[1] - diagram.range[0]
     found = [number]
+    for k, node in enumerate(diagram.nodes):
+        if k == number or node.mirrored:
+            continue
+        if same_place(node.bifurcation, b, diagram.parameter, width, ROUNDING):
+            found.append(k)
+    slack = max(_BESIDE * diagram.nodes[k].bifurcation.accuracy * width for k in found)
+    value = b.params[diagram.parameter]
+    flat = {
+        i
+        for i, branch in enumerate(diagram.branches)
+        if is_continuum(branch) or np.max(np.abs(branch.values - value)) <= slack
+    }
     for known in found:  # grows
-        through = continua & set(diagram.nodes[known].branches)
+        through = flat & set(diagram.nodes[known].branches)
         found += [
             k
             for k, node in enumerate(diagram.nodes)
             if k not in found and through & set(node.branches)
         ]
-    return found
+    return found, slack
 
 
 def _families(

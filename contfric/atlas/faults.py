@@ -10,8 +10,9 @@ from contfric.continuation.branch import Branch
 from contfric.models.definition import FloatArray
 from contfric.orbit.repetition import shortest
 
-#: A hold shorter than this share of the arclength is rounding: on a bridge joints move as its length does.
-_NO_TIME = 1e-2
+#: A hold shorter than this share of the arclength is rounding: on a bridge joints move as its length does, by
+#: 300 times it where one of four periods is held beside a doubling.
+_NO_TIME = 1e-4
 #: A segment this short is known to the root of rounding only, where it touches a surface; and one that comes
 #: in at an event is longer than this share of the arclength.
 _NO_LENGTH, _NO_SHARE = 1e-6, 1e-2

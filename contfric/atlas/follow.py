@@ -26,7 +26,7 @@ from contfric.atlas.leaving_event import (
     settings_for,
     went_somewhere,
 )
-from contfric.atlas.matching import SAME_MOTION, part_distance, same_place
+from contfric.atlas.matching import SAME_MOTION, part_distance, same_kind, same_place
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, sequences_of
@@ -64,6 +64,9 @@ _SHARES = (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6)
 _NOWHERE_ROUGHLY = 1e-3
 #: A branch shorter than this (arclength) that comes back to its event has been nowhere.
 _NO_WIDTH = 1e-3
+#: A bridge shorter than this violates a condition by its square from the start on, which is rounding up to
+#: there (1e-10 at a slack of 1e-9 over a rate that is small).
+_ROUNDED = 1e-5
 #: Where rounding moves an event by this share of the range its orbits hold for every value of the parameter.
 _UNKNOWN = 0.1
 
@@ -207,7 +210,12 @@ def _begins_continuum(state: Exploration, orbit: Orbit | None, event: Event) -> 
 
 def _has_no_width(branch: Branch, event: Event, settings: Settings) -> bool:
     """Tell whether a branch begins and ends at one event and is nowhere else: admissible to rounding only."""
-    return branch.arc[-1] <= _NO_WIDTH and _ends_at(branch.ends[1], event, settings)
+    if branch.arc[-1] <= _NO_WIDTH and _ends_at(branch.ends[1], event, settings):
+        return True
+    last, b = branch.ends[1].bifurcation, event.bifurcation
+    if last is None or not branch.bridge or branch.arc[-1] >= _ROUNDED:
+        return False
+    return same_kind(last, b) and last.outline.apart(b.outline) < SAME_MOTION
 
 
 def _comes_back(side: Side, event: Event, settings: Settings) -> bool:
@@ -216,10 +224,15 @@ def _comes_back(side: Side, event: Event, settings: Settings) -> bool:
 
 
 def _ends_at(end: End, event: Event, settings: Settings) -> bool:
-    last = end.bifurcation
-    return last is not None and same_place(
-        last, event.bifurcation, settings.parameter, settings.width
-    )
+    """Tell whether a branch that leaves an event ends at it again.
+
+    One that ends at another kind of event has been somewhere, however near that is: where a margin is small
+    at a branch point, the branch between is as short, and its parameter changes by the square of that.
+    """
+    last, b = end.bifurcation, event.bifurcation
+    if last is None or not same_kind(last, b):
+        return False
+    return same_place(last, b, settings.parameter, settings.width)
 
 
 # --------------------------------------------------------------------------- branch points

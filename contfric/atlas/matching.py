@@ -27,7 +27,7 @@ _TELLING = {
 }
 #: Parameters of one event, relative to the range, that differ by rounding alone; and how many of its own
 #: accuracies (it is known to that on either branch) they may differ by.
-_ROUNDING, _TWICE = 1e-11, 2.0
+ROUNDING, _TWICE = 1e-11, 2.0
 #: Events this far apart (relative to the range) are two, however badly they are known: how well that is
 #: need not be computed.
 _APART = 0.05
@@ -71,7 +71,7 @@ def stops_distance(a: FloatArray, b: FloatArray, mirror: bool) -> float:
 
 def same_event(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> bool:
     """Tell whether two branches have met the same event (or its mirror image), by how well it is known."""
-    return same_kind(a, b) and same_place(a, b, parameter, width, _ROUNDING)
+    return same_kind(a, b) and same_place(a, b, parameter, width, ROUNDING)
 
 
 def same_place(
@@ -84,9 +84,10 @@ def same_place(
     least : parameters this near (relative to the range) are the same, however well they are known
     """
     gap = abs(a.params[parameter] - b.params[parameter]) / width
-    if gap > least and (gap > _APART or gap > _TWICE * max(a.accuracy, b.accuracy)):
+    if gap > _APART or not a.outline.apart(b.outline) < SAME_MOTION:
         return False
-    return a.outline.apart(b.outline) < SAME_MOTION
+    # accuracies are asked for last: they cost
+    return gap <= least or gap <= _TWICE * max(a.accuracy, b.accuracy)
 
 
 def same_kind(a: Bifurcation, b: Bifurcation) -> bool:

@@ -157,7 +157,7 @@ def watched_value(way, sought, points, row):  # type: ignore[no-untyped-def]
     if sought.kind == BY_PARAMETER:
         return w - sought.target
     if sought.kind == BY_LABEL:
-        code, nearest = crossings(
+        code, nearest, _, _ = crossings(
             functions, layout, index, z, p, workspace.equations, workspace.stationary
         )
         # the distance of the nearest stationary point to a surface vanishes where the label changes;
@@ -351,6 +351,7 @@ def locate(  # type: ignore[no-untyped-def]
         Position in the step, from 0 to 1; -1 if no trial point could be solved; -2 minus the
         position of the last good point if it is Newton that fails behind it.
     """
-    workspace = step_workspace(points.joints.shape[1], points.joints.shape[2], p.shape[0])
+    zs, followed = points.joints, min(index, 0)  # nothing, but no literal
+    workspace = step_workspace(zs.shape[1], zs.shape[2], p.shape[0], followed, followed)
     way = Along(functions, layout, p.copy(), which, scale, stability, counts, workspace)
     return located(way, Sought(kind, index, target), kinked, points)

@@ -46,6 +46,12 @@ def gradient_of(
             touch = touch_of(orbit, i, place.surface)
         except NotationError:
             return None
+        if (
+            touch[0] == orbit.begins[i, 0]
+        ):  # the load of a hold that starts on its limit: whether it falls
+            mode = orbit.word[i][0]
+            gradient[i], slope = _rate_gradient(orbit, mode, place.surface, touch, active)
+            return sign * gradient, sign * slope
         there, slope = surface_gradient(orbit, place.surface, touch, active)
         gradient[i], moves = carried(orbit, i, touch, there, active)
         slope += moves

@@ -29,21 +29,23 @@ def locate_events(
     smooth = [
         (b, point)
         for b, point in smooth_events(orbit, before, after, settings, end)
-        if point.arc < end.arc and not belongs_to(b.kind, point, end, settings)
+        if point.arc < end.arc and not belongs_to(b, point, end, settings)
     ]
     return sorted([*smooth, *sliding], key=lambda pair: pair[1].arc)
 
 
-def belongs_to(kind: Kind, point: Point, end: Point, settings: Settings) -> bool:
+def belongs_to(event: Bifurcation, point: Point, end: Point, settings: Settings) -> bool:
     """Tell whether a smooth event before a sliding event, or after it, is part of it.
 
     Where an exit becomes tangential the branch folds and multipliers are infinite, and near there a place
-    along the branch is good to the root of what the parameter is.
+    along the branch is good to the root of what the parameter is. A vertex is no such fold: the simpler
+    orbits there have been solved.
     """
-    if kind in TERMINAL:
+    if event.kind in TERMINAL:
         return False
     apart = abs(point.arc - end.arc)
-    if apart < (SAME_TANGENCY if kind is Kind.T else SAME_PLACE):
+    if apart < (SAME_TANGENCY if event.kind is Kind.T else SAME_PLACE):
         return True
-    same_value = abs(point.value - end.value) < _SAME_VALUE * settings.width
-    return kind is not Kind.T and same_value and apart < _SAME_FOLD
+    if event.kind is Kind.T or event.orbit.system.segments != len(point.joints):
+        return False
+    return abs(point.value - end.value) < _SAME_VALUE * settings.width and apart < _SAME_FOLD

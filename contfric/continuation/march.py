@@ -9,9 +9,8 @@ arc, ``c (1 + angle^2 / 24)``.
 
 Every accepted point is watched: margins, slope p', ``chi(1)``, ``chi(-1)``, the largest pair of
 multipliers, and the labels of its segments. The march stops at the first step over which any of them
-changes sign; :mod:`contfric.continuation.bracket` then locates the place. A parabola through the last
-three values guards against a margin that dips below zero and returns within one step: such a step is
-taken again, shorter.
+changes sign; :mod:`contfric.continuation.bracket` then locates the place. A step within which one of them
+may change its sign twice is taken again, shorter (:mod:`contfric.continuation.pairs`).
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, vector
+from contfric.continuation.dips import dips
 from contfric.continuation.geometry import (
     PointsType,
     copy_to,
@@ -35,17 +35,18 @@ from contfric.continuation.geometry import (
     product,
     returned,
 )
+from contfric.continuation.pairs import hidden_pair, recall
 from contfric.continuation.steps import (
     Along,
     accept_branch,
     changed,
     correct_branch,
-    dips,
     observe_branch,
     step_workspace,
 )
 from contfric.flow.layouts import FlowType
 from contfric.orbit.equations import LayoutType
+from contfric.orbit.followed import count_followed
 from contfric.orbit.newton import ALONG, INTEGRATED, ON_THE_WAY
 from contfric.references import by_reference
 
@@ -113,6 +114,8 @@ def marching(correct_at: Any, observe_at: Any, accept: Any) -> Any:
         guess_z, guess_w = guess
         step, largest, smallest, gives_way, budget, lost = options
         first, finite, solved, angle = k < 0, lost == 0.0, 0.0, 0.0
+        recall(way, points, k - 1)
+        recall(way, points, k)
         while k + 1 < ws.shape[0]:
             row = k + 1
             if solved >= budget:
@@ -150,13 +153,19 @@ def marching(correct_at: Any, observe_at: Any, accept: Any) -> Any:
                     return BROKEN, k, step
                 step *= 0.25
                 continue
-            if k > 0 and step > 1e-4 * largest and dips(tests, k, arc, tests[row], step):
+            if k > 0 and step > 1e-4 * largest and dips(way, tests, k, arc, tests[row], step):
                 step *= 0.25
                 continue
+            chord = distance(zs[row], ws[row], zs[k], ws[k], way.scale)
+            length = chord * (1.0 + angle * angle / 24.0)
+            if step > 1e-4 * largest:
+                share = hidden_pair(way, points, k, length)
+                if share > 0.0:
+                    step *= share
+                    continue
             k, taken = row, taken + 1
             accept(way)
-            chord = distance(zs[k], ws[k], zs[k - 1], ws[k - 1], way.scale)
-            arc[k] = arc[k - 1] + chord * (1.0 + angle * angle / 24.0)
+            arc[k] = arc[k - 1] + length
             factor = min(_GROWTH, max(0.4, _WANTED_ANGLE / max(angle, 1e-6)))
             size = largest_state(zs[k])
             if way.layout.turn == 0.0:  # the duration is one of the unknowns
@@ -217,7 +226,8 @@ def march(  # type: ignore[no-untyped-def]
         (why it stopped, index of the last row written, next step).
     """
     zs = points.joints
-    workspace = step_workspace(zs.shape[1], zs.shape[2], p.shape[0])
+    rows, surfaces = count_followed(layout), layout.observables.shape[0]
+    workspace = step_workspace(zs.shape[1], zs.shape[2], p.shape[0], rows, surfaces)
     way = Along(functions, layout, p.copy(), which, 1.0 / box[2] ** 2, stability, counts, workspace)
     integrated = layout.rounding > INTEGRATED
     accuracy = ON_THE_WAY if integrated and k >= 0 else ALONG

@@ -13,11 +13,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from contfric.continuation.accuracy import LEAST
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.points import Settings
 from contfric.continuation.side import first_point
-from contfric.continuation.vertices import opening, refined_opening
+from contfric.continuation.vertices import opening, place_error, refined_opening
 from contfric.orbit.index import opening_sign
 from contfric.orbit.orbit import Orbit
 
@@ -61,12 +62,14 @@ def _located(branch: Branch, k: int, before: int, settings: Settings) -> Bifurca
         low, high = (share, high) if sign == before else (low, share)
     if best is None:
         return None
-    there = refined_opening(best, active) or best
+    refined = refined_opening(best, active)
+    there = refined or best
     if not abs(opening(there)) < _OPEN:
         return None
     kind = Kind.BP if branch.system.half else Kind.PD
     position = branch.arc[k] + low * (branch.arc[k + 1] - branch.arc[k])
-    return Bifurcation(kind, there.params, there, (), float(position), False, False)
+    bound = ACCURACY if refined is None else max(LEAST, place_error(there, active) / settings.width)
+    return Bifurcation(kind, there.params, there, (), float(position), False, False, bound=bound)
 
 
 def _between(branch: Branch, k: int, share: float, active: int, settings: Settings) -> Orbit | None:

@@ -37,7 +37,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from contfric.continuation.events import Bifurcation, Kind, hold_of_test
-from contfric.continuation.zero_acceleration import first_zero_acceleration, leaving_rate, touch_of
+from contfric.continuation.zero_acceleration import (
+    first_zero_acceleration,
+    leaving_rate,
+    touch_of,
+    touches_again,
+)
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
@@ -321,6 +326,8 @@ def _pin_moves(orbit: Orbit, place: Test, after_rest: bool) -> Outcome:
     touch = touch_of(orbit, h, place.surface)
     reason = f"hold {h + 1} touches {place.surface}: its pin moves there"
     if after_rest:
+        if touches_again(orbit, h, place.surface, float(orbit.cycle[h, 0])):
+            raise NotationError(f"{reason}: the same orbits, for the load has equal maxima")
         edit = Edit(renamed={(h - 1) % len(orbit.word): place.surface, h: TOUCH})
         return Outcome(edit, {(h, -1): touch}, reason)
     return Outcome(split(h, place.surface, (orbit.word[h][0], TOUCH)), {(h, 0): touch}, reason)

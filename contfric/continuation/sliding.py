@@ -63,9 +63,11 @@ def sliding_events(
     here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     first = _stop_behind(here, point, first)
     kind = kind_of_margin(orbit.system, orbit.system.tests[first], here)
-    together = _TOGETHER
+    together, known = _TOGETHER, 0.0
     rough = False
     if point.lost:
+        # the parameter changes by no more than the margin does, on the way that is left
+        known = _NEARLY_REACHED if abs(point.tests[first]) >= _TOGETHER else 0.0
         held = hold_of_test(orbit.system.tests[first], here) is not None
         rough = abs(point.tests[first]) >= (_NEARLY_REACHED if held else _REACHED)
         together = 2.0 * ROUGHLY_REACHED if rough else _NEARLY_REACHED if held else _REACHED
@@ -86,7 +88,8 @@ def sliding_events(
     )
     found = bifurcation_at(kind, here, before, None, point, settings, group)
     point.rough = rough
-    return [(replace(found, bound=max(found.accuracy, ROUGHLY_REACHED)) if rough else found, point)]
+    known = ROUGHLY_REACHED if rough else known
+    return [(replace(found, bound=max(found.accuracy, known)) if known > 0.0 else found, point)]
 
 
 def _pulled_in(orbit: Orbit, before: Point, point: Point, settings: Settings) -> Point:
@@ -247,7 +250,9 @@ def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation 
         first = orbit.system.tests[_hold_behind(here, orbit.system.tests.index(first))]
     kind = kind_of_margin(orbit.system, first, here)
     group = tuple(test for test in near if kind_of_margin(orbit.system, test, here) is kind)
-    return bifurcation_at(kind, here, tip, None, tip, settings, group)
+    found = bifurcation_at(kind, here, tip, None, tip, settings, group)
+    # the parameter changes by no more than the margins do, on the way that is left
+    return replace(found, bound=max(found.accuracy, _NEARLY_REACHED))
 
 
 def _is_free(first: Test, other: Test) -> bool:

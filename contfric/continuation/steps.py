@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +11,7 @@ from contfric.continuation.geometry import anchor, take_tangent
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import Elimination, elimination_workspace
 from contfric.orbit.equations import EquationWorkspace, close_chain, equation_workspace
+from contfric.orbit.followed import Followed, followed_values, remember
 from contfric.orbit.monitor import StationaryPoints, stationary_workspace, watch
 from contfric.orbit.newton import (
     CHECKS,
@@ -33,8 +33,6 @@ EXTRA = 4
 #: Correction that ends the iteration where an event is located: its test function counts to its last
 #: digits.
 AT_EVENT = 3e-15
-#: Share of the smaller end value above which a parabola's minimum is believed to stay positive.
-_SURE = 0.2
 
 
 class StepWorkspace(NamedTuple):
@@ -44,6 +42,7 @@ class StepWorkspace(NamedTuple):
     elimination: Elimination
     spectral: SpectralWorkspace
     stationary: StationaryPoints
+    followed: Followed
     pencil: FloatArray
     d: FloatArray
     e: FloatArray
@@ -53,14 +52,15 @@ class StepWorkspace(NamedTuple):
 
 
 @allocating_helper
-def step_workspace(count, m, parameters):  # type: ignore[no-untyped-def]
-    """Return the workspace for the branch of a chain."""
+def step_workspace(count, m, parameters, rows, surfaces):  # type: ignore[no-untyped-def]
+    """Return the workspace for the branch of a chain; ``rows`` of stationary values are followed."""
     free = max(1 - count, 1)  # one parameter, but no literal
     return StepWorkspace(
         equation_workspace(count, m, free),
         elimination_workspace(count, m, free, free + free),
         spectral_workspace(m),
         stationary_workspace(),
+        followed_values(rows, surfaces, m),
         np.empty((2, m, m)),
         np.empty((1, count, m)),
         np.empty((1, 1)),
@@ -121,7 +121,15 @@ def observe_branch(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped
     way.p[way.which[0]] = w[0]
     way.counts[CHECKS] += 1
     finite = watch(
-        way.functions, layout, z, way.p, workspace.equations, workspace.stationary, tests, labels
+        way.functions,
+        layout,
+        z,
+        way.p,
+        workspace.equations,
+        workspace.stationary,
+        tests,
+        labels,
+        workspace.followed,
     )
     at = tests.shape[0] - EXTRA
     tests[at + FOLD] = tw[0]
@@ -140,32 +148,8 @@ def observe_branch(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped
 
 @helper
 def accept_branch(way):  # type: ignore[no-untyped-def]
-    """Take nothing from a point that is accepted."""
-
-
-@helper
-def dips(tests, k, arc, value, step):  # type: ignore[no-untyped-def]
-    """Tell whether some test, positive at both ends of a step, is likely to be negative within.
-
-    By the parabola through the last two points and the new one.
-    """
-    back = arc[k] - arc[k - 1]
-    for j in range(value.shape[0]):
-        f0, f1, f2 = tests[k - 1, j], tests[k, j], value[j]
-        if not (f0 * f1 > 0.0 and f1 * f2 > 0.0) or not math.isfinite(f0 * f1 * f2):
-            continue
-        slope0 = (f1 - f0) / back
-        slope1 = (f2 - f1) / step
-        bend = (slope1 - slope0) / (back + step)
-        slope = slope1 - bend * step  # at the start of the step
-        if bend * f1 <= 0.0 or slope * f1 >= 0.0:
-            continue
-        at = -slope / (2.0 * bend)
-        if at < step and abs(f1) + 0.5 * slope * at * math.copysign(1.0, f1) < _SURE * min(
-            abs(f1), abs(f2)
-        ):
-            return True
-    return False
+    """Remember the stationary values of a point that is accepted."""
+    remember(way.workspace.followed)
 
 
 @helper

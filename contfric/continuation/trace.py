@@ -287,7 +287,7 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
                 side.drop_tip()
             side.end = limit_end(point.value > 0.5 * (settings.low + settings.high), settings)
             return True
-        if side.at_event and belongs_to(bifurcation.kind, side.first, point, settings):
+        if side.at_event and belongs_to(bifurcation, side.first, point, settings):
             continue
         if bifurcation.kind is Kind.T and _is_start(side, before, point):
             side.relabel_first(

@@ -7,10 +7,12 @@ located on the simpler orbit, of which one multiplier of a turn is -1.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
+from contfric.continuation.along_curve import Line
 from contfric.continuation.points import Point
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
@@ -38,6 +40,8 @@ _SECANTS = 40
 #: Distance in the parameter at which a multiplier that passes -1 is told from one that touches it; and a
 #: shorter one, where a fold is so near that there is no orbit on one side.
 _BESIDE = (1e-6, 1e-8)
+#: What vanishes at an opening is the difference of matrices of order 1: its rounding, with some reserve.
+_ROUNDING = 1e-13
 #: Odd parts below this (nondimensional) are what a singular system leaves undetermined.
 _ODD = 1e-5
 #: Odd parts below this are rounding: away from a vertex the orbit is symmetric (undoubled). Orbits with
@@ -169,14 +173,18 @@ def joints_like(simple: Orbit, joints: FloatArray) -> FloatArray:
 def _vertex(orbit: Orbit, active: int) -> Orbit | None:
     """Return the orbit solved if its turn has a multiplier -1, else None."""
     solved = polish(orbit, damped=False)
-    if not solved.converged and orbit.system.holds:  # the symmetric bridge turns there, too
-        solved = replace(orbit, status=Status.CONVERGED)
-        return solved if abs(opening(solved)) < _OPENS else None
-    if not solved.converged or not abs(opening(solved)) < _OPENS:
+    if not solved.converged:  # the simpler orbits turn there, too
+        return _refined_along(orbit, active)
+    if not abs(opening(solved)) < _OPENS:
         return None
     refined = _refined(solved, active)
-    same = float(np.max(np.abs(refined.joints - solved.joints))) < _NEARLY
-    return refined if same and abs(opening(refined)) < _LOCATED else None
+    if _is_near(refined, solved) and abs(opening(refined)) < _LOCATED:
+        return refined
+    return _refined_along(orbit, active)
+
+
+def _is_near(orbit: Orbit, other: Orbit) -> bool:
+    return float(np.max(np.abs(orbit.joints - other.joints))) < _NEARLY
 
 
 def opening(orbit: Orbit) -> float:
@@ -202,7 +210,8 @@ def opening(orbit: Orbit) -> float:
 def opens_through(orbit: Orbit, active: int) -> bool:
     """Tell whether a multiplier of the turn passes -1 at a vertex, and does not only touch it.
 
-    At a continuum (Omega = 1/2) it touches: the place is good to the root of rounding.
+    At a continuum (Omega = 1/2) it touches: the place is good to the root of rounding. Where a fold is so
+    near that there is no orbit on one side of the parameter the curve of orbits is asked.
     """
     value = float(orbit.vector[active])
     for beside in _BESIDE:
@@ -210,44 +219,95 @@ def opens_through(orbit: Orbit, active: int) -> bool:
         sides = [opening(moved(orbit, active, value + s * offset)) for s in (-1.0, 1.0)]
         if np.all(np.isfinite(sides)):
             return sides[0] * sides[1] < 0.0
-    return False
+    line = Line.through(orbit, active)
+    along = [] if line is None else [line.at(s * _BESIDE[0]) for s in (-1.0, 1.0)]
+    sides = [opening(there) for there in along if there is not None]
+    return len(sides) == 2 and sides[0] * sides[1] < 0.0
+
+
+def place_error(orbit: Orbit, active: int) -> float:
+    """Return how well the parameter of a located opening is known: by rounding of what vanishes there.
+
+    What vanishes has a slope along the curve of orbits, and so has the parameter; where that turns, its
+    second order counts. Infinite where there is no curve.
+    """
+    line = Line.through(orbit, active)
+    sides = [] if line is None else [line.at(s * _BESIDE[0]) for s in (-1.0, 1.0)]
+    if len(sides) != 2 or None in sides:
+        return np.inf
+    (low, high) = (side for side in sides if side is not None)
+    slope = abs(opening(high) - opening(low)) / (2.0 * _BESIDE[0])
+    if not slope > 0.0:
+        return np.inf
+    off = (abs(opening(orbit)) + _ROUNDING) / slope
+    values = [float(o.vector[active]) for o in (low, orbit, high)]
+    rise = abs(values[2] - values[0]) / (2.0 * _BESIDE[0])
+    bend = abs(values[2] - 2.0 * values[1] + values[0]) / _BESIDE[0] ** 2
+    return rise * off + bend * off * off
 
 
 def refined_opening(orbit: Orbit, active: int) -> Orbit | None:
     """Return the orbit nearby at which a disturbance opens that changes sign after a turn; or None."""
     found = _refined(orbit, active)
-    return found if found.converged and abs(opening(found)) < _EVEN else None
+    if found.converged and abs(opening(found)) < _EVEN:
+        return found
+    along = _refined_along(orbit, active)
+    return along if along is not None and abs(opening(along)) < _EVEN else None
 
 
 def _refined(orbit: Orbit, active: int) -> Orbit:
     """Return the orbit whose turn has the multiplier -1 exactly, by secants in the parameter.
 
-    The best one that was met: whether it has the multiplier is for the caller to ask. Once what vanishes has
-    had both signs no step leaves the bracket: the secant of two values that are rounding leads anywhere.
+    The best one that was met: whether it has the multiplier is for the caller to ask.
     """
     value = float(orbit.vector[active])
-    offset = 1e-7 * (1.0 + abs(value))  # far above rounding, far below the branch's curvature
-    a, b = orbit, moved(orbit, active, value + offset)
-    open_a, open_b = opening(a), opening(b)
-    best, least = orbit, abs(open_a)
+    size = 1.0 + abs(value)
+    return _by_secants(orbit, lambda shift, near: moved(near, active, value + shift), size)
+
+
+def _refined_along(orbit: Orbit, active: int) -> Orbit | None:
+    """Do the same along the curve of orbits, where that turns beside the vertex; None if it fails."""
+    line = Line.through(orbit, active)
+    start = None if line is None else line.at(0.0)
+    if line is None or start is None or not abs(opening(start)) < _OPENS:
+        return None
+    lost = replace(start, status=Status.NOT_CONVERGED)
+    found = _by_secants(start, lambda shift, _: line.at(shift) or lost, 1.0)
+    return found if _is_near(found, orbit) and abs(opening(found)) < _LOCATED else None
+
+
+def _by_secants(orbit: Orbit, orbit_at: Callable[[float, Orbit], Orbit], size: float) -> Orbit:
+    """Return the orbit at which a disturbance opens, or the one that is nearest to it of those met.
+
+    Once what vanishes has had both signs no step leaves the bracket: the secant of two values that are
+    rounding leads anywhere.
+
+    Parameters
+    ----------
+    orbit_at : the orbit at a shift from the first one, from another one nearby
+    size : scale of the shifts
+    """
+    before, here = 0.0, 1e-7 * size  # far above rounding, far below the curve's curvature
+    near = orbit_at(here, orbit)
+    open_before, open_here = opening(orbit), opening(near)
+    best, least = orbit, abs(open_before)
     ends = [np.nan, np.nan]  # the last places at which it was negative, and positive
-    ends[int(open_a > 0.0)], ends[int(open_b > 0.0)] = value, float(b.vector[active])
+    ends[int(open_before > 0.0)], ends[int(open_here > 0.0)] = before, here
     for _ in range(_SECANTS):
-        if not np.isfinite(open_b) or open_a == open_b:
+        if not np.isfinite(open_here) or open_before == open_here:
             break
-        here = float(b.vector[active])
-        there = here - open_b * (here - float(a.vector[active])) / (open_b - open_a)
+        there = here - open_here * (here - before) / (open_here - open_before)
         if np.all(np.isfinite(ends)) and not min(ends) < there < max(ends):
             there = 0.5 * (ends[0] + ends[1])
-        if not abs(there - value) < _FAR * (1.0 + abs(value)):
+        if not abs(there) < _FAR * size:
             break
-        a, open_a = b, open_b
-        b = moved(b, active, there)
-        open_b = opening(b)
-        ends[int(open_b > 0.0)] = there
-        if abs(open_b) <= least:
-            best, least = b, abs(open_b)
-        if abs(there - here) < 1e-15 * (1.0 + abs(value)):
+        before, open_before, last = here, open_here, here
+        near = orbit_at(there, near)
+        here, open_here = there, opening(near)
+        ends[int(open_here > 0.0)] = here
+        if abs(open_here) <= least:
+            best, least = near, abs(open_here)
+        if abs(here - last) < 1e-15 * size:
             break
     return best
 

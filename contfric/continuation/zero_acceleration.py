@@ -6,6 +6,7 @@ Both are places on one known segment, looked for once an event.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +21,11 @@ from contfric.orbit.system import inside_sign, mode_domains
 _PIECES = 8
 #: An acceleration this small (relative to 1) at the start of a rest is zero: the rest begins at a touch.
 _ZERO = 1e-9
+#: Heights of touches that agree to this (relative to 1 + the level) are equal: far above their rounding.
+_EQUAL = 1e-11
+#: A touch this share of the period after another one is another one; how far before a touch, as a share of
+#: it, stationary points are looked for at other parameters; and how far beside those are.
+_LATER, _BACK, _ASIDE = 1e-4, 0.02, 1e-3
 #: Halvings of a bracket: to the resolution of time.
 _HALVINGS = 60
 
@@ -109,7 +115,7 @@ def _stationary(orbit: Orbit, i: int) -> list[float]:
 
 
 def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
-    """Return the joint at which a segment comes nearest to a surface inside.
+    """Return the joint at which a segment comes nearest to a surface inside; of equal ones the first.
 
     Without a surface: at which a hold is nearest to not being left any more.
 
@@ -131,8 +137,50 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
         return joint_within(orbit, i, time)
     level = orbit.flow.level(surface)
     sign = inside_sign(model, orbit.word[i][0], surface)
-    found = stationary_values(orbit, i, model.surface_by_name[surface].observable)
+    observable = model.surface_by_name[surface].observable
+    found = stationary_values(orbit, i, observable)
+    start = orbit.begins[i]
+    rises = orbit.flow.rate(orbit.word[i][0], observable, float(start[0]), start[1:])
+    gap = orbit.flow.observe(observable, float(start[0]), start[1:]) - level
+    if abs(rises) < _ZERO and abs(gap) < _EQUAL * (1.0 + abs(level)):
+        return np.array(start)  # it begins with the touch
     if not found:
         raise NotationError(f"segment {i + 1} touches {surface} nowhere inside")
-    time = min(found, key=lambda pair: sign * (pair[1] - level))[0]
-    return joint_within(orbit, i, time)
+    least = min(sign * (value - level) for _, value in found)
+    near = _EQUAL * (1.0 + abs(level))
+    return joint_within(orbit, i, next(t for t, v in found if sign * (v - level) <= least + near))
+
+
+def touches_again(orbit: Orbit, i: int, surface: str, start: float) -> bool:
+    """Tell whether a rest whose load touches a surface at its start does so at the same height later.
+
+    Not by chance, but for all parameters: under an even excitation a load at rest has maxima of equal height
+    by twos, and it has the same ones in every period. Heights are compared at parameters beside, too.
+    """
+    observable, mode = orbit.model.surface_by_name[surface].observable, orbit.word[i][0]
+    back, lasts = _BACK * orbit.period, float(orbit.ends[i, 0]) - start
+    joint = joint_within(orbit, i, start)
+
+    def heights(vector: FloatArray) -> list[tuple[float, float]]:
+        flow = replace(orbit, vector=vector).flow
+        state = flow.state(mode, start, joint[1:], -back)
+        times, values = flow.stationary(mode, observable, start - back, state, lasts + back)
+        return [(start - back + float(t), float(v)) for t, v in zip(times, values, strict=True)]
+
+    found = heights(orbit.vector)
+    first = orbit.flow.observe(observable, start, joint[1:])
+    near = _EQUAL * (1.0 + abs(first))
+    later = [t for t, v in found if t - start > _LATER * orbit.period and abs(v - first) < near]
+    if not later:
+        return False
+    for k in range(len(orbit.vector)):
+        vector = orbit.vector.copy()
+        vector[k] += _ASIDE * (1.0 + abs(vector[k]))
+        beside = heights(vector)
+        if len(beside) < 2:
+            continue
+        times = np.array([t for t, _ in beside])
+        first, other = (beside[int(np.argmin(np.abs(times - t)))][1] for t in (start, later[0]))
+        if abs(first - other) > near:
+            return False
+    return True

@@ -19,25 +19,11 @@ the cross terms do not vanish, and at d = 0 all of it is a quotient of zeros. Of
 from __future__ import annotations
 
 from contfric.compiled import helper
-from contfric.orbit.equations import apply_reset, behind_reset, mean_rate_row
+from contfric.orbit.equations import apply_reset, mean_rate_row, segment_jacobian
 
 #: Step of the differences where a flow has no second derivatives of its own, against the size of the
 #: direction: the cube root of rounding.
 DIFFERENCE = 6e-6
-
-
-@helper
-def segment_jacobian(functions, layout, i, start, duration, p, which, out, equations):  # type: ignore[no-untyped-def]
-    """Write the end of segment i, from its joint, with the derivatives: behind a reset by the chain rule."""
-    mode, state = layout.modes[i], equations.state
-    if layout.resets[i] >= 0:
-        n = state.shape[0]
-        apply_reset(functions, layout, i, start, p, which, equations)
-        begin = equations.behind[n, :n]
-        functions.flow(mode, start[0], begin, duration, p, which, state, out)
-        behind_reset(out, equations.behind, equations.grad, n)
-    else:
-        functions.flow(mode, start[0], start[1:], duration, p, which, state, out)
 
 
 @helper

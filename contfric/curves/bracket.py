@@ -121,7 +121,10 @@ def locate_on_curve(  # type: ignore[no-untyped-def]
     tuple
         (1 if it is bracketed to its last digits, 0 if not, -1 if no trial was solved; the value there).
     """
-    workspace = curve_workspace(points.joints.shape[1], points.joints.shape[2], p.shape[0])
+    followed = min(index, 0)  # nothing, but no literal
+    workspace = curve_workspace(
+        points.joints.shape[1], points.joints.shape[2], p.shape[0], followed, followed
+    )
     way = AlongCurve(
         functions, second, layout, condition, border, p.copy(), which, scale, counts, workspace
     )

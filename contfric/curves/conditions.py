@@ -24,7 +24,6 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import allocating_helper, f8, helper, i8, indices
-from contfric.curves.bending import segment_jacobian
 from contfric.curves.bordered import (
     BorderedWorkspace,
     bordered_workspace,
@@ -33,7 +32,13 @@ from contfric.curves.bordered import (
 )
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import Elimination, elimination_workspace
-from contfric.orbit.equations import EquationWorkspace, apply_reset, equation_workspace
+from contfric.orbit.equations import (
+    EquationWorkspace,
+    apply_reset,
+    equation_workspace,
+    segment_jacobian,
+)
+from contfric.orbit.followed import Followed, followed_values
 from contfric.orbit.monitor import (
     StationaryPoints,
     find_behind,
@@ -80,6 +85,7 @@ class CurveWorkspace(NamedTuple):
     elimination: Elimination
     spectral: SpectralWorkspace
     stationary: StationaryPoints
+    followed: Followed
     bordered: BorderedWorkspace
     pencil: FloatArray
     d: FloatArray
@@ -90,14 +96,15 @@ class CurveWorkspace(NamedTuple):
 
 
 @allocating_helper
-def curve_workspace(count, m, parameters):  # type: ignore[no-untyped-def]
-    """Return the workspace for a curve of chains of ``count`` segments."""
+def curve_workspace(count, m, parameters, rows, surfaces):  # type: ignore[no-untyped-def]
+    """Return the workspace for a curve of chains; ``rows`` of stationary values are followed."""
     free = max(2 - count, 2)  # two parameters, but no literal
     return CurveWorkspace(
         equation_workspace(count, m, free),
         elimination_workspace(count, m, free, free),
         spectral_workspace(m),
         stationary_workspace(),
+        followed_values(rows, surfaces, m),
         bordered_workspace(count, m, free),
         np.empty((2, m, m)),
         np.empty((2, count, m)),

@@ -18,6 +18,7 @@ from contfric.curves.conditions import EXIT, JOINT, SPECTRAL, CurveWorkspace, co
 from contfric.curves.normal_form import cubic_coefficient
 from contfric.models.definition import FloatArray
 from contfric.orbit.equations import close_chain
+from contfric.orbit.followed import remember
 from contfric.orbit.monitor import find_behind, find_stationary, watch
 from contfric.orbit.newton import (
     CHECKS,
@@ -122,7 +123,8 @@ def correct_curve(way, z, w, tz, tw, accuracy):  # type: ignore[no-untyped-def]
 
 @helper
 def accept_curve(way):  # type: ignore[no-untyped-def]
-    """Let the border follow the null vectors of a point that is accepted."""
+    """Remember a point that is accepted, and let the border follow its null vectors."""
+    remember(way.workspace.followed)
     if way.condition.kind == SPECTRAL:
         follow_border(way.border, way.workspace)
 
@@ -202,7 +204,8 @@ def observe_curve(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped-
     at = tests.shape[0] - EXTRA
     one, minus = multipliers(layout, workspace.pencil, equations.close, mu, workspace.spectral)
     tests[at + BEND] = bend_value(functions, second, layout, condition, z, p, which, workspace)
-    finite = watch(functions, layout, z, p, equations, workspace.stationary, tests, labels)
+    stationary, followed = workspace.stationary, workspace.followed
+    finite = watch(functions, layout, z, p, equations, stationary, tests, labels, followed)
     for k in range(condition.pinned.shape[0]):
         row = condition.pinned[k]
         tests[row] = 1.0

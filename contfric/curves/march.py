@@ -16,6 +16,7 @@ from contfric.curves.conditions import ConditionType, curve_workspace
 from contfric.curves.correct import AlongCurve, accept_curve, correct_curve, observe_curve
 from contfric.flow.layouts import FlowType, SecondType
 from contfric.orbit.equations import LayoutType
+from contfric.orbit.followed import count_followed
 
 _march_points = marching(correct_curve, observe_curve, accept_curve)
 
@@ -76,7 +77,8 @@ def march_curve(  # type: ignore[no-untyped-def]
         (why it stopped, index of the last row written, next step).
     """
     zs, scale = points.joints, 1.0 / box[2] ** 2
-    workspace = curve_workspace(zs.shape[1], zs.shape[2], p.shape[0])
+    rows, surfaces = count_followed(layout), layout.observables.shape[0]
+    workspace = curve_workspace(zs.shape[1], zs.shape[2], p.shape[0], rows, surfaces)
     way = AlongCurve(
         functions, second, layout, condition, border, p.copy(), which, scale, counts, workspace
     )

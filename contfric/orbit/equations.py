@@ -183,6 +183,20 @@ def behind_reset(jac, reset, row, n):  # type: ignore[no-untyped-def]
 
 
 @helper
+def segment_jacobian(functions, layout, i, start, duration, p, which, out, workspace):  # type: ignore[no-untyped-def]
+    """Write the end of segment i, from its joint, with the derivatives: behind a reset by the chain rule."""
+    mode, state = layout.modes[i], workspace.state
+    if layout.resets[i] >= 0:
+        n = state.shape[0]
+        apply_reset(functions, layout, i, start, p, which, workspace)
+        begin = workspace.behind[n, :n]
+        functions.flow(mode, start[0], begin, duration, p, which, state, out)
+        behind_reset(out, workspace.behind, workspace.grad, n)
+    else:
+        functions.flow(mode, start[0], start[1:], duration, p, which, state, out)
+
+
+@helper
 def pin_value(functions, layout, i, start, p, which, grad):  # type: ignore[no-untyped-def]
     """Return what vanishes at the start of hold i, with the gradient where there is space for it."""
     surface = layout.pins[i]

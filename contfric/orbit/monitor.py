@@ -23,7 +23,8 @@ from contfric.orbit.equations import (
     equation_workspace,
     segment_rows,
 )
-from contfric.orbit.holds import NO_PIN
+from contfric.orbit.followed import followed_values, keep_end, keep_levels, keep_values
+from contfric.orbit.holds import NO_PIN, TOUCH_PIN
 from contfric.orbit.newton import CHECKS
 from contfric.references import by_reference
 
@@ -39,6 +40,9 @@ _TOUCH = 2e-15
 #: stationary point is the joint itself: what it misses is the square of it, 1e-12.
 _AT_PIN = 1e-6
 
+#: Maxima of equal height of a load at rest (under an even excitation, or one period apart) differ by
+#: rounding: by less than this, relative to 1 + the level.
+_SAME_HEIGHT = 1e-13
 #: Duration below which rounding hides what is left of a margin without its double zero: at this one it is
 #: known to 1e-3, and a curvature of the load is larger.
 _CLEAR = 1e-6
@@ -107,7 +111,17 @@ def interior_margin(functions, layout, k, found, z, p, workspace, stationary):  
     if layout.pins[i] != NO_PIN or layout.pins[(i + 1) % count] != NO_PIN:
         last = duration - _AT_PIN * (1.0 + duration)
     target = functions.level(layout.interior[k, 1], p, workspace.none, workspace.empty)
-    return least_distance(found, float(layout.interior[k, 2]), target, stationary, first, last)
+    least = least_distance(found, float(layout.interior[k, 2]), target, stationary, first, last)
+    if (
+        layout.pins[i] == TOUCH_PIN
+    ):  # what it touched at its start it may touch at the same height again
+        least += _SAME_HEIGHT * (1.0 + abs(target))
+    if layout.pins[i] == layout.interior[k, 1]:  # its load falls from the limit on which it starts
+        c = layout.observables[layout.interior[k, 1]]
+        none, empty = workspace.none, workspace.empty
+        rate = functions.rate(layout.modes[i], c, z[i, 0], z[i, 1:], p, none, empty)
+        least = least if math.isnan(least) else min(least, float(layout.interior[k, 2]) * rate)
+    return least
 
 
 @helper
@@ -130,17 +144,18 @@ def joint_margin(functions, layout, k, z, p, workspace):  # type: ignore[no-unty
         value = start_value(functions, layout, i, c, z, p, workspace)
     else:
         value = functions.observe(c, after[0], after[1:], p, workspace.none, workspace.empty)
-    return layout.joint[k, 2] * (
-        value - functions.level(surface, p, workspace.none, workspace.empty)
-    )
+    level = functions.level(surface, p, workspace.none, workspace.empty)
+    margin = layout.joint[k, 2] * (value - level)
+    # a hold behind a touch may be left where its load has the same height again: it does not end there
+    return margin + _SAME_HEIGHT * (1.0 + abs(level)) if layout.pins[i] == TOUCH_PIN else margin
 
 
 @helper
-def margins(functions, layout, z, p, workspace, stationary, out):  # type: ignore[no-untyped-def]
+def margins(functions, layout, z, p, workspace, stationary, out, followed):  # type: ignore[no-untyped-def]
     """Fill the margins in the order interior, exit, joint, entry, lasting, held.
 
     An interior margin is infinite without stationary points, that of a tangential exit always. The
-    closure and the rates at the exits are in ``workspace``.
+    closure and the rates at the exits are in ``workspace``; stationary values are kept in ``followed``.
     """
     interior, observables = layout.interior, layout.observables
     segment, watched, found = -1, -1, 0
@@ -152,6 +167,7 @@ def margins(functions, layout, z, p, workspace, stationary, out):  # type: ignor
             else:
                 found = find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
             segment, watched = i, c
+            keep_values(followed, k, found, stationary)
         out[k] = interior_margin(functions, layout, k, found, z, p, workspace, stationary)
     at = interior.shape[0]
     for i in range(z.shape[0]):
@@ -272,7 +288,8 @@ def side_of(value, target):  # type: ignore[no-untyped-def]
 def crossings(functions, layout, k, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
     """Return the surfaces that the segment of row k crosses, as digits of one integer.
 
-    And the distance to the nearest change: of a stationary point or a joint from a surface.
+    And the distance to the nearest change, of a stationary point or a joint from a surface, and the number
+    of stationary points.
     """
     i, c, on, to = (
         layout.labels[k, 0],
@@ -285,7 +302,7 @@ def crossings(functions, layout, k, z, p, workspace, stationary):  # type: ignor
     else:
         found = find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
     if found < 0:
-        return -1, np.inf
+        return -1, np.inf, found, np.nan
     value, final = ends_of(functions, layout, k, z, p, workspace)
     surfaces = layout.observables.shape[0]
     code, nearest, sides = 0, np.inf, 0  # two bits of ``sides`` a surface
@@ -310,19 +327,24 @@ def crossings(functions, layout, k, z, p, workspace, stationary):  # type: ignor
             if before != 0:
                 code = code * (surfaces + 1) + surface + 1
         value = following
-    return code, nearest
+    return code, nearest, found, final
 
 
 @helper
-def watch(functions, layout, z, p, workspace, stationary, out, labels):  # type: ignore[no-untyped-def]
+def watch(functions, layout, z, p, workspace, stationary, out, labels, followed):  # type: ignore[no-untyped-def]
     """Fill margins and labels of an orbit, and behind the margins the distances of the labels.
 
-    False if something is not finite.
+    Stationary values are kept in ``followed``, if it has space for any. False if something is not finite.
     """
-    margins(functions, layout, z, p, workspace, stationary, out)
-    count = count_margins(layout)
+    keep_levels(functions, p, followed, workspace)
+    margins(functions, layout, z, p, workspace, stationary, out, followed)
+    count, interior = count_margins(layout), layout.interior.shape[0]
     for k in range(layout.labels.shape[0]):
-        labels[k], out[count + k] = crossings(functions, layout, k, z, p, workspace, stationary)
+        labels[k], out[count + k], found, end = crossings(
+            functions, layout, k, z, p, workspace, stationary
+        )
+        keep_values(followed, interior + k, found, stationary)
+        keep_end(followed, interior + k, end)
     for k in range(count):
         if math.isnan(out[k]):
             return False
@@ -330,7 +352,7 @@ def watch(functions, layout, z, p, workspace, stationary, out, labels):  # type:
 
 
 @helper
-def examined(functions, layout, z, p, workspace, rows, stationary, out, labels):  # type: ignore[no-untyped-def]
+def examined(functions, layout, z, p, workspace, rows, stationary, out, labels, followed):  # type: ignore[no-untyped-def]
     """Fill margins and labels of a solved orbit; what :func:`examine` returns."""
     layout, workspace = by_reference(layout), by_reference(workspace)
     count, m = z.shape
@@ -338,7 +360,8 @@ def examined(functions, layout, z, p, workspace, rows, stationary, out, labels):
     for i in range(count):  # for the rates at the exits
         after = z[i + 1] if i + 1 < count else workspace.last
         segment_rows(functions, layout, i, m, z[i], after, p, workspace.none, workspace, rows)
-    return watch(functions, layout, z, p, workspace, by_reference(stationary), out, labels)
+    stationary = by_reference(stationary)
+    return watch(functions, layout, z, p, workspace, stationary, out, labels, by_reference(followed))
 
 
 @kernel(types.boolean(FlowType, LayoutType, matrix, vector, vector, indices, indices))
@@ -350,5 +373,5 @@ def examine(functions, layout, z, p, out, labels, counts):  # type: ignore[no-un
         count, 0
     )  # no parameter, and no literal: the workspace would be compiled once for each
     workspace, rows = equation_workspace(count, m, free), np.empty((2 * m, 3 * m + 1))
-    stationary = stationary_workspace()
-    return examined(functions, layout, z, p, workspace, rows, stationary, out, labels)
+    stationary, followed = stationary_workspace(), followed_values(free, free, m)
+    return examined(functions, layout, z, p, workspace, rows, stationary, out, labels, followed)

@@ -1,0 +1,105 @@
+"""Classes of scenes whose diagrams once depended on the start: what was wrong with each, and that it is not.
+
+The scenes are those of the stress run (``benchmarks/stress/restarts.py``), by seed and index.
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import contfric as cf
+from contfric.continuation.along_curve import Line
+from contfric.continuation.report import ROUGH
+from contfric.continuation.vertices import _LOCATED, opening
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "stress"))
+import restarts
+from report import Tally
+
+#: Scenes by what was wrong with them.
+CLASSES: dict[str, tuple[tuple[int, int], ...]] = {
+    "a vertex on a bridge, beside a fold of the simpler bridge": (
+        (1, 495),
+        (1, 640),
+        (1, 907),
+        (1, 2105),
+    ),
+    "a branch point beside a sliding event, nearer than parameters can tell": (
+        (2, 101),
+        (1, 2097),
+        (1, 1268),
+    ),
+    "a hold that grows slowly": ((2, 58),),
+    "a branch point of a bridge beside its end": ((2, 169),),
+    "a hold on a limit from which its load no longer falls": ((1, 2323), (1, 2146)),
+    "two touches within one step": ((1, 435), (1, 1117), (1, 2243), (1, 2331), (1, 2413)),
+}
+#: Random scenes of a slow run: as many as take a few minutes.
+MANY = range(150)
+
+
+@cache
+def diagram(seed: int, index: int) -> cf.Diagram:
+    found = restarts.scene(seed, index)
+    orbit = cf.find_orbit("coulomb", found.params, longest=1000)
+    return cf.explore(orbit, found.vary, found.range)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_the_same_from_every_branch(name: str) -> None:
+    checked = 0
+    for seed, index in CLASSES[name]:
+        found = diagram(seed, index).verify(restarts=4)
+        assert found.passed, (seed, index, str(found))
+        checked += len(found.restarts)
+    assert checked >= len(CLASSES[name])
+
+
+@pytest.mark.slow
+def test_many_random_scenes() -> None:
+    """Another seed than that of the quick share: no difference outside of the degenerate classes."""
+    tally = Tally()
+    for index in MANY:
+        tally.index = index
+        restarts.one_scene(tally, restarts.scene(2, index), most=3)
+    assert not tally.failed, tally.failed
+    assert tally.counts["restarts"] > len(MANY)
+
+
+def test_orbits_on_a_curve_that_turns() -> None:
+    """Through folds: both sides are solved, and the parameter is on one side of the fold."""
+    checked = 0
+    for seed, index in [pair for pairs in CLASSES.values() for pair in pairs]:
+        found = diagram(seed, index)
+        width = found.range[1] - found.range[0]
+        for fold in found.of_kind("SN"):
+            active = fold.orbit.model.index_of(found.parameter)
+            line = Line.through(fold.orbit, active)
+            assert line is not None
+            value = fold.params[found.parameter]
+            for distance in (1e-4, 2e-4):
+                sides = [line.at(s * distance) for s in (-1.0, 1.0)]
+                if any(side is None for side in sides):
+                    continue
+                gaps = [float(o.vector[active]) - value for o in sides if o is not None]
+                assert all(o is not None and o.converged for o in sides)
+                assert gaps[0] * gaps[1] > 0.0 or max(map(abs, gaps)) < 1e-9 * width
+                checked += 1
+    assert checked > 5
+
+
+def test_located_openings_open() -> None:
+    """What vanishes at a branch point or a doubling of a bridge does so, as the search for it promises."""
+    checked = 0
+    for seed, index in [pair for pairs in CLASSES.values() for pair in pairs]:
+        found = diagram(seed, index)
+        for event in found.bifurcations:
+            if event.kind in (cf.Kind.BP, cf.Kind.PD) and event.orbit.system.holds:
+                assert abs(opening(event.orbit)) < _LOCATED
+                assert event.accuracy <= ROUGH
+                checked += 1
+    assert checked >= 4
