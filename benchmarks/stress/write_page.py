@@ -20,8 +20,8 @@ index, compared with a reference that shares nothing with the library but the eq
 counted. An error is compared with what rounding of the arguments alone explains at the condition of the
 problem (a ratio of 1 is the most that is allowed; below 1 the result is as exact as doubles permit).
 
-A failure stays on the page with its scene. Those that remain are touches (T) that a large step does not
-see, or of two degenerate kinds, each a limitation (see [numerics](numerics.md#conditioning)): scenes with
+A failure stays on the page with its scene. Those that remain are of two degenerate
+kinds, each a limitation (see [numerics](numerics.md#conditioning)): scenes with
 S = S0, where several conditions vanish together at an end, so that its name may depend on the step; and
 ends at Omega = 1/2, where a stick vanishes just as its release becomes tangential and the orbit is one of
 a continuum.
@@ -30,9 +30,9 @@ Of the restarts: a diagram explored again from another of its branches is to hav
 branches. What is excused was fixed before the run: by the scene (S = S0; Omega = 1/n without damping), or
 by its events (`contfric/atlas/degenerate.py`): two in one place with one motion, or a second condition
 that fails at a smooth one. Scenes with more branches than the limit, or that take longer than a minute,
-are counted as cut. What is left failed are, by kind: touches (T) of which a large step sees two or none,
-orbits beside a continuum at a value of Omega that is no 1/n, and events on orbits of many periods that
-are nearer to each other than 1e-7 of the range.
+are counted as cut. What is left failed are, by kind: orbits beside a continuum at a value of Omega that is
+no 1/n, folds of bridges of many segments, and events on orbits of many periods that are nearer to each other
+than 1e-7 of the range.
 
 `make stress` repeats all runs; one of them and the page:
 

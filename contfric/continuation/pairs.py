@@ -27,7 +27,7 @@ import math
 
 from contfric.compiled import helper
 from contfric.continuation.dips import changes_much, cubic_dip, earlier_of, mean_dip
-from contfric.continuation.touches import PINNED, labels_dip, margins_dip, set_parameters
+from contfric.continuation.touches import PINNED, is_far, labels_dip, margins_dip, set_parameters
 from contfric.orbit.equations import close_chain
 from contfric.orbit.followed import (
     BEFORE,
@@ -42,7 +42,7 @@ from contfric.orbit.followed import (
     segment_and_observable,
 )
 from contfric.orbit.holds import NO_PIN
-from contfric.orbit.monitor import find_behind, find_stationary
+from contfric.orbit.monitor import count_margins, find_behind, find_stationary
 
 #: A parameter that changes more slowly than this (in ranges, by arclength) is constant: the sign of its slope
 #: is rounding.
@@ -116,7 +116,10 @@ def labelled_ends_dip(way, points, k, length):  # type: ignore[no-untyped-def]
     layout, followed, at = way.layout, way.workspace.followed, 0.0
     earlier, before, here = followed.slots[EARLIER], followed.slots[BEFORE], followed.slots[HERE]
     ends, levels = followed.ends, followed.levels
+    margins = count_margins(layout)
     for label in range(layout.labels.shape[0]):
+        if is_far(points, k, margins + label, length):
+            continue
         row = layout.interior.shape[0] + label
         i, c, to = layout.labels[label, 0], layout.labels[label, 1], layout.labels[label, 3]
         for surface in range(layout.observables.shape[0]):

@@ -187,6 +187,24 @@ def second_change(way, points, k, row, length):  # type: ignore[no-untyped-def]
 
 
 @helper
+def keeps_sides(way, row, c):  # type: ignore[no-untyped-def]
+    """Tell at once that there are as many stationary values as before, each on its side of every surface."""
+    followed = way.workspace.followed
+    before, here = followed.slots[BEFORE], followed.slots[HERE]
+    values, levels = followed.values, followed.levels
+    if followed.counts[before, row] != followed.counts[here, row]:
+        return False
+    for surface in range(way.layout.observables.shape[0]):
+        if way.layout.observables[surface] != c:
+            continue
+        for j in range(followed.counts[here, row]):
+            f1 = values[before, row, j] - levels[before, surface]
+            if f1 * (values[here, row, j] - levels[here, surface]) <= 0.0:
+                return False
+    return True
+
+
+@helper
 def is_far(points, k, column, length):  # type: ignore[no-untyped-def]
     """Tell whether nothing that a column is the least distance of can come to its surface within a step."""
     return min(points.tests[k, column], points.tests[k + 1, column]) > _FAR * length
@@ -214,7 +232,8 @@ def labels_dip(way, points, k, length):  # type: ignore[no-untyped-def]
         row, c = first + label, layout.labels[label, 1]
         if is_far(points, k, margins + label, length):
             continue
-        at = earlier_of(at, second_change(way, points, k, row, length))
+        if not keeps_sides(way, row, c):
+            at = earlier_of(at, second_change(way, points, k, row, length))
         for surface in range(layout.observables.shape[0]):
             if layout.observables[surface] != c:
                 continue
