@@ -139,13 +139,13 @@ def ends_dip(way, points, k, length):  # type: ignore[no-untyped-def]
     column, count = layout.interior.shape[0], layout.exits.shape[0]
     for i in range(count):
         sign = layout.exit_signs[i]
-        if sign != 0.0 and layout.pins[i] == NO_PIN:
+        if sign != 0.0 and layout.pins[i] == NO_PIN and not is_far(points, k, column + i, length):
             values = margin_values(way, points, k, column + i, sign)
             at = earlier_of(at, end_dip(way, points, k, values, i, layout.exits[i], True, length))
     column += count
     for j in range(layout.joint.shape[0]):
         i, surface, sign = layout.joint[j, 0], layout.joint[j, 1], float(layout.joint[j, 2])
-        if layout.joint[j, 3] == 0:
+        if layout.joint[j, 3] == 0 and not is_far(points, k, column + j, length):
             values = margin_values(way, points, k, column + j, sign)
             at = earlier_of(at, end_dip(way, points, k, values, i, surface, False, length))
     return at
@@ -164,8 +164,20 @@ def fold_dip(way, points, k, length):  # type: ignore[no-untyped-def]
 
 
 @helper
+def all_far(way, points, k, length):  # type: ignore[no-untyped-def]
+    """Tell at once that no margin and no label can come to its surface within a step: most of short steps."""
+    for column in range(count_margins(way.layout) + way.layout.labels.shape[0]):
+        if not is_far(points, k, column, length):
+            return False
+    return True
+
+
+@helper
 def hidden_pair(way, points, k, length):  # type: ignore[no-untyped-def]
     """Return the share of the step from row k up to which it is to be taken again; 0 if it is accepted."""
+    if all_far(way, points, k, length):
+        at = fold_dip(way, points, k, length)
+        return 0.0 if at == 0.0 else max(at, _INSIDE)
     at = earlier_of(margins_dip(way, points, k, length), labels_dip(way, points, k, length))
     at = earlier_of(at, ends_dip(way, points, k, length))
     at = earlier_of(at, labelled_ends_dip(way, points, k, length))
