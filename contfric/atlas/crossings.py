@@ -81,4 +81,5 @@ def whole_branch(orbit: Orbit, settings: Settings) -> Branch:
         settings.stability and not orbit.system.holds,
         settings.most_points,
     )
-    return follow_orbit(orbit, replace(own, copies=settings.copies, stop_at=settings.stop_at))
+    own = replace(own, copies=settings.copies, stop_at=settings.stop_at, up_to_mirror=True)
+    return follow_orbit(orbit, own)

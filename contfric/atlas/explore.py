@@ -103,7 +103,7 @@ def explore(
     most = MOST_PERIODS if max_periods is None else max_periods
     again = copies or (max(max_periods, orbit.periods) if max_periods else 1)
     # multipliers are asked for also where the start itself is on a bridge
-    settings = replace(settings, stability=stability, copies=again)
+    settings = replace(settings, stability=stability, copies=again, up_to_mirror=True)
     state = Exploration(
         settings,
         max(most, orbit.periods),

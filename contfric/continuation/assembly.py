@@ -17,6 +17,10 @@ from contfric.continuation.side import Side
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 
+#: Share of the range above which a branch is wider than any event's accuracy that makes sense: those need not
+#: be computed.
+_NARROW = 0.01
+
 
 def join(orbit: Orbit, settings: Settings, behind: Side, ahead: Side) -> Branch:
     """Return one branch from the two sides of its start."""
@@ -70,6 +74,7 @@ def _branch(
     origin: Point | None = None,
 ) -> Branch:
     columns = _joined(behind, ahead, origin)
+    bifurcations, unknown = _known(bifurcations, columns["values"], settings)
     if behind is None:
         ends = _told_upward(ends[0], columns["values"]), ends[1]
     events = [end.bifurcation for end in ends]
@@ -78,7 +83,7 @@ def _branch(
         *bifurcations,
         *([events[1]] if events[1] is not None else []),
     )
-    notes = (*(() if behind is None else behind.notes), *ahead.notes)
+    notes = (*(() if behind is None else behind.notes), *ahead.notes, *unknown)
     branch = Branch(
         orbit.system,
         settings.parameter,
@@ -95,6 +100,26 @@ def _branch(
     _renew_ends(branch)
     branch = replace(branch, notes=(*branch.notes, *continua_of(branch)))
     return with_openings(branch, settings)
+
+
+def _known(
+    events: tuple[Bifurcation, ...], values: FloatArray, settings: Settings
+) -> tuple[tuple[Bifurcation, ...], list[str]]:
+    """Return the events without folds that are not known to be any, and a note for each of these.
+
+    Where the parameter changes by less over the whole branch than a fold's is known to, the sign of its slope
+    is rounding: a branch between two events in one place, next to a continuum of orbits.
+    """
+    kept, notes = [], []
+    span = float(np.ptp(values)) if len(values) else 0.0
+    for b in events:
+        narrow = b.kind is Kind.SN and span < _NARROW * settings.width
+        if narrow and span <= b.accuracy * settings.width:
+            place = f"{settings.parameter} = {b.params[settings.parameter]:.12g}"
+            notes.append(f"{place}: the slope changes its sign within rounding, no fold is listed")
+        else:
+            kept.append(b)
+    return tuple(kept), notes
 
 
 def _renew_ends(branch: Branch) -> None:

@@ -42,22 +42,13 @@ from contfric.orbit.followed import (
     segment_and_observable,
 )
 from contfric.orbit.holds import NO_PIN
-from contfric.orbit.monitor import count_margins, find_behind, find_stationary
+from contfric.orbit.monitor import count_margins, find_behind, find_stationary, is_doubled
 
 #: A parameter that changes more slowly than this (in ranges, by arclength) is constant: the sign of its slope
 #: is rounding.
 _CONSTANT = 1e-6
 #: A step is not taken again up to less than this share of it: the march would come to a stand.
 _INSIDE = 0.05
-
-
-@helper
-def is_doubled(layout, column):  # type: ignore[no-untyped-def]
-    """Tell whether a margin is watched without its double zero."""
-    for k in range(layout.doubles.shape[0]):
-        if layout.doubles[k, 0] == column:
-            return True
-    return False
 
 
 @helper

@@ -59,6 +59,7 @@ class Settings:
     most_points : most points of one side
     copies : most copies of its shortest period that an orbit of the diagram has at a sliding event
     stop_at : quantities, and the value at which a branch ends
+    up_to_mirror : whether it ends as well where its mirror image has that value
     """
 
     parameter: str
@@ -72,6 +73,7 @@ class Settings:
     most_points: int = MOST_POINTS
     copies: int = 1
     stop_at: tuple[tuple[str, float], ...] = ()
+    up_to_mirror: bool = False
 
     @property
     def scale(self) -> float:

@@ -4,12 +4,15 @@ Between two points at which the quantity lies on both sides of the value the pla
 method, each trial a solved orbit. Where it comes near and goes away again, the cubic through values and
 slopes of both ends of a step says whether it reaches the value between them; the solved orbit at the
 extremum of that cubic decides.
+
+Branches of a diagram are listed up to the symmetry of the model, and which of two mirror images is followed
+is chance: such a branch ends where the quantity of either has the value.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +22,7 @@ from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.measure import differentiated
+from contfric.quantities.motion import Directions
 from contfric.quantities.registry import Quantity, number_quantity
 
 #: A start whose quantity is this near to the value (relative to 1 + its size) is at it, and leaves it.
@@ -39,12 +43,13 @@ class Stop:
 
 @dataclass(frozen=True, eq=False)
 class _Sought:
-    """The value of a quantity that a branch is to end at."""
+    """The value of a quantity that a branch is to end at; of its mirror image if ``mirrored``."""
 
     orbit: Orbit
     settings: Settings
     quantity: Quantity
     value: float
+    mirrored: bool = False
 
     def miss(self, point: Point) -> float:
         """Return by how much the quantity is above the value."""
@@ -52,14 +57,29 @@ class _Sought:
 
     def slope(self, point: Point) -> float:
         """Return how fast it grows along the branch."""
-        orbit, settings = self._orbit(point), self.settings
-        return float(
-            differentiated(self.quantity, orbit, along(point, orbit, settings.parameter)).ahead[0]
-        )
+        orbit = self._orbit(point)
+        ahead = along(point, orbit, self.settings.parameter)
+        if self.mirrored:
+            ahead = self._image_of(ahead, orbit)
+        return float(differentiated(self.quantity, orbit, ahead).ahead[0])
+
+    def _image_of(self, ahead: Directions, orbit: Orbit) -> Directions:
+        """Return the direction of the mirror images: states mapped, times later by a share of the period."""
+        symmetry = self.orbit.model.symmetry
+        assert symmetry is not None
+        joints = np.array(ahead.joints)
+        joints[:, 1:, 0] = ahead.joints[:, 1:, 0] @ symmetry.array().T
+        if not orbit.model.autonomous:
+            every = np.arange(len(orbit.vector), dtype=np.int64)
+            grad = np.empty(len(orbit.vector))
+            orbit.model.flow.period(orbit.vector, every, grad)
+            joints[:, 0, 0] += symmetry.fraction * (grad @ ahead.vector[:, 0])
+        return replace(ahead, joints=joints)
 
     def _orbit(self, point: Point) -> Orbit:
         active = self.orbit.model.index_of(self.settings.parameter)
-        return point.orbit(self.orbit.system, self.orbit.vector, active)
+        found = point.orbit(self.orbit.system, self.orbit.vector, active)
+        return found.mirror() if self.mirrored else found
 
     def crossing(self, before: Point, after: Point) -> Stop | None:
         """Return the place between two points on both sides of the value."""
@@ -119,7 +139,10 @@ def stop_among(orbit: Orbit, side: Side, settings: Settings, fresh: int, last: i
 
 def _all_sought(orbit: Orbit, settings: Settings) -> Iterator[_Sought]:
     for name, value in settings.stop_at:
-        yield _Sought(orbit, settings, number_quantity(name, orbit.model, "stop_at"), value)
+        quantity = number_quantity(name, orbit.model, "stop_at")
+        yield _Sought(orbit, settings, quantity, value)
+        if settings.up_to_mirror and orbit.model.symmetry and not orbit.system.half:
+            yield _Sought(orbit, settings, quantity, value, mirrored=True)
 
 
 def _first_stop(sought: _Sought, side: Side, first: int, last: int) -> tuple[int, Stop] | None:

@@ -100,6 +100,26 @@ def least_distance(found, sign, target, stationary, first, last):  # type: ignor
 
 
 @helper
+def is_doubled(layout, column):  # type: ignore[no-untyped-def]
+    """Tell whether a margin is watched without its double zero."""
+    for k in range(layout.doubles.shape[0]):
+        if layout.doubles[k, 0] == column:
+            return True
+    return False
+
+
+@helper
+def equal_heights(layout, i, column, level):  # type: ignore[no-untyped-def]
+    """Return what a margin is allowed for equal maxima of the load that segment i may have touched already.
+
+    Not one that is divided by the square of a duration: there it would be no rounding.
+    """
+    if layout.pins[i] != TOUCH_PIN or is_doubled(layout, column):
+        return 0.0
+    return _SAME_HEIGHT * (1.0 + abs(level))
+
+
+@helper
 def interior_margin(functions, layout, k, found, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
     """Return interior margin k from the stationary points of its segment."""
     i, count = layout.interior[k, 0], z.shape[0]
@@ -112,10 +132,8 @@ def interior_margin(functions, layout, k, found, z, p, workspace, stationary):  
         last = duration - _AT_PIN * (1.0 + duration)
     target = functions.level(layout.interior[k, 1], p, workspace.none, workspace.empty)
     least = least_distance(found, float(layout.interior[k, 2]), target, stationary, first, last)
-    if (
-        layout.pins[i] == TOUCH_PIN
-    ):  # what it touched at its start it may touch at the same height again
-        least += _SAME_HEIGHT * (1.0 + abs(target))
+    # what it touched at its start it may touch at the same height again
+    least += equal_heights(layout, i, k, target)
     if layout.pins[i] == layout.interior[k, 1]:  # its load falls from the limit on which it starts
         c = layout.observables[layout.interior[k, 1]]
         none, empty = workspace.none, workspace.empty
@@ -145,9 +163,9 @@ def joint_margin(functions, layout, k, z, p, workspace):  # type: ignore[no-unty
     else:
         value = functions.observe(c, after[0], after[1:], p, workspace.none, workspace.empty)
     level = functions.level(surface, p, workspace.none, workspace.empty)
-    margin = layout.joint[k, 2] * (value - level)
     # a hold behind a touch may be left where its load has the same height again: it does not end there
-    return margin + _SAME_HEIGHT * (1.0 + abs(level)) if layout.pins[i] == TOUCH_PIN else margin
+    column = layout.interior.shape[0] + layout.exits.shape[0] + k
+    return layout.joint[k, 2] * (value - level) + equal_heights(layout, i, column, level)
 
 
 @helper
@@ -361,7 +379,9 @@ def examined(functions, layout, z, p, workspace, rows, stationary, out, labels, 
         after = z[i + 1] if i + 1 < count else workspace.last
         segment_rows(functions, layout, i, m, z[i], after, p, workspace.none, workspace, rows)
     stationary = by_reference(stationary)
-    return watch(functions, layout, z, p, workspace, stationary, out, labels, by_reference(followed))
+    return watch(
+        functions, layout, z, p, workspace, stationary, out, labels, by_reference(followed)
+    )
 
 
 @kernel(types.boolean(FlowType, LayoutType, matrix, vector, vector, indices, indices))

@@ -253,6 +253,20 @@ def test_a_diagram_keeps_what_it_was_asked_to_stop_at(orbit: cf.Orbit, tmp_path:
     assert diagram.verify(restarts=2).passed
 
 
+@pytest.mark.parametrize("value", [1.405, 1.415, 1.43, 1.3])
+def test_a_diagram_stops_at_the_same_orbits_for_either_mirror_image(
+    orbit: cf.Orbit, value: float
+) -> None:
+    def ends(start: cf.Orbit) -> list[tuple[str, float, float]]:
+        diagram = cf.explore(start, "Omega", (0.4, 0.6), stop_at={"x_max": value})
+        own = [b for b in diagram.branches if not b.mirrored]
+        return sorted((b.name, *sorted(map(float, b.values[[0, -1]]))) for b in own)
+
+    one, other = ends(orbit), ends(orbit.mirror())
+    assert [name for name, *_ in one] == [name for name, *_ in other]
+    np.testing.assert_allclose([e[1:] for e in one], [e[1:] for e in other], rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("stop_at", "words"),
     [
