@@ -28,7 +28,10 @@ _SMOOTH = frozenset({Kind.SN, Kind.BP, Kind.PD})
 
 
 def degenerate_events(diagram: Diagram) -> Iterator[str]:
-    """Yield what is degenerate, in words: two events in one place, two conditions at once."""
+    """Yield what is degenerate, in words: two events in one place, alike or at both ends of a branch.
+
+    And two conditions at once.
+    """
     parameter, width = diagram.parameter, diagram.range[1] - diagram.range[0]
     values = sorted(
         (b for b in diagram.bifurcations if b.kind is not Kind.T), key=lambda b: b.params[parameter]
@@ -38,6 +41,14 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
         known = max(ACCURACY, a.accuracy + b.accuracy) * width
         if gap <= known and part_distance(a.orbit.stops, b.orbit.stops) < _ALIKE:
             yield f"{a.label} and {b.label} at {a.params[parameter]:.10g}: not to be told apart"
+    for branch in diagram.branches:
+        ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
+        known = sum(b.accuracy for b in ends) * width
+        if not branch.mirrored and len(ends) == 2 and np.ptp(branch.values) < known:
+            yield (
+                f"{branch.name} at {branch.values[0]:.10g}: {parameter} changes by less along it than its ends "
+                "are known to"
+            )
     for b in values:
         if b.kind in _SMOOTH and _least_margin(b) < _SECOND:
             yield f"{b.label} at {b.params[parameter]:.10g}: a margin vanishes there, too"
