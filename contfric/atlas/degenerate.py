@@ -45,10 +45,8 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
         ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
         known = sum(b.accuracy for b in ends) * width
         if not branch.mirrored and len(ends) == 2 and np.ptp(branch.values) < known:
-            yield (
-                f"{branch.name} at {branch.values[0]:.10g}: {parameter} changes by less along it than its ends "
-                "are known to"
-            )
+            place = f"{branch.name} at {branch.values[0]:.10g}"
+            yield f"{place}: {parameter} changes by less along it than its ends are known to"
     for b in values:
         if b.kind in _SMOOTH and _least_margin(b) < _SECOND:
             yield f"{b.label} at {b.params[parameter]:.10g}: a margin vanishes there, too"
