@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from contfric.atlas.scenario import Scenario
     from contfric.atlas.verification import Verification
+    from contfric.plot.live.frame import Frame
     from contfric.quantities.registry import QuantityLike
     from contfric.response.sweep import Sweep
 
@@ -242,12 +243,42 @@ class Diagram:
         return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
     def plot(
-        self, ax: Axes | None = None, row: QuantityLike = "x_max", overlay: Sweep | None = None
+        self,
+        ax: Axes | None = None,
+        row: QuantityLike = "x_max",
+        overlay: Sweep | None = None,
+        *,
+        legend: bool = True,
+        names: Mapping[str, str] | None = None,
+        colours: Mapping[str, str] | None = None,
     ) -> Axes:
-        """Draw one quantity of all branches with the bifurcations; behind them the points of a sweep."""
+        """Draw one quantity of all branches with the bifurcations; behind them the points of a sweep.
+
+        ``names`` and ``colours`` say what branches are called in the legend, and their colours, by their
+        signature's name.
+        """
         from contfric.plot.diagram import plot_diagram_row
 
-        return plot_diagram_row(self, row, ax=ax, overlay=overlay)
+        return plot_diagram_row(
+            self, row, ax=ax, overlay=overlay, legend=legend, names=names, colours=colours
+        )
+
+    def show(self, height: int = 900) -> Frame:
+        """Return the live diagram for a notebook (needs bokeh: the extra ``live``).
+
+        Parameters
+        ----------
+        height : int
+            Height of the frame in pixels.
+
+        Raises
+        ------
+        MissingPackageError
+            If bokeh is not installed.
+        """
+        from contfric.plot.live.frame import Frame
+
+        return Frame.of(self, height)
 
     def to_html(self, path: str | PathLike[str]) -> Path:
         """Write the diagram as one page for a browser (needs bokeh: the extra ``live``).

@@ -20,12 +20,13 @@ if TYPE_CHECKING:
     from contfric.plot.plane import plot_curves, plot_plane
     from contfric.plot.response import plot_sweep
     from contfric.plot.returns import plot_release_map, plot_returns
-    from contfric.plot.save import new_figure, save_figure
+    from contfric.plot.save import journal, new_figure, save_figure
     from contfric.plot.style import ROWS
 
 #: Where each public name lives; imported at first use.
 _HOMES = {
     "ROWS": "contfric.plot.style",
+    "journal": "contfric.plot.save",
     "new_figure": "contfric.plot.save",
     "plot_basins": "contfric.plot.basins",
     "plot_branch_graph": "contfric.plot.branch_graph",
@@ -47,6 +48,7 @@ _HOMES = {
 
 __all__ = [
     "ROWS",
+    "journal",
     "new_figure",
     "plot_basins",
     "plot_branch_graph",

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from contfric.plot.lyapunov import edges_of
 from contfric.plot.save import axes_or_new
-from contfric.plot.style import BESIDE, GREY, SMALL, TEXT, branch_colours, lighter
+from contfric.plot.style import BESIDE, GREY, SMALL, TEXT, branch_colours, lighter, sized
 
 if TYPE_CHECKING:
     from contfric.response.basins import Basins
@@ -58,12 +58,12 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     _draw_orbits(ax, found, first, second)
     names = [f"{s.name}: {s.share:.1%}" for s in found.shares]
     handles = [Patch(color=c, label=n) for c, n in zip(_shown(found, colours), names, strict=False)]
-    ax.legend(handles=handles, fontsize=SMALL, frameon=False, **BESIDE)
-    ax.set_xlabel(f"${first}$", fontsize=TEXT + 1)
-    ax.set_ylabel(f"${second}$", fontsize=TEXT + 1)
+    ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **BESIDE)
+    ax.set_xlabel(f"${first}$", fontsize=sized(TEXT + 1))
+    ax.set_ylabel(f"${second}$", fontsize=sized(TEXT + 1))
     ax.set_xlim(edges_of(across)[0], edges_of(across)[-1])
     ax.set_ylim(edges_of(up)[0], edges_of(up)[-1])
-    ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
+    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
     return ax
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from matplotlib.axes import Axes
@@ -12,9 +12,10 @@ from matplotlib.lines import Line2D
 from contfric.errors import either
 from contfric.plot.events import Mark, draw_marks, label_marks, marks_of
 from contfric.plot.labels import settle
+from contfric.plot.look import Look
 from contfric.plot.response import draw_overlay
 from contfric.plot.runs import stability_runs
-from contfric.plot.save import axes_or_new, figure_or_new
+from contfric.plot.save import axes_or_new, figure_or_new, for_journal, legend_of
 from contfric.plot.style import (
     BESIDE,
     BRIDGE,
@@ -32,12 +33,12 @@ from contfric.plot.style import (
     UNKNOWN,
     UNKNOWN_WIDTH,
     UNSTABLE,
-    branch_colours,
     full_title,
     greyish,
     lighter,
     parameter_label,
     row_of,
+    sized,
 )
 
 if TYPE_CHECKING:
@@ -48,6 +49,9 @@ if TYPE_CHECKING:
     from contfric.quantities.registry import QuantityLike
     from contfric.response.sweep import Sweep
 
+#: Width of a figure (inches) below which numbers along its axis would meet, and its parts then.
+_COLUMN, _TICKS = 4.5, 5
+
 
 def plot_branches(
     branches: Sequence[Branch],
@@ -56,6 +60,8 @@ def plot_branches(
     *,
     events: bool = True,
     legend: bool = True,
+    names: Mapping[str, str] | None = None,
+    colours: Mapping[str, str] | None = None,
 ) -> Axes:
     r"""Draw one quantity of some branches against their parameter.
 
@@ -74,6 +80,8 @@ def plot_branches(
     legend : bool
         Whether to draw the legend: beside new axes, or inside yours, there without the meaning of
         the markers.
+    names, colours : mapping, optional
+        What branches are called in the legend, and colours of theirs, by their names.
 
     Examples
     --------
@@ -85,7 +93,8 @@ def plot_branches(
     """
     row_of(row, _model_of(branches))  # before a figure is opened for it
     found = [b for branch in branches for b in branch.bifurcations] if events else []
-    return _plot_row(axes_or_new(ax), branches, found, row, legend, outside=ax is None)
+    look = Look.of(branches, names, colours, legend=legend)
+    return _plot_row(axes_or_new(ax), branches, found, row, look, outside=ax is None)
 
 
 def plot_diagram_row(
@@ -95,6 +104,8 @@ def plot_diagram_row(
     events: bool = True,
     legend: bool = True,
     overlay: Sweep | None = None,
+    names: Mapping[str, str] | None = None,
+    colours: Mapping[str, str] | None = None,
 ) -> Axes:
     """Draw one quantity of all branches of a diagram, with its bifurcations.
 
@@ -111,6 +122,8 @@ def plot_diagram_row(
         Whether to draw the legend.
     overlay : Sweep, optional
         Simulated points of the same parameter, drawn behind the branches.
+    names, colours : mapping, optional
+        What branches are called in the legend, and colours of theirs, by their names.
 
     Examples
     --------
@@ -120,10 +133,11 @@ def plot_diagram_row(
     """
     row_of(row, _model_of(diagram.branches))  # before a figure is opened for it
     found = diagram.bifurcations if events else ()
+    look = Look.of(diagram.branches, names, colours, legend=legend)
     new = axes_or_new(ax)
     new.set_xlim(*diagram.range)
     draw_overlay([new], [row], diagram.parameter, overlay)
-    return _plot_row(new, diagram.branches, found, row, legend, outside=ax is None)
+    return _plot_row(new, diagram.branches, found, row, look, outside=ax is None)
 
 
 def plot_diagram(
@@ -132,6 +146,10 @@ def plot_diagram(
     fig: Figure | None = None,
     overlay: Sweep | None = None,
     title: str = "",
+    *,
+    legend: bool = True,
+    names: Mapping[str, str] | None = None,
+    colours: Mapping[str, str] | None = None,
 ) -> list[Axes]:
     """Draw a diagram in several rows over one parameter axis, as Figs. 4-7 of the reference.
 
@@ -146,6 +164,8 @@ def plot_diagram(
         Simulated points of the same parameter, drawn behind the branches.
     title : str, optional
         What stands above; names of parameters become symbols. The fixed parameters by default.
+    legend, names, colours : optional
+        As for :func:`plot_diagram_row`.
 
     Returns
     -------
@@ -159,6 +179,7 @@ def plot_diagram(
     >>> axes = plot_diagram(cf.explore(orbit, "Omega", (0.4, 0.6)), rows=("x_max", "psi"))
     """
     looks = [row_of(row, _model_of(diagram.branches)) for row in rows]
+    look = Look.of(diagram.branches, names, colours, legend=legend)
     fig = figure_or_new(fig, 8.4, 1.2 + 2.4 * len(rows))
     axes = list(fig.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0])
     axes[0].set_xlim(*diagram.range)
@@ -167,20 +188,21 @@ def plot_diagram(
     text = ", ".join(f"{parameter_label(n)} = {v:.6g}" for n, v in fixed.items())
     if title:
         text = full_title(title, diagram.model.parameter_names, fixed)
-    axes[0].set_title(text, fontsize=TEXT)
+    axes[0].set_title(text, fontsize=sized(TEXT))
     marks = [
         marks_of(diagram.bifurcations, diagram.branches, row, diagram.parameter) for row in rows
     ]
     for ax, row, found in zip(axes, rows, marks, strict=True):
-        _draw_row(ax, diagram.branches, found, row)
+        _draw_row(ax, diagram.branches, found, row, look)
         ax.label_outer()
     fig.align_ylabels(axes)
-    mirrors = any(not look.even for look in looks)
-    handles = _handles(diagram.branches, marks[0], mirrors=mirrors)
-    if fig.get_layout_engine() is None:
-        axes[0].legend(handles=handles, fontsize=SMALL, **BESIDE)
-    else:
-        fig.legend(handles=handles, fontsize=SMALL, frameon=False, loc="outside right upper")
+    if legend:
+        mirrors = any(not shown.even for shown in looks)
+        handles = _handles(diagram.branches, marks[0], look, mirrors=mirrors)
+        if fig.get_layout_engine() is None:
+            axes[0].legend(handles=handles, fontsize=sized(SMALL), **BESIDE)
+        else:
+            legend_of(fig, handles)
     settle(axes[0])
     for ax, found in zip(axes, marks, strict=True):
         label_marks(ax, found)
@@ -206,45 +228,49 @@ def _plot_row(
     branches: Sequence[Branch],
     events: Sequence[Bifurcation],
     row: QuantityLike,
-    legend: bool,
+    look: Look,
     *,
     outside: bool,
 ) -> Axes:
     parameter = branches[0].parameter if branches else ""
     marks = marks_of(events, branches, row, parameter)
     mirrors = not row_of(row, _model_of(branches)).even
-    _draw_row(ax, branches, marks, row)
-    if legend and outside:
-        handles = _handles(branches, marks, mirrors=mirrors)
-        ax.legend(handles=handles, fontsize=SMALL, frameon=False, **BESIDE)
+    _draw_row(ax, branches, marks, row, look)
+    if look.legend and outside:
+        handles = _handles(branches, marks, look, mirrors=mirrors)
+        if for_journal() and isinstance(ax.figure, Figure):
+            legend_of(ax.figure, handles)
+        else:
+            ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **BESIDE)
     settle(ax)
     label_marks(ax, marks)
-    if legend and not outside:  # there is no space for the meaning of the markers
-        handles = _handles(branches, (), mirrors=mirrors)
-        ax.legend(handles=handles, fontsize=SMALL - 1.0, loc="best")
+    if look.legend and not outside:  # there is no space for the meaning of the markers
+        handles = _handles(branches, (), look, mirrors=mirrors)
+        ax.legend(handles=handles, fontsize=sized(SMALL - 1.0), loc="best")
     return ax
 
 
 def _draw_row(
-    ax: Axes, branches: Sequence[Branch], marks: Sequence[Mark], row: QuantityLike
+    ax: Axes, branches: Sequence[Branch], marks: Sequence[Mark], row: QuantityLike, look: Look
 ) -> None:
-    colours = _colours(branches)
-    look = row_of(row, _model_of(branches))
-    twins = {b.name for b in branches if not b.mirrored} if look.even else set()
+    label = row_of(row, _model_of(branches))
+    twins = {b.name for b in branches if not b.mirrored} if label.even else set()
     for branch in sorted(branches, key=lambda b: not b.mirrored):
         if branch.mirrored and branch.name in twins:
             continue  # it lies on its original
         if branch.bridge:
             _draw_bridge(ax, branch, row)
         else:
-            _draw_branch(ax, branch, row, colours[branch.name])
+            _draw_branch(ax, branch, row, look.colours[branch.name])
     draw_marks(ax, marks)
     ax.margins(y=0.12)
     displacement = branches[0].model.states[0] if branches else "x"
-    ax.set_ylabel(look.name(displacement), fontsize=TEXT + 1)
+    ax.set_ylabel(label.name(displacement), fontsize=sized(TEXT + 1))
     if branches:
-        ax.set_xlabel(parameter_label(branches[0].parameter), fontsize=TEXT + 1)
-    ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
+        ax.set_xlabel(parameter_label(branches[0].parameter), fontsize=sized(TEXT + 1))
+    if ax.figure.bbox.width / ax.figure.dpi < _COLUMN:
+        ax.locator_params(axis="x", nbins=_TICKS)
+    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
 
 
 def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, colour: str) -> None:
@@ -257,7 +283,7 @@ def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, colour: str) -> No
             run.y,
             color=colour if known else greyish(colour),
             linestyle=UNKNOWN if not known else STABLE if run.stable else UNSTABLE,
-            linewidth=width if known else UNKNOWN_WIDTH,
+            linewidth=sized(width if known else UNKNOWN_WIDTH),
             solid_capstyle="butt",
             zorder=2.0 + 0.5 * bool(run.stable) - 0.3 * branch.mirrored,
         )
@@ -272,25 +298,21 @@ def _draw_bridge(ax: Axes, branch: Branch, row: QuantityLike) -> None:
             run.y,
             color=lighter(BRIDGE_COLOUR, 0.3) if branch.mirrored else BRIDGE_COLOUR,
             linestyle=BRIDGE,
-            linewidth=BRIDGE_WIDTH,
+            linewidth=sized(BRIDGE_WIDTH),
             zorder=1.6 - 0.1 * branch.mirrored,
         )
         for line in lines:
             line.set_gid(branch.name)
 
 
-def _colours(branches: Sequence[Branch]) -> dict[str, str]:
-    """Return a colour for each name; bridges have no colour of their own."""
-    return branch_colours(b.name for b in branches if not b.bridge)
-
-
-def _handles(branches: Sequence[Branch], marks: Sequence[Mark], *, mirrors: bool) -> list[Line2D]:
+def _handles(
+    branches: Sequence[Branch], marks: Sequence[Mark], look: Look, *, mirrors: bool
+) -> list[Line2D]:
     """Return the entries of the legend: branches, meaning of the lines, meaning of the markers.
 
     Where all rows are even, ``mirrors`` is false: images lie on their originals.
     """
-    colours = _colours(branches)
-    handles = [_line(name, colour) for name, colour in colours.items()]
+    handles = [_line(look.names[name], colour) for name, colour in look.colours.items()]
     if mirrors and any(b.mirrored for b in branches):
         handles.append(_line("mirror image: lighter", lighter(GREY), width=MIRROR_WIDTH))
     regular = [b for b in branches if not b.bridge]
@@ -311,7 +333,7 @@ def _handles(branches: Sequence[Branch], marks: Sequence[Mark], *, mirrors: bool
 
 
 def _line(label: str, colour: str, style: Any = STABLE, width: float = LINE_WIDTH) -> Line2D:
-    return Line2D([], [], color=colour, linestyle=style, linewidth=width, label=label)
+    return Line2D([], [], color=colour, linestyle=style, linewidth=sized(width), label=label)
 
 
 def _marker(kind: str, meaning: str) -> Line2D:
@@ -321,7 +343,7 @@ def _marker(kind: str, meaning: str) -> Line2D:
         [],
         linestyle="none",
         marker=look.shape,
-        markersize=look.size,
+        markersize=sized(look.size),
         markerfacecolor=look.face,
         markeredgecolor=look.edge,
         markeredgewidth=0.8,

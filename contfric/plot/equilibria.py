@@ -22,6 +22,7 @@ from contfric.plot.style import (
     event_label,
     lighter,
     parameter_label,
+    sized,
 )
 
 if TYPE_CHECKING:
@@ -76,10 +77,10 @@ def plot_equilibria(
         )
         first = last
     _draw_events(ax, branch, branch.model.states.index(name))
-    ax.set_xlabel(parameter_label(branch.parameter), fontsize=TEXT + 1)
+    ax.set_xlabel(parameter_label(branch.parameter), fontsize=sized(TEXT + 1))
     if not ax.get_ylabel():
-        ax.set_ylabel(parameter_label(name), fontsize=TEXT + 1)
-    ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
+        ax.set_ylabel(parameter_label(name), fontsize=sized(TEXT + 1))
+    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
     return ax
 
 
@@ -100,7 +101,7 @@ def plot_equilibrium_diagram(
         ax.set_xlim(*found.bounds)
     for branch in found.branches:
         plot_equilibria(branch, ax=ax, state=state)
-    ax.set_xlabel(parameter_label(found.parameter), fontsize=TEXT + 1)
+    ax.set_xlabel(parameter_label(found.parameter), fontsize=sized(TEXT + 1))
     return ax
 
 
@@ -125,5 +126,5 @@ def _draw_events(ax: Axes, branch: EquilibriumBranch, k: int) -> None:
             xytext=(0.0, 7.0),
             textcoords="offset points",
             ha="center",
-            fontsize=SMALL,
+            fontsize=sized(SMALL),
         )

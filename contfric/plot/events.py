@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from contfric.models.definition import FloatArray
 from contfric.plot.labels import Anchor, near, place_labels
 from contfric.plot.runs import quantity
-from contfric.plot.style import MARKERS, OTHER_MARKER, event_label
+from contfric.plot.style import MARKERS, OTHER_MARKER, event_label, sized
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
@@ -101,7 +101,7 @@ def draw_marks(ax: Axes, marks: Sequence[Mark]) -> None:
             mark.y,
             linestyle="none",
             marker=look.shape,
-            markersize=look.size * (_SMALLER if mark.on_bridges else 1.0),
+            markersize=sized(look.size * (_SMALLER if mark.on_bridges else 1.0)),
             markerfacecolor=look.face,
             markeredgecolor=look.edge,
             markeredgewidth=0.5 if mark.on_bridges else 0.8,
@@ -116,7 +116,7 @@ def draw_event(ax: Axes, event: Bifurcation, place: tuple[float, float]) -> None
     ax.plot(
         *place,
         marker=look.shape,
-        markersize=look.size + 1.0,
+        markersize=sized(look.size + 1.0),
         markerfacecolor=look.face,
         markeredgecolor=look.edge,
         zorder=3,

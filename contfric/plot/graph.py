@@ -18,6 +18,7 @@ from contfric.plot.style import (
     TEXT,
     domain_colours,
     lighter,
+    sized,
     surface_label,
 )
 
@@ -129,7 +130,7 @@ def _draw_transition(
         float(middle[0]),
         float(middle[1]),
         text,
-        fontsize=SMALL,
+        fontsize=sized(SMALL),
         color=colour if numbers or walked else GREY,
         ha="center",
         va="center",

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING
 from matplotlib.axes import Axes
 
 from contfric.plot.save import axes_or_new
-from contfric.plot.style import BLUE, LINE_WIDTH, SMALL, STABLE, TEXT, UNSTABLE, parameter_label
+from contfric.plot.style import (
+    BLUE,
+    LINE_WIDTH,
+    SMALL,
+    STABLE,
+    TEXT,
+    UNSTABLE,
+    parameter_label,
+    sized,
+)
 
 if TYPE_CHECKING:
     from contfric.curves.quantity_curve import QuantityCurve
@@ -31,8 +40,8 @@ def plot_quantity_curve(curve: QuantityCurve, ax: Axes | None = None) -> Axes:
         look = STABLE if stable else UNSTABLE
         ax.plot(*part.T, linestyle=look, color=BLUE, linewidth=LINE_WIDTH, label=label)
         label = None
-    ax.set_xlabel(parameter_label(curve.parameters[0]), fontsize=TEXT + 1)
-    ax.set_ylabel(parameter_label(curve.parameters[1]), fontsize=TEXT + 1)
-    ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
-    ax.legend(fontsize=SMALL, loc="best")
+    ax.set_xlabel(parameter_label(curve.parameters[0]), fontsize=sized(TEXT + 1))
+    ax.set_ylabel(parameter_label(curve.parameters[1]), fontsize=sized(TEXT + 1))
+    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
+    ax.legend(fontsize=sized(SMALL), loc="best")
     return ax

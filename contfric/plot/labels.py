@@ -13,7 +13,7 @@ from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
 
 from contfric.models.definition import FloatArray
-from contfric.plot.style import GREY, SMALL
+from contfric.plot.style import GREY, SMALL, sized
 
 #: Distances from the point to the label that are tried, in points; leader lines beyond the first.
 _DISTANCES = (5.0, 12.0, 20.0, 30.0, 42.0, 56.0)
@@ -38,8 +38,9 @@ class Anchor:
 def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
     """Write a text beside each point where it hides as little as possible.
 
-    Equal texts at points that cannot be told apart are written once. Call it when everything else
-    is drawn, the limits of the axes are set and the layout has converged (:func:`settle`).
+    Equal texts at points that cannot be told apart are written once, and a text for which there is no place
+    left inside of the axes and off the others is left out. Call it when everything else is drawn, the limits
+    of the axes are set and the layout has converged (:func:`settle`).
     """
     pixels = _point_size(ax)
     todo = _merged(ax, sorted(anchors, key=lambda a: (a.x, a.y)))
@@ -51,7 +52,9 @@ def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
         label = _annotation(ax, anchor, (0.0, 0.0), leader=False)
         size = np.asarray(label.get_window_extent().size) + 2.0 * pixels
         label.remove()
-        centre, distance = _best_place(ax, at, size, pixels, lines, markers, taken)
+        centre, distance, cost = _best_place(ax, at, size, pixels, lines, markers, taken)
+        if cost >= _LABEL:
+            continue  # wherever it stood it would hide another one
         taken.append(_box(centre, size))
         offset = (centre - at) / pixels
         leader = distance > _DISTANCES[0]
@@ -108,7 +111,7 @@ def _annotation(
         textcoords="offset points",
         ha="center",
         va="center",
-        fontsize=SMALL,
+        fontsize=sized(SMALL),
         arrowprops=arrow if leader else None,
         zorder=6,
     )
@@ -122,8 +125,8 @@ def _best_place(
     lines: FloatArray,
     markers: FloatArray,
     taken: Sequence[Bbox],
-) -> tuple[FloatArray, float]:
-    """Return the centre of the cheapest place, in pixels, and its distance in points."""
+) -> tuple[FloatArray, float, float]:
+    """Return the centre of the cheapest place, in pixels, its distance in points, and its cost."""
     best, place = math.inf, (at, _DISTANCES[0])
     for distance in _DISTANCES:
         for k in range(_DIRECTIONS):
@@ -137,7 +140,7 @@ def _best_place(
             cost += _BEYOND * (not _contains(ax.bbox, box))
             if cost < best:
                 best, place = cost, (centre, distance)
-    return place
+    return *place, best
 
 
 def _box(centre: FloatArray, size: FloatArray) -> Bbox:

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from contfric.models.definition import FloatArray
 from contfric.plot.save import axes_or_new
-from contfric.plot.style import GREY, SMALL, TEXT, lighter, parameter_label
+from contfric.plot.style import GREY, SMALL, TEXT, lighter, parameter_label, sized
 
 if TYPE_CHECKING:
     from contfric.chaos.map import LyapunovMap
@@ -53,15 +53,15 @@ def plot_lyapunov_map(lmap: LyapunovMap, ax: Axes | None = None) -> Axes:
     root = ax.figure
     if root is not None:
         bar = root.colorbar(mesh, ax=ax)
-        bar.set_label(r"largest Lyapunov exponent $\lambda$", fontsize=TEXT)
-        bar.ax.tick_params(labelsize=SMALL + 1)
+        bar.set_label(r"largest Lyapunov exponent $\lambda$", fontsize=sized(TEXT))
+        bar.ax.tick_params(labelsize=sized(SMALL + 1))
     ax.set_xlim(edges[0][0], edges[0][-1])
     ax.set_ylim(edges[1][0], edges[1][-1])
-    ax.set_xlabel(parameter_label(first), fontsize=TEXT + 1)
-    ax.set_ylabel(parameter_label(second), fontsize=TEXT + 1)
-    ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
+    ax.set_xlabel(parameter_label(first), fontsize=sized(TEXT + 1))
+    ax.set_ylabel(parameter_label(second), fontsize=sized(TEXT + 1))
+    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
     fixed = ", ".join(f"{parameter_label(n)} = {v:.6g}" for n, v in lmap.params.items() if v != 0.0)
-    ax.set_title(fixed, fontsize=TEXT)
+    ax.set_title(fixed, fontsize=sized(TEXT))
     return ax
 
 
@@ -78,7 +78,7 @@ def _draw_ground(ax: Axes, lmap: LyapunovMap, edges: tuple[FloatArray, FloatArra
         )
         handles.append(Patch(color=colour, label="not computed" if missing else "no exponent"))
     if handles:
-        ax.legend(handles=handles, fontsize=SMALL, loc="best")
+        ax.legend(handles=handles, fontsize=sized(SMALL), loc="best")
 
 
 def edges_of(centres: FloatArray) -> FloatArray:

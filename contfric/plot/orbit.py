@@ -27,7 +27,7 @@ from contfric.plot.orbit_artists import (
 )
 from contfric.plot.pieces import Piece, pieces_of, rest_bounds
 from contfric.plot.save import axes_or_new, figure_or_new
-from contfric.plot.style import BESIDE, SMALL, TEXT, parameter_label
+from contfric.plot.style import BESIDE, SMALL, TEXT, parameter_label, sized
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
@@ -72,9 +72,9 @@ def plot_orbit(
     if legend:
         handles = legend_handles(orbit, pieces_of(orbit))
         if ax is None:
-            new.legend(handles=handles, fontsize=SMALL, frameon=False, **BESIDE)
+            new.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **BESIDE)
         else:
-            new.legend(handles=handles, fontsize=SMALL - 1.0, loc="best")
+            new.legend(handles=handles, fontsize=sized(SMALL - 1.0), loc="best")
     settle(new)
     place_labels(new, named)
     return new
@@ -146,7 +146,7 @@ def plot_orbit_in_time(orbit: Orbit, axes: Sequence[Axes] | None = None) -> list
         draw_levels(ax, orbit, observable.name, vertical=False)
         name_axes(ax, "", parameter_label(observable.name))
         ax.set_xlim(0.0, 1.0)
-    axes[-1].set_xlabel("time / period of the orbit", fontsize=TEXT)
+    axes[-1].set_xlabel("time / period of the orbit", fontsize=sized(TEXT))
     return list(axes)
 
 
@@ -203,11 +203,11 @@ def plot_orbit_panels(orbit: Orbit, fig: Figure | None = None) -> list[Axes]:
     values = ", ".join(
         f"{parameter_label(n)} = {v:.6g}" for n, v in orbit.params.items() if v != 0.0
     )
-    fig.suptitle(f"{orbit.name}:  {values}", fontsize=TEXT)
+    fig.suptitle(f"{orbit.name}:  {values}", fontsize=sized(TEXT))
     handles = legend_handles(orbit, pieces_of(orbit, points=40))
     fig.legend(
         handles=handles,
-        fontsize=SMALL,
+        fontsize=sized(SMALL),
         ncols=_columns([str(handle.get_label()) for handle in handles], fig.get_figwidth()),
         loc="outside lower center" if fig.get_layout_engine() is not None else "lower center",
         frameon=False,

@@ -31,6 +31,7 @@ from contfric.plot.style import (
     domain_colours,
     domain_labels,
     parameter_label,
+    sized,
     surface_label,
 )
 
@@ -122,7 +123,7 @@ def _name_level(ax: Axes, text: str, value: float, vertical: bool) -> None:
         textcoords="offset points",
         ha=ha,
         va=va,
-        fontsize=SMALL,
+        fontsize=sized(SMALL),
         color=GREY,
     )
 
@@ -223,9 +224,9 @@ def _stop_marker(sticks: bool, x: Sequence[float] = (), y: Sequence[float] = ())
 
 def name_axes(ax: Axes, across: str, up: str) -> None:
     """Label both axes and set the look of their ticks."""
-    ax.set_xlabel(across, fontsize=TEXT + 1)
-    ax.set_ylabel(up, fontsize=TEXT + 1)
-    ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
+    ax.set_xlabel(across, fontsize=sized(TEXT + 1))
+    ax.set_ylabel(up, fontsize=sized(TEXT + 1))
+    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
 
 
 def legend_handles(orbit: Orbit, pieces: Sequence[Piece]) -> list[Line2D | Patch]:

@@ -30,6 +30,7 @@ from contfric.plot.style import (
     VERMILLION,
     event_label,
     parameter_label,
+    sized,
 )
 
 if TYPE_CHECKING:
@@ -132,9 +133,9 @@ def _draw(
                 (line,) = ax.plot(*values.T, color=colour, linewidth=width, linestyle=style)
                 line.set_gid(curve.label)
     names = curves[0].parameters if curves else ("", "")
-    ax.set_xlabel(parameter_label(names[0]), fontsize=TEXT + 1)
-    ax.set_ylabel(parameter_label(names[1]), fontsize=TEXT + 1)
-    ax.tick_params(direction="in", top=True, right=True, labelsize=SMALL + 1)
+    ax.set_xlabel(parameter_label(names[0]), fontsize=sized(TEXT + 1))
+    ax.set_ylabel(parameter_label(names[1]), fontsize=sized(TEXT + 1))
+    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
     _mark(ax, special, names)
     _legend(ax, curves, special, legend)
     settle(ax)
@@ -221,4 +222,4 @@ def _legend(
         ring = Line2D([], [], linestyle="none", marker="o", label="codimension two")
         ring.set(markersize=4.5, markerfacecolor="white", markeredgecolor=BLACK)
         handles.append(ring)
-    ax.legend(handles=handles, fontsize=SMALL, **where)
+    ax.legend(handles=handles, fontsize=sized(SMALL), **where)

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from contfric.errors import ParameterError, did_you_mean
 from contfric.interrupts import held_back
+from contfric.plot.style import SMALL, sized
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,6 +28,72 @@ _ANONYMOUS: dict[str, dict[str, Any]] = {
     ".pdf": {"Creator": None, "Producer": None, "CreationDate": None},
     ".svg": {"Creator": None, "Date": None},
 }
+
+#: Widths of a figure in a journal (mm): of one column and of the page, as Springer and Elsevier have them.
+JOURNALS = {"single": 88.0, "double": 180.0}
+#: Size of text there (points): captions have 8 to 9.
+_JOURNAL_TEXT = 8.0
+#: A figure gets lower by less than it gets narrower.
+_LOWEST = 0.6
+#: Width of a column of a legend (inches), at the size of its text for journals.
+_COLUMN = 1.7
+#: Lengths in a legend of columns, in units of its text: a column of a journal is as wide as two of them.
+_TIGHT = {"columnspacing": 1.0, "handlelength": 1.6, "handletextpad": 0.6}
+
+_width: ContextVar[float | None] = ContextVar("width", default=None)
+
+
+@contextmanager
+def journal(width: str) -> Iterator[None]:
+    """Make the figures that are drawn inside of a ``with`` as wide as a journal asks for.
+
+    Text has 8 points and stays text in SVG, as it does in PDF; legends stand below. Axes that are given keep
+    their size.
+
+    Parameters
+    ----------
+    width : str
+        ``single``, a column of 88 mm, or ``double``, 180 mm.
+
+    Raises
+    ------
+    ParameterError
+        For any other width.
+
+    Examples
+    --------
+    >>> with journal("single"):
+    ...     print(new_figure(7, 4).get_size_inches().round(2))
+    [3.46 2.4 ]
+    """
+    if width not in JOURNALS:
+        raise ParameterError(f"no width '{width}' of a journal{did_you_mean(width, [*JOURNALS])}")
+    before = _width.set(JOURNALS[width] / 25.4)
+    try:
+        with rc_context({"font.size": _JOURNAL_TEXT, "svg.fonttype": "none"}):
+            yield
+    finally:
+        _width.reset(before)
+
+
+def _size(width: float, height: float) -> tuple[float, float]:
+    """Return the size of a new figure: that of a journal, if one is asked for."""
+    asked = _width.get()
+    return (width, height) if asked is None else (asked, max(_LOWEST, asked / width) * height)
+
+
+def for_journal() -> bool:
+    """Tell whether figures are drawn for a journal: with legends below, in columns."""
+    return _width.get() is not None
+
+
+def legend_of(fig: Figure, handles: Sequence[Any]) -> None:
+    """Write the legend of a figure next to its axes, in a journal below them."""
+    where: dict[str, Any] = {"loc": "outside right upper"}
+    if for_journal():
+        columns = max(1, int(float(fig.get_figwidth()) / _COLUMN))
+        where = {"loc": "outside lower center", "ncols": columns, **_TIGHT}
+    fig.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **where)
 
 
 def new_figure(width: float = 7.0, height: float = 4.3) -> Figure:
@@ -37,7 +109,7 @@ def new_figure(width: float = 7.0, height: float = 4.3) -> Figure:
     >>> new_figure(6, 4).get_size_inches()
     array([6., 4.])
     """
-    return Figure(figsize=(width, height), layout="constrained")
+    return Figure(figsize=_size(width, height), layout="constrained")
 
 
 def save_figure(fig: Figure, path: str | PathLike[str], dpi: float = DPI) -> Path:
@@ -55,11 +127,10 @@ def save_figure(fig: Figure, path: str | PathLike[str], dpi: float = DPI) -> Pat
     Path
         The file.
     """
-    import matplotlib as mpl
-
     file = Path(path)
     metadata = _ANONYMOUS.get(file.suffix.lower())
-    with mpl.rc_context({"svg.hashsalt": "contfric"}):
+    # fonts of type 42: what is text stays text
+    with rc_context({"svg.hashsalt": "contfric", "pdf.fonttype": 42}):
         fig.savefig(file, dpi=dpi, metadata=metadata)
     return file
 
@@ -71,7 +142,7 @@ def axes_or_new(ax: Axes | None, width: float = 7.0, height: float = 4.3) -> Axe
     with held_back():
         from matplotlib import pyplot
 
-    fig = pyplot.figure(figsize=(width, height), layout="constrained")
+    fig = pyplot.figure(figsize=_size(width, height), layout="constrained")
     return fig.add_subplot()
 
 
@@ -82,4 +153,4 @@ def figure_or_new(fig: Figure | None, width: float, height: float) -> Figure:
     with held_back():
         from matplotlib import pyplot
 
-    return pyplot.figure(figsize=(width, height), layout="constrained")
+    return pyplot.figure(figsize=_size(width, height), layout="constrained")

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from matplotlib import rcParams
 from matplotlib.colors import to_hex, to_rgb
 
 from contfric.errors import ParameterError, did_you_mean
@@ -35,10 +36,22 @@ LINE_WIDTH, MIRROR_WIDTH, UNKNOWN_WIDTH = 1.7, 1.1, 0.9
 #: Bridges lie apart: finely dotted, thin, of one colour, beneath the branches of motions without holds.
 BRIDGE, BRIDGE_COLOUR, BRIDGE_WIDTH = (0, (1.4, 1.4)), "#8C8C8C", 1.0
 BRIDGE_NAME = "bridge (orbits with a hold)"
+#: Sizes of text where ``font.size`` of matplotlib is 10, its default; see :func:`sized`.
 SMALL, TEXT = 8.0, 10.0
 
 #: Where a legend beside the axes stands.
 BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
+
+
+def sized(size: float) -> float:
+    """Return a size of text or of a marker, in points, in proportion to matplotlib's ``font.size``.
+
+    Examples
+    --------
+    >>> sized(SMALL)
+    8.0
+    """
+    return size * float(rcParams["font.size"]) / 10.0
 
 
 @dataclass(frozen=True)
@@ -165,7 +178,8 @@ def full_title(title: str, names: Sequence[str], fixed: Mapping[str, float]) -> 
         for name, value in fixed.items()
         if value != 0.0 and not re.search(rf"(?<!\w){name}\s*=\s*{value:.6g}(?!\d)", title)
     ]
-    return "\n".join([title_label(title, names), *([", ".join(missing)] if missing else [])])
+    lines = [title_label(title, names), ", ".join(missing)]
+    return "\n".join(filter(None, lines))
 
 
 def surface_label(name: str) -> str:

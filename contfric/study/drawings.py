@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from contfric.errors import did_you_mean
 from contfric.study.responses import KEYS
-from contfric.study.schema import Figure, FigureKind, Format, Row, StudyFile
+from contfric.study.schema import Figure, FigureKind, Format, Journal, Row, StudyFile
 
 if TYPE_CHECKING:
     from contfric.yaml_lines import LocatedYaml
@@ -16,11 +16,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure to draw: its kind, the rows of a diagram, and the name of its file."""
+    """A figure to draw: its kind, the rows of a diagram, the name of its file, and its width."""
 
     kind: FigureKind
     rows: tuple[Row | str, ...]
     file: str
+    journal: Journal | None = None
 
 
 def drawings_of(located: LocatedYaml, content: StudyFile) -> tuple[Drawing, ...]:
@@ -29,7 +30,7 @@ def drawings_of(located: LocatedYaml, content: StudyFile) -> tuple[Drawing, ...]
     for index, figure in enumerate(content.figures):
         rows = _rows(located, content, index)
         file = _file_name(located, figure, index, [drawing.file for drawing in drawings])
-        drawings.append(Drawing(figure.kind, rows, file))
+        drawings.append(Drawing(figure.kind, rows, file, figure.journal))
     return tuple(drawings)
 
 

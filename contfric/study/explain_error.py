@@ -16,6 +16,7 @@ from contfric.study.schema import (
     Figure,
     FigureKind,
     Format,
+    Journal,
     LyapunovTask,
     PlaneTask,
     Row,
@@ -54,6 +55,7 @@ _NAMES: dict[str, type[Enum]] = {
     "kind": FigureKind,
     "rows": Row,
     "format": Format,
+    "journal": Journal,
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -73,6 +74,13 @@ def _draw_equilibria(axes: list[Axes], rows: list[str], found: Findings) -> None
 
 def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
     """Draw a figure and write it; all but orbits and graphs carry the study's title."""
+    from contfric.plot.save import journal
+
+    with nullcontext() if drawing.journal is None else journal(drawing.journal.value):
+        _paint(path, drawing, found, "" if drawing.journal else title)
+
+
+def _paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
     from contfric.plot.branch_graph import plot_branch_graph
     from contfric.plot.diagram import plot_diagram
     from contfric.plot.graph import plot_transition_graph
@@ -80,7 +88,7 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
     from contfric.plot.orbit import panels_height, plot_orbit_panels
     from contfric.plot.plane import plot_plane
     from contfric.plot.save import new_figure, save_figure
-    from contfric.plot.style import TEXT, full_title, title_label
+    from contfric.plot.style import TEXT, full_title, sized, title_label
 
     orbit, diagram, plane, lmap = found.orbit, found.diagram, found.plane, found.lyapunov
     width, height, row_height = _SIZES[drawing.kind]
@@ -89,21 +97,21 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
         assert lmap is not None
         names = [*lmap.params, *lmap.axes]
         plot_lyapunov_map(lmap, ax=figure.add_subplot()).set_title(
-            full_title(title, names, lmap.params), fontsize=TEXT
+            full_title(title, names, lmap.params), fontsize=sized(TEXT)
         )
     elif drawing.kind.value in KEYS:
         response = found.responses[drawing.kind.value]
         fixed = dict(response.params)
         fixed.pop(getattr(response, "parameter", ""), None)
         response.plot(ax=figure.add_subplot()).set_title(
-            full_title(title, response.model.parameter_names, fixed), fontsize=TEXT
+            full_title(title, response.model.parameter_names, fixed), fontsize=sized(TEXT)
         )
     elif drawing.kind is FigureKind.PLANE:
         assert plane is not None
         axes = figure.add_subplot()
         if lmap is not None and tuple(lmap.axes) == plane.parameters:
             plot_lyapunov_map(lmap, ax=axes)
-        axes.set_title(title_label(title, plane.model.parameter_names), fontsize=TEXT)
+        axes.set_title(title_label(title, plane.model.parameter_names), fontsize=sized(TEXT))
         plot_plane(plane, ax=axes, legend_below=True)
     elif drawing.kind in _OF_DIAGRAM:
         assert diagram is not None
@@ -114,7 +122,7 @@ def paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
         else:
             axes = figure.add_subplot()
             plot_branch_graph(diagram, ax=axes)
-            axes.set_title(title_label(title, diagram.model.parameter_names), fontsize=TEXT)
+            axes.set_title(title_label(title, diagram.model.parameter_names), fontsize=sized(TEXT))
     else:
         assert orbit is not None
         if drawing.kind is FigureKind.ORBIT:

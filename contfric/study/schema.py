@@ -74,6 +74,13 @@ class Format(str, Enum):
     PDF = "pdf"
 
 
+class Journal(str, Enum):
+    """Widths of figures in a journal."""
+
+    SINGLE = "single"
+    DOUBLE = "double"
+
+
 # YAML has texts where Python has enumerations: these fields alone are converted
 # (a text that is none of them is a quantity, which the model has or has not)
 _Quantity = Annotated[str, Field(min_length=1)]
@@ -269,6 +276,10 @@ class Figure(_Part):
     file: str | None = Field(None, min_length=1, description="the name of the figure's file")
     format: Annotated[Format, Field(strict=False)] | None = Field(
         None, description="one of png, svg, pdf"
+    )
+    journal: Annotated[Journal, Field(strict=False)] | None = Field(
+        None,
+        description="single or double: as wide as a column (88 mm) or the page (180 mm) of a journal",
     )
 
 

@@ -16,16 +16,19 @@ import pytest
 
 mpl.use("Agg")
 
-from matplotlib import pyplot
+from matplotlib import pyplot, rc_context
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.text import Annotation
+from matplotlib.text import Annotation, Text
 
 import contfric as cf
 from contfric.errors import ParameterError
 from contfric.plot import (
     ROWS,
+    journal,
     new_figure,
     plot_branch_graph,
     plot_branches,
@@ -38,6 +41,7 @@ from contfric.plot import (
     save_figure,
 )
 from contfric.plot.events import marks_of
+from contfric.plot.labels import Anchor, place_labels
 from contfric.plot.orbit import _columns
 from contfric.plot.pieces import level, observe, pieces_of
 from contfric.plot.runs import aligned, stability_runs
@@ -559,6 +563,70 @@ def test_colours_tell_apart() -> None:
     assert len(set(branch_colours(many).values())) == len(many)
     assert len(set(domain_colours(cf.load_model("popp")).values())) == 10
     assert isinstance(UNSTABLE, tuple)
+
+
+@pytest.mark.parametrize(("width", "millimetres"), [("single", 88.0), ("double", 180.0)])
+def test_figures_are_as_wide_as_a_journal_asks_for(
+    diagram: Any, tmp_path: Path, width: str, millimetres: float
+) -> None:
+    with journal(width):
+        figures = [diagram.plot().figure, plot_diagram(diagram, ("x_max", "psi"))[0].figure]
+    for number, figure in enumerate(figures):
+        assert figure.get_figwidth() * 25.4 == pytest.approx(millimetres)
+        figure.canvas.draw()
+        (legend,) = figure.legends
+        axes = [ax.get_tightbbox() for ax in figure.axes]
+        assert legend.get_window_extent().y1 <= min(box.y0 for box in axes) + 1.0  # below them
+        assert legend.get_window_extent().width <= figure.bbox.width
+        for text in figure.findobj(Text):
+            assert text.get_fontsize() <= 9.0 or not text.get_text()
+        written = save_figure(figure, tmp_path / f"{number}.pdf").read_bytes()
+        assert b"/Type0" in written and b"/Type3" not in written  # text is text, no drawing
+    assert diagram.plot().figure.get_figwidth() == 7.0
+
+
+def test_a_width_that_no_journal_has() -> None:
+    with (
+        pytest.raises(
+            cf.ParameterError, match="no width 'singel' of a journal; did you mean 'single'"
+        ),
+        journal("singel"),
+    ):
+        pass
+
+
+def test_sizes_follow_the_user(diagram: Any) -> None:
+    plain = diagram.plot()
+    with rc_context({"font.size": 15.0}):
+        large = diagram.plot()
+    for one, other in ((plain.xaxis.label, large.xaxis.label), (plain.texts[0], large.texts[0])):
+        assert other.get_fontsize() == pytest.approx(1.5 * one.get_fontsize())
+    assert large.lines[0].get_linewidth() == pytest.approx(1.5 * plain.lines[0].get_linewidth())
+
+
+def test_names_and_colours_of_the_user(diagram: Any) -> None:
+    ax = diagram.plot(names={"1a": "asymmetric"}, colours={"1a": "#123456"})
+    entries = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert "asymmetric" in entries and "1a" not in entries
+    drawn = {to_hex(line.get_color()) for line in ax.lines if line.get_gid() == "1a"}
+    assert "#123456" in drawn
+    assert diagram.plot(legend=False).get_legend() is None
+    with pytest.raises(cf.ParameterError, match="no branch '1b' here; did you mean '1a'"):
+        diagram.plot(names={"1b": "x"})
+    with pytest.raises(cf.ParameterError, match="is no colour of matplotlib"):
+        diagram.plot(colours={"1a": "no colour"})
+
+
+def test_labels_without_a_place_are_left_out() -> None:
+    """Of a hundred labels in one corner only those are written that hide no other."""
+    ax = new_figure(3.0, 2.0).add_subplot()
+    ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+    anchors = [Anchor(0.5 + 1e-3 * k, 0.5, f"event {k}") for k in range(100)]
+    placed = place_labels(ax, anchors)
+    FigureCanvasAgg(ax.figure).draw()
+    boxes = [Text.get_window_extent(label) for label in placed]  # without their lines
+    assert 3 < len(placed) < 60
+    assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
 
 
 def test_a_study_has_one_title(diagram: Any) -> None:

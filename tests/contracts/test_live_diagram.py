@@ -311,3 +311,13 @@ def test_a_browser_shows_it(written: Path, tmp_path: Path) -> None:
     assert "2s" in picked["facts"]
     assert picked["parts"] >= 4  # phases of slip and stick
     assert len(set(picked["curves"])) == 1
+
+
+def test_a_notebook_shows_the_page_in_a_frame(diagram: cf.Diagram, written: Path) -> None:
+    shown = diagram.show(height=500)
+    frame = shown._repr_html_()
+    (source,) = re.findall(r'<iframe srcdoc="([^"]*)"', frame)
+    assert 'height="500"' in frame and "allow-same-origin" not in frame
+    page_itself = html.unescape(source)
+    assert page_itself.count("<html") == 1 and diagram.branches[0].name in page_itself
+    assert len(repr(shown)) < 200

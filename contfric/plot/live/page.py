@@ -75,17 +75,22 @@ def write_page(diagram: Diagram, path: str | PathLike[str]) -> Path:
     ResultFileError
         If the file cannot be written.
     """
+    text, file = page_of(diagram), Path(path)
+    with replacing(file) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return file
+
+
+def page_of(diagram: Diagram) -> str:
+    """Return the text of the page; see :func:`write_page`."""
     need_bokeh()
-    file = Path(path)
     text = ""
     orbits: dict[tuple[int, int], dict[str, Any]] = {}
     for detail in _DETAILS:
         text = _page(diagram, collect(diagram, detail, orbits))
         if len(text.encode()) <= LARGEST:
             break
-    with replacing(file) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return file
+    return text
 
 
 def _page(diagram: Diagram, data: dict[str, Any]) -> str:
