@@ -34,7 +34,36 @@ class Location(str, Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Equilibrium:
+class Rest:
+    """A state at which one mode rests: what an equilibrium and a set of them have in common."""
+
+    region: Region
+    vector: FloatArray
+    state: FloatArray
+
+    @property
+    def model(self) -> Model:
+        """The model that rests."""
+        return self.region.model
+
+    @property
+    def params(self) -> dict[str, float]:
+        """All parameters by name."""
+        return self.model.mapping(self.vector)
+
+    @property
+    def mode(self) -> str:
+        """Name of its mode."""
+        return self.region.mode
+
+    @property
+    def pseudo(self) -> bool:
+        """Whether it is a pseudo-equilibrium: of a mode that lies on a surface."""
+        return bool(self.region.on)
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium(Rest):
     """A zero of the field of one mode.
 
     Attributes
@@ -56,32 +85,9 @@ class Equilibrium:
     ('rise', [0.625, 0.0], False)
     """
 
-    region: Region
-    vector: FloatArray
-    state: FloatArray
     eigenvalues: ComplexArray
     location: Location
     violated: tuple[str, ...] = ()
-
-    @property
-    def model(self) -> Model:
-        """The model that rests."""
-        return self.region.model
-
-    @property
-    def params(self) -> dict[str, float]:
-        """All parameters by name."""
-        return self.model.mapping(self.vector)
-
-    @property
-    def mode(self) -> str:
-        """Name of its mode."""
-        return self.region.mode
-
-    @property
-    def pseudo(self) -> bool:
-        """Whether it is a pseudo-equilibrium: of a mode that lies on a surface."""
-        return bool(self.region.on)
 
     @property
     def admissible(self) -> bool:
@@ -120,7 +126,7 @@ def is_stable(eigenvalues: ComplexArray) -> bool | None:
 
 
 @dataclass(frozen=True, eq=False)
-class EquilibriumSet:
+class EquilibriumSet(Rest):
     """A whole set of equilibria: every state of it is one, as where a mass that sticks is at rest.
 
     Attributes
@@ -139,33 +145,10 @@ class EquilibriumSet:
         Of the field within the surfaces of the mode, but one zero for each dimension.
     """
 
-    region: Region
-    vector: FloatArray
-    state: FloatArray
     directions: FloatArray
     states: FloatArray
     ends: tuple[tuple[str, FloatArray], ...]
     eigenvalues: ComplexArray
-
-    @property
-    def model(self) -> Model:
-        """The model that rests."""
-        return self.region.model
-
-    @property
-    def params(self) -> dict[str, float]:
-        """All parameters by name."""
-        return self.model.mapping(self.vector)
-
-    @property
-    def mode(self) -> str:
-        """Name of the mode."""
-        return self.region.mode
-
-    @property
-    def pseudo(self) -> bool:
-        """Whether the mode lies on a surface."""
-        return bool(self.region.on)
 
     @property
     def dimension(self) -> int:

@@ -315,15 +315,5 @@ def _line(label: str, colour: str, style: Any = STABLE, width: float = LINE_WIDT
 
 
 def _marker(kind: str, meaning: str) -> Line2D:
-    look = MARKERS.get(kind, OTHER_MARKER)
-    return Line2D(
-        [],
-        [],
-        linestyle="none",
-        marker=look.shape,
-        markersize=look.size,
-        markerfacecolor=look.face,
-        markeredgecolor=look.edge,
-        markeredgewidth=0.8,
-        label=f"{kind}: {meaning}",
-    )
+    marker = MARKERS.get(kind, OTHER_MARKER)
+    return Line2D([], [], label=f"{kind}: {meaning}", **marker.look())

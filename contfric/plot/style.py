@@ -50,6 +50,17 @@ class Marker:
     size: float = 6.0
     edge: str = BLACK
 
+    def look(self) -> dict[str, Any]:
+        """Return matplotlib's arguments for points that are drawn with it, without a line."""
+        return {
+            "linestyle": "none",
+            "marker": self.shape,
+            "markersize": self.size,
+            "markerfacecolor": self.face,
+            "markeredgecolor": self.edge,
+            "markeredgewidth": 0.8,
+        }
+
 
 MARKERS = {
     "SN": Marker("o", size=5.5),

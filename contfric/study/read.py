@@ -309,13 +309,7 @@ def _check_grid(located: LocatedYaml, content: StudyFile, model: Model) -> None:
             model.index_of(name)
         except ParameterError as error:
             located.fail(address, str(error))
-        fits = len(values) == 3 and values[0] < values[1] and values[2] >= 2
-        if not fits or values[2] != int(values[2]):
-            located.fail(
-                address,
-                f"{name} is [low, high, number of values], with low < high and a whole number of at "
-                f"least 2, got {values}",
-            )
+        responses.check_axis(located, address, name, values)
     from contfric.chaos.compute import check_size
 
     shape = tuple(int(values[2]) for values in task.grid.values())
