@@ -28,16 +28,6 @@ HEAD = "name: test\nmodel: coulomb\n"
 WALK = "segments: x0v+ -> stick -> x-v+\n"
 
 
-@pytest.fixture
-def write(tmp_path: Path):
-    def write_file(text: str, name: str = "test.yaml") -> Path:
-        path = tmp_path / name
-        path.write_text(text, encoding="utf-8")
-        return path
-
-    return write_file
-
-
 # ------------------------------------------------------------------------------ bundled files
 
 
