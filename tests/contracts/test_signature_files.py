@@ -72,7 +72,7 @@ def test_model_without_entry_point_may_be_passed(write) -> None:
     other = dataclasses.replace(COULOMB, name="other")
     path = write("name: mine\nmodel: other\n" + WALK)
     assert load_signature(path, other).model is other
-    with pytest.raises(NotationError, match=r"test\.yaml:2: unknown model 'other'"):
+    with pytest.raises(NotationError, match=r"scene\.yaml:2: unknown model 'other'"):
         load_signature(path)
 
 
