@@ -109,7 +109,7 @@ def write_rates(functions, rank, mode, t, p, walk, cycle, rows, cell):  # type: 
 
 @helper
 def polish(functions, mode, t, p, walk, cycle, rows):  # type: ignore[no-untyped-def]
-    """Move ``walk.y`` to the equilibrium of a mode beside it, where there is one and no continuum."""
+    """Move ``walk.y`` to the equilibrium of a mode near it, where there is one and no continuum."""
     n = walk.y.shape[0]
     for _ in range(_POLISHES):
         functions.flow(mode, t, walk.y, 1.0, p, rows.turns[:0], walk.end, walk.jac)
@@ -128,7 +128,7 @@ def polish(functions, mode, t, p, walk, cycle, rows):  # type: ignore[no-untyped
 
 @helper
 def write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
-    """Write the exponents of the equilibrium beside ``walk.y``; tell whether it attracts.
+    """Write the exponents of the equilibrium near ``walk.y``; tell whether it attracts.
 
     It may lie on a surface. If the fields of two modes vanish there, but their derivatives differ, no
     matrix has its exponents: there are none.
