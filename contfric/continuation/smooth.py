@@ -56,7 +56,7 @@ def smooth_events(
     from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
 
     base = len(before.tests) - EXTRA
-    # an event behind a sliding one is none; but where a stop becomes tangential multipliers are infinite
+    # events behind a sliding one do not happen; where a stop becomes tangential multipliers are infinite
     after = beyond if np.all(np.isfinite(beyond.tests[base:])) else after
     found: list[Located] = []
     folded = False

@@ -98,7 +98,7 @@ class Equilibrium(Rest):
     def stable(self) -> bool | None:
         """Whether it attracts what is near; None where its eigenvalues do not tell.
 
-        A pseudo-equilibrium has to attract within its surface, and the fields beside have to lead to that.
+        A pseudo-equilibrium has to attract within its surface, to which the fields next to it have to lead.
         """
         if self.pseudo and not self.region.attracts(self.state, self.vector):
             return False

@@ -1,6 +1,6 @@
 """Roots along a segment of the forced oscillator: where u, v or their rates take a value.
 
-Pieces of two radians are settled by certificates (:mod:`contfric.flow.pieces`); where they leave it open
+Pieces of two radians are decided by certificates (:mod:`contfric.flow.pieces`); where they leave it open
 (near a grazing) the march by Taylor's remainder (:mod:`contfric.flow.march`) goes on.
 """
 

@@ -54,7 +54,7 @@ def holds_of(model: Model, word: Word) -> tuple[Hold, ...]:
     ------
     ValueError
         If a hold comes first (the pin is a condition on the segment before it), follows another
-        hold, or is none of the model.
+        hold, or the model has no such hold.
     """
     found = []
     for index, (mode, exit_) in enumerate(word):

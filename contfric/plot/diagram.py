@@ -72,7 +72,7 @@ def plot_branches(
     events : bool
         Whether to mark and label the branches' bifurcations.
     legend : bool
-        Whether to draw the legend: beside new axes, or inside yours, there without the meaning of
+        Whether to draw the legend: next to new axes, or inside yours, there without the meaning of
         the markers.
 
     Examples

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 #: Relative: events of one kind this near in the parameter are images of one another.
 _SAME = 1e-9
-#: Extrema of the orbits of one event agree to this: an event beside a singular point, where a branch is
+#: Extrema of the orbits of one event agree to this: an event near a singular point, where a branch is
 #: vertical, is located to about 1e-6.
 _SAME_MOTION = 1e-5
 #: A diagram with more tangencies than this does not label them; nor does it label the events that lie on

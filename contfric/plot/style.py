@@ -37,7 +37,7 @@ BRIDGE, BRIDGE_COLOUR, BRIDGE_WIDTH = (0, (1.4, 1.4)), "#8C8C8C", 1.0
 BRIDGE_NAME = "bridge (orbits with a hold)"
 SMALL, TEXT = 8.0, 10.0
 
-#: Where a legend beside the axes stands.
+#: Where a legend next to the axes stands.
 BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
 
 
@@ -148,7 +148,7 @@ def parameter_label(name: str) -> str:
 def title_label(title: str, names: Sequence[str]) -> str:
     r"""Return a title with the names of parameters in it as mathematics.
 
-    A name of one letter may be a word: it counts where a value or "in" stands beside it.
+    A name of one letter may be a word: it counts where a value or "in" stands next to it.
 
     Examples
     --------

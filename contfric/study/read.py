@@ -340,7 +340,7 @@ def _check_plane(located: LocatedYaml, content: StudyFile, model: Model) -> None
     for name, values in (task.sections or {}).items():
         if name not in ranges:
             hint = did_you_mean(name, ranges)
-            located.fail(("plane", "sections"), f"'{name}' is none of the two parameters{hint}")
+            located.fail(("plane", "sections"), f"'{name}' is not one of the two parameters{hint}")
         low, high = ranges[name]
         for value in values:
             if not low <= value <= high:
