@@ -74,8 +74,3 @@ def holds_of(model: Model, word: Word) -> tuple[Hold, ...]:
             )
         )
     return tuple(found)
-
-
-def with_holds_behind(word: Word) -> int:
-    """Return how far a word is to be rotated so that it does not start with a hold."""
-    return next(i for i, (_, exit_) in enumerate(word) if not is_hold(exit_))

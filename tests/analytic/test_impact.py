@@ -1,4 +1,4 @@
-"""Forced oscillator beside a wall: orbits of one impact in closed form, multipliers, grazing.
+"""Forced oscillator and a wall: orbits of one impact in closed form, multipliers, grazing.
 
 Between impacts ``x = p(t) + free motion`` with the forced response p. An orbit of one impact a period T
 that meets the wall at phase s with speed u leaves it with ``-e u``; after T it is back::

@@ -45,7 +45,7 @@ def test_ends_say_that_the_motion_is_continuous() -> None:
 
 @pytest.mark.parametrize("beside", [-1e-3, 1e-3])
 def test_events_by_simulation_on_both_sides(beside: float) -> None:
-    """The words beside each event are those of the branches that meet there."""
+    """The words near each event are those of the branches that meet there."""
     checked = 0
     for node in diagram().nodes:
         b = node.bifurcation
