@@ -1,4 +1,4 @@
-"""Files whose content is checked before it is used: with a list of digests beside them, or a seal in them.
+"""Files whose content is checked before it is used: with a list of digests next to them, or a seal in them.
 
 What a disk, a copy or a killed process has damaged is thrown away, so that whoever needs it makes it again.
 """

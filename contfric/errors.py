@@ -69,7 +69,7 @@ def did_you_mean(word: object, valid: Iterable[str]) -> str:
     "; did you mean 'Omega'? Valid: Omega, S"
     """
     names, word = [str(name) for name in valid], str(word)
-    likeness = {  # a slip of the shift key is none
+    likeness = {  # upper and lower case count as the same
         name: difflib.SequenceMatcher(None, word.lower(), name.lower()).ratio() for name in names
     }
     best = max(likeness.values(), default=0.0)
@@ -87,7 +87,7 @@ def whole_number(name: str, value: object, least: int, most: int | None = None) 
     Raises
     ------
     ParameterError
-        If it is none, or outside of its limits.
+        If it is no whole number, or outside of its limits.
 
     Examples
     --------
@@ -112,7 +112,7 @@ def checked_range(name: str, bounds: object) -> tuple[float, float]:
     Raises
     ------
     ParameterError
-        If it is none, or so wide or narrow that steps along it cannot be resolved.
+        If it is no such range, or so wide or narrow that steps along it cannot be resolved.
 
     Examples
     --------
@@ -171,7 +171,7 @@ def real_number(
     Raises
     ------
     ParameterError
-        If it is none, or below its limit.
+        If it is no finite number, or below its limit.
 
     Examples
     --------
@@ -209,7 +209,7 @@ def mapping_of(name: str, value: object, example: str) -> Mapping[Any, Any]:
     Raises
     ------
     ParameterError
-        If it is none.
+        If it is no mapping.
     """
     if not isinstance(value, Mapping):
         raise ParameterError(f"{name} is a mapping, such as {example}; got {shown(value)}")
@@ -217,7 +217,7 @@ def mapping_of(name: str, value: object, example: str) -> Mapping[Any, Any]:
 
 
 def items_of(value: object) -> tuple[Any, ...]:
-    """Return the items of a list that a user gave; empty if it is none (a text is none).
+    """Return the items of a list that a user gave; empty if it is no list (a text is not one).
 
     Examples
     --------
@@ -252,7 +252,7 @@ def path_of(what: str, value: object) -> Path:
     Raises
     ------
     ResultFileError
-        If it is none.
+        If it is no path.
     """
     if not isinstance(value, (str, os.PathLike)) or not str(value).strip() or "\0" in str(value):
         raise ResultFileError(f"{what} is a path, such as 'results.npz', got {shown(value)}")

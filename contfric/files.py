@@ -50,7 +50,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def remove_leftovers(path: Path) -> None:
-    """Delete what processes that were killed while they wrote a file have left beside it."""
+    """Delete what processes that were killed while they wrote a file have left next to it."""
     for part in path.parent.glob(f".{path.stem}.*.part{path.suffix}"):
         with suppress(OSError):
             part.unlink()

@@ -7,7 +7,7 @@ time that a new model takes to compile. Here its code stays as it was lowered, a
 is optimised, as a whole.
 
 It is a compiler pipeline of its own (numba's manual, "Customizing the compiler") with a code library that
-leaves these steps out. The library is none of numba's public classes: where it does not have what is
+leaves these steps out. The library is not a public class of numba: where it does not have what is
 overridden here, helpers are compiled in numba's own way, with the same result.
 """
 
@@ -28,7 +28,7 @@ _NEEDED = (
 
 
 class _NoMachineCode:
-    """Takes the environment that machine code would ask for: there is none."""
+    """Takes the environment that machine code would ask for, and has none."""
 
     def set_env(self, name: str, environment: Any) -> None:
         """Keep nothing."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Address: TypeAlias = tuple[str | int, ...]
 #: Largest file, and most entries in it: a model or a study has a few hundred. (Reading takes a second then.)
 _MOST_BYTES, _MOST_ENTRIES = 100_000, 20_000
-#: Words for true and false beside these two, which are names elsewhere.
+#: Words for true and false other than these two, which are names elsewhere.
 _TRUTH = {"yes": True, "on": True, "no": False, "off": False}
 #: What keeps YAML from reading a text with a colon.
 _COLON = "; a text with ': ' in it needs quotes"
@@ -75,7 +75,7 @@ def read_yaml(path: Path) -> LocatedYaml:
         hint = _COLON if str(error.problem).startswith("mapping values") else ""
         raise NotationError(f"{path}:{line}: no valid YAML: {error.problem}{hint}") from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        # ValueError: scalars that look like a date but are none
+        # ValueError: scalars that look like a date but are not one
         raise NotationError(f"{path}:1: no valid YAML: {error}") from None
     if node is None or not isinstance(data, dict):
         raise NotationError(f"{path}:1: must be a mapping of keys to values")

@@ -1,4 +1,4 @@
-"""An independent run in one parameter beside a point of a curve."""
+"""An independent run in one parameter near a point of a curve."""
 
 from __future__ import annotations
 

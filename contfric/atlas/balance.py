@@ -1,4 +1,4 @@
-"""Sums of fixed-point indices in a diagram: beside every event, and over all orbits of one period.
+"""Sums of fixed-point indices in a diagram: near every event, and over all orbits of one period.
 
 The index is that of :mod:`contfric.orbit.index`. Both sums are told by topology; one that is not as it must
 be says that something is not in the diagram.
@@ -35,7 +35,7 @@ _BESIDE = 10.0
 _SHARES = (0.381966, 0.618034)
 #: Events nearer than this share of the range have nothing between them that could be told from them.
 _APART = 1e-6
-#: Where rest is tried beside an event, relative to the range: beyond the accuracy of the event.
+#: Where rest is tried near an event, relative to the range: beyond the accuracy of the event.
 _REST_BESIDE = 1e-4
 #: Events of a trial of rest: a motion has some in each period.
 _EVENTS = 20
@@ -93,7 +93,7 @@ class IndexSum:
 
 
 def balances(diagram: Diagram) -> Iterator[Balance]:
-    """Yield the sums of indices beside every event that is no tangency.
+    """Yield the sums of indices near every event that is no tangency.
 
     Events at the two ends of a continuum are one place, and so are those whose parameters are not to be told
     apart: all that leaves them is summed together.
@@ -140,7 +140,7 @@ def _rest_of(diagram: Diagram, node: Node) -> Orbit | None:
 def _rests(orbit: Orbit, parameter: str, value: float) -> bool:
     """Tell whether the mass can stay at rest for ever, where it comes to rest at an event nearby.
 
-    All places in which it can are one set that attracts what is beside it: its index is 1.
+    All places in which it can are one set that attracts what is near it: its index is 1.
     """
     params = {**orbit.params, parameter: value}
     model, (time, *state) = orbit.model, orbit.cycle[0]

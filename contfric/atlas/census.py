@@ -39,7 +39,7 @@ _BOX = Mesh(coarse=6, torn=9, near=12, settled=9)
 _BITS = 40
 #: Most halvings beyond these: a box then has 262,144 cells at first, and its events take 100 MB.
 _FINEST = 3
-#: In natural units a return map bends over lengths of the order of 1: a box larger than this (beside a
+#: In natural units a return map bends over lengths of the order of 1: a box larger than this (near a
 #: resonance) is searched in steps of this factor, from a small one on.
 _NATURAL, _FACTOR = 8.0, 8.0
 #: The box is doubled at most this often.

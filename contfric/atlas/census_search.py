@@ -1,11 +1,11 @@
-"""The search on one section: cells near a return are handed to Newton, and halved until they are settled.
+"""The search on one section: cells near a return are handed to Newton, and halved until they are decided.
 
 A cell is **torn** if it is mixed (a discontinuity goes through it, and orbits may lie on either side), or
 near while the gaps at its corners differ by more than a return may within a cell. It is halved
 
 * if it is torn; on sections of dimension above one Newton is started from its corners, too, as
   its solutions reach across the discontinuity;
-* if it is near, and Newton, started in it, found no orbit in it or beside it (or several);
+* if it is near, and Newton, started in it, found no orbit in it or next to it (or several);
 * if it is near one orbit, but the gaps at the corners do not fit to that: on a section of dimension
   one the slope of the gap at a fixed point is its multiplier less 1, so that the gaps at both
   corners are known from it. On other sections, until the cell is small.
@@ -53,7 +53,7 @@ _FLAT = 1e-10
 #: Deviation of a gap from the line through a fixed point, relative to its value there, in a cell that
 #: holds no other fixed point: with a deviation of 1 there could be another one at the corner.
 _BENT = 0.5
-#: Largest gap beside a fixed point, in sizes of a cell from it: what a return stretches distances by,
+#: Largest gap near a fixed point, in sizes of a cell from it: what a return stretches distances by,
 #: where discontinuities do not let the cell itself show it.
 _STRETCH = 16.0
 #: Fixed points of one walk nearer than this (relative) are one: rounding over a slope of 1e-5.
@@ -225,11 +225,11 @@ class Search:
         return chosen & (level < self.mesh.near) | torn & (level < self.mesh.torn)
 
     def _leave(self, near: Near, k: int, level: int) -> None:
-        """Count a cell of the smallest size that is left with zero among its gaps, not beside them."""
+        """Count a cell of the smallest size that is left with zero among its gaps, not next to them."""
         low, high = near.gaps[k].min(axis=0), near.gaps[k].max(axis=0)
         if not ((low <= 0.0) & (high >= 0.0)).all():
             return
-        # beside a grazing a return changes with the square root of the distance, and not by more
+        # near a grazing a return changes with the square root of the distance, and not by more
         if (high - low).max() > _STRETCH * math.sqrt(0.5**level):
             self.jumps += 1
         else:

@@ -48,7 +48,7 @@ def follow_crossing(state: Exploration, crossing: Crossing, event: Event, depart
 def _follow_through(
     state: Exploration, crossing: Crossing, direction: Direction, event: Event
 ) -> None:
-    """Continue the branch that passes a branch point in a direction, from just beside it."""
+    """Continue the branch that passes a branch point in a direction, from just next to it."""
     orbit, settings = crossing.orbit, state.settings
     reason = "the branch that goes on through the event"
     for way in (direction, direction.reversed()):
@@ -68,7 +68,7 @@ def _follow_through(
         else:
             state.accept(event, reason, branch)
         return
-    state.judge(event, reason, Verdict.REFUSED, why="no orbit beside the event was found")
+    state.judge(event, reason, Verdict.REFUSED, why="no orbit near the event was found")
 
 
 def whole_branch(orbit: Orbit, settings: Settings) -> Branch:

@@ -27,7 +27,7 @@ Progress = Callable[[str], None]
 #: Kinds that leave nothing to follow: the branch itself goes on.
 _PASSED = frozenset({Kind.SN, Kind.T, Kind.NS})
 #: The tip of a branch whose parameter (relative to the range) and stops agree with an event to these is
-#: at the event: located tips are good to 1e-10, those beside a singular point to 1e-6.
+#: at the event: located tips are good to 1e-10, those near a singular point to 1e-6.
 _SAME_PLACE, _SAME_STOPS = 1e-8, 1e-6
 
 

@@ -100,30 +100,18 @@ def explore(
     function_of("progress", progress)
     bridges, seeds = truth("bridges", bridges), Seeds.given(seeds)
     orbit = shortest(orbit)
-    most = MOST_PERIODS if max_periods is None else max_periods
     again = copies or (max(max_periods, orbit.periods) if max_periods else 1)
+    most = max(max_periods or MOST_PERIODS, orbit.periods)
     # multipliers are asked for also where the start itself is on a bridge
     settings = replace(settings, stability=stability, copies=again, up_to_mirror=True)
-    state = Exploration(
-        settings,
-        max(most, orbit.periods),
-        again,
-        max_branches,
-        bridges,
-        progress,
-    )
+    state = Exploration(settings, most, again, max_branches, bridges, progress)
     if orbit.periods > (max_periods or MOST_PERIODS):
         state.notes.append(
             f"max_periods raised to {orbit.periods}: the start has that many periods"
         )
-    try:
-        state.add(_first_branch(state, orbit))
-        _follow_all(state)
-        if seeds is not None:
-            _follow_seeds(state, orbit, seeds)
-    except KeyboardInterrupt:
-        state.complete = False
-        state.notes.append(EndReason.INTERRUPTED.value)
+    stops = settings.stop_at
+    asked = Asked(max_step, stability, bridges, most, again, max_branches, max_points, stops)
+    _follow_from(state, orbit, seeds)
     return collect(
         orbit.model,
         settings,
@@ -132,17 +120,20 @@ def explore(
         state.events,
         tuple(state.notes),
         state.complete,
-        Asked(
-            max_step,
-            stability,
-            bridges,
-            state.max_periods,
-            state.copies,
-            max_branches,
-            max_points,
-            settings.stop_at,
-        ),
+        replace(asked, max_periods=state.max_periods, copies=state.copies),
     )
+
+
+def _follow_from(state: Exploration, orbit: Orbit, seeds: Seeds | None) -> None:
+    """Follow all that is reached from the start and from the attractors, until Ctrl-C."""
+    try:
+        state.add(_first_branch(state, orbit))
+        _follow_all(state)
+        if seeds is not None:
+            _follow_seeds(state, orbit, seeds)
+    except KeyboardInterrupt:
+        state.complete = False
+        state.notes.append(EndReason.INTERRUPTED.value)
 
 
 def _first_branch(state: Exploration, orbit: Orbit) -> Branch:

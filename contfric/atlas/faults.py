@@ -22,7 +22,7 @@ _ASKED = (0.25, 0.5, 0.75)
 
 
 def fault_of(branch: Branch) -> str | None:
-    """Return why a branch is none; None if nothing is wrong with it."""
+    """Return what is wrong with a branch; None if nothing is."""
     return next((why for is_so, why in _FAULTS if is_so(branch)), None)
 
 

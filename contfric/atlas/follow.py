@@ -58,7 +58,7 @@ from contfric.orbit.solve import polish
 from contfric.orbit.system import Word
 from contfric.signature.edits import show
 
-#: Where an orbit beside an event is looked for, relative to the range.
+#: Where an orbit near an event is looked for, relative to the range.
 _SHARES = (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6)
 #: The same for an event that is located to the root of rounding only.
 _NOWHERE_ROUGHLY = 1e-3
@@ -111,18 +111,18 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
         event.kinds |= {n.kind for n in incident.names if n.before & words and n.after & words}
         if accepted:
             return
-    if not jumps:  # else motions beside the event are not near what follows it
+    if not jumps:  # else motions near the event are not near what follows it
         _follow_flow(state, event)
 
 
 def _follow_flow(state: Exploration, event: Event) -> None:
-    """Try the words that motions beside an event walk."""
+    """Try the words that motions near an event walk."""
     orbit, settings = event.bifurcation.orbit, state.settings
     if orbit.system.holds:
         return
     active = orbit.model.index_of(settings.parameter)
     shifts = tuple((active, share * settings.width) for share in _SHARES)
-    reason = "the word that the flow walks beside the event"
+    reason = "the word that the flow walks near the event"
     for found in walked(orbit.as_whole(), shifts):
         guess = replace(found, vector=orbit.vector)
         branch = _through(state, guess)
@@ -255,11 +255,11 @@ def _follow_branch_point(state: Exploration, event: Event) -> None:
 
 
 def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
-    """Continue a branch through an event that it passes, from just beside it."""
+    """Continue a branch through an event that it passes, from just next to it."""
     reason = "the branch that goes on through the event"
     branch = _through(state, orbit)
     if branch is None:
-        state.judge(event, reason, Verdict.REFUSED, why="no orbit beside the event was found")
+        state.judge(event, reason, Verdict.REFUSED, why="no orbit near the event was found")
     elif (known := state.known(branch[len(branch) // 2])) is not None:
         state.judge(event, reason, Verdict.KNOWN, known)
     else:
@@ -313,7 +313,7 @@ def _follow_departure(
 
 
 def _through(state: Exploration, orbit: Orbit) -> Branch | None:
-    """Return the branch through an orbit at which it may be singular, from just beside it."""
+    """Return the branch through an orbit at which it may be singular, from just next to it."""
     settings = state.settings
     value = settings_value(orbit, settings)
     active = orbit.model.index_of(settings.parameter)

@@ -32,18 +32,18 @@ from contfric.orbit.orbit import Orbit
 #: First step away from an event, in largest steps: the new word is proved close to it.
 _NEAR_EVENT = 0.01
 #: Null vectors where two curves may cross, and the directions between them that are tried: the corrector
-#: reaches a curve from 30 degrees beside it.
+#: reaches a curve from 30 degrees off it.
 _PLANE, _ANGLES = 2, 12
 #: A branch that gets no farther than this (arclength) from the event it starts at has left it in the
 #: direction in which it is not admissible.
 _NOWHERE = 1e-7
 #: The same for an event that is located to the root of rounding only.
 _NOWHERE_ROUGHLY = 1e-3
-#: The first start beside an event that is singular, in roots of rounding: states are known there to a share
+#: The first start near an event that is singular, in roots of rounding: states are known there to a share
 #: of 1e-5, and what happens nearer changes the parameter by rounding only (by the square of this).
 _KNOWN = 500.0
 #: One that gets this far has left it in the right one. A shorter one may have gone back the way that the
-#: start was beside the event: a touch at the very end of a segment is located to the root of rounding.
+#: start was near the event: a touch at the very end of a segment is located to the root of rounding.
 _SURELY_AWAY = 1e-4
 
 
@@ -84,7 +84,7 @@ def _ways(
 def _leave_beside(
     state: Exploration, orbit: Orbit, away: FloatArray, event: Event, settings: Settings
 ) -> Branch | None:
-    """Trace away from an event at which the new orbit is singular, from a little beside it."""
+    """Trace away from an event at which the new orbit is singular, from a short distance off it."""
     active = orbit.model.index_of(settings.parameter)
     for distance in _distances(orbit, event):
         moved = replace(orbit, joints=orbit.joints + distance * orbit.period * away)
@@ -108,7 +108,7 @@ def _leave_beside(
 
 
 def _distances(orbit: Orbit, event: Event) -> list[float]:
-    """Return how far beside an event a start is tried: as near as states are known, farther, then nearer.
+    """Return at which distances from an event to start: as near as states are known, farther, then nearer.
 
     At an event that is known roughly what is near is rounding.
     """

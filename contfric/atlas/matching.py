@@ -147,7 +147,7 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
 def _guesses(branch: Branch, orbit: Orbit, value: float) -> Iterator[Orbit]:
     """Yield guesses for the orbits of a branch at a value, one for each time it takes it.
 
-    By interpolation between its points and the folds between them, beside which it is a parabola.
+    By interpolation between its points and the folds between them, near which it is a parabola.
     """
     arc, values, folds = branch.nodes
     ahead = values - value

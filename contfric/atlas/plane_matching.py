@@ -59,7 +59,7 @@ def _same_word(orbit: Orbit, part: CurvePart) -> bool:
 
 
 def _on_part(orbit: Orbit, w: FloatArray, part: CurvePart, problem: Problem) -> bool:
-    """Tell whether an orbit is on a piece of a curve: solve for the curve beside it, and compare."""
+    """Tell whether an orbit is on a piece of a curve: solve for the curve near it, and compare."""
     widths = problem.box.widths
     scaled = (part.values - w) / widths
     mirror = orbit.model.symmetry is not None

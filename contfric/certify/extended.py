@@ -1,6 +1,6 @@
 r"""Events as regular zeros of extended systems, with one parameter p free.
 
-The unknowns are the joints z of the chain ``F(z, p) = 0``, p, and what the event needs beside them:
+The unknowns are the joints z of the chain ``F(z, p) = 0``, p, and what the event needs in addition:
 
 * an observable g on a surface, or a rate that vanishes, at a joint: ``g(z_k, p) = 0``;
 * a touch inside of a segment, a time tau after its start: ``q(tau) = 0, q'(tau) = 0``;
@@ -32,7 +32,7 @@ Builder = Callable[[arb], BallModel]
 
 @dataclass(frozen=True)
 class Condition:
-    """What vanishes at an event beside the chain.
+    """What vanishes at an event in addition to the chain.
 
     Attributes
     ----------

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _DIGITS = 40
 #: Discs of multipliers are printed this much wider: another way to compute them rounds otherwise.
 _WIDER = 1e-25
-#: Larger certificate files are none: 400 segments take 200 kB.
+#: A larger file is no certificate: 400 segments take 200 kB.
 _LARGEST = 10_000_000
 
 
@@ -30,7 +30,7 @@ def certificate_data(certificate: Certificate) -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        If it is none that a file can state: of a model that the checker does not know, or with holds.
+        If a file cannot state it: its model is unknown to the checker, or the orbit has holds.
     """
     orbit = certificate.orbit
     if orbit.model.name not in CHECKED_MODELS or orbit.system.holds:

@@ -117,7 +117,7 @@ def _is_left_held(segments: Segments, i: int, surface: str) -> bool:
 
 
 def _met(touch: Touch | None, modes: tuple[str, ...], model: BallModel) -> dict[int, list[Vector]]:
-    """Return the rows that vanish at the ends of segments at an event, beside the exits."""
+    """Return the rows that vanish at the ends of segments at an event, in addition to the exits."""
     if touch is None or touch.condition.within:
         return {}
     met = touch.condition

@@ -35,7 +35,7 @@ class Location:
     Attributes
     ----------
     orbit : on the shortest problem
-    condition : what vanishes beside the equations of the orbit
+    condition : what vanishes in addition to the equations of the orbit
     after : approximate time of a touch after the start of its segment
     """
 

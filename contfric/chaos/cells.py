@@ -145,32 +145,18 @@ def start_mode(functions, tables, starting, t, y, p, workspace):  # type: ignore
 
 @helper
 def try_cycle(  # type: ignore[no-untyped-def]
-    functions,
-    tables,
-    ranks,
-    mode,
-    on,
-    key,
-    t,
-    joints,
-    turns,
-    p,
-    period,
-    rise,
-    workspaces,
-    rows,
-    cell,
+    functions, tables, ranks, at, back, p, period, rise, workspaces, rows, cell
 ):
     """Solve for the cycle that the last joint seems to be on, and write what the motion is if it is."""
-    cycle, walk = workspaces.cycle, workspaces.walk
-    n = walk.y.shape[0]
+    cycle, walk, state = workspaces.cycle, workspaces.walk, workspaces.state
+    (mode, on, key, t), (joints, turns), n = at, back, walk.y.shape[0]
     cycle.z[0] = t
     for j in range(n):
         cycle.z[1 + j] = walk.y[j]
         for k in range(n + 1):
             cycle.frame[j, k] = workspaces.frame[j, k]
     error = solve_cycle(
-        functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, workspaces.state
+        functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, state
     )
     if error == AT_A_POINT:
         for j in range(n):
@@ -187,18 +173,7 @@ def try_cycle(  # type: ignore[no-untyped-def]
     rows.turns[cell] = 1  # without excitation: a cycle
     if walk.at_once[1] & 1 == 0:
         rows.turns[cell] = shortest(
-            functions,
-            tables,
-            ranks,
-            mode,
-            on,
-            key,
-            joints,
-            turns,
-            p,
-            period,
-            cycle,
-            workspaces.state,
+            functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, state
         )
     return True
 
@@ -247,6 +222,16 @@ def carry_behind(functions, tables, ranks, mode, on, t, p, period, live, workspa
 
 
 @helper
+def write_last(functions, tables, outcome, ranks, mode, t, p, period, workspaces, rows, cell):  # type: ignore[no-untyped-def]
+    """Write what a motion is that meets nothing any more, or breaks off."""
+    walk, cycle = workspaces.walk, workspaces.cycle
+    if outcome == QUIET:
+        write_quiet(functions, tables, ranks, mode, t, p, period, walk, cycle, rows, cell)
+    else:
+        write_end(functions, outcome, ranks, mode, t, p, period, walk, cycle, rows, cell)
+
+
+@helper
 def follow_cell(  # type: ignore[no-untyped-def]
     functions, tables, ranks, mode, on, t, p, period, limits, stop, workspaces, rows, cell
 ):
@@ -270,13 +255,10 @@ def follow_cell(  # type: ignore[no-untyped-def]
             outcome, surface, following, duration, turns, t, live = carry_behind(
                 functions, tables, ranks, mode, on, t, p, period, live, workspaces
             )
-        if outcome == QUIET:
-            workspace = workspaces.cycle
-            write_quiet(functions, tables, ranks, mode, t, p, period, walk, workspace, rows, cell)
-            break
         if outcome != ARRIVED:
-            workspace = workspaces.cycle
-            write_end(functions, outcome, ranks, mode, t, p, period, walk, workspace, rows, cell)
+            write_last(
+                functions, tables, outcome, ranks, mode, t, p, period, workspaces, rows, cell
+            )
             break
         total += growth[0] if live > 0 else 0.0
         lowest = min(lowest, total)
@@ -285,23 +267,10 @@ def follow_cell(  # type: ignore[no-untyped-def]
         mode, joint, cycle = following, joint + 1, cycle + turns
         key = mode * surfaces + surface
         timeless = walk.at_once[1] & 1 != 0
-        joints, lag = returned(workspaces.memory, key, cycle, joint, t, walk.y, period, timeless)
-        if joints > 0 and try_cycle(
-            functions,
-            tables,
-            ranks,
-            mode,
-            on,
-            key,
-            t,
-            joints,
-            lag,
-            p,
-            period,
-            rise,
-            workspaces,
-            rows,
-            cell,
+        at = mode, on, key, t
+        back = returned(workspaces.memory, key, cycle, joint, t, walk.y, period, timeless)
+        if back[0] > 0 and try_cycle(
+            functions, tables, ranks, at, back, p, period, rise, workspaces, rows, cell
         ):
             break
         if averaging:

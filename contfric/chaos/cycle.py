@@ -8,7 +8,7 @@ if it returns to 1e-11 and attracts. (A near return of a chaotic motion leads to
 nowhere; then the motion goes on, and the next return has to be ten times nearer.)
 
 The exponents of the cycle are ``ln|mu| / T`` with the eigenvalues mu of M over its period T. Of the
-smallest one that is not zero, which a matrix in floating point would lose beside a large one, the sum is
+smallest one that is not zero, which a matrix in floating point would lose next to a large one, the sum is
 known: the logarithms of an orthonormalised frame (:func:`contfric.chaos.tangent.orthonormalise`) add up to
 ``ln|mu_1 .. mu_r|`` over a cycle, without cancellation.
 """
@@ -31,7 +31,7 @@ from contfric.chaos.tangent import (
     push,
     to_joint,
 )
-from contfric.compiled import allocating_helper, helper
+from contfric.compiled import allocating_helper, helper, inlined_helper
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import dense_solve
 from contfric.orbit.spectrum import spectrum
@@ -143,11 +143,24 @@ def forget(memory):  # type: ignore[no-untyped-def]
     memory.near[0] = NEAR
 
 
+@inlined_helper
+def nearest_turn(turns, slip, period, timeless):  # type: ignore[no-untyped-def]
+    """Return the whole periods between two joints and the shift in phase that is left.
+
+    Without excitation any time may have passed.
+    """
+    if timeless:
+        return 1, 0.0
+    if slip > 0.5 * period:
+        return turns + 1, slip - period
+    if slip < -0.5 * period:
+        return turns - 1, slip + period
+    return turns, slip
+
+
 @helper
 def returned(memory, key, cycle, event, t, y, period, timeless):  # type: ignore[no-untyped-def]
     """Return (joints, periods) since a joint that this one is a near return of; zeros if none.
-
-    Without excitation any time may have passed.
 
     What has been remembered for its span is replaced by this joint.
     """
@@ -155,13 +168,7 @@ def returned(memory, key, cycle, event, t, y, period, timeless):  # type: ignore
     for i in range(memory.key.shape[0]):
         turns = cycle - memory.cycle[i]
         if memory.key[i] == key and turns >= 0:
-            slip = t - memory.z[i, 0]
-            if slip > 0.5 * period:
-                slip, turns = slip - period, turns + 1
-            elif slip < -0.5 * period:
-                slip, turns = slip + period, turns - 1
-            if timeless:
-                slip, turns = 0.0, 1
+            turns, slip = nearest_turn(turns, t - memory.z[i, 0], period, timeless)
             same = turns > 0 and abs(slip) <= near
             for j in range(y.shape[0]):
                 same = same and abs(y[j] - memory.z[i, 1 + j]) <= near * (1.0 + abs(y[j]))

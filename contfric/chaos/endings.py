@@ -19,11 +19,11 @@ from contfric.orbit.trajectory import HELD, IMPOSSIBLE, INFINITE, TOO_LARGE
 #: The motions, by their numbers in :class:`contfric.chaos.status.Motion`; 8 and 9 are given elsewhere.
 PERIODIC, TRANSIENT, CHAOTIC, SETTLING, UNDECIDED, AT_REST, UNBOUNDED, NO_MOTION = range(8)
 BROKEN, CHATTERS, UNCUT = range(10, 13)
-#: Periods (units of time without excitation) after which a motion that meets no surface any more has
-#: settled, if it moves by less than this (relative) in one more.
+#: Periods (units of time without excitation) after which a motion that meets no surface any more is
+#: at rest, if it moves by less than this (relative) in one more.
 _SETTLES, _STILL = 1e4, 1e-9
-#: An equilibrium is polished this often, by corrections of at most this (relative): the motion is near it.
-_POLISHES, _NEARBY = 4, 1e-3
+#: An equilibrium is corrected this often, by at most this (relative): the motion is near it.
+_CORRECTIONS, _NEARBY = 4, 1e-3
 #: An equilibrium that attracts, to the accuracy of its exponents.
 _ATTRACTS = 1e-8
 #: A multiplier of a mode's flow below this share of the largest is taken from a shorter time: the
@@ -109,9 +109,9 @@ def write_rates(functions, rank, mode, t, p, walk, cycle, rows, cell):  # type: 
 
 @helper
 def polish(functions, mode, t, p, walk, cycle, rows):  # type: ignore[no-untyped-def]
-    """Move ``walk.y`` to the equilibrium of a mode beside it, where there is one and no continuum."""
+    """Move ``walk.y`` to the equilibrium of a mode near it, where there is one and no continuum."""
     n = walk.y.shape[0]
-    for _ in range(_POLISHES):
+    for _ in range(_CORRECTIONS):
         functions.flow(mode, t, walk.y, 1.0, p, rows.turns[:0], walk.end, walk.jac)
         for i in range(n):
             for j in range(n):
@@ -128,10 +128,10 @@ def polish(functions, mode, t, p, walk, cycle, rows):  # type: ignore[no-untyped
 
 @helper
 def write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
-    """Write the exponents of the equilibrium beside ``walk.y``; tell whether it attracts.
+    """Write the exponents of the equilibrium near ``walk.y``; tell whether it attracts.
 
     It may lie on a surface. If the fields of two modes vanish there, but their derivatives differ, no
-    matrix has its exponents: there are none.
+    matrix has its exponents, and none are written.
     """
     n = walk.y.shape[0]
     polish(functions, mode, t, p, walk, cycle, rows)

@@ -119,7 +119,7 @@ class LyapunovMap:
 
     @cached_property
     def second(self) -> FloatArray:
-        """Second exponent beside each value, shape (len, len); -inf where sticks leave none.
+        """Second exponent at each value, shape (len, len); -inf where sticks leave none.
 
         Without a second state it is nan.
         """
@@ -129,7 +129,7 @@ class LyapunovMap:
 
     @cached_property
     def dimension(self) -> FloatArray:
-        """Lyapunov dimension in the stroboscopic section beside each value, shape (len, len)."""
+        """Lyapunov dimension in the stroboscopic section at each value, shape (len, len)."""
         return self._of_largest(lyapunov_dimension(self.exponents))
 
     def where(self, *motions: Motion) -> NDArray[np.bool_]:

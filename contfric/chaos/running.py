@@ -43,7 +43,7 @@ def check_executor(executor: object) -> None:
     Raises
     ------
     ParameterError
-        If it is none.
+        If it is no executor.
     """
     if executor is not None and not isinstance(executor, Executor):
         raise ParameterError(

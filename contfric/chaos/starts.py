@@ -71,7 +71,7 @@ def given_states(model: Model, state: StateLike, params: Mapping[str, float]) ->
     Raises
     ------
     ParameterError
-        If they are none of the model.
+        If they are no states of the model.
     """
     try:
         given = state(params) if callable(state) else state

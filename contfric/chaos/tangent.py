@@ -61,7 +61,7 @@ from contfric.orbit.trajectory import (
 ARRIVED, BROKEN = 0, 10
 #: Halvings in the search of the place where the integration breaks down. A motion that has grown there by
 #: this factor grows without bound in a finite time (as 1/(time left) it has grown by 1e12), and one that
-#: is larger than this has grown already: levels of size 1 are rounding beside it.
+#: is larger than this has grown already: levels of size 1 are rounding compared with it.
 _HALVINGS, _ESCAPES, _HUGE = 40, 1e6, 1e10
 
 

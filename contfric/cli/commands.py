@@ -21,7 +21,7 @@ Command: TypeAlias = Callable[[argparse.Namespace], int]
 
 
 def say(text: str) -> None:
-    """Print a message for the user, beside the data."""
+    """Print a message for the user, apart from the data."""
     print(f"contfric: {text}", file=sys.stderr)
 
 

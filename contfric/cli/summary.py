@@ -38,10 +38,14 @@ def findings(record: Record) -> Iterator[str]:
             yield from lines(record[key])
 
 
-def _map(entry: Record) -> Iterator[str]:
+def _grid(entry: Record) -> str:
     sides = (f"{n} {low:g} to {high:g} ({k})" for n, (low, high, k) in entry["grid"].items())
+    return " x ".join(sides)
+
+
+def _map(entry: Record) -> Iterator[str]:
     found = ", ".join(f"{count} {motion}" for motion, count in entry["motions"].items())
-    yield f"exponents at {' x '.join(sides)}, {entry['starts']} start(s) each: {found}"
+    yield f"exponents at {_grid(entry)}, {entry['starts']} start(s) each: {found}"
     yield f"largest   {entry['largest']:.6g}"
     if not entry["complete"]:
         yield "incomplete: the same command goes on from the finished tiles"
@@ -52,8 +56,7 @@ def _points(entry: Record) -> Iterator[str]:
 
 
 def _basins(entry: Record) -> Iterator[str]:
-    sides = (f"{n} {low:g} to {high:g} ({k})" for n, (low, high, k) in entry["grid"].items())
-    yield f"basins at {' x '.join(sides)}"
+    yield f"basins at {_grid(entry)}"
     rows = [["", "starts", "share", "95 % interval"]]
     for s in entry["shares"]:
         interval = f"{s['low']:.2%} to {s['high']:.2%}"

@@ -10,7 +10,7 @@ from contfric.errors import ResultFileError
 
 
 def view(options: argparse.Namespace) -> int:
-    """Write the page beside the results; its path goes to stdout."""
+    """Write the page next to the results; its path goes to stdout."""
     from contfric.atlas.diagram import Diagram
     from contfric.extras import need_bokeh
     from contfric.results import load

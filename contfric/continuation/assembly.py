@@ -126,7 +126,7 @@ def _renew_ends(branch: Branch) -> None:
     """Evaluate the multipliers at both ends anew, from the joints that stand there.
 
     At an end an exit may be tangential. What the march knows are the multipliers of its last Jacobian, from
-    beside the event, and beside it they change with the root of the distance.
+    near the event, and near it they change with the root of the distance.
     """
     if branch.turn_multipliers is None:
         return

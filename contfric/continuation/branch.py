@@ -141,9 +141,7 @@ class Branch:
     @property
     def params(self) -> dict[str, FloatArray]:
         """Every parameter at every point, shape (k,) each."""
-        columns = {n: np.full(len(self), v) for n, v in self.model.mapping(self.vector).items()}
-        columns[self.parameter] = self.values
-        return columns
+        return self.model.columns(self.vector, {self.parameter: self.values})
 
     @property
     def period(self) -> FloatArray:

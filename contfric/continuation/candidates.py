@@ -38,9 +38,9 @@ class Candidate:
     ----------
     reason : what would happen there, in words
     orbit : the orbit at the event, of the new word; None if there is no such word
-    refusal : why there is none
-    away : how its joints move where it is singular at the event and has to start beside it; else None
-    rest : whether there is none because nothing moves any more
+    refusal : why there is no orbit
+    away : how its joints move where it is singular at the event and has to start near it; else None
+    rest : whether that is because nothing moves any more
     words : of the units that it consists of
     """
 

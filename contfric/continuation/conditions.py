@@ -1,4 +1,4 @@
-"""Local conditions: which sequences of forms can exist beside an event, to first order.
+"""Local conditions: which sequences of forms can exist near an event, to first order.
 
 A form (:mod:`contfric.continuation.incident`) relates the joint u that a unit begins with to the joint u'
 that it ends with, and to the distance lambda in the parameter:

@@ -7,7 +7,7 @@ motion without sticks leaves its amplitude free. Such a family is met in two way
 * The branch **passes through** one family after the other: a multiplier is 1 at every point, and the
   sign of chi(1) or chi(-1) is rounding. An orbit of such a family other than the symmetric one has no unique
   continuation: the equations with the parameter have two null vectors there, as they have at a branch
-  point; but beside it they have two again.
+  point; but near it they have two again.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _ONE_VALUE = 1e-12
 _LENGTH = 1e-6
 #: A multiplier is 1 to this: the root of rounding, where two of them are.
 _ONE = 1e-7
-#: Points in a row from which multipliers at 1 are no event: of one, the two beside it would be farther away.
+#: Points in a row from which multipliers at 1 are no event: of one, its two neighbours would be farther away.
 _RUN = 4
 #: Distance to the neighbour in a continuum (root mean square of joints): far from rounding, and near enough
 #: for Newton's method.
@@ -44,7 +44,7 @@ _PLANE = 2
 
 
 def in_continuum(orbit: Orbit, active: int) -> bool:
-    """Tell whether an orbit is one of a family at one value of the parameter that varies beside it, too.
+    """Tell whether orbits form a family at a value of the parameter, and at the values near it.
 
     It is, if the equations have a plane of null vectors there and at a neighbour found along the one of
     them that leaves the parameter as it is.

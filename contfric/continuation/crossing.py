@@ -28,7 +28,7 @@ from contfric.orbit.linear import equations_at
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.system import System
 
-#: Smallest singular value of J against the largest, above which no branch point is near. Beside one it is
+#: Smallest singular value of J against the largest, above which no branch point is near. Near one it is
 #: about the distance; steps of a branch are 1e-2 at most.
 _REGULAR = 3e-2
 #: Newton's method converges from there in 3 to 6 steps.

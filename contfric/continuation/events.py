@@ -365,7 +365,7 @@ def kind_of_hold(hold: Hold, test: Test) -> Kind:
 
 
 def resting_domain(system: System, test: Test) -> Domain | None:
-    """Return the domain of rest that a joint is beside, bounded by the surface of a test; None if none."""
+    """Return the domain of rest that a joint is next to, bounded by the surface of a test; None if none."""
     model = system.model
     mode, exit_ = system.word[test.segment]
     resting = [

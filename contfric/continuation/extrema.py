@@ -163,7 +163,7 @@ class _Search:
         try:
             return point_at(float(brentq(slope_at, 0.0, 1.0, xtol=_SHORTEST, rtol=4.0 * _SHORTEST)))
         except ArithmeticError:
-            return None  # Newton fails inside of the step: beside an event
+            return None  # Newton fails inside of the step: near an event
 
 
 def _nearest(slopes: FloatArray) -> Iterator[float]:

@@ -1,8 +1,8 @@
-"""What follows an event as the flow itself says: the words that motions beside it walk.
+"""What follows an event as the flow itself says: the words that motions near it walk.
 
 Where the flow is continuous at an event (static and kinetic limit agree, a grazing impact, two surfaces
-met at once), motions beside the orbit at the event walk its word or that of the orbit that takes over.
-So motions a little beside it are followed for one turn, and each word that is new is proposed. It takes
+met at once), motions near the orbit at the event walk its word or that of the orbit that takes over.
+So motions that start near it are followed for one turn, and each word that is new is proposed. It takes
 no knowledge of the event, and finds nothing where what follows repels too fast to be walked.
 """
 
@@ -30,7 +30,7 @@ _LONGER = 1.2
 
 
 def walked(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator[Orbit]:
-    """Yield orbits, not solved, of the words that motions beside an orbit walk in one turn.
+    """Yield orbits, not solved, of the words that motions near an orbit walk in one turn.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def _end_of_turn(orbit: Orbit, trajectory: Trajectory, start: float, unit: float
 
 
 def _declared(orbit: Orbit, i: int, time: float, state: FloatArray) -> str:
-    """Return the mode, as it was declared, that a motion beside segment i is in."""
+    """Return the mode, as it was declared, that a motion near segment i is in."""
     model, mode = orbit.model, orbit.word[i][0]
     if mode not in model.joined:
         return mode

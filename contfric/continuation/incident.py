@@ -50,7 +50,7 @@ _MOST_FORMS = 64
 
 @dataclass(frozen=True)
 class Refusal:
-    """An outcome that is none, and why; whether because nothing moves any more."""
+    """An outcome that is rejected, and why; whether because nothing moves any more."""
 
     reason: str
     why: str
@@ -68,7 +68,7 @@ class Name:
 
 @dataclass(frozen=True, eq=False)
 class Incident:
-    """The unit of the motion at an event, its forms, and the outcomes that are none.
+    """The unit of the motion at an event, its forms, and the outcomes that are rejected.
 
     ``names`` say what the step from one form to another is called; margins below ``least`` count as zero.
     """

@@ -12,8 +12,9 @@ from contfric.orbit.orbit import Orbit
 _NEAR_LIMIT = 1e-6
 
 
-def limit_end(upper: bool, settings: Settings) -> End:
-    """Return the end at a limit of the model, or of the range that was asked for."""
+def limit_end(value: float, settings: Settings) -> End:
+    """Return the end at the limit next to a value: of the model, or of the range that was asked for."""
+    upper = value > 0.5 * (settings.low + settings.high)
     reason = settings.high_reason if upper else settings.low_reason
     kind = EndReason.LIMIT if reason else EndReason.RANGE
     return End(kind, f"{kind.value}: {reason}" if reason else "")

@@ -24,7 +24,7 @@ from contfric.orbit.orbit import Orbit
 
 #: Halvings of the step in which an opening is seen: to far below where secants take over.
 _HALVINGS = 24
-#: An opening is open to this (relative to the size of the equations); beside a pole it is not.
+#: An opening is open to this (relative to the size of the equations); near a pole it is not.
 _OPEN = 1e-5
 
 

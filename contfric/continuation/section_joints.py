@@ -1,7 +1,7 @@
 """Joints of smooth cycles on their section, along a branch: one moves to another crossing before it vanishes.
 
 An orbit that only touches a section does not change. But where it has a joint there, the joint vanishes with
-the crossing: as an unknown it has a fold, which is none of the orbit's.
+the crossing: as an unknown it has a fold, which the orbit itself does not have.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ from contfric.orbit.system import Margin, Test
 #: Arclength within which a smooth event belongs to a sliding event: where a stop becomes tangential
 #: the branch folds and its multipliers are infinite, and where it meets a surface labels change.
 SAME_PLACE = 1e-7
-#: The same for a tangency: beside a tangential release (AS) the load overshoots its limit by the square
+#: The same for a tangency: near a tangential release (AS) the load overshoots its limit by the square
 #: of the release's rate, which is rounding up to this distance.
 SAME_TANGENCY = 2e-6
 #: A parameter that changes this slowly along a branch, in units of arclength, is constant: the orbits are
@@ -44,17 +44,21 @@ _SHORTEST_LEAP = 1e-7
 _COMPLEX = 1e-6
 
 
+#: An event with the point of the branch at which it is.
+Located = tuple[Bifurcation, Point]
+
+
 def smooth_events(
     orbit: Orbit, before: Point, after: Point, settings: Settings, beyond: Point
-) -> list[tuple[Bifurcation, Point]]:
+) -> list[Located]:
     """Return folds, branch points, doublings, tori and tangencies; ``beyond`` is good behind them."""
     from contfric.continuation.bracket import BY_TEST
     from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
 
     base = len(before.tests) - EXTRA
-    # an event behind a sliding one is none; but where a stop becomes tangential multipliers are infinite
+    # events behind a sliding one do not happen; where a stop becomes tangential multipliers are infinite
     after = beyond if np.all(np.isfinite(beyond.tests[base:])) else after
-    found: list[tuple[Bifurcation, Point]] = []
+    found: list[Located] = []
     folded = False
     for column in (FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR):
         a, b = before.tests[base + column], after.tests[base + column]
@@ -62,64 +66,87 @@ def smooth_events(
             continue  # chi(1) of a fold vanishes with it
         if max(abs(a), abs(b)) < LEVEL:
             continue  # zero on both sides: a continuum of orbits, and the sign is rounding
-        if column == CHI_ONE and not _passes_vertex(orbit, before, after, a / (a - b), settings):
-            crossing = _crossing(orbit, before, after, beyond, a / (a - b), settings)
+        share = a / (a - b)
+        if column == CHI_ONE and not _passes_vertex(orbit, before, after, share, settings):
+            crossing = _crossing(orbit, before, after, beyond, share, settings)
             if crossing is not None:
                 found.append(crossing)
                 continue
         point = locate_change(orbit, before, after, settings, BY_TEST, base + column)
-        if point is None or point.lost or _is_pole(point.tests[base + column], a, b):
-            if column == FOLD:
-                # at the vertex of a pitchfork or of a period doubling the arclength system itself is
-                # singular, and Newton may be lost around it: look from between the two points
-                between = parabola_vertex(before, after, a / (a - b))
-                vertex = _fold(orbit, before, beyond, between, settings)
-                if vertex[0].kind is Kind.SN:
-                    vertex = (
-                        _vertex_of_crossing(orbit, before, after, beyond, a / (a - b), settings)
-                        or vertex
-                    )
-                folded = True
-                if vertex[0].kind is Kind.SN:
-                    if not _is_vertical(before, after, settings):
-                        found.append(_not_located(orbit, Kind.SN, before, beyond, settings))
-                else:
-                    found.append(vertex)
-            elif point is None or point.lost:
-                # a pole is no event: multipliers are infinite where an exit becomes tangential
-                half = orbit.system.half or column == CHI_ONE
-                kind = Kind.NS if column == CHI_PAIR else Kind.BP if half else Kind.PD
-                found.append(_overshot(orbit, kind, before, after, beyond, settings))
-            continue
+        lost = point is None or point.lost
+        if point is not None and (lost or _is_pole(point.tests[base + column], a, b)):
+            point = None
         if column == FOLD:
             folded = True
-            vertex = _fold(orbit, before, beyond, point, settings)
-            if vertex[0].kind is Kind.SN:
-                share = (point.arc - before.arc) / (after.arc - before.arc)
-                crossing = _vertex_of_crossing(orbit, before, after, beyond, share, settings)
-                vertex = crossing or vertex
-            vertical = _is_vertical(before, after, settings, point) or _is_idle(
-                orbit, before, point, after, settings
+            found += (
+                _fold_between(orbit, before, after, beyond, share, settings)
+                if point is None
+                else _fold_at(orbit, before, after, beyond, point, settings)
             )
-            if vertex[0].kind is not Kind.SN or not vertical:
-                found.append(vertex)
-            continue
-        kind = Kind.BP
-        if column == CHI_PAIR:
-            if abs(point.mu[0].imag) < _COMPLEX:
-                continue  # two real multipliers with product 1: nothing happens
-            kind = Kind.NS
-        elif column == CHI_MINUS and not orbit.system.half:
-            kind = Kind.PD
-        active = orbit.model.index_of(settings.parameter)
-        here = point.orbit(orbit.system, orbit.vector, active)
-        if kind is Kind.BP and not orbit.system.half and _is_vertex(here, active):
-            continue  # the fold there says what it is; beside it chi(1) is rounding
-        event = bifurcation_at(kind, here, before, beyond, point, settings)
-        if column == CHI_MINUS and not opens_through(here, active):
-            event = replace(event, bound=ROUGH)
-        found.append((event, point))
+        elif point is not None:
+            found += _at_multiplier(orbit, column, before, beyond, point, settings)
+        elif lost:  # a pole is no event: multipliers are infinite where an exit becomes tangential
+            half = orbit.system.half or column == CHI_ONE
+            kind = Kind.NS if column == CHI_PAIR else Kind.BP if half else Kind.PD
+            found.append(_overshot(orbit, kind, before, after, beyond, settings))
     return [*found, *_tangencies(orbit, before, beyond, settings)]
+
+
+def _fold_between(
+    orbit: Orbit, before: Point, after: Point, beyond: Point, share: float, settings: Settings
+) -> list[Located]:
+    """Return what a change of sign of the slope is for which no point was found.
+
+    At the vertex of a pitchfork or of a period doubling the arclength system itself is singular, and Newton
+    may be lost around it: it is looked for from between the two points.
+    """
+    between = parabola_vertex(before, after, share)
+    vertex = _fold(orbit, before, beyond, between, settings)
+    if vertex[0].kind is not Kind.SN:
+        return [vertex]
+    crossing = _vertex_of_crossing(orbit, before, after, beyond, share, settings)
+    if crossing is not None:
+        return [crossing]
+    vertical = _is_vertical(before, after, settings)
+    return [] if vertical else [_not_located(orbit, Kind.SN, before, beyond, settings)]
+
+
+def _fold_at(
+    orbit: Orbit, before: Point, after: Point, beyond: Point, point: Point, settings: Settings
+) -> list[Located]:
+    """Return what a change of sign of the slope at a point is: a fold, a vertex, or nothing."""
+    vertex = _fold(orbit, before, beyond, point, settings)
+    if vertex[0].kind is not Kind.SN:
+        return [vertex]
+    share = (point.arc - before.arc) / (after.arc - before.arc)
+    crossing = _vertex_of_crossing(orbit, before, after, beyond, share, settings)
+    if crossing is not None:
+        return [crossing]
+    vertical = _is_vertical(before, after, settings, point)
+    return [] if vertical or _is_idle(orbit, before, point, after, settings) else [vertex]
+
+
+def _at_multiplier(
+    orbit: Orbit, column: int, before: Point, beyond: Point, point: Point, settings: Settings
+) -> list[Located]:
+    """Return what a multiplier on the unit circle is: a branch point, a doubling, a torus, or nothing."""
+    from contfric.continuation.steps import CHI_MINUS, CHI_PAIR
+
+    kind = Kind.BP
+    if column == CHI_PAIR:
+        if abs(point.mu[0].imag) < _COMPLEX:
+            return []  # two real multipliers with product 1: nothing happens
+        kind = Kind.NS
+    elif column == CHI_MINUS and not orbit.system.half:
+        kind = Kind.PD
+    active = orbit.model.index_of(settings.parameter)
+    here = point.orbit(orbit.system, orbit.vector, active)
+    if kind is Kind.BP and not orbit.system.half and _is_vertex(here, active):
+        return []  # the fold there says what it is; near it chi(1) is rounding
+    event = bifurcation_at(kind, here, before, beyond, point, settings)
+    if column == CHI_MINUS and not opens_through(here, active):
+        event = replace(event, bound=ROUGH)
+    return [(event, point)]
 
 
 def _passes_vertex(
@@ -135,7 +162,7 @@ def _passes_vertex(
 
 def _crossing(
     orbit: Orbit, before: Point, after: Point, beyond: Point, share: float, settings: Settings
-) -> tuple[Bifurcation, Point] | None:
+) -> Located | None:
     """Return the branch point in a step, if there is one: another curve of orbits crosses there.
 
     Along one parameter that takes a symmetry. One that is declared is dealt with by the orbits that have
@@ -152,7 +179,7 @@ def _crossing(
 
 def _vertex_of_crossing(
     orbit: Orbit, before: Point, after: Point, beyond: Point, share: float, settings: Settings
-) -> tuple[Bifurcation, Point] | None:
+) -> Located | None:
     """Return the branch point at which the parameter turns, if that is what a fold is."""
     found = _crossing(orbit, before, after, beyond, share, settings)
     return found if found is not None and found[1].slope == 0.0 else None
@@ -160,7 +187,7 @@ def _vertex_of_crossing(
 
 def overshot_vertex(
     orbit: Orbit, before: Point, after: Point, share: float, settings: Settings
-) -> tuple[Bifurcation, Point] | None:
+) -> Located | None:
     """Return the vertex between two points on its two sides, if it is one."""
     point = parabola_vertex(before, after, share)
     point.w = before.w + share * (after.w - before.w)
@@ -219,7 +246,7 @@ def _is_vertex(here: Orbit, active: int) -> bool:
 
 def _not_located(
     orbit: Orbit, kind: Kind, before: Point, beyond: Point, settings: Settings
-) -> tuple[Bifurcation, Point]:
+) -> Located:
     """Return an event that is known to lie behind a point, and no better: it is not kept silent.
 
     Its bound is that of an event at the point, and as much again for the way behind it.
@@ -231,7 +258,7 @@ def _not_located(
 
 def _overshot(
     orbit: Orbit, kind: Kind, before: Point, after: Point, beyond: Point, settings: Settings
-) -> tuple[Bifurcation, Point]:
+) -> Located:
     """Return what stands for a step between whose ends no branch is found: it is to be taken back.
 
     A step as short as can be is not: then the event is reported as not located.
@@ -245,13 +272,11 @@ def _is_pole(value: float, a: float, b: float) -> bool:
     return not np.isfinite(value) or abs(value) > 2.0 * max(abs(a), abs(b))
 
 
-def _tangencies(
-    orbit: Orbit, before: Point, after: Point, settings: Settings
-) -> list[tuple[Bifurcation, Point]]:
+def _tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -> list[Located]:
     """Return the events T: changes of the surfaces that a segment crosses."""
     from contfric.continuation.bracket import BY_LABEL
 
-    found: list[tuple[Bifurcation, Point]] = []
+    found: list[Located] = []
     active = orbit.model.index_of(settings.parameter)
     for k in range(len(before.labels)):
         if before.labels[k] == after.labels[k]:
@@ -272,9 +297,9 @@ def _tangencies(
     return _once(found) if orbit.model.joined else found
 
 
-def _once(found: list[tuple[Bifurcation, Point]]) -> list[tuple[Bifurcation, Point]]:
+def _once(found: list[Located]) -> list[Located]:
     """Return one tangency of those in one place: where a joint on a section is, is of no importance."""
-    kept: list[tuple[Bifurcation, Point]] = []
+    kept: list[Located] = []
     for event in sorted(found, key=lambda pair: pair[1].arc):
         if not kept or event[1].arc - kept[-1][1].arc > SAME_TANGENCY:
             kept.append(event)
@@ -287,9 +312,7 @@ def _label_place(orbit: Orbit, k: int) -> tuple[Margin, int, str]:
     return Margin.INTERIOR, int(segment), name
 
 
-def _fold(
-    orbit: Orbit, before: Point, after: Point, point: Point, settings: Settings
-) -> tuple[Bifurcation, Point]:
+def _fold(orbit: Orbit, before: Point, after: Point, point: Point, settings: Settings) -> Located:
     """Tell a fold from the vertex of a pitchfork or of a period doubling."""
     active = orbit.model.index_of(settings.parameter)
     here = point.orbit(orbit.system, orbit.vector, active)

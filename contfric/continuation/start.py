@@ -21,7 +21,7 @@ _BESIDE_START = (1.3e-3, -1.3e-3)
 
 
 def start_of(orbit: Orbit, settings: Settings) -> tuple[Orbit, Point]:
-    """Return the orbit that a branch is traced from, and its point; beside an event where it is at one.
+    """Return the orbit that a branch is traced from, and its point; near an event where it is at one.
 
     Raises
     ------
@@ -43,17 +43,17 @@ def _why(orbit: Orbit, settings: Settings) -> str:
     """Return why an orbit has no unique continuation, and what to do."""
     if in_continuum(orbit, orbit.model.index_of(settings.parameter)):
         return (
-            f"it is one of a continuum of orbits, at each {settings.parameter} beside it, too. Continue the "
+            f"it is one of a continuum of orbits, at each {settings.parameter} near it, too. Continue the "
             "symmetric one of them, or vary what makes them a continuum (the damping, the frequency)"
         )
     return "the equations are singular there (a bifurcation). Move the parameter a little and solve again"
 
 
 def _off_events(orbit: Orbit, start: Point, settings: Settings) -> tuple[Orbit, Point]:
-    """Return a start at which no smooth event happens: the same, or one beside it.
+    """Return a start at which no smooth event happens: the same, or one near it.
 
-    An event is seen where a test changes sign, and at the event itself its sign is rounding. Where it is that
-    beside the start, too, orbits are continua, and the start is as good as any.
+    An event is seen where a test changes sign, and at the event itself its sign is rounding. Where it is
+    rounding near the start, too, orbits are continua, and the start is as good as any.
     """
     if not _is_at_event(start, settings):
         return orbit, start

@@ -100,8 +100,8 @@ def overshoots(
 ) -> bool:
     """Tell whether a start lies behind something that belongs to the branch, too.
 
-    What watches a multiplier -1 has another sign there than beside the branch point, or the branch is no
-    parabola in between. Multipliers, and the parameter, may change so fast beside a touch of a kink.
+    What watches a multiplier -1 has another sign there than near the branch point, or the branch is no
+    parabola in between. Multipliers, and the parameter, may change so fast near a touch of a kink.
     """
     from contfric.continuation.steps import CHI_MINUS
 

@@ -9,10 +9,10 @@ import numpy as np
 from contfric.continuation.accuracy import not_critical
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
+from contfric.continuation.ending import end_at_limit, ends_at, is_point
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.limits import is_at_limit, limit_crossed, limit_end
 from contfric.continuation.locate import belongs_to, locate_events
-from contfric.continuation.outcomes import end_message
 from contfric.continuation.points import (
     EXTRA,
     FIRST_STEP,
@@ -33,14 +33,12 @@ from contfric.continuation.smooth import SAME_PLACE
 from contfric.continuation.start import start_of
 from contfric.continuation.stopping import stop_among, stop_between
 from contfric.continuation.vertex_ends import (
-    CROSSED,
     NEAREST,
     SHORTER,
     Overshoot,
     end_stalled,
     overshoots_vertex,
 )
-from contfric.continuation.vertices import at_vertex
 from contfric.errors import ConvergenceError, function_of
 from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
@@ -50,15 +48,9 @@ _AT_LIMIT = 1e-6
 
 #: A margin this negative (nondimensional) is violated; a located limit is good to rounding.
 _VIOLATED = 1e-9
-#: Points this near to a vertex (arclength) are left out: the system is singular there, and they are good
-#: to about 1e-4 only. The branch that leaves starts at twice the distance.
-_CROWD = 5e-4
-
 #: A turn this much longer than at the start, along a parameter whose share of the tangent is below this,
 #: comes to an equilibrium.
 _LONGER, _STANDS = 1.5, 1e-6
-#: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
-_NO_SIZE = 1e-5
 
 #: A step this short after hundreds of points (arclength) gets nowhere.
 _CRAWLS = 1e-6
@@ -207,8 +199,7 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     if why in reasons:
         side.end = End(reasons[why])
         if why in (kernels.STEP, kernels.BROKEN) and is_at_limit(side.tip.value, settings):
-            upper = side.tip.value > 0.5 * (settings.low + settings.high)
-            side.end = limit_end(upper, settings)
+            side.end = limit_end(side.tip.value, settings)
         elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
             end_stalled(orbit, side, settings)
         if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and _slows_down(side, settings):
@@ -222,7 +213,7 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
 def _slows_down(side: Side, settings: Settings) -> bool:
     """Tell whether a side has run along one value of the parameter while only its period grew.
 
-    Beside a homoclinic orbit the period grows as the logarithm of the distance of the parameter, and
+    Near a homoclinic orbit the period grows as the logarithm of the distance of the parameter, and
     Newton fails when that distance is rounding.
     """
     if not side.autonomous:
@@ -232,16 +223,6 @@ def _slows_down(side: Side, settings: Settings) -> bool:
         abs(tip.slope) < _STANDS * settings.width
         and tip.joints[0, 0] < _LONGER * first.joints[0, 0]
     )
-
-
-def _is_point(orbit: Orbit) -> bool:
-    """Tell whether an autonomous orbit has shrunk to a point, and not only its joints to one place."""
-    if not orbit.model.autonomous:
-        return False
-    states = orbit.joints[:, 1:]
-    size = np.max(np.abs(states - states[0])) + np.max(np.abs(orbit.ends[-1, 1:] - states[0]))
-    least = _NO_SIZE * (1.0 + np.max(np.abs(states)))
-    return bool(size < least) and orbit.x_max - orbit.x_min < least
 
 
 def _end_of_holds(orbit: Orbit, side: Side, settings: Settings, stuck: bool) -> bool:
@@ -260,7 +241,7 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     if stop is not None and (limit is None or stop.point.arc <= limit[0].arc):
         limit = stop.point, ""
     located = locate_events(orbit, before, after, settings)
-    if any(is_on_section(b) and _is_point(b.orbit) for b, _ in located):
+    if any(is_on_section(b) and is_point(b.orbit) for b, _ in located):
         side.drop_tip()  # beyond it the same orbits come again, half a cycle later
         side.end = End(EndReason.POINT)
         return True
@@ -274,77 +255,63 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         return True
     side.largest = np.inf  # what asked for shorter steps is behind
     for bifurcation, point in located:
-        if limit is not None and (
-            point.arc > limit[0].arc - _AT_LIMIT * (after.arc - before.arc)
-            or not settings.low <= point.value <= settings.high
-        ):
+        if limit is not None and _is_beyond(point, limit[0], after.arc - before.arc, settings):
             break
         if is_at_limit(point.value, settings):
-            inside = [p for _, p in located if settings.low <= p.value <= settings.high]
-            if inside:
-                side.put_tip(inside[0])
-            else:  # conditions degenerate together there: the last good point is as near as one gets
-                side.drop_tip()
-            side.end = limit_end(point.value > 0.5 * (settings.low + settings.high), settings)
+            end_at_limit(side, located, point, settings)
             return True
-        if side.at_event and belongs_to(bifurcation, side.first, point, settings):
+        if _is_known(side, bifurcation, before, point, after, settings):
             continue
-        if bifurcation.kind is Kind.T and _is_start(side, before, point):
-            side.relabel_first(
-                after.labels
-            )  # where a stop lies on a surface its label is arbitrary
-            continue
-        if bifurcation.kind is Kind.T and is_known_touch(side, point):
-            continue
-        if bifurcation.kind in TERMINAL and _is_point(bifurcation.orbit):
+        if bifurcation.kind in TERMINAL and is_point(bifurcation.orbit):
             side.put_tip(point)
             side.end = End(EndReason.POINT)
             return True
         if not point.lost and (note := not_critical(bifurcation, before, after, settings)):
             side.notes.append(note)
-            continue
-        ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, point, orbit)
-        if ends is None:
-            side.bifurcations.append(bifurcation)
-            continue
-        if ends in (EndReason.BP, EndReason.PD):
-            active = orbit.model.index_of(settings.parameter)
-            side.drop_crowd(point.arc - _CROWD)
-            side.put_tip(at_vertex(point, bifurcation.orbit, active))
-        else:
-            side.put_tip(point)
-        message = _end_message(bifurcation) if ends.name == bifurcation.kind.name else ""
-        if ends is EndReason.BP and bifurcation.orbit.system.half == orbit.system.half:
-            message = CROSSED
-        side.end = End(ends, message, None if point.lost else bifurcation)
-        return True
+        elif ends_at(orbit, side, bifurcation, point, settings):
+            return True
     reached = after if limit is None else limit[0]
     if np.any(reached.tests[:-EXTRA] < -_VIOLATED):
         side.drop_tip()
         near = is_at_limit(side.tip.value, settings)
-        upper = side.tip.value > 0.5 * (settings.low + settings.high)
-        side.end = limit_end(upper, settings) if near else End(EndReason.SINGULAR)
+        side.end = limit_end(side.tip.value, settings) if near else End(EndReason.SINGULAR)
         return True
     if limit is None:
         return False
     side.put_tip(limit[0])
-    side.end = limit_end(after.value > settings.high, settings)
+    side.end = limit_end(after.value, settings)
     if stop is not None and limit[0] is stop.point:
         side.end = stop.end
     return True
 
 
-def _end_message(bifurcation: Bifurcation) -> str:
-    """Return why a branch ends at an event, in words that fit what happens there."""
-    kind, meaning = bifurcation.kind, bifurcation.meaning
-    message = end_message(bifurcation)
-    if meaning == kind.meaning or not TERMINAL & {kind}:
-        return message
-    return (message or EndReason[kind.name].value).replace(kind.meaning, meaning)
+def _is_beyond(point: Point, limit: Point, step: float, settings: Settings) -> bool:
+    """Tell whether an event lies at the limit of the parameter, or behind it."""
+    within = settings.low <= point.value <= settings.high
+    return point.arc > limit.arc - _AT_LIMIT * step or not within
+
+
+def _is_known(
+    side: Side,
+    bifurcation: Bifurcation,
+    before: Point,
+    point: Point,
+    after: Point,
+    settings: Settings,
+) -> bool:
+    """Tell whether an event is that at which the side starts, or a touch that is known already."""
+    if side.at_event and belongs_to(bifurcation, side.first, point, settings):
+        return True
+    if bifurcation.kind is not Kind.T:
+        return False
+    if _is_start(side, before, point):
+        side.relabel_first(after.labels)  # where a stop lies on a surface its label is arbitrary
+        return True
+    return is_known_touch(side, point)
 
 
 def _comes_closer(side: Side, located: list[tuple[Bifurcation, Point]], step: float) -> bool:
-    """Go back to the point before an event beside which Newton fails, and on in shorter steps.
+    """Go back to the point before an event near which Newton fails, and on in shorter steps.
 
     Where two curves of orbits cross, Newton converges from no farther than the crossing is away: a step
     across may end on the other curve, and what is between its ends belongs to neither.
@@ -360,16 +327,3 @@ def _comes_closer(side: Side, located: list[tuple[Bifurcation, Point]], step: fl
 def _is_start(side: Side, before: Point, point: Point) -> bool:
     """Tell whether a change of labels happens at the very start of a side, at an event."""
     return side.count == 2 and point.arc - before.arc < SAME_PLACE
-
-
-def _ends_branch(bifurcation: Bifurcation, point: Point, orbit: Orbit) -> EndReason | None:
-    """Return why a branch ends at a bifurcation, or None if it goes on."""
-    if bifurcation.kind in TERMINAL:
-        return EndReason[bifurcation.kind.name]
-    if bifurcation.kind is Kind.BP and point.slope == 0.0:  # another curve crosses at its vertex
-        return EndReason.BP
-    if not orbit.system.half and bifurcation.kind is Kind.BP and bifurcation.orbit.system.half:
-        return EndReason.BP
-    if bifurcation.kind is Kind.PD and bifurcation.orbit.periods < orbit.periods:
-        return EndReason.PD
-    return None

@@ -1,6 +1,6 @@
 """A vertex between two orbits: the first asymmetric (doubled), the second symmetric (undoubled) already.
 
-Where a vertex has a sharp tip, orbits become symmetric too fast to be met by shorter steps: beside a touch
+Where a vertex has a sharp tip, orbits become symmetric too fast to be met by shorter steps: near a touch
 of a kink multipliers change with the root of the parameter. What vanishes at the vertex is defined on the
 symmetric orbits on both sides of it, and changes sign there.
 """
@@ -27,7 +27,7 @@ def left_at(before: Point, after: Orbit, settings: Settings) -> Point | None:
     """Return the vertex at which a step went over from asymmetric orbits to symmetric ones, if it did.
 
     The simpler orbits between its ends are found at fixed parameters from the far one; where they turn on the
-    way (a fold may lie beside the vertex), along the chord between both ends.
+    way (a fold may lie near the vertex), along the chord between both ends.
     """
     active = after.model.index_of(settings.parameter)
     found = _at_values(before, after, active) or _along_chord(before, after, settings, active)

@@ -17,7 +17,7 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.sections import is_smooth
 
-#: Beside an event at which Newton fails steps are shortened by this factor, down to this length.
+#: Near an event at which Newton fails steps are shortened by this factor, down to this length.
 SHORTER, NEAREST = 8.0, 1e-8
 
 #: Why a branch ends at a branch point at which its parameter turns, and no declared symmetry is broken.

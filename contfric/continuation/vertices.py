@@ -45,7 +45,7 @@ _ROUNDING = 1e-13
 #: Odd parts below this (nondimensional) are what a singular system leaves undetermined.
 _ODD = 1e-5
 #: Odd parts below this are rounding: away from a vertex the orbit is symmetric (undoubled). Orbits with
-#: a small odd part may be truly asymmetric, where a vertex lies beside a fold.
+#: a small odd part may be truly asymmetric, where a vertex lies near a fold.
 _EVEN = 1e-9
 
 
@@ -161,7 +161,7 @@ def at_vertex(point: Point, simple: Orbit, active: int) -> Point:
 
 
 def joints_like(simple: Orbit, joints: FloatArray) -> FloatArray:
-    """Return the joints of a simpler orbit where an orbit beside it, run through once, has its own."""
+    """Return the joints of a simpler orbit where an orbit near it, run through once, has its own."""
     whole = simple.as_whole()
     if whole.joints.shape != joints.shape:
         return simple.doubled().joints

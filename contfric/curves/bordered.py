@@ -141,7 +141,7 @@ def fill_blocks(functions, layout, z, p, which, workspace):  # type: ignore[no-u
 def chain_solve(bordered, sign, column, rhs, transposed, close, pencil):  # type: ignore[no-untyped-def]
     """Solve the chain (its transpose) with one border row, which is in d, e, s of the workspace.
 
-    ``column`` stands beside the rows, shape (N, m); ``rhs`` on their right-hand sides. False if singular.
+    ``column`` stands next to the rows, shape (N, m); ``rhs`` on their right-hand sides. False if singular.
     """
     work, rows = bordered.work, bordered.work.rows
     count, m = column.shape

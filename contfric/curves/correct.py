@@ -86,7 +86,7 @@ _correct = correcting(normal_and_condition)
 def correct_curve(way, z, w, tz, tw, accuracy):  # type: ignore[no-untyped-def]
     """Correct (z, w) normal to the tangent (tz, tw), and replace the tangent; (converged, all is finite).
 
-    Where it fails with second derivatives by differences it is tried again with shorter ones: beside a touch
+    Where it fails with second derivatives by differences it is tried again with shorter ones: near a touch
     of a kink the first derivatives change within less than the difference.
     """
     functions, layout, p, which, workspace = (

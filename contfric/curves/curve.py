@@ -157,10 +157,9 @@ class Curve:
     @property
     def params(self) -> dict[str, FloatArray]:
         """Every parameter at every point, shape (k,) each."""
-        columns = {n: np.full(len(self), v) for n, v in self.model.mapping(self.vector).items()}
-        values = self.values
-        columns[self.parameters[0]], columns[self.parameters[1]] = values[:, 0], values[:, 1]
-        return columns
+        return self.model.columns(
+            self.vector, dict(zip(self.parameters, self.values.T, strict=True))
+        )
 
     @property
     def arc(self) -> FloatArray:

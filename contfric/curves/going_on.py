@@ -111,7 +111,7 @@ def words_at(special: SpecialPoint) -> Iterator[Orbit]:
 
 
 def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation | None:
-    """Return the condition of a curve in another word for the motion at a point; None if it is none."""
+    """Return the condition of a curve in another word for the motion at a point; None if it has none."""
     if problem.test is None:
         if orbit.system.half is not problem.system.half:
             return None
@@ -129,7 +129,7 @@ def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation 
 
 
 def _tangency_again(test: Test, one: Orbit, other: Orbit) -> Bifurcation | None:
-    """Return the tangency of a motion in another word for it; None where the segment is none of it."""
+    """Return the tangency of a motion in another word for it; None where none of its segments touches."""
     try:
         place = _tangent_at(one, test)
     except ParameterError:
@@ -199,7 +199,7 @@ def prove(
 ) -> Problem | None:
     """Return a curve's problem if its orbits are admissible a short step away from a point.
 
-    Margins that vanish at the point but not beside it are watched from there on. ``born`` says that a fold
+    Margins that vanish at the point but not near it are watched from there on. ``born`` says that a fold
     curve begins near the point: there the normal form is small, and tells of no continuum.
     """
     for share in _PROOFS:

@@ -13,7 +13,7 @@ degenerate BP, PD                   from the symmetric (undoubled) side the fold
 turnover of CS and SS               the AS of the short stick whose release is tangential
 ==================================  ============================================================
 
-The last two start beside the point, where their own equations are singular: a small distance away along
+The last two start near the point, where their own equations are singular: a small distance away along
 the direction in which the new orbits differ (the null vector; the length of the stick).
 """
 
@@ -40,7 +40,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test
 
-#: Distances beside a degenerate point at which the curve that leaves is started: as for branches.
+#: Distances near a degenerate point at which the curve that leaves is started: as for branches.
 _BESIDE = (1e-2, 3e-3, 1e-3)
 #: Margins below this vanish at a located point; those of two located events agree to about 1e-8.
 _VANISHES = 1e-6

@@ -37,26 +37,13 @@ from contfric.orbit.equations import is_divided
 
 @helper
 def second_order(  # type: ignore[no-untyped-def]
-    functions,
-    second,
-    layout,
-    i,
-    start,
-    after,
-    p,
-    which,
-    sign,
-    others,
-    twist,
-    divided,
-    workspace,
-    out,
+    functions, second, layout, i, ends, p, which, sign, others, twist, divided, workspace, out
 ):
-    """Write F_i,zz v w (m numbers); w is ``others``, closed by ``twist``.
+    """Write F_i,zz v w (m numbers) between two joints; w is ``others``, closed by ``twist``.
 
-    ``divided`` says whether the exit row is divided by the duration: that of the orbit, beside it as well.
+    ``divided`` says whether the exit row is divided by the duration: that of the orbit, near it as well.
     """
-    bordered, equations = workspace.bordered, workspace.equations
+    bordered, equations, (start, after) = workspace.bordered, workspace.equations, ends
     m = start.shape[0]
     n, close, along, other = m - 1, equations.close, bordered.along, bordered.other
     segment_direction(bordered.v, i, sign, close, along)
@@ -98,7 +85,7 @@ def third_order(functions, second, layout, i, z, p, which, sign, workspace, out)
     bordered, close = workspace.bordered, workspace.equations.close
     v, u = bordered.v, bordered.u
     count, m = z.shape
-    start, after = workspace.z_ref[i], bordered.after
+    start, after = ends = workspace.z_ref[i], bordered.after
     divided = divides_exit(layout, i, z, workspace)
     slopes = 0.0
     for level in range(2):
@@ -111,20 +98,7 @@ def third_order(functions, second, layout, i, z, p, which, sign, workspace, out)
                 start[j] = z[i, j] + h * v[i, j]
                 after[j] = end + h * end_of(v, i, sign, close, j)
             second_order(
-                functions,
-                second,
-                layout,
-                i,
-                start,
-                after,
-                p,
-                which,
-                sign,
-                v,
-                sign,
-                divided,
-                workspace,
-                out,
+                functions, second, layout, i, ends, p, which, sign, v, sign, divided, workspace, out
             )
             for j in range(m):
                 slopes += weight * u[i, j] * out[j] / (2.0 * h)
@@ -132,62 +106,38 @@ def third_order(functions, second, layout, i, z, p, which, sign, workspace, out)
 
 
 @helper
+def bend_segment(functions, second, layout, i, z, p, which, sign, others, twist, workspace, out):  # type: ignore[no-untyped-def]
+    """Write F_i,zz v w of segment i of the orbit; w is ``others``, closed by ``twist``."""
+    ends = z[i], (z[i + 1] if i + 1 < z.shape[0] else workspace.equations.last)
+    divided = divides_exit(layout, i, z, workspace)
+    second_order(
+        functions, second, layout, i, ends, p, which, sign, others, twist, divided, workspace, out
+    )
+
+
+@helper
 def cubic_coefficient(functions, second, layout, sign, z, p, which, workspace):  # type: ignore[no-untyped-def]
     """Return b; the blocks of the Jacobian and the null vectors are in the workspace."""
-    bordered, equations = workspace.bordered, workspace.equations
+    bordered, close = workspace.bordered, workspace.equations.close
     v, u, even = bordered.v, bordered.u, bordered.even
     count, m = z.shape
     spare = workspace.pencil[0, 0]
     total = 0.0
     for i in range(count):
-        after = z[i + 1] if i + 1 < count else equations.last
-        divided = divides_exit(layout, i, z, workspace)
-        second_order(
-            functions,
-            second,
-            layout,
-            i,
-            z[i],
-            after,
-            p,
-            which,
-            sign,
-            v,
-            sign,
-            divided,
-            workspace,
-            spare,
-        )
+        bend_segment(functions, second, layout, i, z, p, which, sign, v, sign, workspace, spare)
         for j in range(m):
             even[i, j] = -spare[j]
     workspace.z_ref[:, :] = 0.0
     set_border(bordered, v, 1.0, 0.0)
     plain, periodic = count < 0, 1.0
-    if not chain_solve(
-        bordered, periodic, workspace.z_ref, even, plain, equations.close, workspace.pencil
-    ):
+    if not chain_solve(bordered, periodic, workspace.z_ref, even, plain, close, workspace.pencil):
         return 0.0
     for i in range(count):
         for j in range(m):
             even[i, j] = bordered.work.z[i, j, 0]
     for i in range(count):
-        after = z[i + 1] if i + 1 < count else equations.last
-        divided = divides_exit(layout, i, z, workspace)
-        second_order(
-            functions,
-            second,
-            layout,
-            i,
-            z[i],
-            after,
-            p,
-            which,
-            sign,
-            even,
-            periodic,
-            divided,
-            workspace,
-            spare,
+        bend_segment(
+            functions, second, layout, i, z, p, which, sign, even, periodic, workspace, spare
         )
         for j in range(m):
             total += 0.5 * u[i, j] * spare[j]

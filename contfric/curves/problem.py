@@ -25,7 +25,7 @@ from contfric.orbit.system import IntArray, Margin, System, Test
 #: Margins below this at the start (nondimensional) vanish along the curve, with its condition: located
 #: events are zero to about 1e-12, and those of a group agree to their conditioning.
 _VANISHES = 1e-6
-#: A multiplier this far from +-1 is none of a located bifurcation.
+#: A multiplier this far from +-1 does not belong to a located bifurcation.
 _MULTIPLIER = 1e-2
 
 
@@ -149,7 +149,7 @@ def box_of(
     for name in mapping_of("ranges", ranges, f"{{'{one}': (lower, upper), ..}}"):
         if name not in (one, other):
             raise ParameterError(
-                f"'{name}' is none of the two parameters{did_you_mean(str(name), (one, other))}"
+                f"'{name}' is not one of the two parameters{did_you_mean(str(name), (one, other))}"
             )
     corners = [_range_of(name, ranges) for name in (one, other)]
     low, high = (np.array(side) for side in zip(*corners, strict=True))
@@ -227,7 +227,9 @@ def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Proble
             raise ParameterError(f"{bifurcation!r}: its orbit has no margin {test}")
         margin = float(orbit.margins[system.tests.index(test)])
         if not abs(margin) < _VANISHES:
-            raise ParameterError(f"{bifurcation!r} is none: its margin is {margin:.3g}, not zero")
+            raise ParameterError(
+                f"{bifurcation!r} is no bifurcation: its margin is {margin:.3g}, not zero"
+            )
         places = {
             Margin.JOINT: JOINT,
             Margin.EXIT: EXIT,

@@ -81,10 +81,9 @@ class QuantityCurve:
     @property
     def params(self) -> dict[str, FloatArray]:
         """Every parameter at every point, shape (k,) each."""
-        columns = {n: np.full(len(self), v) for n, v in self.model.mapping(self.vector).items()}
-        for k, name in enumerate(self.parameters):
-            columns[name] = self.values[:, k]
-        return columns
+        return self.model.columns(
+            self.vector, dict(zip(self.parameters, self.values.T, strict=True))
+        )
 
     def measured(self, name: QuantityLike) -> FloatArray:
         """Return another quantity at every point, shape (k,)."""

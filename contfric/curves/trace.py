@@ -155,7 +155,7 @@ def start_of_curve(problem: Problem, bifurcation: Bifurcation, largest: float) -
     Raises
     ------
     ConvergenceError
-        If Newton fails there, ends somewhere else, or no orbit beside it is admissible.
+        If Newton fails there, ends somewhere else, or no orbit near it is admissible.
     """
     orbit = problem.orbit(_joints(problem, bifurcation), bifurcation.orbit.vector[problem.which])
     found = first_curve_point(problem, orbit)
@@ -177,7 +177,7 @@ def start_of_curve(problem: Problem, bifurcation: Bifurcation, largest: float) -
             return proved, point, border
     text = "are a continuum, each marginally stable" if is_continuum(problem, point) else ""
     raise ConvergenceError(
-        f"the orbits on the curve beside {bifurcation!r} {text or 'are not admissible'}", orbit
+        f"the orbits on the curve near {bifurcation!r} {text or 'are not admissible'}", orbit
     )
 
 

@@ -71,14 +71,14 @@ def _amplitude(event: HopfPoint) -> float:
     at, q = event.equilibrium, event.centre.vector
     region = at.region
     scale = scale_of(at.model, at.vector)
-    room = [float(np.min(scale / np.maximum(np.abs(q), 1e-12 * np.max(np.abs(q)))))]
+    limits = [float(np.min(scale / np.maximum(np.abs(q), 1e-12 * np.max(np.abs(q)))))]
     domain, _ = region.domain_of(at.state, at.vector)
     values, slopes = (f(at.state, at.vector) for f in (region.heights.value, region.heights.slopes))
     for k, name in enumerate(region.heights.names):
         reach = float(abs(slopes[k] @ q))
         if name in region.sides(domain) and region.bounds(domain, name) and reach > 0.0:
-            room.append(float(abs(values[k])) / reach)
-    return 0.5 * _SHARE * min(room)
+            limits.append(float(abs(values[k])) / reach)
+    return 0.5 * _SHARE * min(limits)
 
 
 def _solved(event: HopfPoint, amplitude: float) -> Orbit | None:
@@ -197,7 +197,7 @@ def cycle_of_boundary(event: BoundaryPoint, distance: float | None = None) -> Or
 
 
 def _attractors(event: BoundaryPoint, moved: float) -> Iterator[Orbit]:
-    """Yield the orbits that simulations from near a boundary equilibrium come to, beside the event."""
+    """Yield the orbits that simulations from near a boundary equilibrium come to, near the event."""
     from contfric.orbit.find import find_orbit
 
     at = event.equilibrium

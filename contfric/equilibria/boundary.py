@@ -14,7 +14,7 @@ Let ``f1`` hold where ``H > 0`` and have an equilibrium that reaches ``H = 0`` a
 
 (M. di Bernardo, C. J. Budd, A. R. Champneys, P. Kowalczyk, Piecewise-smooth Dynamical Systems, Springer 2008,
 chapter 5.) The same is told by the two sides: where each of the two branches is admissible. That also holds
-for modes on surfaces that were typed, and is what decides here; the product is kept beside it.
+for modes on surfaces that were typed, and is what decides here; the product is kept with it.
 """
 
 from __future__ import annotations

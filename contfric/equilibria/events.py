@@ -122,7 +122,7 @@ class HopfPoint(EquilibriumEvent):
         return f"Hopf point, {kind[(self.lyapunov > 0) - (self.lyapunov < 0)]}"
 
     def cycle(self, amplitude: float | None = None) -> Orbit:
-        """Return a small cycle that is born here, stable or not, solved for at a parameter beside the event.
+        """Return a small cycle that is born here, stable or not, solved for at a parameter near the event.
 
         Parameters
         ----------

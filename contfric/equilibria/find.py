@@ -111,7 +111,7 @@ def _of_region(
 
 
 def _goes_on(zeros: Zeros, y: FloatArray, direction: FloatArray) -> bool:
-    """Tell whether there is another zero beside a singular one: a whole set of them, not a fold."""
+    """Tell whether there is another zero near a singular one: a whole set of them, not a fold."""
     length = 1e-3 * float(np.min(zeros.scale))
     beside = zeros.newton(y + length * direction)
     return beside is not None and float((beside - y) @ direction) > 0.5 * length

@@ -32,7 +32,7 @@ from contfric.models.definition import FloatArray
 
 #: Relative: an imaginary part below this is rounding, as that of a double eigenvalue may be: its root.
 _REAL = 1e-7
-#: Relative: a coefficient smaller than this beside its terms is zero to rounding.
+#: Relative: a coefficient smaller than this, compared with its terms, is zero to rounding.
 _CANCELLED = 1e-10
 
 

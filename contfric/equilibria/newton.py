@@ -12,7 +12,7 @@ from contfric.models.definition import FloatArray
 
 #: Newton's method converges within about ten steps, or wanders.
 _STEPS, _HALVINGS = 60, 10
-#: Relative: a last step this short is at rounding, and a zero that is reached no better is none.
+#: Relative: a last step this short is at rounding, and a zero has to be reached as well as this.
 _SHORT, _CONVERGED = 1e-14, 1e-9
 #: A singular value below this share of the largest is zero: rounding of a matrix of moderate size.
 _RANK = 1e-11

@@ -80,7 +80,7 @@ class Region:
         return {**own, **self.kinks}
 
     def bounds(self, domain: Domain, name: str) -> bool:
-        """Tell whether a surface (or kink) bounds the region beside a domain of it."""
+        """Tell whether a surface (or kink) bounds the region next to a domain of it."""
         if name in self.kinks:
             return True
         if name in self._wraps or name in self.on:
@@ -117,7 +117,7 @@ class Region:
         return self.fields.eigenvalues(y, p)
 
     def attracts(self, y: FloatArray, p: FloatArray) -> bool:
-        """Tell whether the fields beside the surface of the mode lead to it.
+        """Tell whether the fields on both sides of the surface of the mode lead to it.
 
         They do where sliding is derived. A static limit above the kinetic one holds what they would carry
         off.

@@ -34,34 +34,12 @@ class Location(str, Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Equilibrium:
-    """A zero of the field of one mode.
-
-    Attributes
-    ----------
-    region : the mode and where it holds
-    vector : ndarray, shape (parameters,)
-    state : ndarray, shape (n,)
-    eigenvalues : ndarray, shape (n - k,)
-        Of the field within the k surfaces that the mode lies on; the largest real part first.
-    location : Location
-    violated : tuple of str
-        Surfaces and kinks on whose wrong side it is.
-
-    Examples
-    --------
-    >>> import contfric as cf
-    >>> [rest] = cf.find_equilibria("belt")
-    >>> rest.mode, rest.state.round(9).tolist(), rest.stable
-    ('rise', [0.625, 0.0], False)
-    """
+class Rest:
+    """A state at which one mode rests: what an equilibrium and a set of them have in common."""
 
     region: Region
     vector: FloatArray
     state: FloatArray
-    eigenvalues: ComplexArray
-    location: Location
-    violated: tuple[str, ...] = ()
 
     @property
     def model(self) -> Model:
@@ -83,6 +61,34 @@ class Equilibrium:
         """Whether it is a pseudo-equilibrium: of a mode that lies on a surface."""
         return bool(self.region.on)
 
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium(Rest):
+    """A zero of the field of one mode.
+
+    Attributes
+    ----------
+    region : the mode and where it holds
+    vector : ndarray, shape (parameters,)
+    state : ndarray, shape (n,)
+    eigenvalues : ndarray, shape (n - k,)
+        Of the field within the k surfaces that the mode lies on; the largest real part first.
+    location : Location
+    violated : tuple of str
+        Surfaces and kinks on whose wrong side it is.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> [rest] = cf.find_equilibria("belt")
+    >>> rest.mode, rest.state.round(9).tolist(), rest.stable
+    ('rise', [0.625, 0.0], False)
+    """
+
+    eigenvalues: ComplexArray
+    location: Location
+    violated: tuple[str, ...] = ()
+
     @property
     def admissible(self) -> bool:
         """Whether it lies inside of the region of its mode."""
@@ -92,7 +98,7 @@ class Equilibrium:
     def stable(self) -> bool | None:
         """Whether it attracts what is near; None where its eigenvalues do not tell.
 
-        A pseudo-equilibrium has to attract within its surface, and the fields beside have to lead to that.
+        A pseudo-equilibrium has to attract within its surface, to which the fields next to it have to lead.
         """
         if self.pseudo and not self.region.attracts(self.state, self.vector):
             return False
@@ -120,7 +126,7 @@ def is_stable(eigenvalues: ComplexArray) -> bool | None:
 
 
 @dataclass(frozen=True, eq=False)
-class EquilibriumSet:
+class EquilibriumSet(Rest):
     """A whole set of equilibria: every state of it is one, as where a mass that sticks is at rest.
 
     Attributes
@@ -139,33 +145,10 @@ class EquilibriumSet:
         Of the field within the surfaces of the mode, but one zero for each dimension.
     """
 
-    region: Region
-    vector: FloatArray
-    state: FloatArray
     directions: FloatArray
     states: FloatArray
     ends: tuple[tuple[str, FloatArray], ...]
     eigenvalues: ComplexArray
-
-    @property
-    def model(self) -> Model:
-        """The model that rests."""
-        return self.region.model
-
-    @property
-    def params(self) -> dict[str, float]:
-        """All parameters by name."""
-        return self.model.mapping(self.vector)
-
-    @property
-    def mode(self) -> str:
-        """Name of the mode."""
-        return self.region.mode
-
-    @property
-    def pseudo(self) -> bool:
-        """Whether the mode lies on a surface."""
-        return bool(self.region.on)
 
     @property
     def dimension(self) -> int:

@@ -14,7 +14,7 @@ piece, or a part of it, *has no root* if the smallest coefficient exceeds the fi
 if it ends below zero and its slope is negative throughout. The second bound serves a piece that
 starts on a root: P / s has the coefficients ``5 c_i / i``.
 
-A piece of two radians is settled by the two evaluations at its ends, where a march of third order
+A piece of two radians is decided by the two evaluations at its ends, where a march of third order
 needs five or more.
 """
 

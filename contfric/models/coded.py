@@ -48,7 +48,7 @@ class Forms:
     Raises
     ------
     NotAffineError
-        With the reason, where one is none.
+        With the reason, where one is not affine.
     """
 
     def __init__(self, description: Description) -> None:

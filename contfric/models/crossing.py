@@ -284,7 +284,7 @@ class _Limits:
         return self._surface(f"rate_{name}", rate, level)
 
     def alone(self, i: int, s: int) -> dict[str, Any]:
-        """Return the sides on which sliding on surface i holds, beside the side s of the other."""
+        """Return the sides on which sliding on surface i holds, on the side s of the other."""
         return {self._limit(i, s, 1): "-", self._limit(i, s, -1): "+"}
 
     def beyond(self, i: int, s: int, out: int) -> dict[str, Any]:

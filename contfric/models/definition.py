@@ -268,6 +268,14 @@ class Model(TransitionMaps):
         """Return the engine's vector as a mapping name -> float."""
         return {name: float(v) for name, v in zip(self.parameter_names, vector, strict=True)}
 
+    def columns(
+        self, vector: FloatArray, varied: Mapping[str, FloatArray]
+    ) -> dict[str, FloatArray]:
+        """Return all parameters at the points of a branch or curve, along which some are varied."""
+        count = len(next(iter(varied.values())))
+        fixed = {name: np.full(count, value) for name, value in self.mapping(vector).items()}
+        return {**fixed, **varied}
+
     def limits(self, name: str, params: Mapping[str, float]) -> tuple[float, float, str, str]:
         """Return the interval that the constraints leave to one parameter, others fixed.
 

@@ -68,7 +68,7 @@ def turned_modes(
 def leaves_at_rest(sampler: Sampler, description: Description, domains: tuple[Domain, ...]) -> bool:
     """Return whether every sliding mode is left without acceleration: the flow then never jumps.
 
-    That is so where the limit under which a mode slides is the very place at which the field beside it
+    That is so where the limit under which a mode slides is the very place at which the field next to it
     turns around (static and kinetic limits agree); it must be so for other parameters, too.
     """
     under = {
@@ -132,7 +132,7 @@ def _on_both(
 def _beside_limit(
     at: Mapping[tuple[tuple[str, int], ...], Domain], signs: Mapping[str, int], on: str, limit: str
 ) -> list[Domain]:
-    """Return the domains beside a rest, beyond its limit; none where there is no rest within the limit."""
+    """Return the domains next to a rest, beyond its limit; none where there is no rest within the limit."""
     found = []
     for side in (1, -1):  # of the limit, within which there is rest
         rest = at.get(tuple(sorted({**signs, limit: side}.items())))

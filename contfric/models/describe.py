@@ -197,7 +197,7 @@ def _surfaces(
     for name in top.texts("kinks"):
         if name not in (*formulas, *states):
             top.fail(
-                "kinks", f"a kink is where an observable or a state is 0, and '{name}' is none"
+                "kinks", f"a kink is where an observable or a state is 0, and '{name}' is neither"
             )
         formulas.setdefault(name, name)
     return tuple(Observable(name, text) for name, text in formulas.items()), tuple(surfaces)

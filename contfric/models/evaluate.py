@@ -21,7 +21,7 @@ _TRIES, _STEPS = 400, 30
 _ON = 1e-12
 #: Central differences: the cube root of the rounding error.
 _DIFFERENCE = 6e-6
-#: Beside a surface: far beyond rounding, and nothing against a rate that matters.
+#: Near a surface: far beyond rounding, and nothing against a rate that matters.
 _BESIDE = 1e-9
 
 
@@ -196,7 +196,7 @@ class Sampler:
         return found
 
     def rate(self, mode: str, surface: str, side: int, t: float, y: Sequence[float]) -> float:
-        """Return the rate at which a mode moves off a surface, upwards, just beside it.
+        """Return the rate at which a mode moves off a surface, upwards, just next to it.
 
         The field is that of the side: on the surface itself ``sign`` would be 0.
         """

@@ -40,7 +40,7 @@ def matrix_of(key: str, value: Any, size: int, default: str | None = None) -> Te
     Raises
     ------
     EntryError
-        If it is none, or has another size.
+        If it is no matrix, or has another size.
     """
     wanted = (
         f"'{key}' is a matrix of {size} rows of {size}: a list of rows, a list of its diagonal, one "

@@ -29,7 +29,7 @@ _KINKED = frozenset({"abs", "sign", "where", "min", "max"})
 _POINTS, _PLACES = 8, 40
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
 _SAME = 1e-9
-#: Beside a surface: a smooth field changes by about as much over it, one that jumps by far more.
+#: Near a surface: a smooth field changes by about as much over it, one that jumps by far more.
 _BESIDE, _JUMP = 1e-9, 1e-5
 
 

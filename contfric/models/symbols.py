@@ -86,7 +86,7 @@ class Formulas:
         return found
 
     def affine(self, formulas: list[Any]) -> list[AffineForm] | str:
-        """Return formulas as affine forms, or why one of them is none."""
+        """Return formulas as affine forms, or why one of them is not affine."""
         states, found = self.description.states, []
         for i, f in enumerate(formulas):
             try:
@@ -97,7 +97,7 @@ class Formulas:
         return found
 
     def affine_fields(self) -> list[list[AffineForm] | str]:
-        """Return the field of each piece as affine forms, or why it is none.
+        """Return the field of each piece as affine forms, or why it is not affine.
 
         A model that asks for an implicit method has fast decays, along which a series takes many steps.
         """
@@ -126,7 +126,7 @@ class Formulas:
         ]
 
     def projections(self) -> list[list[Any]]:
-        """Return the state on the surfaces that each mode moves on, beside a state: one Newton step.
+        """Return the state on the surfaces that each mode moves on, near a state: one Newton step.
 
         A mode that slides forgets what its start has off its surfaces.
         """

@@ -293,7 +293,7 @@ def _is_same(z: FloatArray, other: FloatArray, sizes: FloatArray, period: float)
 
 
 def _adjoins(tangencies: _Tangencies, z: FloatArray) -> bool:
-    """Tell whether both modes hold beside a place on their surface."""
+    """Tell whether both modes hold near a place on their surface."""
     model, flow = tangencies.model, tangencies.model.view(tangencies.vector)
     heights = {s.name: flow.height(s.name, float(z[0]), z[1:]) for s in model.surfaces}
 

@@ -1,4 +1,4 @@
-"""From a simulation to a periodic orbit: read off the signature, detect the period, polish."""
+"""From a simulation to a periodic orbit: read off the signature, detect the period, refine by Newton."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ def _advice(trajectory: Trajectory, done: int) -> str:
 def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:
     """Return the orbit that the end of a trajectory has converged to, if it has.
 
-    A return that is not yet exact may belong to an orbit that repels, beside an attractor of longer
+    A return that is not yet exact may belong to an orbit that repels, near an attractor of longer
     period; longer simulation tells. Only at the final look are multipliers asked instead, and where the
     motion creeps towards the orbit as slowly as they say.
     """

@@ -54,7 +54,7 @@ def holds_of(model: Model, word: Word) -> tuple[Hold, ...]:
     ------
     ValueError
         If a hold comes first (the pin is a condition on the segment before it), follows another
-        hold, or is none of the model.
+        hold, or the model has no such hold.
     """
     found = []
     for index, (mode, exit_) in enumerate(word):
@@ -74,8 +74,3 @@ def holds_of(model: Model, word: Word) -> tuple[Hold, ...]:
             )
         )
     return tuple(found)
-
-
-def with_holds_behind(word: Word) -> int:
-    """Return how far a word is to be rotated so that it does not start with a hold."""
-    return next(i for i, (_, exit_) in enumerate(word) if not is_hold(exit_))

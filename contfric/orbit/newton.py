@@ -8,12 +8,12 @@ One rule ends the iteration here and along curves in two parameters (:func:`verd
 own error: with quadratic convergence the error after a correction of size d_k, following one of size d_{k-1},
 is about ``d_k^3 / d_{k-1}^2``; at the floor of rounding the corrections stop falling. How high that floor is,
 the residual says: a flow that is integrated through large accelerations rounds to 1e-13 of its state, not to
-1e-16, and beside the vertex of a pitchfork the corrections are that divided by the distance to it. A residual
+1e-16, and near the vertex of a pitchfork the corrections are that divided by the distance to it. A residual
 that is small and no longer falls is rounding, and no iterate can be better. (Where the system itself is
 singular corrections stop falling quadratically, too; but the residual goes on by a factor of 4 a step, being
 quadratic in the distance.)
 
-At fixed parameters an orbit that the equations do not determine (one of a continuum, or beside one) has no
+At fixed parameters an orbit that the equations do not determine (one of a continuum, or near one) has no
 residual to speak of wherever Newton stops. So the last elimination also says what an error of rounding in
 every equation would move it by; where that is more than :data:`_UNDETERMINED` the system is singular.
 """
@@ -71,7 +71,7 @@ ON_THE_WAY = 1e-10
 #: Corrections that are not even halved after which a step along such a branch is given up: from the cubic
 #: predictor Newton converges at once, or goes in circles about a touch of a kink for ever.
 _CIRCLES = 2
-#: Relative residual that is rounding: where the system is ill-conditioned (beside a fold) corrections
+#: Relative residual that is rounding: where the system is ill-conditioned (near a fold) corrections
 #: stop falling earlier, and no iterate can be better.
 _ROUNDING = 1e-14
 #: A residual that no longer falls is rounding below this many times that of the flow.
@@ -80,7 +80,7 @@ _NOISE = 10.0
 _STILL_FALLS = 0.5
 #: Error that the last correction may leave: below one unit in the last place.
 _TARGET = 1e-16
-#: What rounding in every equation may move an orbit by (relative): far above what it does beside folds and
+#: What rounding in every equation may move an orbit by (relative): far above what it does near folds and
 #: vertices that are located (1e-7), far below what it does on a continuum (1e-2 and more).
 _UNDETERMINED = 1e-5
 

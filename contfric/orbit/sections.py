@@ -17,7 +17,7 @@ from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Word, build_system
 
-#: A crossing this slow beside the fastest one is that of a small loop.
+#: A crossing this slow compared with the fastest one is that of a small loop.
 _SMALL = 0.2
 #: States that repeat themselves to this (relative to 1 + their size) are the same.
 _SAME = 1e-8
@@ -26,7 +26,7 @@ _MOST, _AT_JOINT = 1000, 1e-8
 
 
 def has_sections(model: Model, word: Word) -> bool:
-    """Tell whether a word has joints on sections beside others."""
+    """Tell whether a word has joints on sections and on other surfaces."""
     return bool(model.sections) and any(pair in model.sections for pair in word)
 
 

@@ -160,32 +160,65 @@ def whole_turns(t, period):  # type: ignore[no-untyped-def]
 
 
 @helper
+def begin(carry, on, t, period):  # type: ignore[no-untyped-def]
+    """Return (period, phase, surfaces) of a start, or where the last call ended."""
+    if carry[STARTED] != 0.0:
+        return int(carry[CYCLE]), t, int(carry[ON])
+    cycle = int(math.floor(t / period)) if period > 0.0 else 0
+    t -= cycle * period
+    carry[STARTED], carry[FIRST_CYCLE], carry[FIRST_TIME] = 1.0, float(cycle), t
+    carry[AT_ONCE] = carry[STRUCK] = 0.0
+    return cycle, t, on
+
+
+@helper
+def time_left(carry, cycle, t, period, periods):  # type: ignore[no-untyped-def]
+    """Return how much of the time asked for is left."""
+    if period <= 0.0:
+        return periods - (t - carry[FIRST_TIME])
+    return (periods - (cycle - int(carry[FIRST_CYCLE]))) * period - (t - carry[FIRST_TIME])
+
+
+@helper
+def shortest_flight(tables, mode):  # type: ignore[no-untyped-def]
+    """Return the share of a period within which events follow each other at once."""
+    for k in range(tables.observables.shape[0]):
+        if tables.bounds[mode, k] == 2:  # a wall bounds every mode
+            return NO_FLIGHT
+    return NO_TIME
+
+
+@helper
+def too_large(y):  # type: ignore[no-untyped-def]
+    """Tell whether a state has grown beyond all bounds, or is no number."""
+    for j in range(y.shape[0]):
+        if not abs(y[j]) < TOO_LARGE:
+            return True
+    return False
+
+
+@helper
+def write_event(rows, event, mode, surface, cycle, t):  # type: ignore[no-untyped-def]
+    """Write an event, but for its state."""
+    rows.joints[event, 0] = mode
+    rows.joints[event, 1] = surface
+    rows.cycles[event] = cycle
+    rows.times[event] = t
+
+
+@helper
 def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, workspace):  # type: ignore[no-untyped-def]
     """Follow a trajectory; see :func:`simulate`."""
-    observables = tables.observables
-    joints, none, empty, after = rows.joints, workspace.none, workspace.empty, workspace.after
-    period = functions.period(p, none, empty)
+    none, after = workspace.none, workspace.after
+    period = functions.period(p, none, workspace.empty)
     unit = period if period > 0.0 else 1.0
-    cycle, event, at_most, waited = 0, 0, NO_TIME, 0.0
-    if carry[STARTED] == 0.0:
-        if period > 0.0:
-            cycle = int(math.floor(t / period))
-            t -= cycle * period
-        carry[STARTED], carry[FIRST_CYCLE], carry[FIRST_TIME] = 1.0, float(cycle), t
-        carry[AT_ONCE] = carry[STRUCK] = 0.0
-    else:
-        cycle, on = int(carry[CYCLE]), int(carry[ON])
-    first_cycle, first_time = int(carry[FIRST_CYCLE]), carry[FIRST_TIME]
+    cycle, t, on = begin(carry, on, t, period)
+    event, waited, at_most = 0, 0.0, shortest_flight(tables, mode)
     at_once, struck = int(carry[AT_ONCE]), carry[STRUCK] != 0.0
-    for k in range(observables.shape[0]):
-        if tables.bounds[mode, k] == 2:  # a wall bounds every mode
-            at_most = NO_FLIGHT
     for _ in range(budget):
-        if event == joints.shape[0]:
+        if event == rows.joints.shape[0]:
             break
-        left = (periods - (cycle - first_cycle)) * unit - (t - first_time)
-        if period <= 0.0:
-            left = periods - (t - first_time)
+        left = time_left(carry, cycle, t, period, periods)
         allowance = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * unit
         stretch = min(left, allowance - waited, _STRETCH * unit)
         tau, surface = first_hit(functions, tables, mode, on, t, y, p, stretch, unit, workspace)
@@ -194,42 +227,33 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
             if left > stretch and not waited < allowance:
                 return never_left(tables, mode), event, mode, cycle, t
             functions.flow(mode, t, y, stretch, p, none, after, workspace.nothing)
-            copy_state(after, y)
-            t, on = t + stretch, 0
-            if period > 0.0:
-                turns, t = whole_turns(t, period)
-                cycle += turns
+            tau, on = stretch, 0
+        copy_state(after, y)
+        turns, t = whole_turns(t + tau, period)
+        cycle += turns
+        if surface < 0:
             if left > stretch:
                 continue
             return ALL_TIME, event, mode, cycle, t
         waited = 0.0
-        copy_state(after, y)
-        t += tau
-        turns, t = whole_turns(t, period)
-        cycle += turns
-        for j in range(y.shape[0]):
-            if not abs(y[j]) < TOO_LARGE:  # or flights too short to be resolved
-                return (CHATTER if struck else INFINITE), event, mode, cycle, t
+        if too_large(y):  # or flights too short to be resolved
+            return (CHATTER if struck else INFINITE), event, mode, cycle, t
         reset = tables.bounds[mode, surface] == 2
         if reset:  # rows keep the state before it, as the joints of orbits do
             copy_state(y, rows.states[event])
             functions.reset(surface, t, rows.states[event], p, none, y, workspace.nothing)
-        landed = tables.landed[surface]
-        code = sign_code(functions, observables, landed, t, y, p, none, empty)
+        on = tables.landed[surface]
+        code = sign_code(functions, tables.observables, on, t, y, p, none, workspace.empty)
         target = mode_after(tables, mode, surface, code)
         at_once = at_once + 1 if tau <= at_most * unit else 0
         struck = reset or (struck and at_once > 0)
         if at_once > MOST_AT_ONCE:
             return (CHATTER if struck else IMPOSSIBLE), event, mode, cycle, t
-        on = landed
         if reset and target < 0:
             return IMPOSSIBLE, event, mode, cycle, t
         if target < 0:
             continue  # nothing leads there: the surface is touched and left to the same side
-        joints[event, 0] = mode
-        joints[event, 1] = surface
-        rows.cycles[event] = cycle
-        rows.times[event] = t
+        write_event(rows, event, mode, surface, cycle, t)
         if not reset:
             copy_state(y, rows.states[event])
         on = behind_event(tables, mode, surface)

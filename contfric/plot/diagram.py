@@ -78,7 +78,7 @@ def plot_branches(
     events : bool
         Whether to mark and label the branches' bifurcations.
     legend : bool
-        Whether to draw the legend: beside new axes, or inside yours, there without the meaning of
+        Whether to draw the legend: next to new axes, or inside yours, there without the meaning of
         the markers.
     names, colours : mapping, optional
         What branches are called in the legend, and colours of theirs, by their names.
@@ -337,15 +337,5 @@ def _line(label: str, colour: str, style: Any = STABLE, width: float = LINE_WIDT
 
 
 def _marker(kind: str, meaning: str) -> Line2D:
-    look = MARKERS.get(kind, OTHER_MARKER)
-    return Line2D(
-        [],
-        [],
-        linestyle="none",
-        marker=look.shape,
-        markersize=sized(look.size),
-        markerfacecolor=look.face,
-        markeredgecolor=look.edge,
-        markeredgewidth=0.8,
-        label=f"{kind}: {meaning}",
-    )
+    marker = MARKERS.get(kind, OTHER_MARKER)
+    return Line2D([], [], label=f"{kind}: {meaning}", **marker.look())

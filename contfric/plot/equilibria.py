@@ -107,22 +107,13 @@ def plot_equilibrium_diagram(
 
 def _draw_events(ax: Axes, branch: EquilibriumBranch, k: int) -> None:
     for event in branch.events:
-        look = _MARKERS[event.kind.value]
-        (mark,) = ax.plot(
-            [event.value],
-            [float(np.asarray(event.equilibrium.state)[k])],
-            linestyle="none",
-            marker=look.shape,
-            markersize=look.size,
-            markerfacecolor=look.face,
-            markeredgecolor=look.edge,
-            markeredgewidth=0.8,
-            zorder=5,
-        )
+        height = float(np.asarray(event.equilibrium.state)[k])
+        look = _MARKERS[event.kind.value].look()
+        (mark,) = ax.plot([event.value], [height], zorder=5, **look)
         mark.set_gid(event.label)
         ax.annotate(
             event_label(event.label),
-            (event.value, float(np.asarray(event.equilibrium.state)[k])),
+            (event.value, height),
             xytext=(0.0, 7.0),
             textcoords="offset points",
             ha="center",

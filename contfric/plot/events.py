@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 #: Relative: events of one kind this near in the parameter are images of one another.
 _SAME = 1e-9
-#: Extrema of the orbits of one event agree to this: an event beside a singular point, where a branch is
+#: Extrema of the orbits of one event agree to this: an event near a singular point, where a branch is
 #: vertical, is located to about 1e-6.
 _SAME_MOTION = 1e-5
 #: A diagram with more tangencies than this does not label them; nor does it label the events that lie on
@@ -95,17 +95,15 @@ def _distinct(values: FloatArray) -> FloatArray:
 def draw_marks(ax: Axes, marks: Sequence[Mark]) -> None:
     """Mark events; the artists have the event's label as their id (``get_gid``)."""
     for mark in marks:
-        look = MARKERS.get(mark.kind.value, OTHER_MARKER)
+        marker = MARKERS.get(mark.kind.value, OTHER_MARKER)
+        look = marker.look()
+        if mark.on_bridges:
+            look |= {"markersize": sized(_SMALLER * marker.size), "markeredgewidth": 0.5}
         (line,) = ax.plot(
             np.full(len(mark.y), mark.x),
             mark.y,
-            linestyle="none",
-            marker=look.shape,
-            markersize=sized(look.size * (_SMALLER if mark.on_bridges else 1.0)),
-            markerfacecolor=look.face,
-            markeredgecolor=look.edge,
-            markeredgewidth=0.5 if mark.on_bridges else 0.8,
             zorder=4 if mark.kind.value == "T" or mark.on_bridges else 5,
+            **look,
         )
         line.set_gid(mark.label)
 

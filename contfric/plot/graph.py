@@ -120,7 +120,7 @@ def _draw_transition(
     arrow.set_gid(f"{source} -> {target}")
     ax.add_patch(arrow)
     along = end - start
-    # a quadratic arc passes half of its control point's offset beside the chord
+    # a quadratic arc passes half of its control point's offset from the chord
     middle = 0.5 * (start + end) + 0.5 * _CURVE * np.array([along[1], -along[0]])
     text = surface_label(surface)
     if numbers:

@@ -1,4 +1,4 @@
-"""Labels beside points, off the lines and off each other."""
+"""Labels next to points, off the lines and off each other."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Anchor:
 
 
 def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
-    """Write a text beside each point where it hides as little as possible.
+    """Write a text next to each point where it hides as little as possible.
 
     Equal texts at points that cannot be told apart are written once, and a text for which there is no place
     left inside of the axes and off the others is left out. Call it when everything else is drawn, the limits

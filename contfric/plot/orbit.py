@@ -163,7 +163,7 @@ def panels_height(orbit: Orbit) -> float:
 
 
 def plot_orbit_panels(orbit: Orbit, fig: Figure | None = None) -> list[Axes]:
-    """Draw an orbit in the phase plane, beside the load plane and its observables in time.
+    """Draw an orbit in the phase plane, next to the load plane and its observables in time.
 
     Parameters
     ----------

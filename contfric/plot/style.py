@@ -39,7 +39,7 @@ BRIDGE_NAME = "bridge (orbits with a hold)"
 #: Sizes of text where ``font.size`` of matplotlib is 10, its default; see :func:`sized`.
 SMALL, TEXT = 8.0, 10.0
 
-#: Where a legend beside the axes stands.
+#: Where a legend next to the axes stands.
 BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
 
 
@@ -62,6 +62,17 @@ class Marker:
     face: str = BLACK
     size: float = 6.0
     edge: str = BLACK
+
+    def look(self) -> dict[str, Any]:
+        """Return matplotlib's arguments for points that are drawn with it, without a line."""
+        return {
+            "linestyle": "none",
+            "marker": self.shape,
+            "markersize": sized(self.size),
+            "markerfacecolor": self.face,
+            "markeredgecolor": self.edge,
+            "markeredgewidth": 0.8,
+        }
 
 
 MARKERS = {
@@ -150,7 +161,7 @@ def parameter_label(name: str) -> str:
 def title_label(title: str, names: Sequence[str]) -> str:
     r"""Return a title with the names of parameters in it as mathematics.
 
-    A name of one letter may be a word: it counts where a value or "in" stands beside it.
+    A name of one letter may be a word: it counts where a value or "in" stands next to it.
 
     Examples
     --------

@@ -75,7 +75,7 @@ def multiplier(measuring: Measuring) -> Dual:
     """Return the largest modulus of a Floquet multiplier.
 
     Its derivatives are differences: the Jacobian of the equations is exact wherever joints and parameters are
-    displaced, on an orbit or beside one, so that nothing is solved for. With Richardson's extrapolation.
+    displaced, on an orbit or near one, so that nothing is solved for. With Richardson's extrapolation.
     """
     motion = measuring.motion
     value = _largest_modulus(motion.orbit)

@@ -79,7 +79,7 @@ def given_orbits(model: Model, vector: FloatArray, orbits: object) -> list[Orbit
     Raises
     ------
     ParameterError
-        If they are none of the model at these parameters.
+        If they are no orbits of the model at these parameters.
     """
     branches = getattr(orbits, "branches", None)
     if branches is not None:

@@ -152,7 +152,7 @@ def check_starts(model: Model, grid: object, at: object) -> None:
     Raises
     ------
     ParameterError
-        If they are none of the model, or do not fit into the memory.
+        If they are no states of the model, or do not fit into the memory.
     """
     axes = _checked_grid(model, grid)
     _checked_at(model, axes, at)

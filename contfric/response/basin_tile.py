@@ -37,7 +37,7 @@ class BasinRows:
 
     @classmethod
     def checked(cls, arrays: Mapping[str, Any] | None, starts: int) -> BasinRows | None:
-        """Return the rows that some arrays are; None if they are none."""
+        """Return rows of these arrays; None if the arrays are not those of rows."""
         if arrays is None or arrays.keys() != cls.__dataclass_fields__.keys():
             return None
         rows = cls(**arrays)

@@ -31,7 +31,7 @@ _ROUNDINGS = 10.0
 
 
 def repeats_of(model: Model) -> float:
-    """Return the difference of a return that is none."""
+    """Return the difference below which a return is to the same state."""
     return _ROUNDINGS * model.rounding
 
 

@@ -41,7 +41,7 @@ class Following(NamedTuple):
     Attributes
     ----------
     transient, span : periods before points are collected, and all periods
-    repeats : difference (relative to 1 + state) of a return that is none; 0 to follow to the end
+    repeats : difference (relative to 1 + state) below which a return ends a solution; 0 to follow to the end
     most : points after which a solution is left
     carried : 1 if each starts where the one before has ended
     """

@@ -34,7 +34,7 @@ from contfric.response.sweeping import positive
 _ALL = np.iinfo(np.int64).max
 #: Newton steps for the state at a release, from the origin; observables of friction are nearly linear.
 _STEPS = 30
-#: Releases at which (relative to 1 + state) the surfaces are not met are none.
+#: A release counts if the surfaces are met to this (relative to 1 + state).
 _MET = 1e-12
 #: Bytes of a release: its parameters, its events, its results.
 _BYTES = 512

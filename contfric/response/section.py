@@ -15,6 +15,7 @@ import math
 from numba import types
 
 from contfric.chaos.cells import StartingType, start_mode
+from contfric.chaos.cycle import nearest_turn
 from contfric.compiled import (
     f8,
     helper,
@@ -94,12 +95,7 @@ def repeats(memory, key, event, segment, period, timeless, within):  # type: ign
     for i in range(MEMORIES):
         if memory.whole[i, 0] == key:
             turns, slip = cycle - memory.whole[i, 2], t - memory.z[i, 0]
-            if slip > 0.5 * period:
-                slip, turns = slip - period, turns + 1
-            elif slip < -0.5 * period:
-                slip, turns = slip + period, turns - 1
-            if timeless:
-                slip, turns = 0.0, 1
+            turns, slip = nearest_turn(turns, slip, period, timeless)
             same = turns > 0 and abs(slip) <= within * (1.0 + period)
             for j in range(y.shape[0]):
                 same = same and abs(y[j] - memory.z[i, 1 + j]) <= within * (1.0 + abs(y[j]))

@@ -41,7 +41,7 @@ class StretchRows:
 
     @classmethod
     def checked(cls, arrays: Mapping[str, Any] | None, values: int, n: int) -> StretchRows | None:
-        """Return the rows that some arrays are; None if they are none."""
+        """Return rows of these arrays; None if the arrays are not those of rows."""
         if arrays is None or arrays.keys() != cls.__dataclass_fields__.keys():
             return None
         rows = cls(**arrays)

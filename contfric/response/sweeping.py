@@ -172,7 +172,7 @@ def positive(name: str, value: object) -> float:
     Raises
     ------
     ParameterError
-        If it is none.
+        If it is not such a number.
     """
     number = real_number(name, value, least=0.0)
     if number == 0.0:

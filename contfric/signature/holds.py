@@ -68,11 +68,6 @@ def known_hold(name: str, model: Model) -> bool:
     )
 
 
-def held_modes(model: Model) -> tuple[str, ...]:
-    """Return the modes in which a model rests on a surface: those that a hold can have."""
-    return tuple(mode.name for mode in model.modes if mode.sliding)
-
-
 def release_mode(model: Model, mode: str, surface: str) -> str | None:
     """Return the mode that a regular release through a surface leads to; None if there is none."""
     for domain in model.domains:

@@ -258,7 +258,7 @@ def _read_pair(model: object, segments: object) -> tuple[Model, tuple[str, ...]]
     Raises
     ------
     NotationError
-        If the segments are none.
+        If they are no segments.
     ParameterError
         If there is no such model.
     """

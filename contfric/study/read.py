@@ -309,13 +309,7 @@ def _check_grid(located: LocatedYaml, content: StudyFile, model: Model) -> None:
             model.index_of(name)
         except ParameterError as error:
             located.fail(address, str(error))
-        fits = len(values) == 3 and values[0] < values[1] and values[2] >= 2
-        if not fits or values[2] != int(values[2]):
-            located.fail(
-                address,
-                f"{name} is [low, high, number of values], with low < high and a whole number of at "
-                f"least 2, got {values}",
-            )
+        responses.check_axis(located, address, name, values)
     from contfric.chaos.compute import check_size
 
     shape = tuple(int(values[2]) for values in task.grid.values())
@@ -346,7 +340,7 @@ def _check_plane(located: LocatedYaml, content: StudyFile, model: Model) -> None
     for name, values in (task.sections or {}).items():
         if name not in ranges:
             hint = did_you_mean(name, ranges)
-            located.fail(("plane", "sections"), f"'{name}' is none of the two parameters{hint}")
+            located.fail(("plane", "sections"), f"'{name}' is not one of the two parameters{hint}")
         low, high = ranges[name]
         for value in values:
             if not low <= value <= high:

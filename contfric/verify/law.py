@@ -81,8 +81,8 @@ def _check_stick(scene: Scene, i: int, t: arb, x: arb, end: arb, side: int) -> N
 
         def sign(tau: arb, level: int = level) -> arb:
             middle = arb(tau.mid())
-            room = scene.s0 - level * (x - scene.force(t + middle))
-            return room + level * scene.force(t + tau, 1) * (tau - middle)
+            margin = scene.s0 - level * (x - scene.force(t + middle))
+            return margin + level * scene.force(t + tau, 1) * (tau - middle)
 
         def ends(tau: arb, level: int = level) -> bool:
             return level == side and bool(-side * scene.force(t + tau, 1) > 0)

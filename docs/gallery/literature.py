@@ -78,9 +78,11 @@ def with_table(page: str, name: str, lines: list[str], what: str = "events") -> 
     return before + begin + "\n".join(lines) + "\n" + end + after
 
 
-def main(names: tuple[str, ...] = STUDIES) -> None:
-    """Run the studies, copy their figures and put the tables into the pages."""
-    for name in names:
+def main(pages: tuple[str, ...] = (*STUDIES, *PLANES.values())) -> None:
+    """Run the studies of some pages, copy their figures and put the tables into the pages."""
+    for name in STUDIES:
+        if name not in pages:
+            continue
         page = HERE / f"{name}.md"
         with tempfile.TemporaryDirectory() as folder:
             result = cf.run_study(name, Path(folder) / "out")
@@ -92,7 +94,7 @@ def main(names: tuple[str, ...] = STUDIES) -> None:
         page.write_text(with_table(text, name, table_of(result.diagram)), encoding="utf-8")
         print(f"{name}: {result.diagram!r}, {result.info['timings']}")
     for name, on in PLANES.items():
-        if on in names or on == name:
+        if on in pages:
             draw_plane(name, HERE / f"{on}.md")
 
 

@@ -8,7 +8,6 @@ that ``x_max = S + r`` and ``x_min = S - r`` with ``r^2 = (S0 - S)^2 + V^2``.
 from __future__ import annotations
 
 import math
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -18,9 +17,7 @@ from scipy.optimize import brentq
 
 import contfric as cf
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "models"))
-
-from linear_pieces import belt
+belt = cf.load_model(Path(__file__).parents[1] / "models" / "belt_constant.yaml")
 
 S, S0 = 0.3, 0.5
 

@@ -21,7 +21,7 @@ FOLDER = Path(__file__).parents[2] / "benchmarks"
 
 @pytest.fixture(scope="module")
 def tasks() -> Iterator[ModuleType]:
-    """The tasks of the benchmarks, whose modules are scripts beside each other."""
+    """The tasks of the benchmarks, whose modules are scripts in one folder."""
     before = set(sys.modules)
     sys.path.insert(0, str(FOLDER))
     try:

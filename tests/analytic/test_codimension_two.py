@@ -1,4 +1,4 @@
-"""A cusp and a degenerate period doubling, each against one-parameter runs beside it."""
+"""A cusp and a degenerate period doubling, each against one-parameter runs near it."""
 
 from __future__ import annotations
 

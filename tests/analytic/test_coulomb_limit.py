@@ -1,4 +1,4 @@
-"""Steep friction laws beside Coulomb's: what is derived on the page, by integration and by orbits."""
+"""Steep friction laws next to Coulomb's: what is derived on the page, by integration and by orbits."""
 
 from __future__ import annotations
 

@@ -348,7 +348,7 @@ def test_belt_by_another_integrator() -> None:
 
 
 def test_plane_of_the_belt() -> None:
-    """Without excitation and of Filippov's kind: both curves, each once, and what lives beside them."""
+    """Without excitation and of Filippov's kind: both curves, each once, and what lives on both sides."""
     orbit = cf.find_orbit("belt", {"vb": 0.2})
     ranges = {"vb": (0.1, 8.0), "delta": (0.5, 6.0)}
     plane = cf.explore_plane(orbit, ("vb", "delta"), ranges, max_sections=2, max_periods=1)
@@ -396,7 +396,7 @@ class Pieces:
         return [*gaps, state[1] - u[0], state[2] - u[1]], tangent
 
     def event(self, c: float, near: float, sign: float) -> float:
-        """Return A at which a multiplier is ``sign``, at 1 beside the trivial one."""
+        """Return A at which a multiplier is ``sign``, at 1 in addition to the trivial one."""
 
         def conditions(u: Any) -> list[float]:
             gaps, tangent = self.cycle(u, c)

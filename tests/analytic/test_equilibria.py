@@ -1,4 +1,4 @@
-"""Equilibria, their branches and events beside closed forms, scipy, and cycles that are solved for."""
+"""Equilibria, their branches and events against closed forms, scipy, and cycles that are solved for."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Hybrid systems of the textbooks, typed by their equations, beside closed forms and other programs.
+"""Hybrid systems of the textbooks, typed by their equations, against closed forms and other programs.
 
 Resets to other places, through a surface and to other modes; modes with memory; clocks; angles; sliding that
-is derived. References are closed forms that stand beside each test, or scipy's integrator along the equations
+is derived. References are closed forms next to each test, or scipy's integrator along the equations
 as they are written here.
 """
 

@@ -1,4 +1,4 @@
-"""Forced oscillator beside a wall: orbits of one impact in closed form, multipliers, grazing.
+"""Forced oscillator and a wall: orbits of one impact in closed form, multipliers, grazing.
 
 Between impacts ``x = p(t) + free motion`` with the forced response p. An orbit of one impact a period T
 that meets the wall at phase s with speed u leaves it with ``-e u``; after T it is back::
@@ -13,7 +13,6 @@ the other (di Bernardo et al., Piecewise-smooth Dynamical Systems, Springer 2008
 from __future__ import annotations
 
 import math
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -25,12 +24,10 @@ import contfric as cf
 from contfric.chaos.two_orbits import two_orbit_estimate
 from contfric.signature import parse_signature
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "models"))
-
-from linear_pieces import impact
+impact = cf.load_model(Path(__file__).parents[1] / "models" / "moving_wall.yaml")
 
 OMEGA, ZETA, E = 1.7, 0.1, 0.7
-PARAMS = {"S": 0.0, "V": 0.0, "f": 1.0, "Omega": OMEGA, "zeta": ZETA, "wall": 0.2, "e": E}
+PARAMS = {"f": 1.0, "Omega": OMEGA, "zeta": ZETA, "wall": 0.2, "e": E}
 STATE = [0.0, 0.1]
 
 

@@ -44,29 +44,33 @@ def advance(model, t, y, dt, p):
     return out
 
 
-def lugre_by_scipy(t0, y0, dt, omega, s, s0, sigma0=1000.0, vs=0.05):
-    """Integrate piece by piece with scipy; the sign of v is held in each piece."""
-    sign, t, y = math.copysign(1.0, y0[1]), t0, np.array(y0)
+def by_pieces(field, level, t, y, dt, **options):
+    """Integrate with scipy; in each piece the side of ``v = level`` is held: ``field(t, y, side)``."""
+    side, end, y = math.copysign(1.0, y[1] - level), t + dt, np.array(y)
 
-    def field(t, y):
+    def meets(t, y, side):
+        return y[1] - level
+
+    meets.terminal = True
+    while True:
+        meets.direction = -side
+        found = solve_ivp(field, (t, end), y, events=meets, args=(side,), **options)
+        t, y = float(found.t[-1]), found.y[:, -1]
+        if found.status == 0:
+            return y
+        side, y[1] = -side, level
+
+
+def lugre_by_scipy(t0, y0, dt, omega, s, s0, sigma0=1000.0, vs=0.05):
+    """Integrate the oscillator with scipy's explicit method of order 8."""
+
+    def field(t, y, sign):
         x, v, z = y
         g = s + (s0 - s) * math.exp(-sign * v / vs)
         return [v, math.cos(omega * t) - x - sigma0 * z, v - sigma0 * sign * v / g * z]
 
-    def stop(t, y):
-        return y[1]
-
-    stop.terminal = True
-    while True:
-        stop.direction = -sign
-        found = solve_ivp(
-            field, (t, t0 + dt), y, method="DOP853", rtol=1e-12, atol=[1e-12, 1e-12, 1e-15],
-            events=stop,
-        )  # fmt: skip
-        t, y = float(found.t[-1]), found.y[:, -1]
-        if found.status == 0:
-            return y
-        sign, y[1] = -sign, 0.0
+    options = {"method": "DOP853", "rtol": 1e-12, "atol": [1e-12, 1e-12, 1e-15]}
+    return by_pieces(field, 0.0, t0, y0, dt, **options)
 
 
 def test_motion_through_many_kinks_is_that_of_scipy(model):
@@ -272,30 +276,16 @@ def test_fold_curve_is_where_runs_in_one_parameter_turn(model, symmetric):
 
 
 def belt_by_scipy(t0, y0, dt, p):
-    """Integrate the block on the belt with scipy's Radau method; the side of the belt's speed is held."""
-    t, y = t0, np.array(y0)
-    side = math.copysign(1.0, y[1] - p["vb"])
+    """Integrate the block on the belt with scipy's Radau method."""
 
-    def field(t, y):
+    def field(t, y, side):
         x, v, z = y
         slip = v - p["vb"]
         dz = slip - p["sigma0"] * side * slip * (1.0 + p["delta"] * side * slip) / p["Fs"] * z
         return [v, -x - p["sigma0"] * z - p["sigma1"] * dz, dz]
 
-    def meets(t, y):
-        return y[1] - p["vb"]
-
-    meets.terminal = True
-    while True:
-        meets.direction = -side
-        found = solve_ivp(
-            field, (t, t0 + dt), y, method="Radau", rtol=1e-9, atol=[1e-11, 1e-11, 1e-14],
-            events=meets,
-        )  # fmt: skip
-        t, y = float(found.t[-1]), found.y[:, -1]
-        if found.status == 0:
-            return y
-        side, y[1] = -side, p["vb"]
+    options = {"method": "Radau", "rtol": 1e-9, "atol": [1e-11, 1e-11, 1e-14]}
+    return by_pieces(field, p["vb"], t0, y0, dt, **options)
 
 
 def test_stick_slip_on_a_belt_is_that_of_scipy():

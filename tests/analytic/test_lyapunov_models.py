@@ -252,7 +252,7 @@ def test_what_has_no_exponents_is_named(
 
 
 def test_a_map_of_all_kinds_of_motions_is_not_lost() -> None:
-    """Escapes, rests and cycles stand beside each other, and breakdowns where a root has no value."""
+    """Escapes, rests and cycles stand next to each other, and breakdowns where a root has no value."""
     grid = {"a": [-1.0, 1.0, 2.06], "d": [0.0, 3.0]}
     start = [0.02, 0.0, 0.01]
     lmap = cf.lyapunov_map(jerk(), grid, state=start, tile=2, periods=3000)
@@ -278,7 +278,7 @@ def test_impacts_that_accumulate(e: float) -> None:
 
 
 def test_negative_damping_wins_beyond_the_unstable_cycle() -> None:
-    """It grows until the levels +-1 of its surfaces are rounding beside the speed."""
+    """It grows until the levels +-1 of its surfaces are rounding compared with the speed."""
     found = cf.lyapunov_exponent("dead-band", {"alpha": 2.5}, state=[1.0, 0.0])
     assert found.motion is Motion.UNBOUNDED
 

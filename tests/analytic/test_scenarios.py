@@ -1,4 +1,4 @@
-"""Persistence, non-smooth folds and jumps, beside what is known of the events from elsewhere."""
+"""Persistence, non-smooth folds and jumps, against what is known of the events from elsewhere."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two-folds of normal forms and of a friction oscillator whose normal force vanishes, beside closed forms."""
+"""Two-folds of normal forms, and of friction with a normal force that vanishes, against closed forms."""
 
 from __future__ import annotations
 

@@ -194,9 +194,8 @@ HEAD = "model: coulomb\nparams: {Omega: 0.541, S: 0.32, S0: 0.4}\n"
 BASINS = "basins: {grid: {x: [-2, 2, 24], v: [-1.5, 1.5, 20]}}\n"
 
 
-def test_study(three: cf.Basins, tmp_path: Path) -> None:
-    path = tmp_path / "scene.yaml"
-    path.write_text(HEAD + BASINS + "figures: [{kind: basins}]\n")
+def test_study(three: cf.Basins, write, tmp_path: Path) -> None:
+    path = write(HEAD + BASINS + "figures: [{kind: basins}]\n")
     result = cf.run_study(path, tmp_path / "out")
     assert result.status is RunStatus.DONE
     assert {f.name for f in result.files} == {"basins.csv", "basins.npz", "basins.png", "run.json"}
@@ -215,8 +214,7 @@ def test_study(three: cf.Basins, tmp_path: Path) -> None:
         ("figures: [{kind: basins}]\n", "scene.yaml:3: .*needs 'basins'"),
     ],
 )
-def test_bad_study(tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "scene.yaml"
-    path.write_text(HEAD + text)
+def test_bad_study(write, tmp_path: Path, text: str, message: str) -> None:
+    path = write(HEAD + text)
     with pytest.raises(cf.StudyError, match=message):
         cf.run_study(path, tmp_path / "out")

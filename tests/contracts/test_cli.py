@@ -20,13 +20,8 @@ EXPLORE = "explore: {parameter: Omega, range: [0.45, 0.56]}\n"
 
 
 @pytest.fixture
-def study(tmp_path: Path):
-    def write(text: str, name: str = "scene.yaml") -> str:
-        path = tmp_path / name
-        path.write_text(text, encoding="utf-8")
-        return str(path)
-
-    return write
+def study(write):
+    return lambda *given: str(write(*given))
 
 
 def command(*args: object, cwd: Path | None = None, before: str = "") -> subprocess.Popen[str]:

@@ -111,15 +111,14 @@ def test_models_without_a_release_map() -> None:
         cf.release_map("belt")
 
 
-def test_study(tmp_path: Path) -> None:
-    path = tmp_path / "scene.yaml"
+def test_study(write, tmp_path: Path) -> None:
     head = "model: coulomb\nparams: {Omega: 0.35, S: 0.05, S0: 0.4}\n"
-    path.write_text(head + "poincare: {section: 0.5, periods: 20}\nfigures: [{kind: poincare}]\n")
+    path = write(head + "poincare: {section: 0.5, periods: 20}\nfigures: [{kind: poincare}]\n")
     result = cf.run_study(path, tmp_path / "out")
     assert result.poincare is not None and len(result.poincare) == 20
     direct = cf.poincare("coulomb", CHAOS, section=0.5, periods=20)
     np.testing.assert_array_equal(result.poincare.states, direct.states)
     assert (tmp_path / "out" / "poincare.png").is_file()
-    path.write_text(head + "poincare: {section: F}\n")
+    write(head + "poincare: {section: F}\n")
     with pytest.raises(cf.StudyError, match=r"scene.yaml:3: .*no section 'F'"):
         cf.run_study(path, tmp_path / "out2")

@@ -28,16 +28,6 @@ HEAD = "name: test\nmodel: coulomb\n"
 WALK = "segments: x0v+ -> stick -> x-v+\n"
 
 
-@pytest.fixture
-def write(tmp_path: Path):
-    def write_file(text: str, name: str = "test.yaml") -> Path:
-        path = tmp_path / name
-        path.write_text(text, encoding="utf-8")
-        return path
-
-    return write_file
-
-
 # ------------------------------------------------------------------------------ bundled files
 
 
@@ -82,7 +72,7 @@ def test_model_without_entry_point_may_be_passed(write) -> None:
     other = dataclasses.replace(COULOMB, name="other")
     path = write("name: mine\nmodel: other\n" + WALK)
     assert load_signature(path, other).model is other
-    with pytest.raises(NotationError, match=r"test\.yaml:2: unknown model 'other'"):
+    with pytest.raises(NotationError, match=r"scene\.yaml:2: unknown model 'other'"):
         load_signature(path)
 
 

@@ -24,16 +24,6 @@ CONTINUE = "continue: {parameter: Omega, range: [0.45, 0.56]}\n"
 ALL = "want: [stability, asymmetry, extrema, stops]\n"
 
 
-@pytest.fixture
-def study(tmp_path: Path):
-    def write(text: str, name: str = "scene.yaml") -> Path:
-        path = tmp_path / name
-        path.write_text(text, encoding="utf-8")
-        return path
-
-    return write
-
-
 def rows_of(path: Path) -> list[dict[str, str]]:
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
@@ -157,25 +147,25 @@ def run_python(code: str, *args: object) -> subprocess.CompletedProcess[str]:
         ),
     ],
 )
-def test_bad_study(study, text: str, line: int, message: str) -> None:
-    path = study(text)
+def test_bad_study(write, text: str, line: int, message: str) -> None:
+    path = write(text)
     with pytest.raises(cf.StudyError, match=message) as caught:
         read_study(path)
     assert str(caught.value).startswith(f"{path}:{line}: ")
     assert "\n" not in str(caught.value)
 
 
-def test_bad_signature_file_is_named_with_its_line(study) -> None:
-    study("name: a\nmodel: coulomb\nsegments: stik -> x-v+\n", "own.yaml")
-    path = study(HEAD + "start: {signature: own.yaml}\n")
+def test_bad_signature_file_is_named_with_its_line(write) -> None:
+    write("name: a\nmodel: coulomb\nsegments: stik -> x-v+\n", "own.yaml")
+    path = write(HEAD + "start: {signature: own.yaml}\n")
     with pytest.raises(
         cf.StudyError, match=r"scene\.yaml:3: .*own\.yaml:3: .*did you mean 'stick'"
     ):
         read_study(path)
-    study("name: a\nmodel: coulomb\nsegments: stick -> x+v+\n", "own.yaml")
+    write("name: a\nmodel: coulomb\nsegments: stick -> x+v+\n", "own.yaml")
     with pytest.raises(cf.StudyError, match=r"'stick' cannot be followed .*can come: x\+v-"):
         read_study(path)
-    path = study(HEAD + "start: {signature: none.yaml}\n")
+    path = write(HEAD + "start: {signature: none.yaml}\n")
     with pytest.raises(cf.StudyError, match=r"scene\.yaml:3: cannot read .*none\.yaml"):
         read_study(path)
 
@@ -190,13 +180,13 @@ def test_unknown_study(tmp_path) -> None:
         read_study(tmp_path)
 
 
-def test_a_billion_laughs_end_in_one_line(study) -> None:
+def test_a_billion_laughs_end_in_one_line(write) -> None:
     lines = ["a0: &a0 [x, x]"] + [f"a{k}: &a{k} [*a{k - 1}, *a{k - 1}]" for k in range(1, 40)]
     with pytest.raises(cf.StudyError, match="entries, those that its aliases repeat"):
-        read_study(study("\n".join(lines)))
+        read_study(write("\n".join(lines)))
     nested = "model: &m [x, x, *m]\n"
     with pytest.raises(cf.StudyError) as caught:
-        read_study(study(nested))
+        read_study(write(nested))
     assert len(str(caught.value)) < 500
 
 
@@ -209,8 +199,8 @@ def test_bundled_studies_are_valid() -> None:
         assert make_plan(read_study(name)).steps
 
 
-def test_plan_says_what_is_skipped(study) -> None:
-    text = str(make_plan(read_study(study(HEAD + EXPLORE))))
+def test_plan_says_what_is_skipped(write) -> None:
+    text = str(make_plan(read_study(write(HEAD + EXPLORE))))
     for line in (
         "1. orbit: simulate until",
         "2. explore: every branch that can be reached, Omega from 0.45 to 0.56\n",
@@ -226,8 +216,8 @@ def test_plan_says_what_is_skipped(study) -> None:
     assert "diagram (x_max, stops, psi), orbit" in everything
 
 
-def test_bridges_are_switched_off(tmp_path, study) -> None:
-    path = study(HEAD + EXPLORE.replace("}", ", bridges: false, max_periods: 16}"))
+def test_bridges_are_switched_off(tmp_path, write) -> None:
+    path = write(HEAD + EXPLORE.replace("}", ", bridges: false, max_periods: 16}"))
     text = str(make_plan(read_study(path)))
     assert "- bridges: branches end where the flow jumps: switched off (bridges: false)" in text
     assert "Omega from 0.45 to 0.56, of up to 16 period(s)" in text
@@ -236,15 +226,15 @@ def test_bridges_are_switched_off(tmp_path, study) -> None:
     assert len(record["loose_ends"]) > 0
     refused = [p for event in record["bifurcations"] for p in event["proposals"]]
     assert "bridges are switched off" in {p["why"] for p in refused if p["verdict"] == "refused"}
-    plain = study(HEAD + EXPLORE, "plain.yaml")
+    plain = write(HEAD + EXPLORE, "plain.yaml")
     assert "bridges" not in str(make_plan(read_study(plain)))
     record = cf.run_study(plain, tmp_path / "plain").info
     assert {b["bridge"] for b in record["branches"]} == {True, False}
     assert record["loose_ends"] == []
 
 
-def test_proposals_are_recorded(tmp_path, study) -> None:
-    result = cf.run_study(study(HEAD + EXPLORE), tmp_path / "out")
+def test_proposals_are_recorded(tmp_path, write) -> None:
+    result = cf.run_study(write(HEAD + EXPLORE), tmp_path / "out")
     events = result.info["bifurcations"]
     assert [e["label"] for e in events] == [b.label for b in result.diagram.bifurcations]
     for entry, event in zip(events, result.diagram.bifurcations, strict=True):
@@ -255,12 +245,12 @@ def test_proposals_are_recorded(tmp_path, study) -> None:
     assert any(e["proposals"] for e in events)
 
 
-def test_plan_of_other_scenes(study) -> None:
-    text = str(make_plan(read_study(study(HEAD + "start: {signature: 1a}\n"))))
+def test_plan_of_other_scenes(write) -> None:
+    text = str(make_plan(read_study(write(HEAD + "start: {signature: 1a}\n"))))
     assert "solve for the signature 1a" in text
     assert "- simulation to a steady state: the start is a signature" in text
     assert "- continuation: neither 'explore' nor 'continue' is given" in text
-    text = str(make_plan(read_study(study(HEAD + CONTINUE + ALL))))
+    text = str(make_plan(read_study(write(HEAD + CONTINUE + ALL))))
     assert "- other branches: 'continue' follows one branch only" in text
 
 
@@ -280,8 +270,8 @@ def test_plan_computes_nothing() -> None:
 # ------------------------------------------------------------------------- only what is wanted
 
 
-def test_everything(tmp_path, study) -> None:
-    result = cf.run_study(study(HEAD + EXPLORE + ALL), tmp_path / "out")
+def test_everything(tmp_path, write) -> None:
+    result = cf.run_study(write(HEAD + EXPLORE + ALL), tmp_path / "out")
     assert result.status is RunStatus.DONE
     assert [p.name for p in result.files] == [
         "points.csv",
@@ -300,8 +290,8 @@ def test_everything(tmp_path, study) -> None:
     assert result.info["counts"]["multiplier_evaluations"] > 0
 
 
-def test_tables_are_exact(tmp_path, study) -> None:
-    result = cf.run_study(study(HEAD + EXPLORE + ALL), tmp_path / "out")
+def test_tables_are_exact(tmp_path, write) -> None:
+    result = cf.run_study(write(HEAD + EXPLORE + ALL), tmp_path / "out")
     assert result.diagram is not None
     points = rows_of(result.out / "points.csv")
     for number, branch in enumerate(result.diagram.branches, start=1):
@@ -324,10 +314,10 @@ def test_tables_are_exact(tmp_path, study) -> None:
         assert result.diagram.branches[int(row["branch"]) - 1].name == row["signature"]
 
 
-def test_without_stability_no_multiplier_is_evaluated(tmp_path, study) -> None:
+def test_without_stability_no_multiplier_is_evaluated(tmp_path, write) -> None:
     before = counts()
     result = cf.run_study(
-        study(HEAD + EXPLORE + "want: [extrema, stops, asymmetry]\n"), tmp_path / "out"
+        write(HEAD + EXPLORE + "want: [extrema, stops, asymmetry]\n"), tmp_path / "out"
     )
     assert (counts() - before).multiplier_evaluations == 0
     assert result.info["counts"]["multiplier_evaluations"] == 0
@@ -349,31 +339,31 @@ def test_without_stability_no_multiplier_is_evaluated(tmp_path, study) -> None:
         ("want: [stability]\n", ["stable"]),
     ],
 )
-def test_only_wanted_columns(tmp_path, study, want, columns) -> None:
-    result = cf.run_study(study(HEAD + CONTINUE + want), tmp_path / "out")
+def test_only_wanted_columns(tmp_path, write, want, columns) -> None:
+    result = cf.run_study(write(HEAD + CONTINUE + want), tmp_path / "out")
     header = list(rows_of(result.out / "points.csv")[0])
     assert header == ["branch", "signature", "Omega", "S", "S0", "h", "zeta", *columns]
 
 
-def test_quantities_that_are_not_wanted_are_not_computed(tmp_path, study, monkeypatch) -> None:
+def test_quantities_that_are_not_wanted_are_not_computed(tmp_path, write, monkeypatch) -> None:
     def refuse(_: object) -> None:
         raise AssertionError("computed, though nobody wants it")
 
     for name in ("stops", "x_max", "x_min", "asymmetry", "multipliers"):
         monkeypatch.setattr(cf.Branch, name, property(refuse))
-    cf.run_study(study(HEAD + CONTINUE), tmp_path / "out")
+    cf.run_study(write(HEAD + CONTINUE), tmp_path / "out")
     with pytest.raises(UnwrittenError, match="nobody wants it"):
-        cf.run_study(study(HEAD + CONTINUE + "want: [asymmetry]\n"), tmp_path / "other")
+        cf.run_study(write(HEAD + CONTINUE + "want: [asymmetry]\n"), tmp_path / "other")
 
 
 @pytest.mark.parametrize("figures", ["", "figures: [{kind: orbit}]\n"])
-def test_matplotlib_is_loaded_for_figures_only(tmp_path, study, figures) -> None:
+def test_matplotlib_is_loaded_for_figures_only(tmp_path, write, figures) -> None:
     code = (
         "import sys, contfric as cf; r = cf.run_study(sys.argv[1], sys.argv[2]);"
         "assert r.info['modules']['matplotlib'] == ('matplotlib' in sys.modules);"
         "print('matplotlib' in sys.modules, 'pandas' in sys.modules, 'networkx' in sys.modules)"
     )
-    done = run_python(code, study(HEAD + figures), tmp_path / "out")
+    done = run_python(code, write(HEAD + figures), tmp_path / "out")
     assert done.stdout.split() == [str(bool(figures)), "False", "False"], done.stderr
     record = json.loads((tmp_path / "out" / "run.json").read_text())
     assert record["modules"]["matplotlib"] is bool(figures)
@@ -382,8 +372,8 @@ def test_matplotlib_is_loaded_for_figures_only(tmp_path, study, figures) -> None
     assert ("matplotlib" in [item["what"] for item in record["skipped"]]) is not bool(figures)
 
 
-def test_record(tmp_path, study) -> None:
-    result = cf.run_study(study("title: A scene\n" + HEAD + EXPLORE), tmp_path / "out")
+def test_record(tmp_path, write) -> None:
+    result = cf.run_study(write("title: A scene\n" + HEAD + EXPLORE), tmp_path / "out")
     record = json.loads((result.out / "run.json").read_text())
     assert record == json.loads(json.dumps(result.info))
     assert record["title"] == "A scene"
@@ -401,8 +391,8 @@ def test_record(tmp_path, study) -> None:
     assert record["loose_ends"] == [str(end) for end in result.diagram.loose_ends]
 
 
-def test_record_counts_this_run_only(tmp_path, study) -> None:
-    path = study(HEAD + CONTINUE)
+def test_record_counts_this_run_only(tmp_path, write) -> None:
+    path = write(HEAD + CONTINUE)
     first = cf.run_study(path, tmp_path / "a").info["counts"]
     second = cf.run_study(path, tmp_path / "b").info["counts"]
     assert first == second
@@ -411,8 +401,8 @@ def test_record_counts_this_run_only(tmp_path, study) -> None:
 # ------------------------------------------------------------------------------ starts and tasks
 
 
-def test_start_from_a_signature(tmp_path, study) -> None:
-    result = cf.run_study(study(HEAD + "start: {signature: 2s}\n" + ALL), tmp_path / "out")
+def test_start_from_a_signature(tmp_path, write) -> None:
+    result = cf.run_study(write(HEAD + "start: {signature: 2s}\n" + ALL), tmp_path / "out")
     assert result.orbit is not None
     assert result.orbit.name == "2s"
     assert result.diagram is None
@@ -422,20 +412,20 @@ def test_start_from_a_signature(tmp_path, study) -> None:
     assert float(row["x_max"]) == result.orbit.x_max
 
 
-def test_start_from_a_given_state(tmp_path, study) -> None:
+def test_start_from_a_given_state(tmp_path, write) -> None:
     start = "start: {simulate: {state: [-1.3, 0.0], time: 0.5, periods: 1}}\n"
-    result = cf.run_study(study(HEAD + start), tmp_path / "out")
+    result = cf.run_study(write(HEAD + start), tmp_path / "out")
     assert result.orbit is not None
     assert result.orbit.name == "1a"
     with pytest.raises(cf.ConvergenceError, match=r"an orbit of 1 period\(s\), not 2"):
-        cf.run_study(study(HEAD + "start: {simulate: {periods: 2}}\n"), tmp_path / "two")
+        cf.run_study(write(HEAD + "start: {simulate: {periods: 2}}\n"), tmp_path / "two")
     assert not (tmp_path / "two").exists()
 
 
-def test_restart_from_a_saved_orbit(tmp_path, study) -> None:
-    first = cf.run_study(study(HEAD + CONTINUE), tmp_path / "first")
+def test_restart_from_a_saved_orbit(tmp_path, write) -> None:
+    first = cf.run_study(write(HEAD + CONTINUE), tmp_path / "first")
     text = "model: coulomb\nstart: {orbit: first/orbit.npz}\n" + CONTINUE
-    again = cf.run_study(study(text, "again.yaml"), tmp_path / "again")
+    again = cf.run_study(write(text, "again.yaml"), tmp_path / "again")
     assert again.info["counts"]["simulated_events"] == 0
     assert first.branch is not None
     assert again.branch is not None
@@ -445,36 +435,36 @@ def test_restart_from_a_saved_orbit(tmp_path, study) -> None:
     assert loaded.values.tolist() == again.branch.values.tolist()
 
 
-def test_saved_start_is_checked_before_anything_is_computed(tmp_path, study) -> None:
-    first = cf.run_study(study(HEAD + CONTINUE), tmp_path / "first")
+def test_saved_start_is_checked_before_anything_is_computed(tmp_path, write) -> None:
+    first = cf.run_study(write(HEAD + CONTINUE), tmp_path / "first")
     other = "model: coulomb\nparams: {Omega: 0.51}\nstart: {orbit: first/orbit.npz}\n"
     with pytest.raises(
         cf.StudyError, match=r":2: Omega = 0\.51, but the saved orbit has Omega = 0\.5"
     ):
-        read_study(study(other))
+        read_study(write(other))
     other = "model: coulomb\nstart: {orbit: first/branch.npz}\n"
     with pytest.raises(cf.StudyError, match=r":2: first/branch\.npz holds a Branch"):
-        read_study(study(other))
+        read_study(write(other))
     path = first.out / "orbit.npz"
     path.write_bytes(path.read_bytes()[:-40])
     other = "model: coulomb\nstart: {orbit: first/orbit.npz}\n"
     with pytest.raises(cf.StudyError, match=r":2: .*orbit\.npz is damaged or incomplete"):
-        read_study(study(other))
+        read_study(write(other))
 
 
-def test_limits_are_passed_on(tmp_path, study) -> None:
+def test_limits_are_passed_on(tmp_path, write) -> None:
     limits = "max_step: 0.01, max_points: 12"
     text = HEAD + CONTINUE.replace("}", f", {limits}}}")
-    result = cf.run_study(study(text), tmp_path / "a")
+    result = cf.run_study(write(text), tmp_path / "a")
     assert result.branch is not None
     assert len(result.branch) <= 2 * 12
     assert any("max_points" in end for end in result.info["loose_ends"])
     text = HEAD + EXPLORE.replace("}", ", max_branches: 1, max_periods: 1}")
-    result = cf.run_study(study(text), tmp_path / "b")
+    result = cf.run_study(write(text), tmp_path / "b")
     assert result.info["notes"][-1] == "stopped at max_branches = 1"
 
 
-def test_figures(tmp_path, study) -> None:
+def test_figures(tmp_path, write) -> None:
     text = (
         HEAD
         + CONTINUE
@@ -482,7 +472,7 @@ def test_figures(tmp_path, study) -> None:
         + "- {kind: diagram, rows: [x_min], format: svg}\n"
         + "- {kind: transitions, file: moves.pdf}\n- {kind: branches}\n"
     )
-    result = cf.run_study(study(text), tmp_path / "out")
+    result = cf.run_study(write(text), tmp_path / "out")
     names = ("diagram.png", "diagram.svg", "moves.pdf", "branches.png")
     figures = [result.out / name for name in names]
     starts = [path.read_bytes()[:5] for path in figures]
@@ -491,8 +481,8 @@ def test_figures(tmp_path, study) -> None:
     assert "figures" in result.info["timings"]
 
 
-def test_default_folder_is_the_name(tmp_path, study, monkeypatch) -> None:
-    path = study(HEAD, "my-scene.yaml")
+def test_default_folder_is_the_name(tmp_path, write, monkeypatch) -> None:
+    path = write(HEAD, "my-scene.yaml")
     monkeypatch.chdir(tmp_path)
     assert cf.run_study(path).out == Path("my-scene")
     assert (tmp_path / "my-scene" / "run.json").is_file()
@@ -505,8 +495,8 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def test_results_are_not_overwritten(tmp_path, study) -> None:
-    path, out = study(HEAD), tmp_path / "out"
+def test_results_are_not_overwritten(tmp_path, write) -> None:
+    path, out = write(HEAD), tmp_path / "out"
     cf.run_study(path, out)
     before = contents(out)
     started = counts()
@@ -516,52 +506,52 @@ def test_results_are_not_overwritten(tmp_path, study) -> None:
     assert counts() == started, "refused before anything is computed"
 
 
-def test_a_single_file_in_the_way_is_enough(tmp_path, study) -> None:
+def test_a_single_file_in_the_way_is_enough(tmp_path, write) -> None:
     out = tmp_path / "out"
     out.mkdir()
     (out / "mine.png").write_text("precious")
     text = HEAD + "figures: [{kind: orbit, file: mine}]\n"
     with pytest.raises(cf.ResultFileError, match=r"holds results of an earlier run \(mine\.png\)"):
-        cf.run_study(study(text), out)
+        cf.run_study(write(text), out)
     assert contents(out) == {"mine.png": b"precious"}
     (out / "mine.png").rename(out / "notes.txt")
-    cf.run_study(study(text), out)
+    cf.run_study(write(text), out)
     assert contents(out)["notes.txt"] == b"precious"
 
 
-def test_force_replaces_and_leaves_no_stale_file(tmp_path, study) -> None:
+def test_force_replaces_and_leaves_no_stale_file(tmp_path, write) -> None:
     out = tmp_path / "out"
-    cf.run_study(study(HEAD + CONTINUE), out)
+    cf.run_study(write(HEAD + CONTINUE), out)
     (out / "notes.txt").write_text("mine")
-    cf.run_study(study(HEAD), out, force=True)
+    cf.run_study(write(HEAD), out, force=True)
     assert sorted(contents(out)) == ["notes.txt", "orbit.npz", "points.csv", "run.json"]
 
 
-def test_a_failing_forced_run_keeps_the_earlier_results(tmp_path, study) -> None:
+def test_a_failing_forced_run_keeps_the_earlier_results(tmp_path, write) -> None:
     out = tmp_path / "out"
-    cf.run_study(study(HEAD), out)
+    cf.run_study(write(HEAD), out)
     before = contents(out)
     with pytest.raises(cf.ConvergenceError):
-        cf.run_study(study(HEAD + "start: {simulate: {periods: 2}}\n"), out, force=True)
+        cf.run_study(write(HEAD + "start: {simulate: {periods: 2}}\n"), out, force=True)
     assert contents(out) == before
 
 
-def test_aperiodic_start(tmp_path, study) -> None:
+def test_aperiodic_start(tmp_path, write) -> None:
     text = "model: coulomb\nparams: {Omega: 0.35, S: 0.1, S0: 0.4}\n"
     text += "start: {simulate: {longest: 1000}}\n"
     with pytest.raises(cf.AperiodicError, match=r"is aperiodic: .*1000 periods\. Try .*signature"):
-        cf.run_study(study(text), tmp_path / "out")
+        cf.run_study(write(text), tmp_path / "out")
     assert not (tmp_path / "out").exists(), "an empty folder is not left behind"
 
 
-def test_the_orbit_of_a_failed_run_is_saved(tmp_path, study, monkeypatch) -> None:
+def test_the_orbit_of_a_failed_run_is_saved(tmp_path, write, monkeypatch) -> None:
     def fail(*_: object, **__: object) -> None:
         raise cf.ConvergenceError("no tangent")
 
     monkeypatch.setattr("contfric.atlas.explore.explore", fail)
     for name in ("orbit-of-failed-run.npz", "orbit-of-failed-run-2.npz"):
         with pytest.raises(cf.ConvergenceError, match=rf"no tangent \(the orbit 1a .*{name}\)"):
-            cf.run_study(study(HEAD + EXPLORE), tmp_path / "out")
+            cf.run_study(write(HEAD + EXPLORE), tmp_path / "out")
         loaded = cf.load(tmp_path / "out" / name)
         assert isinstance(loaded, cf.Orbit)
         assert loaded.name == "1a"
@@ -575,9 +565,9 @@ def interrupt_at(word: str):
     return progress
 
 
-def test_interrupted_exploration_is_saved(tmp_path, study) -> None:
+def test_interrupted_exploration_is_saved(tmp_path, write) -> None:
     result = cf.run_study(
-        study(HEAD + EXPLORE + ALL), tmp_path / "out", progress=interrupt_at("branch 2")
+        write(HEAD + EXPLORE + ALL), tmp_path / "out", progress=interrupt_at("branch 2")
     )
     assert result.status is RunStatus.INTERRUPTED
     assert result.diagram is not None
@@ -589,19 +579,19 @@ def test_interrupted_exploration_is_saved(tmp_path, study) -> None:
     assert (record["status"], record["complete"]) == ("interrupted", False)
 
 
-def test_interrupted_before_the_first_branch(tmp_path, study) -> None:
+def test_interrupted_before_the_first_branch(tmp_path, write) -> None:
     result = cf.run_study(
-        study(HEAD + EXPLORE), tmp_path / "out", progress=interrupt_at("points, Omega")
+        write(HEAD + EXPLORE), tmp_path / "out", progress=interrupt_at("points, Omega")
     )
     assert result.status is RunStatus.INTERRUPTED
     assert [p.name for p in result.files] == ["orbit.npz", "run.json"]
 
 
-def test_interrupted_branch_is_saved(tmp_path, study, monkeypatch) -> None:
+def test_interrupted_branch_is_saved(tmp_path, write, monkeypatch) -> None:
     whole = cf.continue_orbit(cf.find_orbit("coulomb", {}), "Omega", (0.45, 0.56))
     partial = dataclasses.replace(whole, ends=(whole.ends[0], End(EndReason.INTERRUPTED)))
     monkeypatch.setattr("contfric.continuation.trace.continue_orbit", lambda *_, **__: partial)
-    result = cf.run_study(study(HEAD + CONTINUE), tmp_path / "out")
+    result = cf.run_study(write(HEAD + CONTINUE), tmp_path / "out")
     assert result.status is RunStatus.INTERRUPTED
     loaded = cf.load(result.out / "branch.npz")
     assert isinstance(loaded, cf.Branch)
@@ -609,18 +599,18 @@ def test_interrupted_branch_is_saved(tmp_path, study, monkeypatch) -> None:
 
 
 @pytest.mark.parametrize("task", [EXPLORE, CONTINUE])
-def test_interrupted_before_the_orbit(tmp_path, study, task) -> None:
-    result = cf.run_study(study(HEAD + task), tmp_path / "out", progress=interrupt_at("simulating"))
+def test_interrupted_before_the_orbit(tmp_path, write, task) -> None:
+    result = cf.run_study(write(HEAD + task), tmp_path / "out", progress=interrupt_at("simulating"))
     assert (result.status, result.files) == (RunStatus.INTERRUPTED, ())
     assert not (tmp_path / "out").exists()
 
 
-def test_interrupted_while_writing(tmp_path, study, monkeypatch) -> None:
+def test_interrupted_while_writing(tmp_path, write, monkeypatch) -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("contfric.study.tables.write_points", interrupt)
-    result = cf.run_study(study(HEAD + CONTINUE), tmp_path / "out")
+    result = cf.run_study(write(HEAD + CONTINUE), tmp_path / "out")
     assert result.status is RunStatus.INTERRUPTED
     assert sorted(contents(result.out)) == [
         "bifurcations.csv",
@@ -631,7 +621,7 @@ def test_interrupted_while_writing(tmp_path, study, monkeypatch) -> None:
     ]
 
 
-def test_a_full_disk_loses_no_result(tmp_path, study, monkeypatch) -> None:
+def test_a_full_disk_loses_no_result(tmp_path, write, monkeypatch) -> None:
     from contfric import files
 
     synced: list[int] = []
@@ -643,7 +633,7 @@ def test_a_full_disk_loses_no_result(tmp_path, study, monkeypatch) -> None:
 
     monkeypatch.setattr(files.os, "fsync", full)
     with pytest.raises(UnwrittenError) as caught:
-        cf.run_study(study(HEAD + CONTINUE), tmp_path / "out")
+        cf.run_study(write(HEAD + CONTINUE), tmp_path / "out")
     message = str(caught.value)
     assert "cannot write" in message
     assert "points.csv: No space left on device; free some space" in message
@@ -661,23 +651,23 @@ def test_a_full_disk_loses_no_result(tmp_path, study, monkeypatch) -> None:
     assert json.loads((result.out / "run.json").read_text())["status"] == RunStatus.UNWRITTEN.value
 
 
-def test_an_unwritable_folder_is_found_before_anything_is_computed(tmp_path, study) -> None:
+def test_an_unwritable_folder_is_found_before_anything_is_computed(tmp_path, write) -> None:
     (tmp_path / "file").write_text("")
     before = counts()
     with pytest.raises(cf.ResultFileError, match="a file stands where a folder should be"):
-        cf.run_study(study(HEAD), tmp_path / "file")
+        cf.run_study(write(HEAD), tmp_path / "file")
     with pytest.raises(cf.ResultFileError, match="a file stands where a folder should be"):
-        cf.run_study(study(HEAD), tmp_path / "file" / "out")
+        cf.run_study(write(HEAD), tmp_path / "file" / "out")
     assert counts() == before
 
 
-def test_a_read_only_disk(tmp_path, study, monkeypatch) -> None:
+def test_a_read_only_disk(tmp_path, write, monkeypatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise OSError(30, "Read-only file system")
 
     monkeypatch.setattr(Path, "mkdir", refuse)
     with pytest.raises(cf.ResultFileError, match="Read-only file system; the folder is read-only"):
-        cf.run_study(study(HEAD), tmp_path / "out")
+        cf.run_study(write(HEAD), tmp_path / "out")
 
 
 def test_force_removes_the_figures_of_another_study(tmp_path: Path) -> None:

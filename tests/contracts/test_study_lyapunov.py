@@ -18,12 +18,6 @@ HEAD = "model: coulomb\nparams: {S0: 0.4}\n"
 GRID = "lyapunov: {grid: {Omega: [0.3, 0.5, 5], S: [0.05, 0.3, 4]}, periods: 100}\n"
 
 
-def write(folder: Path, text: str) -> Path:
-    path = folder / "scene.yaml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
 @pytest.mark.parametrize(
     ("grid", "line", "message"),
     [
@@ -35,20 +29,20 @@ def write(folder: Path, text: str) -> Path:
         ("{grid: {Omega: [0.3, 0.5, 5], S: [0, 1, 2]}, peroids: 5}", 3, "did you mean 'periods'"),
     ],
 )
-def test_bad_grid(tmp_path: Path, grid: str, line: int, message: str) -> None:
-    path = write(tmp_path, f"{HEAD}lyapunov: {grid}\n")
+def test_bad_grid(write, grid: str, line: int, message: str) -> None:
+    path = write(f"{HEAD}lyapunov: {grid}\n")
     with pytest.raises(cf.StudyError, match=f"scene.yaml:{line}: .*{message}"):
         read_study(path)
 
 
-def test_a_figure_of_the_map_needs_the_map(tmp_path: Path) -> None:
-    path = write(tmp_path, f"{HEAD}figures: [{{kind: lyapunov}}]\n")
+def test_a_figure_of_the_map_needs_the_map(write) -> None:
+    path = write(f"{HEAD}figures: [{{kind: lyapunov}}]\n")
     with pytest.raises(cf.StudyError, match=r"scene.yaml:3: .* needs 'lyapunov'"):
         read_study(path)
 
 
-def test_a_map_alone(tmp_path: Path) -> None:
-    path = write(tmp_path, HEAD + GRID + "figures: [{kind: lyapunov}]\n")
+def test_a_map_alone(write, tmp_path: Path) -> None:
+    path = write(HEAD + GRID + "figures: [{kind: lyapunov}]\n")
     result = cf.run_study(path, tmp_path / "out")
     assert result.orbit is None and result.diagram is None and result.status is RunStatus.DONE
     grid = {"Omega": np.linspace(0.3, 0.5, 5), "S": np.linspace(0.05, 0.3, 4)}
@@ -70,8 +64,8 @@ def test_a_map_alone(tmp_path: Path) -> None:
     assert "the orbit of the start: nothing asks for it" in str(make_plan(result.study))
 
 
-def test_a_map_alone_loads_no_continuation(tmp_path: Path) -> None:
-    path = write(tmp_path, HEAD + GRID)
+def test_a_map_alone_loads_no_continuation(write, tmp_path: Path) -> None:
+    path = write(HEAD + GRID)
     code = (
         "import sys, contfric as cf\n"
         "cf.run_study(sys.argv[1], sys.argv[2])\n"
@@ -83,17 +77,17 @@ def test_a_map_alone_loads_no_continuation(tmp_path: Path) -> None:
     assert done.stdout.strip() == "[]"
 
 
-def test_a_map_beside_a_diagram(tmp_path: Path) -> None:
+def test_a_map_beside_a_diagram(write, tmp_path: Path) -> None:
     text = (
         HEAD.replace("S0", "S: 0.32, S0") + GRID + "explore: {parameter: S, range: [0.3, 0.33]}\n"
     )
-    result = cf.run_study(write(tmp_path, text), tmp_path / "out")
+    result = cf.run_study(write(text), tmp_path / "out")
     assert result.orbit is not None and result.diagram is not None and result.lyapunov is not None
     assert {"lyapunov", "start", "branches"} <= set(result.info)
 
 
-def test_a_killed_run_goes_on(tmp_path: Path) -> None:
-    path = write(tmp_path, HEAD + GRID.replace("5]", "40]"))
+def test_a_killed_run_goes_on(write, tmp_path: Path) -> None:
+    path = write(HEAD + GRID.replace("5]", "40]"))
     out = tmp_path / "out"
 
     def kill(text: str) -> None:

@@ -226,9 +226,8 @@ HEAD = "model: coulomb\nparams: {S: 0.32, S0: 0.4}\n"
 SWEEP = "sweep: {parameter: Omega, values: [0.3, 0.6, 150]}\n"
 
 
-def test_study(tmp_path: Path) -> None:
-    path = tmp_path / "scene.yaml"
-    path.write_text(HEAD + SWEEP + "figures: [{kind: sweep}]\n")
+def test_study(write, tmp_path: Path) -> None:
+    path = write(HEAD + SWEEP + "figures: [{kind: sweep}]\n")
     result = cf.run_study(path, tmp_path / "out")
     assert {f.name for f in result.files} == {"sweep.csv", "sweep.npz", "sweep.png", "run.json"}
     direct = cf.sweep("coulomb", "Omega", GRID, {"S": 0.32, "S0": 0.4})
@@ -240,9 +239,8 @@ def test_study(tmp_path: Path) -> None:
     assert result.info["sweep"]["outcomes"]["periodic"] > 0
 
 
-def test_study_interrupted_goes_on(tmp_path: Path) -> None:
-    path = tmp_path / "scene.yaml"
-    path.write_text(HEAD + SWEEP)
+def test_study_interrupted_goes_on(write, tmp_path: Path) -> None:
+    path = write(HEAD + SWEEP)
 
     def stop(text: str) -> None:
         if "%" in text:
@@ -266,8 +264,7 @@ def test_study_interrupted_goes_on(tmp_path: Path) -> None:
         ("figures: [{kind: sweep}]\n", "scene.yaml:3: .*needs 'sweep'"),
     ],
 )
-def test_bad_study(tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "scene.yaml"
-    path.write_text(HEAD + text)
+def test_bad_study(write, tmp_path: Path, text: str, message: str) -> None:
+    path = write(HEAD + text)
     with pytest.raises(cf.StudyError, match=message):
         cf.run_study(path, tmp_path / "out")

@@ -10,19 +10,20 @@ from __future__ import annotations
 
 import math
 
+from coulomb_integrated import OMEGA, period_of
+
 from contfric.compiled import (
     field_signature,
     helper,
     kernel,
     level_signature,
     observe_signature,
-    period_signature,
     rate_signature,
     scale_signature,
 )
 from contfric.flow.integrated import Functions
 
-OMEGA, S, S0, SIGMA0, SIGMA1, C, VS = range(7)
+_, S, S0, SIGMA0, SIGMA1, C, VS = range(7)
 
 
 @helper
@@ -117,14 +118,6 @@ def rate_of(mode, c, t, y, p, which, grad):
     if c == 1:
         return dz
     return math.cos(p[OMEGA] * t) - x - k * z - p[SIGMA1] * dz - p[C] * v
-
-
-@kernel(period_signature)
-def period_of(p, which, grad):
-    value = 2.0 * math.pi / p[OMEGA]
-    for k in range(grad.shape[0]):
-        grad[k] = -value / p[OMEGA] if which[k] == OMEGA else 0.0
-    return value
 
 
 @kernel(scale_signature)

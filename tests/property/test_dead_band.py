@@ -6,7 +6,6 @@ symmetric, and nowhere with a jump of the flow (a system of Filippov).
 
 from __future__ import annotations
 
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -15,9 +14,7 @@ import pytest
 
 import contfric as cf
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "models"))
-
-from linear_pieces import dead_band
+dead_band = cf.load_model(Path(__file__).parents[1] / "models" / "band_friction.yaml")
 
 PARAMS = {"zeta": -0.1, "V": 1.0, "S": 0.8}
 
@@ -48,7 +45,7 @@ def test_ends_say_that_the_motion_is_continuous() -> None:
 
 @pytest.mark.parametrize("beside", [-1e-3, 1e-3])
 def test_events_by_simulation_on_both_sides(beside: float) -> None:
-    """The words beside each event are those of the branches that meet there."""
+    """The words near each event are those of the branches that meet there."""
     checked = 0
     for node in diagram().nodes:
         b = node.bifurcation

@@ -70,7 +70,7 @@ def turn(orbit: cf.Orbit, time: float, state: np.ndarray) -> cf.orbit.simulation
 
 @each_diagram
 def test_every_orbit_reproduces_itself_and_its_word(name: str) -> None:
-    """Measured: 2e-14 at worst, 8e-12 |mu| beside an event at which the flow jumps (in h).
+    """Measured: 2e-14 at worst, 8e-12 |mu| near an event at which the flow jumps (in h).
 
     Where an exit is met almost tangentially, with a rate r, its time is good to rounding / r only:
     the branch in h comes within 1e-6 of such an end (a stick that vanishes as its release becomes
@@ -123,7 +123,7 @@ def domains_passed(
 @each_diagram
 def test_signature_is_the_one_that_the_simulation_visits(name: str) -> None:
     """All seven domains, by their definition. What is shorter than a sample is not seen, as happens
-    beside T; such orbits must be few."""
+    near T; such orbits must be few."""
     differ, count = [], 0
     for orbit in orbits(name, every=9):
         if np.min(orbit.margins) < 1e-3:

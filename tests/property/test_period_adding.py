@@ -53,7 +53,7 @@ def test_every_simulation_in_the_gap_settles_on_a_word_of_the_list_or_a_longer_o
 
 @pytest.mark.parametrize("index", range(7))
 def test_simulation_settles_on_the_word(index: int) -> None:
-    """From beside the orbit: windows overlap a little, and two attractors have their basins there."""
+    """From near the orbit: windows overlap a little, and two attractors have their basins there."""
     window = windows()[index]
     low, high = window.range
     orbit = window.branch[len(window.branch) // 2]

@@ -211,7 +211,7 @@ def test_a_slide_between_two_holds_must_last() -> None:
 def test_the_place_of_a_vertex_does_not_depend_on_where_it_is_looked_for(
     distance: float, sign: float
 ) -> None:
-    """From any symmetric orbit beside it: the same place, or none."""
+    """From any symmetric orbit near it: the same place, or none."""
     orbit = cf.solve_orbit("coulomb", "2s", {"Omega": 0.489, "S": 0.32, "S0": 0.4})
     vertex = 0.48874064302956684431  # 40 digits
     vector = orbit.vector.copy()

@@ -49,24 +49,33 @@ def varied_row(model, group, i, co, by, t, y, w, dw):  # type: ignore[no-untyped
 
 
 @allocating_helper
-def waves_at(model, values, by, w, dw):  # type: ignore[no-untyped-def]
-    """Write the frequencies and their derivatives."""
+def numbers_at(model, p, which):  # type: ignore[no-untyped-def]
+    """Return all operations' results with their derivatives, and the frequencies with theirs."""
+    free = which.shape[0]
+    values, by = np.empty(model.values), np.empty((free, model.values))
+    evaluate(model, p, which, values, by)
+    w, dw = np.empty(model.waves), np.empty((free, model.waves))
     for j in range(model.waves):
         w[j] = values[model.frequency_at[j]]
-        for k in range(by.shape[0]):
+        for k in range(free):
             dw[k, j] = by[k, model.frequency_at[j]]
+    return values, by, w, dw
+
+
+@allocating_helper
+def group_at(model, group, values, by):  # type: ignore[no-untyped-def]
+    """Return the coefficients of a group with their derivatives."""
+    co, slopes = np.empty(model.coefficients), np.empty((by.shape[0], model.coefficients))
+    coefficients_of(model, group, values, by, co, slopes)
+    return co, slopes
 
 
 @allocating_helper
 def map_of(model, group, t, y, p, which, out, jac):  # type: ignore[no-untyped-def]
     """Write the n rows of a group at a state; their derivatives where ``jac`` has space."""
     n, free = y.shape[0], which.shape[0] if jac.shape[0] > 0 else 0
-    values, by = np.empty(model.values), np.empty((free, model.values))
-    evaluate(model, p, which[:free], values, by)
-    co, slopes = np.empty(model.coefficients), np.empty((free, model.coefficients))
-    coefficients_of(model, group, values, by, co, slopes)
-    w, dw, row = np.empty(model.waves), np.empty((free, model.waves)), np.empty(n)
-    waves_at(model, values, by, w, dw)
+    values, by, w, dw = numbers_at(model, p, which[:free])
+    (co, slopes), row = group_at(model, group, values, by), np.empty(n)
     for i in range(n):
         out[i], rate, _ = row_at(model, group, i, co, t, y, w, row)
         if jac.shape[0] == 0:
@@ -92,12 +101,8 @@ def reset(model, k, t, y, p, which, y1, jac):  # type: ignore[no-untyped-def]
 def seen(model, c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
     """Return an observable, with its gradient."""
     n, free, group = y.shape[0], which.shape[0] if grad.shape[0] > 0 else 0, model.observable_of[c]
-    values, by = np.empty(model.values), np.empty((free, model.values))
-    evaluate(model, p, which[:free], values, by)
-    co, slopes = np.empty(model.coefficients), np.empty((free, model.coefficients))
-    coefficients_of(model, group, values, by, co, slopes)
-    w, dw, row = np.empty(model.waves), np.empty((free, model.waves)), np.empty(n)
-    waves_at(model, values, by, w, dw)
+    values, by, w, dw = numbers_at(model, p, which[:free])
+    (co, slopes), row = group_at(model, group, values, by), np.empty(n)
     value, rate, _ = row_at(model, group, 0, co, t, y, w, row)
     if grad.shape[0] > 0:
         grad[0] = rate
@@ -116,14 +121,9 @@ def observe(model, c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
 def rate(model, mode, c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
     """Return the rate of an observable along a mode: ``o_t + o_y . f`` (``rate_signature``)."""
     n, free, group = y.shape[0], which.shape[0] if grad.shape[0] > 0 else 0, model.observable_of[c]
-    values, by = np.empty(model.values), np.empty((free, model.values))
-    evaluate(model, p, which[:free], values, by)
-    co, slopes = np.empty(model.coefficients), np.empty((free, model.coefficients))
-    own, owns = np.empty(model.coefficients), np.empty((free, model.coefficients))
-    coefficients_of(model, group, values, by, co, slopes)
-    coefficients_of(model, mode, values, by, own, owns)
-    w, dw = np.empty(model.waves), np.empty((free, model.waves))
-    waves_at(model, values, by, w, dw)
+    values, by, w, dw = numbers_at(model, p, which[:free])
+    co, slopes = group_at(model, group, values, by)
+    own, owns = group_at(model, mode, values, by)
     weights, row = np.empty(n), np.empty(n)
     _, total, second = row_at(model, group, 0, co, t, y, w, weights)
     for m in range(grad.shape[0]):

@@ -26,11 +26,6 @@ def numbers(matrix: arb_mat) -> Vector:
     return list(matrix.entries())
 
 
-def magnitude(x: arb) -> arb:
-    """Return an upper bound of the modulus, exact."""
-    return x.abs_upper()
-
-
 def around(centre: arb, radius: arb) -> arb:
     """Return a ball that contains all numbers within a radius of a centre (itself a ball, or exact)."""
     return centre + arb(0, radius.abs_upper())

@@ -81,7 +81,7 @@ def _rates_along(report: ModelReport, probe: Probe) -> None:
 
 
 def _nearby(model: Model, probe: Probe) -> dict[str, float]:
-    """Return parameters beside the defaults: terms with a coefficient of zero are seen, too."""
+    """Return parameters near the defaults: terms with a coefficient of zero are seen, too."""
     draw, values = random.Random(probe.seed), model.mapping(probe.vector)
     moved = {
         name: value * (1.0 + 0.1 * draw.random()) + (0.05 * draw.random() if value == 0.0 else 0.0)

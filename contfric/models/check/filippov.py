@@ -15,7 +15,7 @@ _SAME = 1e-8
 
 
 def check_filippov(report: ModelReport, probe: Probe) -> None:
-    """Compare each sliding mode with the convex combination of the fields beside it.
+    """Compare each sliding mode with the convex combination of the fields on its two sides.
 
     One that differs is legal, and said; so is one that holds where motion would leave.
     """

@@ -28,7 +28,7 @@ _SAME = 1e-8
 _STEPS = 6
 #: Step of differences: the cube root of rounding.
 _DIFFERENCE = 6e-6
-#: Parameters beside the given ones are drawn within these shares of them.
+#: Parameters near the given ones are drawn within these shares of them.
 _BESIDE = 0.1
 #: Sets of parameters that a symmetry of the model itself must hold at, besides the given ones.
 _SETS = 4
@@ -202,7 +202,7 @@ def _advice(probe: Probe, found: Affine) -> str:
     if not always:
         return (
             f"at these parameters the model has a symmetry that is not declared: {shown}. Expect that "
-            f"{pairs}. It does not hold at parameters beside these, so that it cannot be declared"
+            f"{pairs}. It does not hold at parameters near these, so that it cannot be declared"
         )
     if np.any(found.shift):
         moved = [s for s, k in zip(probe.model.states, found.shift, strict=True) if k != 0.0]
@@ -218,7 +218,7 @@ def _advice(probe: Probe, found: Affine) -> str:
 
 
 def _beside(probe: Probe) -> Iterator[Probe]:
-    """Yield probes at parameters beside the given ones, more than there are parameters."""
+    """Yield probes at parameters near the given ones, more than there are parameters."""
     draw, values = random.Random(probe.seed), probe.model.mapping(probe.vector)
     count, wanted = 0, len(values) + 2 + _SETS
     for _ in range(50 * wanted):

@@ -1,0 +1,85 @@
+"""Events that end a branch: which do, and the end that they are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
+from contfric.continuation.limits import limit_end
+from contfric.continuation.outcomes import end_message
+from contfric.continuation.points import Point, Settings
+from contfric.continuation.side import Side
+from contfric.continuation.vertex_ends import CROSSED
+from contfric.continuation.vertices import at_vertex
+from contfric.orbit.orbit import Orbit
+
+#: Points this near to a vertex (arclength) are left out: the system is singular there, and they are good
+#: to about 1e-4 only. The branch that leaves starts at twice the distance.
+_CROWD = 5e-4
+#: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
+_NO_SIZE = 1e-5
+
+
+def is_point(orbit: Orbit) -> bool:
+    """Tell whether an autonomous orbit has shrunk to a point, and not only its joints to one place."""
+    if not orbit.model.autonomous:
+        return False
+    states = orbit.joints[:, 1:]
+    size = np.max(np.abs(states - states[0])) + np.max(np.abs(orbit.ends[-1, 1:] - states[0]))
+    least = _NO_SIZE * (1.0 + np.max(np.abs(states)))
+    return bool(size < least) and orbit.x_max - orbit.x_min < least
+
+
+def end_at_limit(
+    side: Side, located: list[tuple[Bifurcation, Point]], point: Point, settings: Settings
+) -> None:
+    """End a side before a limit of the model at which an event lies: several conditions degenerate there."""
+    inside = [p for _, p in located if settings.low <= p.value <= settings.high]
+    if inside:
+        side.put_tip(inside[0])
+    else:  # the last good point is as near as one gets
+        side.drop_tip()
+    side.end = limit_end(point.value, settings)
+
+
+def ends_at(
+    orbit: Orbit, side: Side, bifurcation: Bifurcation, point: Point, settings: Settings
+) -> bool:
+    """End a side at an event, or keep the event where the side goes on through it."""
+    ends = EndReason.SINGULAR if point.lost else _ends_branch(bifurcation, point, orbit)
+    if ends is None:
+        side.bifurcations.append(bifurcation)
+        return False
+    if ends in (EndReason.BP, EndReason.PD):
+        active = orbit.model.index_of(settings.parameter)
+        side.drop_crowd(point.arc - _CROWD)
+        side.put_tip(at_vertex(point, bifurcation.orbit, active))
+    else:
+        side.put_tip(point)
+    message = _end_message(bifurcation) if ends.name == bifurcation.kind.name else ""
+    if ends is EndReason.BP and bifurcation.orbit.system.half == orbit.system.half:
+        message = CROSSED
+    side.end = End(ends, message, None if point.lost else bifurcation)
+    return True
+
+
+def _end_message(bifurcation: Bifurcation) -> str:
+    """Return why a branch ends at an event, in words that fit what happens there."""
+    kind, meaning = bifurcation.kind, bifurcation.meaning
+    message = end_message(bifurcation)
+    if meaning == kind.meaning or not TERMINAL & {kind}:
+        return message
+    return (message or EndReason[kind.name].value).replace(kind.meaning, meaning)
+
+
+def _ends_branch(bifurcation: Bifurcation, point: Point, orbit: Orbit) -> EndReason | None:
+    """Return why a branch ends at a bifurcation, or None if it goes on."""
+    if bifurcation.kind in TERMINAL:
+        return EndReason[bifurcation.kind.name]
+    if bifurcation.kind is Kind.BP and point.slope == 0.0:  # another curve crosses at its vertex
+        return EndReason.BP
+    if not orbit.system.half and bifurcation.kind is Kind.BP and bifurcation.orbit.system.half:
+        return EndReason.BP
+    if bifurcation.kind is Kind.PD and bifurcation.orbit.periods < orbit.periods:
+        return EndReason.PD
+    return None
