@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, TypeVar
 
 from contfric.errors import ModelError
 from contfric.models.coefficient_texts import text_of
@@ -28,6 +29,7 @@ _OTHERS = (
     *("name", "title", "references", "parameters", "constraints", "period", "autonomous", "define"),
     *("observables", "symmetry", "spread", "integration", "max_step"),
 )
+_T = TypeVar("_T")
 #: How far the order of a harmonic may be from an odd number: rounding.
 _ODD = 1e-9
 
@@ -128,11 +130,14 @@ class _Modes:
                 self._limits(c, add)
             elif c.kind is ContactKind.JENKINS:
                 level = f"({c.texts['limit']})/({c.texts['stiffness']})"
-                add(c.name, f"w_{c.name}", self._speed(c), "0")
+                if self._stop(c)[0] == c.name:
+                    add(c.name, f"w_{c.name}", self._speed(c), "0")
                 add(f"{c.name}+", c.name, c.name, level)
                 add(f"{c.name}-", c.name, c.name, f"-{level}")
             else:
                 add(c.name, f"g_{c.name}", c.texts["gap"], "0")
+                if self._section == f"w_{c.name}":
+                    add(self._section, self._section, self._approach(c), "0")
         return observables, surfaces
 
     def _limits(self, c: Contact, add: Any) -> None:
@@ -155,14 +160,55 @@ class _Modes:
         """Return the velocity along a direction of coordinates."""
         return summed([times(repr(w), self.velocities[i]) for i, w in c.direction.items()])
 
+    def _stop(self, c: Contact) -> tuple[str, Mapping[str, str]]:
+        """Return the surface on which the velocity of a Jenkins element vanishes, and its sides where it slides.
+
+        Elements that are stretched along one direction share that of the first.
+        """
+        for other in self.contacts:
+            if other.kind is ContactKind.JENKINS and (factor := _factor(other, c)):
+                ways = "+-" if factor > 0.0 else "-+"
+                return other.name, dict(zip("pn", ways, strict=True))
+        raise AssertionError(c.name)  # its own direction is one of them
+
+    def _contradicts(self, states: Mapping[str, str]) -> bool:
+        """Tell whether elements along one direction slide opposite ways."""
+        sides: dict[str, set[str]] = {}
+        for c in self.contacts:
+            if c.kind is ContactKind.JENKINS and states[c.name] != "s":
+                stop, ways = self._stop(c)
+                sides.setdefault(stop, set()).add(ways[states[c.name]])
+        return any(len(found) > 1 for found in sides.values())
+
     def _modes(self) -> dict[str, Any]:
         found = {}
         acting = [c for c in self.contacts if c.states]
         for letters in itertools.product(*(c.states for c in acting)):
             states = {c.name: letter for c, letter in zip(acting, letters, strict=True)}
+            if self._contradicts(states):
+                continue
             name = "".join(letters) or "free"
             found[name] = {"in": self._sides(states), "field": self._field(states)}
+        self._divide(found)
         return found
+
+    def _divide(self, modes: dict[str, Any]) -> None:
+        """Divide the mode in which no contact acts, so that an orbit that stays in it meets a section."""
+        section = self._section
+        quiet = "".join(c.states[0] for c in self.contacts if c.states) or "free"
+        if section:
+            sides = modes[quiet]["in"]
+            for name, side in (quiet, "+"), (f"{quiet}-", "-"):
+                modes[name] = {**modes[quiet], "in": {**sides, section: side}}
+
+    @cached_property
+    def _section(self) -> str:
+        """The surface of the velocity by which an orbit is found along which no contact changes; or none."""
+        if "period" not in self.top.data:  # where nothing acts nothing moves
+            return ""
+        elastic = [c for c in self.contacts if c.kind is ContactKind.JENKINS]
+        gaps = [c for c in self.contacts if c.kind is ContactKind.SPRING]
+        return elastic[0].name if elastic else f"w_{gaps[0].name}" if gaps else ""
 
     def _sides(self, states: Mapping[str, str]) -> dict[str, str]:
         sides: dict[str, str] = {}
@@ -176,7 +222,8 @@ class _Modes:
                 limits = {"s": {"+": "-", "-": "+"}, "p": {"+": "0"}, "n": {"-": "0"}}[state]
                 sides |= {f"{c.name}{sign}": side for sign, side in limits.items()}
                 if state != "s":
-                    sides[c.name] = "+" if state == "p" else "-"
+                    stop, ways = self._stop(c)
+                    sides[stop] = ways[state]
             elif state == "s":
                 closed = self.structure.closed(c, states)
                 sides |= {c.name: "0", _limit(c, closed, "+"): "-", _limit(c, closed, "-"): "+"}
@@ -222,14 +269,8 @@ class _Modes:
 
     def _departures(self, c: Contact) -> list[dict[str, Any]]:
         """Return where motion on the surfaces of a contact leaves to."""
-        if c.kind is ContactKind.JENKINS:  # when the velocity changes its sign the slider sticks
-            return [
-                {
-                    "where": {f"{c.name}{sign}": "0", c.name: other},
-                    "leaves": {f"{c.name}{sign}": other},
-                }
-                for sign, other in (("+", "-"), ("-", "+"))
-            ]
+        if c.kind is ContactKind.JENKINS:
+            return self._stops(c) if self._stop(c)[0] == c.name else []
         if c.kind is not ContactKind.FRICTION:
             return []
         found = []
@@ -238,6 +279,31 @@ class _Modes:
             for sign in "+-":  # friction that has reached its limit slides
                 where = {c.name: "0", _limit(c, closed, sign): sign, **gaps}
                 found.append({"where": where, "leaves": {c.name: sign}})
+        return found
+
+    def _stops(self, first: Contact) -> list[dict[str, Any]]:
+        """Return what sticks when a velocity changes its sign: all elements along it that slide, at once."""
+        along = [
+            (c, ways)
+            for c in self.contacts
+            if c.kind is ContactKind.JENKINS
+            for stop, ways in [self._stop(c)]
+            if stop == first.name
+        ]
+        found = []
+        for sliding in reversed(_subsets(along)):  # the largest set that slides is all of them
+            for side in "+-" if sliding else "":
+                limits = [
+                    (f"{c.name}{'+' if ways['p'] == side else '-'}", "+-"[ways["p"] == side])
+                    for c, ways in sliding
+                ]
+                where = {**dict.fromkeys((name for name, _ in limits), "0")}
+                found.append(
+                    {
+                        "where": where | {first.name: "-" if side == "+" else "+"},
+                        "leaves": dict(limits),
+                    }
+                )
         return found
 
     def _resets(self) -> dict[str, dict[str, str]]:
@@ -259,8 +325,21 @@ class _Modes:
         return self._speed(c) if is_zero(given) else f"{self._speed(c)} - ({given})"
 
 
-def _subsets(springs: tuple[Contact, ...]) -> list[tuple[Contact, ...]]:
-    return [s for k in range(len(springs) + 1) for s in itertools.combinations(springs, k)]
+def _factor(one: Contact, other: Contact) -> float:
+    """Return by which factor the direction of one contact is that of another one; 0 if it is not."""
+    if one.direction.keys() != other.direction.keys():
+        return 0.0
+    i, *_ = other.direction
+    factor = other.direction[i] / one.direction[i]
+    same = all(
+        math.isclose(w, factor * one.direction[j], rel_tol=1e-12)
+        for j, w in other.direction.items()
+    )
+    return factor if same else 0.0
+
+
+def _subsets(items: Sequence[_T]) -> list[tuple[_T, ...]]:
+    return [s for k in range(len(items) + 1) for s in itertools.combinations(items, k)]
 
 
 def _limit(contact: Contact, closed: tuple[Contact, ...], sign: str) -> str:
