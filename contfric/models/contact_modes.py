@@ -16,10 +16,11 @@ from typing import Any, TypeVar
 from contfric.errors import ModelError
 from contfric.models.coefficient_texts import text_of
 from contfric.models.coefficients import AFFINE, symbols
+from contfric.models.contact_laws import laws_of
 from contfric.models.contacts import Contact, ContactKind, drift
 from contfric.models.entries import EntryError, Part, mapping_in
 from contfric.models.grammar import Scope, names_in, number_of, parse
-from contfric.models.matrices import is_zero, summed, times
+from contfric.models.matrices import summed, times
 from contfric.models.not_affine import NotAffineError
 from contfric.models.structure import COORDINATES, Structure, defaults_of
 
@@ -27,7 +28,7 @@ from contfric.models.structure import COORDINATES, Structure, defaults_of
 KEYS = (COORDINATES, "mass", "damping", "stiffness", "force", "contacts")
 _OTHERS = (
     *("name", "title", "references", "parameters", "constraints", "period", "autonomous", "define"),
-    *("observables", "symmetry", "spread", "integration", "max_step"),
+    *("observables", "symmetry", "spread", "integration", "max_step", "quantities"),
 )
 _T = TypeVar("_T")
 #: How far the order of a harmonic may be from an odd number: rounding.
@@ -61,6 +62,7 @@ class _Modes:
         self.structure, self.top = structure, structure.top
         self.coordinates, self.velocities = structure.coordinates, structure.velocities
         self.contacts, self.mass = structure.contacts, structure.mass
+        self.states: dict[str, Mapping[str, str]] = {}
 
     def data(self) -> dict[str, Any]:
         """Return the model in the schema of all models."""
@@ -73,13 +75,15 @@ class _Modes:
             for q, force in zip(self.coordinates, self.structure.forces, strict=True)
         }
         observables, surfaces = self._surfaces()
+        modes = self._modes()
         found = {
             **kept,
             "states": states,
             "define": define,
             "observables": {**mapping_in(kept, "observables"), **observables},
             "surfaces": surfaces,
-            "modes": self._modes(),
+            "modes": modes,
+            "forces": laws_of(self.structure, self.states),
             "departures": [d for c in self.contacts for d in self._departures(c)],
             "spread": {**dict.fromkeys(states, "1"), **mapping_in(kept, "spread")},
         }
@@ -131,13 +135,13 @@ class _Modes:
             elif c.kind is ContactKind.JENKINS:
                 level = f"({c.texts['limit']})/({c.texts['stiffness']})"
                 if self._stop(c)[0] == c.name:
-                    add(c.name, f"w_{c.name}", self._speed(c), "0")
+                    add(c.name, f"w_{c.name}", self.structure.speed(c), "0")
                 add(f"{c.name}+", c.name, c.name, level)
                 add(f"{c.name}-", c.name, c.name, f"-{level}")
             else:
                 add(c.name, f"g_{c.name}", c.texts["gap"], "0")
                 if self._section == f"w_{c.name}":
-                    add(self._section, self._section, self._approach(c), "0")
+                    add(self._section, self._section, self.structure.approach(c), "0")
         return observables, surfaces
 
     def _limits(self, c: Contact, add: Any) -> None:
@@ -156,14 +160,10 @@ class _Modes:
                     side = "high" if sign == "+" else "low"
                     add(surface, f"{name}_{side}", f"{load} {other} ({static})", "0")
 
-    def _speed(self, c: Contact) -> str:
-        """Return the velocity along a direction of coordinates."""
-        return summed([times(repr(w), self.velocities[i]) for i, w in c.direction.items()])
-
     def _stop(self, c: Contact) -> tuple[str, Mapping[str, str]]:
-        """Return the surface on which the velocity of a Jenkins element vanishes, and its sides where it slides.
+        """Return the surface on which the velocity of an element vanishes, and its sides where it slides.
 
-        Elements that are stretched along one direction share that of the first.
+        Jenkins elements that are stretched along one direction share that of the first.
         """
         for other in self.contacts:
             if other.kind is ContactKind.JENKINS and (factor := _factor(other, c)):
@@ -189,6 +189,7 @@ class _Modes:
                 continue
             name = "".join(letters) or "free"
             found[name] = {"in": self._sides(states), "field": self._field(states)}
+            self.states[name] = states
         self._divide(found)
         return found
 
@@ -200,6 +201,7 @@ class _Modes:
             sides = modes[quiet]["in"]
             for name, side in (quiet, "+"), (f"{quiet}-", "-"):
                 modes[name] = {**modes[quiet], "in": {**sides, section: side}}
+                self.states[name] = self.states[quiet]
 
     @cached_property
     def _section(self) -> str:
@@ -250,7 +252,7 @@ class _Modes:
             if c.kind is ContactKind.FRICTION and state == "s":
                 self._hold(c, field)
             elif c.kind is ContactKind.JENKINS:
-                field[c.name] = self._speed(c) if state == "s" else "0"
+                field[c.name] = self.structure.speed(c) if state == "s" else "0"
         return field
 
     def _hold(self, c: Contact, field: dict[str, str]) -> None:
@@ -311,18 +313,13 @@ class _Modes:
         for c in self.contacts:
             if c.kind is ContactKind.IMPACT:
                 over = self.structure.mobility(c, c)
-                kick = f"-(1 + ({c.texts['restitution']}))*({self._approach(c)})/({over})"
+                kick = f"-(1 + ({c.texts['restitution']}))*({self.structure.approach(c)})/({over})"
                 moved = self.mass.of({i: repr(w) for i, w in c.direction.items()})
                 found[c.name] = {
                     self.velocities[i]: f"{self.velocities[i]} + {times(w, kick)}"
                     for i, w in moved.items()
                 }
         return found
-
-    def _approach(self, c: Contact) -> str:
-        """Return the rate of a gap: the wall may move."""
-        given = drift(c)  # minus the rate of what is given: a gap is W . q + g(t)
-        return self._speed(c) if is_zero(given) else f"{self._speed(c)} - ({given})"
 
 
 def _factor(one: Contact, other: Contact) -> float:

@@ -105,6 +105,16 @@ class Structure:
         free = along if is_zero(apart) else f"{along} - ({apart})"
         return f"({free})/({self.mobility(contact, contact)})"
 
+    def speed(self, contact: Contact) -> str:
+        """Return the velocity along a direction of coordinates."""
+        return summed([times(repr(w), self.velocities[i]) for i, w in contact.direction.items()])
+
+    def approach(self, contact: Contact) -> str:
+        """Return the rate of a gap: the wall may move."""
+        given = drift(contact)  # minus the rate of what is given: a gap is W . q + g(t)
+        speed = self.speed(contact)
+        return speed if is_zero(given) else f"{speed} - ({given})"
+
     @cached_property
     def springs(self) -> dict[str, tuple[Contact, ...]]:
         """The springs that the load of each friction contact depends on."""

@@ -24,7 +24,7 @@ import numpy as np
 
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray
-from contfric.models.quantity_texts import Functional
+from contfric.models.quantity_texts import WORK, Functional
 from contfric.quantities.duals import Dual, Kinks, Number, apply, constant, divide
 from contfric.quantities.inside import Inside
 from contfric.quantities.motion import Motion, Segment
@@ -62,6 +62,8 @@ class Measuring:
 
     def functional(self, asked: Functional) -> Dual:
         """Return a functional as a number."""
+        if asked.kind == WORK:
+            return self._work(asked)
         function = self.inside.function(asked)
         if asked.kind in ("max", "min"):
             return self._extremum(asked, function)
@@ -85,6 +87,18 @@ class Measuring:
         for part in parts:
             slopes = slopes + part.slopes[0, : self.motion.count]
         return self.number(value, slopes)
+
+    def _work(self, asked: Functional) -> Dual:
+        """Return what a contact dissipates in a period of the orbit: where it slides, and at impacts."""
+        contact = asked.text
+        total = self._integral(asked, self.inside.power(contact))
+        loss, word = self.inside.loss(contact), self.motion.orbit.word
+        for segment, (_, exit_) in zip(self.motion.segments, word, strict=True):
+            if exit_ == contact and exit_ in self.motion.orbit.model.reset_by_surface:
+                lost = loss(segment, np.ones(1), Kinks())
+                slopes = lost.slopes[0, : self.motion.count]
+                total = _dual(total + self.number(float(lost.values[0]), slopes))
+        return total
 
     def _resolved(self, asked: Functional, function: Function) -> Iterator[Resolved]:
         for segment in self.motion.segments:
