@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -72,6 +72,11 @@ class Inside:
         """Return the power that a contact dissipates as a function along a segment."""
         return self.along(lambda mode: parse(self.laws[contact].power(mode)))
 
+    def powers(self, contact: str) -> list[Function]:
+        """Return the powers of all laws of a contact, each as if it held everywhere."""
+        texts = {t for key, t in self.laws[contact].texts.items() if key.startswith("power")}
+        return [self.along(partial(_always, parse(text))) for text in texts]
+
     def loss(self, contact: str) -> Function:
         """Return the energy that an impact takes, as a function of the state before it."""
         return self.along(lambda _: parse(self.laws[contact].loss))
@@ -117,6 +122,10 @@ def definitions_of(model: Model) -> Mapping[str, ast.expr]:
 
     parts = from_text(model.definition).names.parts
     return {name: parse(text) for name, text in parts.items()}
+
+
+def _always(tree: ast.expr, _: str) -> ast.expr:
+    return tree
 
 
 @lru_cache(maxsize=64)
