@@ -103,9 +103,7 @@ class Measuring:
                 total = _dual(total + self.number(float(lost.values[0]), slopes))
         return total
 
-    def _resolved(
-        self, asked: Functional, function: Function, size: float
-    ) -> Iterator[Resolved]:
+    def _resolved(self, asked: Functional, function: Function, size: float) -> Iterator[Resolved]:
         size = max(size, least_size(self.motion.segments, function))
         for segment in self.motion.segments:
             yield resolve(segment, function, asked.text, size)
@@ -181,9 +179,7 @@ class Measuring:
         return self.motion if self.motion.directions is None else Motion(self.motion.orbit)
 
 
-def _candidates(
-    asked: Functional, segment: Segment, function: Function, size: float
-) -> FloatArray:
+def _candidates(asked: Functional, segment: Segment, function: Function, size: float) -> FloatArray:
     """Return the shares of a segment at which the function can be extreme.
 
     The displacement has its extrema at joints where the model's motion is cut at its stops; observables have
