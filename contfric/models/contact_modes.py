@@ -17,7 +17,7 @@ from contfric.errors import ModelError
 from contfric.models.coefficient_texts import text_of
 from contfric.models.coefficients import AFFINE, symbols
 from contfric.models.contact_laws import laws_of
-from contfric.models.contacts import Contact, ContactKind, drift
+from contfric.models.contacts import Contact, ContactKind, drift, factor_of
 from contfric.models.entries import EntryError, Part, mapping_in
 from contfric.models.grammar import Scope, names_in, number_of, parse
 from contfric.models.matrices import summed, times
@@ -166,7 +166,7 @@ class _Modes:
         Jenkins elements that are stretched along one direction share that of the first.
         """
         for other in self.contacts:
-            if other.kind is ContactKind.JENKINS and (factor := _factor(other, c)):
+            if other.kind is ContactKind.JENKINS and (factor := factor_of(other, c)):
                 ways = "+-" if factor > 0.0 else "-+"
                 return other.name, dict(zip("pn", ways, strict=True))
         raise AssertionError(c.name)  # its own direction is one of them
@@ -320,19 +320,6 @@ class _Modes:
                     for i, w in moved.items()
                 }
         return found
-
-
-def _factor(one: Contact, other: Contact) -> float:
-    """Return by which factor the direction of one contact is that of another one; 0 if it is not."""
-    if one.direction.keys() != other.direction.keys():
-        return 0.0
-    i, *_ = other.direction
-    factor = other.direction[i] / one.direction[i]
-    same = all(
-        math.isclose(w, factor * one.direction[j], rel_tol=1e-12)
-        for j, w in other.direction.items()
-    )
-    return factor if same else 0.0
 
 
 def _subsets(items: Sequence[_T]) -> list[tuple[_T, ...]]:

@@ -104,7 +104,9 @@ class Measuring:
         return total
 
     def _resolved(self, asked: Functional, function: Function, size: float) -> Iterator[Resolved]:
-        size = max(size, least_size(self.motion.segments, function))
+        variants = () if asked.kind == WORK else self.inside.variants(asked)
+        for each in (function, *variants):
+            size = max(size, least_size(self.motion.segments, each))
         for segment in self.motion.segments:
             yield resolve(segment, function, asked.text, size)
 
@@ -137,7 +139,10 @@ class Measuring:
     def _extremum(self, asked: Functional, function: Function) -> Dual:
         sign = 1.0 if asked.kind == "max" else -1.0
         found: list[tuple[Segment, float, float]] = []
-        size = least_size(self._still.segments, function)
+        size = max(
+            least_size(self._still.segments, each)
+            for each in (function, *self.inside.variants(asked))
+        )
         # without derivatives: only those of the extrema themselves are wanted
         for still, segment in zip(self._still.segments, self.motion.segments, strict=True):
             shares = _candidates(asked, still, function, size)

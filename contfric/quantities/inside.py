@@ -72,6 +72,16 @@ class Inside:
         """Return the power that a contact dissipates as a function along a segment."""
         return self.along(lambda mode: parse(self.laws[contact].power(mode)))
 
+    def variants(self, asked: Functional) -> list[Function]:
+        """Return the expression of a functional with each law of its contacts, as if it held everywhere."""
+        found = []
+        for contact in sorted(asked.contacts):
+            texts = self.laws[contact].texts
+            for text in {t for key, t in texts.items() if key.startswith("force")}:
+                own = {FORCE_OF + contact: parse(text)}
+                found.append(self.along(lambda _: asked.tree, asked.contacts - {contact}, own))
+        return found
+
     def powers(self, contact: str) -> list[Function]:
         """Return the powers of all laws of a contact, each as if it held everywhere."""
         texts = {t for key, t in self.laws[contact].texts.items() if key.startswith("power")}
@@ -82,19 +92,23 @@ class Inside:
         return self.along(lambda _: parse(self.laws[contact].loss))
 
     def along(
-        self, tree_in: Callable[[str], ast.expr], contacts: frozenset[str] = frozenset()
+        self,
+        tree_in: Callable[[str], ast.expr],
+        contacts: frozenset[str] = frozenset(),
+        given: Mapping[str, ast.expr] | None = None,
     ) -> Function:
         """Return an expression, that of each mode, as a function along a segment.
 
         Parameters
         ----------
         contacts : whose forces it is made of
+        given : further named expressions
         """
 
         def value(segment: Segment, shares: FloatArray, kinks: Kinks) -> Dual:
             tree = tree_in(segment.mode)
             forces = {FORCE_OF + c: parse(self.laws[c].force(segment.mode)) for c in contacts}
-            defined = {**self.definitions, **forces}
+            defined = {**self.definitions, **forces, **(given or {})}
             names = _leaves(tree, defined)
             time, states = segment.at(shares)
             values: dict[str, Any] = {TIME: time}
