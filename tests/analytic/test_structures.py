@@ -180,3 +180,39 @@ def test_a_beam_of_twelve_modes_touches_where_the_linear_response_is_the_gap() -
         return shape * push - frequencies**2 * y[:n] - 2.0 * zeta * frequencies * y[n:]
 
     assert follow(other, acceleration, n) == 2
+
+
+def test_a_stick_lasts_until_waves_have_come_back() -> None:
+    """Longer than a period of the excitation: other masses move on, and the load grows with them."""
+    n, w = 20, 0.4
+    stiffness = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    stiffness[-1, -1] = 1.0
+    rubs = {"kind": "friction", "velocity": "v1", "kinetic": 0.2, "static": 0.25}
+    model = cf.Mechanism(
+        np.eye(n),
+        0.03 * np.eye(n),
+        stiffness,
+        contacts={"pad": rubs},
+        force={f"q{n}": "0.6*cos(w*t)"},
+        parameters={"w": w},
+        period="2*pi/w",
+    )
+    start = [*np.ones(n), *np.zeros(n)]
+    found = cf.simulate(model, {}, state=start, periods=2)
+    times = found.times + found.cycles * 2.0 * np.pi / w
+    first = times[1] - times[0]
+    assert first > 2.0 * np.pi / w
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        a = -stiffness @ y[:n] - 0.03 * y[n:]
+        a[-1] += 0.6 * np.cos(w * t)
+        a[0] = 0.0
+        return np.concatenate([y[n:], a])
+
+    def load(t: float, y: np.ndarray) -> float:
+        return 0.25 - abs(float(stiffness[0] @ y[:n]))
+
+    load.terminal = True  # type: ignore[attr-defined]
+    options = {"events": load, "rtol": 1e-12, "atol": 1e-13}
+    stuck = solve_ivp(rates, (times[0], 40.0), found.states[0], "DOP853", **options)
+    assert stuck.t_events[0][0] == pytest.approx(times[1], abs=1e-9)
