@@ -15,7 +15,7 @@ import numpy as np
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.sections import without_sections
+from contfric.orbit.sections import is_smooth, without_sections
 from contfric.orbit.simulation import Trajectory, run
 from contfric.orbit.starts import signs_at
 from contfric.orbit.structure import mode_domains
@@ -61,12 +61,14 @@ def _beside(
 ) -> Iterator[tuple[FloatArray, FloatArray]]:
     _, time = _middle(orbit)
     middle = orbit.state(time)
+    data = orbit.system.layout.conserved  # which are given: motions beside the orbit have the same
     for size in _BESIDE:
         for k in range(len(middle)):
+            apart = np.zeros(len(middle))
+            apart[k] = size * (1.0 + abs(middle[k]))
+            apart -= data.T @ (data @ apart)
             for sign in (1.0, -1.0):
-                state = middle.copy()
-                state[k] += sign * size * (1.0 + abs(middle[k]))
-                yield orbit.vector, state
+                yield orbit.vector, middle + sign * apart
     for index, change in shifts:
         vector = orbit.vector.copy()
         vector[index] += change
@@ -90,6 +92,8 @@ def _one_turn(orbit: Orbit, vector: FloatArray, state: FloatArray) -> Orbit | No
     joints = np.roll(joints, 1, axis=0)
     joints[0, 0] = end - orbit.period
     word, joints, end = without_sections(model, word, joints, end, vector, orbit.periods)
+    if len(word) == 1 and is_smooth(model, word) and not model.wraps:
+        return None  # a cycle that crosses a section comes back through it: this one has not closed
     try:
         system = build_system(model, word, orbit.periods)
     except ValueError:

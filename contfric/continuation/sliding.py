@@ -224,7 +224,10 @@ def _vanished_stick(here: Orbit, kind: Kind, test: Test) -> Test | None:
         symmetry = here.model.symmetry
         if here.system.half and symmetry is not None:
             surface = {image: name for name, image in symmetry.surfaces.items()}[surface]
-    return Test(Margin.JOINT, segment, surface)
+    stop = Test(Margin.JOINT, segment, surface)
+    return (
+        stop if stop in here.system.tests else None
+    )  # of several contacts: another one cut it short
 
 
 def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation | None:

@@ -9,16 +9,18 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, TypeVar
 
 from contfric.errors import ModelError
 from contfric.models.coefficient_texts import text_of
 from contfric.models.coefficients import AFFINE, symbols
-from contfric.models.contacts import Contact, ContactKind, drift
+from contfric.models.contact_laws import laws_of
+from contfric.models.contacts import Contact, ContactKind, drift, factor_of
 from contfric.models.entries import EntryError, Part, mapping_in
 from contfric.models.grammar import Scope, names_in, number_of, parse
-from contfric.models.matrices import is_zero, summed, times
+from contfric.models.matrices import summed, times
 from contfric.models.not_affine import NotAffineError
 from contfric.models.structure import COORDINATES, Structure, defaults_of
 
@@ -26,8 +28,9 @@ from contfric.models.structure import COORDINATES, Structure, defaults_of
 KEYS = (COORDINATES, "mass", "damping", "stiffness", "force", "contacts")
 _OTHERS = (
     *("name", "title", "references", "parameters", "constraints", "period", "autonomous", "define"),
-    *("observables", "symmetry", "spread", "integration", "max_step"),
+    *("observables", "symmetry", "spread", "integration", "max_step", "quantities"),
 )
+_T = TypeVar("_T")
 #: How far the order of a harmonic may be from an odd number: rounding.
 _ODD = 1e-9
 
@@ -59,6 +62,7 @@ class _Modes:
         self.structure, self.top = structure, structure.top
         self.coordinates, self.velocities = structure.coordinates, structure.velocities
         self.contacts, self.mass = structure.contacts, structure.mass
+        self.states: dict[str, Mapping[str, str]] = {}
 
     def data(self) -> dict[str, Any]:
         """Return the model in the schema of all models."""
@@ -71,13 +75,15 @@ class _Modes:
             for q, force in zip(self.coordinates, self.structure.forces, strict=True)
         }
         observables, surfaces = self._surfaces()
+        modes = self._modes()
         found = {
             **kept,
             "states": states,
             "define": define,
             "observables": {**mapping_in(kept, "observables"), **observables},
             "surfaces": surfaces,
-            "modes": self._modes(),
+            "modes": modes,
+            "forces": laws_of(self.structure, self.states),
             "departures": [d for c in self.contacts for d in self._departures(c)],
             "spread": {**dict.fromkeys(states, "1"), **mapping_in(kept, "spread")},
         }
@@ -128,11 +134,14 @@ class _Modes:
                 self._limits(c, add)
             elif c.kind is ContactKind.JENKINS:
                 level = f"({c.texts['limit']})/({c.texts['stiffness']})"
-                add(c.name, f"w_{c.name}", self._speed(c), "0")
+                if self._stop(c)[0] == c.name:
+                    add(c.name, f"w_{c.name}", self.structure.speed(c), "0")
                 add(f"{c.name}+", c.name, c.name, level)
                 add(f"{c.name}-", c.name, c.name, f"-{level}")
             else:
                 add(c.name, f"g_{c.name}", c.texts["gap"], "0")
+                if self._section == f"w_{c.name}":
+                    add(self._section, self._section, self.structure.approach(c), "0")
         return observables, surfaces
 
     def _limits(self, c: Contact, add: Any) -> None:
@@ -151,18 +160,57 @@ class _Modes:
                     side = "high" if sign == "+" else "low"
                     add(surface, f"{name}_{side}", f"{load} {other} ({static})", "0")
 
-    def _speed(self, c: Contact) -> str:
-        """Return the velocity along a direction of coordinates."""
-        return summed([times(repr(w), self.velocities[i]) for i, w in c.direction.items()])
+    def _stop(self, c: Contact) -> tuple[str, Mapping[str, str]]:
+        """Return the surface on which the velocity of an element vanishes, and its sides where it slides.
+
+        Jenkins elements that are stretched along one direction share that of the first.
+        """
+        for other in self.contacts:
+            if other.kind is ContactKind.JENKINS and (factor := factor_of(other, c)):
+                ways = "+-" if factor > 0.0 else "-+"
+                return other.name, dict(zip("pn", ways, strict=True))
+        raise AssertionError(c.name)  # its own direction is one of them
+
+    def _contradicts(self, states: Mapping[str, str]) -> bool:
+        """Tell whether elements along one direction slide opposite ways."""
+        sides: dict[str, set[str]] = {}
+        for c in self.contacts:
+            if c.kind is ContactKind.JENKINS and states[c.name] != "s":
+                stop, ways = self._stop(c)
+                sides.setdefault(stop, set()).add(ways[states[c.name]])
+        return any(len(found) > 1 for found in sides.values())
 
     def _modes(self) -> dict[str, Any]:
         found = {}
         acting = [c for c in self.contacts if c.states]
         for letters in itertools.product(*(c.states for c in acting)):
             states = {c.name: letter for c, letter in zip(acting, letters, strict=True)}
+            if self._contradicts(states):
+                continue
             name = "".join(letters) or "free"
             found[name] = {"in": self._sides(states), "field": self._field(states)}
+            self.states[name] = states
+        self._divide(found)
         return found
+
+    def _divide(self, modes: dict[str, Any]) -> None:
+        """Divide the mode in which no contact acts, so that an orbit that stays in it meets a section."""
+        section = self._section
+        quiet = "".join(c.states[0] for c in self.contacts if c.states) or "free"
+        if section:
+            sides = modes[quiet]["in"]
+            for name, side in (quiet, "+"), (f"{quiet}-", "-"):
+                modes[name] = {**modes[quiet], "in": {**sides, section: side}}
+                self.states[name] = self.states[quiet]
+
+    @cached_property
+    def _section(self) -> str:
+        """The surface of the velocity by which an orbit is found along which no contact changes; or none."""
+        if "period" not in self.top.data:  # where nothing acts nothing moves
+            return ""
+        elastic = [c for c in self.contacts if c.kind is ContactKind.JENKINS]
+        gaps = [c for c in self.contacts if c.kind is ContactKind.SPRING]
+        return elastic[0].name if elastic else f"w_{gaps[0].name}" if gaps else ""
 
     def _sides(self, states: Mapping[str, str]) -> dict[str, str]:
         sides: dict[str, str] = {}
@@ -176,7 +224,8 @@ class _Modes:
                 limits = {"s": {"+": "-", "-": "+"}, "p": {"+": "0"}, "n": {"-": "0"}}[state]
                 sides |= {f"{c.name}{sign}": side for sign, side in limits.items()}
                 if state != "s":
-                    sides[c.name] = "+" if state == "p" else "-"
+                    stop, ways = self._stop(c)
+                    sides[stop] = ways[state]
             elif state == "s":
                 closed = self.structure.closed(c, states)
                 sides |= {c.name: "0", _limit(c, closed, "+"): "-", _limit(c, closed, "-"): "+"}
@@ -203,7 +252,7 @@ class _Modes:
             if c.kind is ContactKind.FRICTION and state == "s":
                 self._hold(c, field)
             elif c.kind is ContactKind.JENKINS:
-                field[c.name] = self._speed(c) if state == "s" else "0"
+                field[c.name] = self.structure.speed(c) if state == "s" else "0"
         return field
 
     def _hold(self, c: Contact, field: dict[str, str]) -> None:
@@ -222,14 +271,8 @@ class _Modes:
 
     def _departures(self, c: Contact) -> list[dict[str, Any]]:
         """Return where motion on the surfaces of a contact leaves to."""
-        if c.kind is ContactKind.JENKINS:  # when the velocity changes its sign the slider sticks
-            return [
-                {
-                    "where": {f"{c.name}{sign}": "0", c.name: other},
-                    "leaves": {f"{c.name}{sign}": other},
-                }
-                for sign, other in (("+", "-"), ("-", "+"))
-            ]
+        if c.kind is ContactKind.JENKINS:
+            return self._stops(c) if self._stop(c)[0] == c.name else []
         if c.kind is not ContactKind.FRICTION:
             return []
         found = []
@@ -240,12 +283,37 @@ class _Modes:
                 found.append({"where": where, "leaves": {c.name: sign}})
         return found
 
+    def _stops(self, first: Contact) -> list[dict[str, Any]]:
+        """Return what sticks when a velocity changes its sign: all elements along it that slide, at once."""
+        along = [
+            (c, ways)
+            for c in self.contacts
+            if c.kind is ContactKind.JENKINS
+            for stop, ways in [self._stop(c)]
+            if stop == first.name
+        ]
+        found = []
+        for sliding in reversed(_subsets(along)):  # the largest set that slides is all of them
+            for side in "+-" if sliding else "":
+                limits = [
+                    (f"{c.name}{'+' if ways['p'] == side else '-'}", "+-"[ways["p"] == side])
+                    for c, ways in sliding
+                ]
+                where = {**dict.fromkeys((name for name, _ in limits), "0")}
+                found.append(
+                    {
+                        "where": where | {first.name: "-" if side == "+" else "+"},
+                        "leaves": dict(limits),
+                    }
+                )
+        return found
+
     def _resets(self) -> dict[str, dict[str, str]]:
         found = {}
         for c in self.contacts:
             if c.kind is ContactKind.IMPACT:
                 over = self.structure.mobility(c, c)
-                kick = f"-(1 + ({c.texts['restitution']}))*({self._approach(c)})/({over})"
+                kick = f"-(1 + ({c.texts['restitution']}))*({self.structure.approach(c)})/({over})"
                 moved = self.mass.of({i: repr(w) for i, w in c.direction.items()})
                 found[c.name] = {
                     self.velocities[i]: f"{self.velocities[i]} + {times(w, kick)}"
@@ -253,14 +321,9 @@ class _Modes:
                 }
         return found
 
-    def _approach(self, c: Contact) -> str:
-        """Return the rate of a gap: the wall may move."""
-        given = drift(c)  # minus the rate of what is given: a gap is W . q + g(t)
-        return self._speed(c) if is_zero(given) else f"{self._speed(c)} - ({given})"
 
-
-def _subsets(springs: tuple[Contact, ...]) -> list[tuple[Contact, ...]]:
-    return [s for k in range(len(springs) + 1) for s in itertools.combinations(springs, k)]
+def _subsets(items: Sequence[_T]) -> list[tuple[_T, ...]]:
+    return [s for k in range(len(items) + 1) for s in itertools.combinations(items, k)]
 
 
 def _limit(contact: Contact, closed: tuple[Contact, ...], sign: str) -> str:

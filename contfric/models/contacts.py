@@ -21,6 +21,7 @@ load of each is a function of time and state alone; others are refused.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -29,7 +30,7 @@ from contfric.errors import ModelError
 from contfric.models.coefficient_texts import text_of
 from contfric.models.coefficients import AFFINE, CONSTANT, Affine, symbols
 from contfric.models.entries import Part
-from contfric.models.grammar import Scope, parse
+from contfric.models.grammar import Scope, check_name, parse
 from contfric.models.not_affine import NotAffineError
 
 
@@ -115,6 +116,15 @@ def read_contacts(
     found = []
     for name in part.data:
         entry = part.part(name, "{kind: friction, velocity: v1, kinetic: S, static: S0}")
+        try:
+            check_name(name, "contact")
+        except ModelError as error:
+            part.fail(name, str(error))
+        if name in (*coordinates, *velocities, *parameters):
+            part.fail(
+                name,
+                f"'{name}' is a coordinate, velocity or parameter: give the contact another name",
+            )
         kind = ContactKind(entry.one_of("kind", [k.value for k in ContactKind], "kind of contact"))
         entry.only(("kind", *KEYS[kind]))
         texts = {
@@ -180,3 +190,16 @@ def drift(contact: Contact) -> str:
         wave, sign = ("sin", "") if kind == "cos" else ("cos", "-")  # w0 is minus what stands in w
         parts.append(f"{sign}({text_of(by)})*({w})*{wave}(({w})*t)")
     return " + ".join(parts) or "0"
+
+
+def factor_of(one: Contact, other: Contact) -> float:
+    """Return by which factor the direction of one contact is that of another one; 0 if it is not."""
+    if one.direction.keys() != other.direction.keys():
+        return 0.0
+    i, *_ = other.direction
+    factor = other.direction[i] / one.direction[i]
+    same = all(
+        math.isclose(w, factor * one.direction[j], rel_tol=1e-12)
+        for j, w in other.direction.items()
+    )
+    return factor if same else 0.0

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from contfric.errors import ModelError
+from contfric.models.contact_laws import KEY as LAWS
+from contfric.models.contact_laws import check_laws, read_laws
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.description import Description, DomainText, ModeText
 from contfric.models.entries import Part
@@ -30,6 +32,7 @@ KEYS = (
     ),
     "max_step",
     "quantities",
+    LAWS,
 )
 _PARAMETER = ("default", "meaning")
 _SURFACE = ("observable", "level", "switching")
@@ -111,6 +114,7 @@ def _described(data: dict[str, Any]) -> Description:
         tolerance=tolerance,
         max_step=_max_step(top),
         quantities=read_quantities(top),
+        laws=read_laws(top),
     )
     _check_expressions(found, names)
     return measured(found)
@@ -382,4 +386,5 @@ def _check_expressions(found: Description, names: Names) -> None:
         names.check(("spread", state), width, only_parameters=True)
     if found.period:
         names.check(("period",), found.period, only_parameters=True)
-    check_quantities(found.quantities, names, timed)
+    check_laws(found.laws, names, timed)
+    check_quantities(found.quantities, names, timed, [law.name for law in found.laws])

@@ -13,6 +13,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+from contfric.models.contact_laws import KEY as LAWS
+from contfric.models.contact_laws import ContactLaws, written
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.names import Names
 
@@ -58,6 +60,7 @@ class Description:
     method, tolerance : how motion is integrated (:mod:`contfric.flow.integrated`)
     max_step : largest step of a continuation where the user gives none; None for the engine's
     quantities : (name, expression) of each quantity that the file declares
+    laws : what the contacts of a structure carry and dissipate
     """
 
     name: str
@@ -85,6 +88,7 @@ class Description:
     tolerance: float = 1e-12
     max_step: float | None = None
     quantities: tuple[tuple[str, str], ...] = ()
+    laws: tuple[ContactLaws, ...] = ()
 
     def data(self) -> dict[str, Any]:
         """Return the description in the schema of the YAML files, with nothing left out."""
@@ -135,6 +139,8 @@ class Description:
             found["max_step"] = self.max_step
         if self.quantities:
             found["quantities"] = dict(self.quantities)
+        if self.laws:
+            found[LAWS] = written(self.laws)
         return found
 
     def _mode(self, mode: ModeText) -> dict[str, Any]:
@@ -152,9 +158,9 @@ class Description:
     @cached_property
     def motion(self) -> str:
         """The same of what motion depends on: without steps of a continuation, and what is measured."""
-        if self.max_step is None and not self.quantities:
+        if self.max_step is None and not self.quantities and not self.laws:
             return self.text
-        return replace(self, max_step=None, quantities=()).text
+        return replace(self, max_step=None, quantities=(), laws=()).text
 
     @cached_property
     def names(self) -> Names:

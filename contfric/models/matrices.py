@@ -66,6 +66,10 @@ def matrix_of(key: str, value: Any, size: int, default: str | None = None) -> Te
 def _text(key: str, row: int, entry: Any) -> str:
     if isinstance(entry, bool) or not isinstance(entry, (str, int, float)):
         raise EntryError((key, row), f"an entry of '{key}' is an expression, got {shown(entry)}")
+    if not isinstance(entry, str) and not np.isfinite(entry):
+        raise EntryError(
+            (key, row), f"an entry of '{key}' is {entry}: it has to be a finite number"
+        )
     return entry if isinstance(entry, str) else repr(float(entry))
 
 
@@ -101,9 +105,11 @@ def _from_file(part: Part, path: Path) -> Any:
 
             found = mmread(path)
             return np.asarray(found.todense() if hasattr(found, "todense") else found)
+        if path.suffix != ".npz":
+            part.fail("file", f"{path.name} is no npz with named arrays, and no .mtx")
         with np.load(path, allow_pickle=False) as arrays:
-            if not hasattr(arrays, "files"):
-                part.fail("file", f"{path.name} is no npz with named arrays, and no .mtx")
+            if "array" not in part.data:
+                part.fail(None, f"say which array of {path.name}: {', '.join(arrays.files)}")
             name = part.text("array")
             if name not in arrays.files:
                 hint = did_you_mean(name, arrays.files)

@@ -10,13 +10,13 @@ that any expression of the model may have.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from contfric.errors import ModelError, did_you_mean
 from contfric.models.entries import EntryError, Part
 from contfric.models.grammar import PI, check_name
 from contfric.models.names import Names
-from contfric.models.quantity_texts import BUNDLED, FUNCTIONALS, LIST, read
+from contfric.models.quantity_texts import BUNDLED, FUNCTIONALS, LIST, WORK, no_contact, read
 from contfric.yaml_lines import Address
 
 KEY = "quantities"
@@ -33,12 +33,15 @@ def read_quantities(top: Part) -> tuple[tuple[str, str], ...]:
     return tuple(found)
 
 
-def check_quantities(quantities: tuple[tuple[str, str], ...], names: Names, timed: bool) -> None:
+def check_quantities(
+    quantities: tuple[tuple[str, str], ...], names: Names, timed: bool, contacts: Sequence[str] = ()
+) -> None:
     """Read every quantity and look all of its names up.
 
     Parameters
     ----------
     timed : whether the model is autonomous, so that no expression has the time in it
+    contacts : of a structure, whose forces and work are measured
 
     Raises
     ------
@@ -54,7 +57,10 @@ def check_quantities(quantities: tuple[tuple[str, str], ...], names: Names, time
         except ModelError as error:
             raise EntryError(address, str(error)) from None
         for functional in parsed.functionals.values():
-            names.check(address, functional.text, timed)
+            for contact in sorted(functional.contacts - set(contacts)):
+                raise EntryError(address, no_contact(contact, contacts))
+            if functional.kind != WORK:
+                names.check(address, functional.plain, timed)
         known = [*(b for b in BUNDLED if b != LIST), *above, *names.parameters]
         for used in sorted(parsed.names - {*known, PI}):
             raise EntryError(address, _unknown(used, names, known))

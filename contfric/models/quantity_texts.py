@@ -3,15 +3,18 @@ r"""The language of quantities: expressions in which a functional of the orbit i
 ``mean(x)``, ``max(u)``, ``integral(S*abs(v))`` and the others of :data:`FUNCTIONALS` turn a function of
 time along the orbit into a number; outside of them stand parameters, other quantities, and the operators
 and functions of a model's expressions (:mod:`contfric.models.grammar`): ``(max(x) - min(x))/2``.
+``work(brake)`` is what a contact of a structure dissipates; ``force(brake)``, inside of the other
+functionals, is what it carries.
 """
 
 from __future__ import annotations
 
 import ast
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from contfric.errors import ModelError
+from contfric.errors import ModelError, did_you_mean
 from contfric.models.grammar import names_in, number_of, parse
 
 #: Names that mean the same for every model; what they are is in :mod:`contfric.quantities.registry`.
@@ -24,6 +27,10 @@ LIST = "stops"
 PLAIN = ("integral", "max", "mean", "min", "rms")
 HARMONIC = ("amplitude", "phase")
 FUNCTIONALS = (*PLAIN, *HARMONIC)
+#: What a contact dissipates, a functional of its name; and what it carries, which varies along an orbit.
+WORK, FORCE = "work", "force"
+#: The name that stands for the force of a contact inside of an expression.
+FORCE_OF = "_force_"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +39,9 @@ class Functional:
 
     Attributes
     ----------
-    kind : its name, one of :data:`FUNCTIONALS`
-    tree, text : the expression that it is of
+    kind : its name, one of :data:`FUNCTIONALS`, or ``work``
+    tree, text : the expression that it is of; in the tree the forces of contacts are names
+    contacts : whose forces or work it measures
     harmonic : the number of a harmonic, in frequencies of the excitation; 0 of the others
     """
 
@@ -41,6 +49,12 @@ class Functional:
     tree: ast.expr
     text: str
     harmonic: float = 0.0
+    contacts: frozenset[str] = frozenset()
+
+    @property
+    def plain(self) -> str:
+        """The expression, with a number in the place of each force."""
+        return ast.unparse(_Plain().visit(ast.parse(ast.unparse(self.tree), mode="eval").body))
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,15 +103,61 @@ class _Taking(ast.NodeTransformer):
     def visit_Call(self, node: ast.Call) -> ast.AST:
         """Take a functional out; other calls are looked through."""
         kind = node.func.id if isinstance(node.func, ast.Name) else ""
+        if kind == FORCE:
+            text = ast.unparse(node)
+            raise ModelError(f"{text} varies along an orbit: write a functional of it, max({text})")
         several = kind in ("max", "min") and len(node.args) != 1
-        if kind not in FUNCTIONALS or several:
+        if kind not in (*FUNCTIONALS, WORK) or several:
             return self.generic_visit(node)
         name = f"_{len(self.found)}"
         self.found[name] = _functional(kind, node)
         return ast.copy_location(ast.Name(name, ast.Load()), node)
 
 
+class _Plain(ast.NodeTransformer):
+    """Puts a number in the place of the force of each contact."""
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        """Replace a name that stands for a force."""
+        return ast.Constant(1) if node.id.startswith(FORCE_OF) else node
+
+
+class _Forces(ast.NodeTransformer):
+    """Puts a name in the place of the force of each contact."""
+
+    def __init__(self) -> None:
+        self.contacts: set[str] = set()
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        """Replace ``force(brake)``; other calls are looked through."""
+        if not isinstance(node.func, ast.Name) or node.func.id != FORCE:
+            return self.generic_visit(node)
+        contact = _contact(node)
+        self.contacts.add(contact)
+        return ast.copy_location(ast.Name(FORCE_OF + contact, ast.Load()), node)
+
+
+def _contact(node: ast.Call) -> str:
+    """Return the name of the contact that ``work(brake)`` or ``force(brake)`` is of."""
+    if len(node.args) != 1 or node.keywords or not isinstance(node.args[0], ast.Name):
+        kind = ast.unparse(node.func)
+        raise ModelError(
+            f"{kind}() takes the name of a contact, such as {kind}(brake), got {ast.unparse(node)}"
+        )
+    return node.args[0].id
+
+
+def no_contact(name: str, contacts: Sequence[str]) -> str:
+    """Return what to say of a contact that a model does not have."""
+    if not contacts:
+        return f"there is no contact '{name}': force and work are those of contacts of a structure"
+    return f"there is no contact '{name}'{did_you_mean(name, contacts)}"
+
+
 def _functional(kind: str, node: ast.Call) -> Functional:
+    if kind == WORK:
+        contact = _contact(node)
+        return Functional(kind, node.args[0], contact, contacts=frozenset((contact,)))
     wanted = 2 if kind in HARMONIC else 1
     example = f"{kind}(x, 3)" if wanted == 2 else f"{kind}(x)"
     plain = not node.keywords and not any(isinstance(a, ast.Starred) for a in node.args)
@@ -106,14 +166,15 @@ def _functional(kind: str, node: ast.Call) -> Functional:
     inside: list[Any] = [n for n in ast.walk(node.args[0]) if isinstance(n, ast.Call)]
     for call in inside:
         name = call.func.id if isinstance(call.func, ast.Name) else ""
-        if name in FUNCTIONALS and not (name in ("max", "min") and len(call.args) > 1):
+        if name in (*FUNCTIONALS, WORK) and not (name in ("max", "min") and len(call.args) > 1):
             raise ModelError(
                 f"in {ast.unparse(node)}: a functional cannot stand inside of another one; combine "
                 "their numbers, such as sqrt(rms(x)**2 - mean(x)**2)"
             )
-    text = ast.unparse(node.args[0])
+    text, forces = ast.unparse(node.args[0]), _Forces()
+    tree = parse(ast.unparse(forces.visit(node.args[0])))
     harmonic = _harmonic(node) if kind in HARMONIC else 0.0
-    return Functional(kind, parse(text), text, harmonic)
+    return Functional(kind, tree, text, harmonic, frozenset(forces.contacts))
 
 
 def _harmonic(node: ast.Call) -> float:

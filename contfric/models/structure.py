@@ -7,8 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from contfric.models.contacts import Contact, ContactKind, drift, read_contacts
+import numpy as np
+
+from contfric.errors import ModelError, did_you_mean
+from contfric.models.contacts import Contact, ContactKind, drift, factor_of, read_contacts
 from contfric.models.entries import EntryError, Part, mapping_in
+from contfric.models.grammar import names_in, parse
 from contfric.models.matrices import Mass, Texts, is_zero, mass_of, matrix_of, summed, times
 
 COORDINATES = "coordinates"
@@ -56,6 +60,13 @@ class Structure:
             tuple(params),
             {str(k): str(v) for k, v in mapping_in(top.data, "define").items()},
         )
+        if not contacts:
+            raise EntryError(("contacts",), "a structure has at least one contact")
+        known = {*coordinates, *velocities, *params, "t", "pi", *(c.name for c in contacts)}
+        known |= {*mapping_in(top.data, "define"), *mapping_in(top.data, "observables")}
+        known |= {*mapping_in(top.data, "parameters")}
+        for key in ("damping", "stiffness", "force"):
+            _check_names(top, key, size, known)
         found = cls(top, coordinates, velocities, mass, forces, tuple(contacts))
         found.check()
         return found
@@ -74,6 +85,7 @@ class Structure:
                 f"{_MOST_MODES} can be listed (five contacts of three states)",
             )
         rubbing = [c for c in self.contacts if c.kind is ContactKind.FRICTION]
+        self._check_locks(rubbing)
         for one, other in itertools.combinations(rubbing, 2):
             if not is_zero(self.mobility(one, other)):
                 raise EntryError(
@@ -81,6 +93,32 @@ class Structure:
                     f"the loads of '{one.name}' and '{other.name}' depend on each other (W . M^-1 W' is not "
                     "0): friction contacts have to act on masses of their own. A Jenkins element, whose "
                     "force is a state, can be put anywhere",
+                )
+
+    def _check_locks(self, rubbing: list[Contact]) -> None:
+        """Refuse contacts whose forces are not determined, and those that act at one place."""
+        directions = np.zeros((len(rubbing), len(self.coordinates)))
+        for row, contact in enumerate(rubbing):
+            directions[row, list(contact.direction)] = list(contact.direction.values())
+            if np.linalg.matrix_rank(directions[: row + 1]) <= row:
+                others = ", ".join(f"'{c.name}'" for c in rubbing[:row])
+                raise EntryError(
+                    ("contacts", contact.name),
+                    f"'{contact.name}' locks with {others}: where they stick the force of each is not "
+                    "determined (statically indeterminate). Leave it out, or make it a Jenkins element",
+                )
+        for one, other in itertools.combinations(self.contacts, 2):
+            kinds = {one.kind, other.kind}
+            if kinds <= {ContactKind.SPRING, ContactKind.IMPACT} and one.form == other.form:
+                raise EntryError(
+                    ("contacts", other.name),
+                    f"'{other.name}' has the gap of '{one.name}': leave one out",
+                )
+            if kinds == {ContactKind.FRICTION, ContactKind.JENKINS} and factor_of(one, other):
+                raise EntryError(
+                    ("contacts", other.name),
+                    f"'{one.name}' and '{other.name}' act along one direction: friction that sticks holds "
+                    "the element, too. Put a mass between them, or two Jenkins elements",
                 )
 
     def mobility(self, one: Contact, other: Contact) -> str:
@@ -104,6 +142,16 @@ class Structure:
         apart = drift(contact)
         free = along if is_zero(apart) else f"{along} - ({apart})"
         return f"({free})/({self.mobility(contact, contact)})"
+
+    def speed(self, contact: Contact) -> str:
+        """Return the velocity along a direction of coordinates."""
+        return summed([times(repr(w), self.velocities[i]) for i, w in contact.direction.items()])
+
+    def approach(self, contact: Contact) -> str:
+        """Return the rate of a gap: the wall may move."""
+        given = drift(contact)  # minus the rate of what is given: a gap is W . q + g(t)
+        speed = self.speed(contact)
+        return speed if is_zero(given) else f"{speed} - ({given})"
 
     @cached_property
     def springs(self) -> dict[str, tuple[Contact, ...]]:
@@ -146,6 +194,25 @@ def defaults_of(top: Part) -> dict[str, float]:
         if isinstance(given, (int, float)) and not isinstance(given, bool):
             found[name] = float(given)
     return found
+
+
+def _check_names(top: Part, key: str, size: int, known: set[str]) -> None:
+    """Look up the names in a matrix or in the forces, each in its row."""
+    given = top.data.get(key)
+    rows: list[tuple[str | int, list[str]]] = (
+        [(q, [str(text)]) for q, text in mapping_in(top.data, key).items()]
+        if key == "force"
+        else list(enumerate(matrix_of(key, given, size, "0")))
+    )
+    for row, texts in rows:
+        for text in texts:
+            try:
+                foreign = sorted(names_in(parse(text)) - known)
+            except ModelError as error:
+                raise EntryError((key, row), str(error)) from None
+            if foreign:
+                hint = did_you_mean(foreign[0], sorted(known))
+                raise EntryError((key, row), f"unknown name '{foreign[0]}'{hint}")
 
 
 def _force(

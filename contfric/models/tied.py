@@ -166,6 +166,11 @@ def _substituted(data: dict[str, Any], ties: Mapping[str, str]) -> dict[str, Any
         found[key] = put.each(data[key])
     if "quantities" in data:
         found["quantities"] = put.each(data["quantities"])
+    if "forces" in data:
+        found["forces"] = {
+            name: {**entry, "texts": put.each(entry["texts"])}
+            for name, entry in data["forces"].items()
+        }
     if "period" in data:
         found["period"] = put.text(data["period"])
     if "field" in data:

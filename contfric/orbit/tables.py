@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contfric.errors import ModelError
-from contfric.models.definition import Model
+from contfric.models.definition import Mode, Model
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.system import IntArray
 
@@ -33,7 +33,7 @@ class Tables(NamedTuple):
     bounds : whether a surface bounds a mode, shape (modes, surfaces); 2 if it has a reset
     first : first rule of each (mode, surface), and the number of rules, shape (modes * surfaces + 1,)
     rules : rows (mask, value, mode that follows): the first that the sides of all surfaces fit, as bits
-    sliding : whether a mode slides on a surface; 2 if it may do so for long, without excitation
+    sliding : whether a mode slides on a surface; 2 if it may do so for more than a period
     lies_on : surfaces that a mode moves on, as bits
     kept : surfaces that the state stays on where a surface is met, as bits: a reset takes it off others
     landed : surfaces that the state is on where motion goes on, as bits: the one met, but for a reset
@@ -76,7 +76,7 @@ def tables(model: Model) -> Tables:
         first,
         rules,
         np.array(
-            [int(m.sliding) * (1 + int(model.autonomous)) for m in model.modes], dtype=np.int64
+            [int(m.sliding) * (1 + int(_moves_on(model, m))) for m in model.modes], dtype=np.int64
         ),
         np.array([surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
         np.array([_surfaces_kept(model, s.name) for s in model.surfaces], dtype=np.int64),
@@ -166,3 +166,11 @@ def _landed(model: Model, met: str) -> Collection[str]:
 
 def _bits(model: Model, surfaces: Iterable[str]) -> int:
     return sum(1 << model.surface_index[name] for name in surfaces)
+
+
+def _moves_on(model: Model, mode: Mode) -> bool:
+    """Tell whether a load may grow for more than a period: without excitation, or as other masses move.
+
+    Where as many states are free as are held, these are the places of what rests.
+    """
+    return model.autonomous or 2 * mode.rank > len(model.states)

@@ -24,11 +24,11 @@ import numpy as np
 
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray
-from contfric.models.quantity_texts import Functional
+from contfric.models.quantity_texts import WORK, Functional
 from contfric.quantities.duals import Dual, Kinks, Number, apply, constant, divide
 from contfric.quantities.inside import Inside
 from contfric.quantities.motion import Motion, Segment
-from contfric.quantities.panels import Function, Resolved, resolve
+from contfric.quantities.panels import Function, Resolved, least_size, resolve
 
 #: Extrema that differ by less than this, relative to 1 + their size, are equal: orbits are solved to 1e-13.
 _EQUAL = 1e-10
@@ -62,6 +62,8 @@ class Measuring:
 
     def functional(self, asked: Functional) -> Dual:
         """Return a functional as a number."""
+        if asked.kind == WORK:
+            return self._work(asked)
         function = self.inside.function(asked)
         if asked.kind in ("max", "min"):
             return self._extremum(asked, function)
@@ -78,17 +80,35 @@ class Measuring:
         """Return the period of the orbit."""
         return self.number(self.motion.orbit.period, self.motion.d_period)
 
-    def _integral(self, asked: Functional, function: Function) -> Dual:
-        parts = [resolved.integral() for resolved in self._resolved(asked, function)]
+    def _integral(self, asked: Functional, function: Function, size: float = 0.0) -> Dual:
+        parts = [resolved.integral() for resolved in self._resolved(asked, function, size)]
         value = math.fsum(float(part.values[0]) for part in parts)
         slopes = np.zeros(self.motion.count)
         for part in parts:
             slopes = slopes + part.slopes[0, : self.motion.count]
         return self.number(value, slopes)
 
-    def _resolved(self, asked: Functional, function: Function) -> Iterator[Resolved]:
+    def _work(self, asked: Functional) -> Dual:
+        """Return what a contact dissipates in a period of the orbit: where it slides, and at impacts."""
+        contact = asked.text
+        # where it has just begun to slide all values are small: beside those of any mode they are rounding
+        laws = self.inside.powers(contact)
+        size = max(least_size(self.motion.segments, function) for function in laws)
+        total = self._integral(asked, self.inside.power(contact), size)
+        loss, word = self.inside.loss(contact), self.motion.orbit.word
+        for segment, (_, exit_) in zip(self.motion.segments, word, strict=True):
+            if exit_ == contact and exit_ in self.motion.orbit.model.reset_by_surface:
+                lost = loss(segment, np.ones(1), Kinks())
+                slopes = lost.slopes[0, : self.motion.count]
+                total = _dual(total + self.number(float(lost.values[0]), slopes))
+        return total
+
+    def _resolved(self, asked: Functional, function: Function, size: float) -> Iterator[Resolved]:
+        variants = () if asked.kind == WORK else self.inside.variants(asked)
+        for each in (function, *variants):
+            size = max(size, least_size(self.motion.segments, each))
         for segment in self.motion.segments:
-            yield resolve(segment, function, asked.text)
+            yield resolve(segment, function, asked.text, size)
 
     # ---------------------------------------------------------------------------- harmonics
 
@@ -119,9 +139,13 @@ class Measuring:
     def _extremum(self, asked: Functional, function: Function) -> Dual:
         sign = 1.0 if asked.kind == "max" else -1.0
         found: list[tuple[Segment, float, float]] = []
+        size = max(
+            least_size(self._still.segments, each)
+            for each in (function, *self.inside.variants(asked))
+        )
         # without derivatives: only those of the extrema themselves are wanted
         for still, segment in zip(self._still.segments, self.motion.segments, strict=True):
-            shares = _candidates(asked, still, function)
+            shares = _candidates(asked, still, function, size)
             values = function(still, shares, Kinks()).values
             found += [(segment, float(s), float(v)) for s, v in zip(shares, values, strict=True)]
         if not all(math.isfinite(value) for _, _, value in found):
@@ -160,7 +184,7 @@ class Measuring:
         return self.motion if self.motion.directions is None else Motion(self.motion.orbit)
 
 
-def _candidates(asked: Functional, segment: Segment, function: Function) -> FloatArray:
+def _candidates(asked: Functional, segment: Segment, function: Function, size: float) -> FloatArray:
     """Return the shares of a segment at which the function can be extreme.
 
     The displacement has its extrema at joints where the model's motion is cut at its stops; observables have
@@ -177,7 +201,7 @@ def _candidates(asked: Functional, segment: Segment, function: Function) -> Floa
         view = model.view(segment.vector)
         times, _ = view.stationary(segment.mode, name, segment.start, segment.state, segment.lasts)
         return np.concatenate([ends, times / segment.lasts])
-    resolved = resolve(segment, function, asked.text)
+    resolved = resolve(segment, function, asked.text, size)
     inside = [panel.stationary() for panel in resolved.panels]
     cuts = [panel.low for panel in resolved.panels[1:]]
     return np.concatenate([ends, cuts, *inside])

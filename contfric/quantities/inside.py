@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 
 from contfric.errors import ParameterError, did_you_mean
+from contfric.models.contact_laws import ContactLaws
 from contfric.models.definition import FloatArray, Model
 from contfric.models.grammar import PI, TIME, Scope, names_in, parse
-from contfric.models.quantity_texts import Functional
+from contfric.models.quantity_texts import FORCE_OF, WORK, Functional, no_contact
 from contfric.quantities.duals import Dual, Kinks, constant
 from contfric.quantities.motion import Segment
 from contfric.quantities.panels import Function
@@ -35,6 +36,7 @@ class Inside:
     def __init__(self, model: Model) -> None:
         self.model = model
         self.definitions = definitions_of(model)
+        self.laws = {law.name: law for law in laws_of(model)}
         named = [o.name for o in model.observables if o.name not in model.states]
         self.observables = [name for name in named if name not in self.definitions]
         self.known = tuple(
@@ -51,8 +53,12 @@ class Inside:
         ParameterError
             If there is one.
         """
+        for name in sorted(asked.contacts - set(self.laws)):
+            raise ParameterError(f"model '{self.model.name}': {no_contact(name, tuple(self.laws))}")
+        if asked.kind == WORK:
+            return
         for name in sorted(names_in(asked.tree)):
-            if name not in self.known:
+            if name not in self.known and not name.startswith(FORCE_OF):
                 raise ParameterError(
                     f"in {asked.kind}({asked.text}): model '{self.model.name}' has no '{name}'"
                     f"{did_you_mean(name, self.known)}"
@@ -60,9 +66,50 @@ class Inside:
 
     def function(self, asked: Functional) -> Function:
         """Return the expression of a functional as a function along a segment."""
-        names = _leaves(asked.tree, self.definitions)
+        return self.along(lambda _: asked.tree, asked.contacts)
+
+    def power(self, contact: str) -> Function:
+        """Return the power that a contact dissipates as a function along a segment."""
+        return self.along(lambda mode: parse(self.laws[contact].power(mode)))
+
+    def variants(self, asked: Functional) -> list[Function]:
+        """Return the expression of a functional with each law of its contacts, as if it held everywhere."""
+        found = []
+        for contact in sorted(asked.contacts):
+            texts = self.laws[contact].texts
+            for text in {t for key, t in texts.items() if key.startswith("force")}:
+                own = {FORCE_OF + contact: parse(text)}
+                found.append(self.along(lambda _: asked.tree, asked.contacts - {contact}, own))
+        return found
+
+    def powers(self, contact: str) -> list[Function]:
+        """Return the powers of all laws of a contact, each as if it held everywhere."""
+        texts = {t for key, t in self.laws[contact].texts.items() if key.startswith("power")}
+        return [self.along(partial(_always, parse(text))) for text in texts]
+
+    def loss(self, contact: str) -> Function:
+        """Return the energy that an impact takes, as a function of the state before it."""
+        return self.along(lambda _: parse(self.laws[contact].loss))
+
+    def along(
+        self,
+        tree_in: Callable[[str], ast.expr],
+        contacts: frozenset[str] = frozenset(),
+        given: Mapping[str, ast.expr] | None = None,
+    ) -> Function:
+        """Return an expression, that of each mode, as a function along a segment.
+
+        Parameters
+        ----------
+        contacts : whose forces it is made of
+        given : further named expressions
+        """
 
         def value(segment: Segment, shares: FloatArray, kinks: Kinks) -> Dual:
+            tree = tree_in(segment.mode)
+            forces = {FORCE_OF + c: parse(self.laws[c].force(segment.mode)) for c in contacts}
+            defined = {**self.definitions, **forces, **(given or {})}
+            names = _leaves(tree, defined)
             time, states = segment.at(shares)
             values: dict[str, Any] = {TIME: time}
             values.update(zip(self.model.states, states, strict=True))
@@ -72,9 +119,9 @@ class Inside:
             for name in self.observables:
                 if name in names:
                     values[name] = segment.observable(name, time, states)
-            scope: Scope[Any] = Scope(kinks.algebra(), values, self.definitions)
+            scope: Scope[Any] = Scope(kinks.algebra(), values, defined)
             with np.errstate(all="ignore"):
-                found = scope.evaluate(asked.tree)
+                found = scope.evaluate(tree)
             return found if isinstance(found, Dual) else constant(found, time)
 
         return value
@@ -89,6 +136,20 @@ def definitions_of(model: Model) -> Mapping[str, ast.expr]:
 
     parts = from_text(model.definition).names.parts
     return {name: parse(text) for name, text in parts.items()}
+
+
+def _always(tree: ast.expr, _: str) -> ast.expr:
+    return tree
+
+
+@lru_cache(maxsize=64)
+def laws_of(model: Model) -> tuple[ContactLaws, ...]:
+    """Return the laws of the contacts of a structure; none of another model."""
+    if not model.definition:
+        return ()
+    from contfric.models.describe import from_text
+
+    return from_text(model.definition).laws
 
 
 def _leaves(tree: ast.expr, definitions: Mapping[str, ast.expr]) -> set[str]:

@@ -11,7 +11,7 @@ of panels.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -27,6 +27,8 @@ _NODES = 16
 #: Last coefficients of a series, relative to the largest value: the square of it is rounding. Of an
 #: integrated flow no better than its rounding, a hundred times over.
 RESOLVED, _UNITS = 1e-9, 100.0
+#: Rounding of a function, relative to its largest value on the orbit.
+_ROUNDING = 1e-16
 #: Coefficients that no longer fall when a panel is halved are noise of the integrator, if they are below this
 #: share of the largest value; a kink or a jump that nobody noted has larger ones.
 _NOISE, _FALLS, _HALVED = 1e-4, 0.7, 4
@@ -138,12 +140,24 @@ class Resolved:
         return Dual(np.zeros(1), slopes)
 
 
-def resolve(segment: Segment, function: Function, what: str) -> Resolved:
+def least_size(segments: Sequence[Segment], function: Function) -> float:
+    """Return the size below which values of a function are rounding of those elsewhere on the orbit."""
+    shares, largest = 0.5 * (_POINTS + 1.0), 0.0
+    for segment in segments:
+        if segment.lasts > 0.0:
+            with np.errstate(all="ignore"):
+                values = function(segment, shares, Kinks()).values
+            largest = max(largest, float(np.max(np.abs(values))))
+    return _ROUNDING / RESOLVED * largest if np.isfinite(largest) else 0.0
+
+
+def resolve(segment: Segment, function: Function, what: str, size: float = 0.0) -> Resolved:
     """Resolve a function on a segment.
 
     Parameters
     ----------
     what : the function's name, for messages
+    size : values below it are rounding (:func:`least_size`): a slide that has just appeared has no others
 
     Raises
     ------
@@ -152,7 +166,7 @@ def resolve(segment: Segment, function: Function, what: str) -> Resolved:
     """
     found = Resolved(segment, function, what)
     if segment.lasts > 0.0:
-        _resolve(found, 0.0, 1.0, 0, 0.0, np.inf)
+        _resolve(found, 0.0, 1.0, 0, size, np.inf)
     return found
 
 

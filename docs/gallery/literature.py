@@ -22,6 +22,7 @@ STUDIES = (
     *("bouncing-ball", "gear-pair", "pendulum", "normal-force", "jenkins"),
     "compass-gait",
     *("blade-damper", "pounding", "two-blocks", "braced-chain"),
+    *("drill-string", "iwan", "beam-stop", "storeys"),
 )
 #: Studies of planes, each with the page that shows it.
 PLANES = {"popp-plane": "popp", "integrate-and-fire": "integrate-and-fire"}

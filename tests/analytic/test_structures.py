@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import contfric as cf
 
@@ -91,3 +92,127 @@ def test_an_orbit_that_grazes_is_not_followed_twice() -> None:
         orbit = branch[len(branch) // 2]
         assert shortest(orbit) is orbit
     assert not [b for b in diagram.bifurcations if b.kind is cf.Kind.BP]
+
+
+def test_a_drill_string_sticks_and_slips_as_an_integrator_says() -> None:
+    """From the release to the next one, by scipy's own events."""
+    w = 0.3
+    start = [-0.25, -0.5, -0.75, -1.0, -w, -w, -w, -w]
+    orbit = cf.find_orbit("drill-string", {"w": w}, state=start)
+    p = orbit.params
+    stiffness = p["k"] * (2.0 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1))
+    stiffness[3, 3] = p["k"]
+    mass = np.array([0.1, 0.1, 0.1, p["J"]])
+
+    def forces(y: np.ndarray) -> np.ndarray:
+        return -stiffness @ y[:4] - p["c"] * (y[4:] + w)
+
+    def slips(t: float, y: np.ndarray) -> np.ndarray:
+        return np.concatenate([y[4:], (forces(y) - [0, 0, 0, p["S"]]) / mass])
+
+    def sticks(t: float, y: np.ndarray) -> np.ndarray:
+        return np.concatenate([y[4:], forces(y) / mass * [1, 1, 1, 0]])
+
+    def stops(t: float, y: np.ndarray) -> float:
+        return float(y[7] + w) if t > 1e-3 else 1.0
+
+    def lets_go(t: float, y: np.ndarray) -> float:
+        return float(forces(y)[3] - p["S0"])
+
+    stops.terminal = lets_go.terminal = True  # type: ignore[attr-defined]
+    release = next(i for i, (mode, _) in enumerate(orbit.word) if mode == "p")
+    y, period = np.array(orbit.begins[release][1:]), 0.0
+    for rates, event in ((slips, stops), (sticks, lets_go)):
+        found = solve_ivp(
+            rates, (0.0, 50.0), y, "DOP853", events=event, rtol=1e-12, atol=1e-13, max_step=0.05
+        )
+        period += found.t_events[0][0]
+        y = found.y_events[0][0]
+    assert orbit.stable
+    assert period == pytest.approx(orbit.period, abs=1e-9)
+    assert np.max(np.abs(y - orbit.begins[release][1:])) < 1e-9
+
+
+def test_stuck_elements_let_go_where_the_linear_amplitude_is_their_limit() -> None:
+    params = {"F": 0.05, "S": 0.05, "W": 1.2}
+    stuck = cf.find_orbit("iwan", params, state=[0.05, 0.0, 0.05, 0.05, 0.05])
+    p = stuck.params
+    per_force = 1.0 / abs(p["k"] + 3.0 * p["kt"] - p["W"] ** 2 + 1j * p["c"] * p["W"])
+    assert stuck.x_max == pytest.approx(p["F"] * per_force, rel=1e-12)
+    diagram = cf.explore(stuck, "F", (0.02, 0.3), max_periods=1)
+    assert len(diagram.branches) == 4  # none slips, one, two, three
+    assert not diagram.loose_ends
+    first = min(b.params["F"] for b in diagram.bifurcations)
+    assert first == pytest.approx(p["S"] / p["kt"] / per_force, rel=1e-10)
+
+
+def beam() -> tuple[np.ndarray, np.ndarray]:
+    """Return natural frequencies over the first one, and the modes at the tip, from their equation."""
+    near = np.pi * (np.arange(1, 13) - 0.5)
+    roots = np.array(
+        [brentq(lambda b: np.cos(b) + 1.0 / np.cosh(b), b - 0.5, b + 0.5, xtol=1e-15) for b in near]
+    )
+    return (roots / roots[0]) ** 2, 2.0 * (-1.0) ** np.arange(12)
+
+
+def test_a_beam_of_twelve_modes_touches_where_the_linear_response_is_the_gap() -> None:
+    frequencies, shape = beam()
+    zeta, force, n = 0.02, 0.6, 12
+
+    def response(w: float) -> np.ndarray:
+        return shape * force / (frequencies**2 - w**2 + 2j * zeta * frequencies * w)
+
+    touches = brentq(lambda w: abs(shape @ response(w)) - 1.0, 6.0, 6.2, xtol=1e-14)
+    x = response(6.1)
+    start = [*x.real, *(6.1j * x).real]
+    orbit = cf.find_orbit("beam-stop", {"W": 6.1}, state=start)
+    assert orbit.quantity("max(tip)") == pytest.approx(abs(shape @ x), rel=1e-11)
+    diagram = cf.explore(orbit, "W", (6.1, 6.14), max_periods=1, max_step=0.2)
+    grazing = next(b for b in diagram.bifurcations if b.kind is cf.Kind.GS)
+    assert grazing.params["W"] == pytest.approx(touches, abs=1e-10)
+    hitting = next(b for b in diagram.branches if len(b[0].word) == 2 and b[0].word[0][1] == "stop")
+    other = hitting[len(hitting) // 2]
+    p = other.params
+
+    def acceleration(mode: str, t: float, y: np.ndarray) -> np.ndarray:
+        tip = shape @ y[:n]
+        push = p["F"] * np.cos(p["W"] * t) - (p["ks"] * (tip - p["d"]) if mode == "c" else 0.0)
+        return shape * push - frequencies**2 * y[:n] - 2.0 * zeta * frequencies * y[n:]
+
+    assert follow(other, acceleration, n) == 2
+
+
+def test_a_stick_lasts_until_waves_have_come_back() -> None:
+    """Longer than a period of the excitation: other masses move on, and the load grows with them."""
+    n, w = 20, 0.4
+    stiffness = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    stiffness[-1, -1] = 1.0
+    rubs = {"kind": "friction", "velocity": "v1", "kinetic": 0.2, "static": 0.25}
+    model = cf.Mechanism(
+        np.eye(n),
+        0.03 * np.eye(n),
+        stiffness,
+        contacts={"pad": rubs},
+        force={f"q{n}": "0.6*cos(w*t)"},
+        parameters={"w": w},
+        period="2*pi/w",
+    )
+    start = [*np.ones(n), *np.zeros(n)]
+    found = cf.simulate(model, {}, state=start, periods=2)
+    times = found.times + found.cycles * 2.0 * np.pi / w
+    first = times[1] - times[0]
+    assert first > 2.0 * np.pi / w
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        a = -stiffness @ y[:n] - 0.03 * y[n:]
+        a[-1] += 0.6 * np.cos(w * t)
+        a[0] = 0.0
+        return np.concatenate([y[n:], a])
+
+    def load(t: float, y: np.ndarray) -> float:
+        return 0.25 - abs(float(stiffness[0] @ y[:n]))
+
+    load.terminal = True  # type: ignore[attr-defined]
+    options = {"events": load, "rtol": 1e-12, "atol": 1e-13}
+    stuck = solve_ivp(rates, (times[0], 40.0), found.states[0], "DOP853", **options)
+    assert stuck.t_events[0][0] == pytest.approx(times[1], abs=1e-9)

@@ -68,7 +68,8 @@ def test_every_mode_obeys_the_equations_of_motion(seed: int) -> None:
     evaluator = floats(from_text(model.definition))
     rng, omega, checked = np.random.default_rng(seed + 1), PARAMETERS["Omega"], 0
     for mode in model.modes:
-        letters = dict(zip((*FRICTION, "jk", "pad2"), mode.name, strict=True))
+        states = mode.name.removesuffix("-")  # where nothing acts the mode is divided by a section
+        letters = dict(zip((*FRICTION, "jk", "pad2"), states, strict=True))
         t, y = float(rng.uniform(0.0, 7.0)), rng.normal(size=9)
         rates = np.array(evaluator.field(mode.name, PARAMETERS, t, list(map(float, y))))
         v, a = y[4:8], rates[4:8]
@@ -90,8 +91,8 @@ def test_every_mode_obeys_the_equations_of_motion(seed: int) -> None:
                     rest += w * (other + 0.3)
                 checked += 1
         assert np.max(np.abs(rest)) < 1e-10
-    assert len(model.modes) == 54
-    assert checked == 36
+    assert len(model.modes) == 54 + 1
+    assert checked == 36 + 2
 
 
 def test_one_mass_is_the_oscillator_of_the_article() -> None:
@@ -168,6 +169,10 @@ def test_two_masses_that_hit_each_other_keep_their_momentum() -> None:
     assert orbit.admissible
 
 
+RUBS = {"kind": "friction", "velocity": "v1", "kinetic": "S"}
+ELEMENT = {"kind": "jenkins", "displacement": "2*q1", "stiffness": "k", "limit": "S"}
+WALL = {"kind": "impact", "gap": "1 - q1", "restitution": 0.5}
+
 WRONG: list[tuple[dict[str, Any], str]] = [
     ({"mass": [[1.0, 0.5], [0.0, 1.0]]}, "a mass matrix is symmetric"),
     (
@@ -198,6 +203,26 @@ WRONG: list[tuple[dict[str, Any], str]] = [
         {"contacts": {"a": {"kind": "impact", "gap": "q1*q2", "restitution": 1}}},
         "linear in the states",
     ),
+    ({"contacts": {"a": RUBS, "b": RUBS}}, "contacts -> b: 'b' locks with 'a'.* indeterminate"),
+    (
+        {
+            "contacts": {
+                "a": RUBS,
+                "b": RUBS | {"velocity": "v2"},
+                "c": RUBS | {"velocity": "v1-v2"},
+            }
+        },
+        "contacts -> c: 'c' locks with 'a', 'b'",
+    ),
+    ({"contacts": {"a": RUBS, "z": ELEMENT}}, "contacts -> z: 'a' and 'z' act along one direction"),
+    ({"contacts": {"a": WALL, "b": WALL}}, "contacts -> b: 'b' has the gap of 'a'"),
+    ({"contacts": {"a": WALL | {"gap": "1 - q7"}}}, "contacts -> a -> gap: unknown name 'q7'"),
+    ({"contacts": {"q1": RUBS}}, "contacts -> q1: 'q1' is a coordinate"),
+    ({"contacts": {"my brake": RUBS}}, "contacts -> my brake: contact 'my brake'"),
+    ({"contacts": {}}, "contacts: a structure has at least one contact"),
+    ({"stiffness": [["kk", 0.0], [0.0, 1.0]]}, "stiffness -> 0: unknown name 'kk'"),
+    ({"force": {"q1": "cos(w*t)"}}, "force -> q1: unknown name 'w'"),
+    ({"mass": [[1.0, 0.0], [0.0, float("nan")]]}, "mass -> 1: .* has to be a finite number"),
 ]
 
 
@@ -253,6 +278,13 @@ def test_matrices_from_files(tmp_path: Any) -> None:
     with pytest.raises(
         ModelError, match=r"frame.yaml:6: frame.npz has no array 'KK'.*did you mean 'K'"
     ):
+        cf.load_model(path)
+    path.write_text("\n".join(lines).replace(", array: K", ""))
+    with pytest.raises(ModelError, match=r"frame.yaml:6: say which array of frame.npz: K"):
+        cf.load_model(path)
+    np.save(tmp_path / "frame.npy", stiffness)
+    path.write_text("\n".join(lines).replace("frame.npz", "frame.npy"))
+    with pytest.raises(ModelError, match=r"frame.yaml:6: frame.npy is no npz"):
         cf.load_model(path)
 
 
