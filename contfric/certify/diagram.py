@@ -24,6 +24,7 @@ from contfric.certify.diagram_certificate import (
     merged,
 )
 from contfric.certify.events import EventCertificate, certify_event
+from contfric.certify.files import event_data
 from contfric.chaos.running import Progress, check_executor, compute_all
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation
@@ -92,6 +93,7 @@ def certify_diagram(
         tuple(events),
         time.time() - began,
         ended,
+        _checkable([found[k] for k in range(len(nodes)) if k in found]),
     )
 
 
@@ -150,6 +152,17 @@ def prove(
     if isinstance(task.what, Branch):
         return certify_branch(task.what, until=task.until, progress=progress)
     return certify_event(task.what, task.parameter)
+
+
+def _checkable(proofs: list[EventCertificate]) -> tuple[dict[str, Any], ...]:
+    """Return the certificates that the checker knows, as plain data."""
+    found = []
+    for proof in proofs:
+        try:
+            found.append(event_data(proof))
+        except ParameterError:  # not proved, or none of those that it knows
+            continue
+    return tuple(found)
 
 
 def _event_summary(

@@ -114,6 +114,8 @@ class DiagramCertificate:
         How long it took.
     ended : str
         What ended the run before all was tried (a time limit, an interrupt); empty if nothing did.
+    checkable : tuple of dict
+        Certificates of events as plain data, which ``contfric verify`` checks.
     """
 
     model: str
@@ -123,6 +125,7 @@ class DiagramCertificate:
     events: tuple[EventSummary, ...]
     seconds: float
     ended: str = ""
+    checkable: tuple[dict[str, Any], ...] = ()
 
     @property
     def covered(self) -> float:
@@ -150,12 +153,17 @@ class DiagramCertificate:
     def save(self, path: Any) -> None:
         """Write it as a JSON file; :func:`load_diagram_certificate` reads it.
 
+        ``contfric verify`` checks the events in it that are ``checkable``, and not the summary.
+
         Raises
         ------
         ResultFileError
             If the file cannot be written.
         """
-        text = json.dumps({"certificate": _KIND, "format": _FORMAT, **asdict(self)}, indent=1)
+        summary = asdict(self)
+        checkable = summary.pop("checkable")
+        data = {"certificate": _KIND, "format": _FORMAT, "checkable": checkable, "summary": summary}
+        text = json.dumps(data, indent=1)
         with replacing(path_of("a certificate file", path)) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
 
@@ -219,8 +227,9 @@ def load_diagram_certificate(path: Any) -> DiagramCertificate:
     file: Path = path_of("a certificate file", path)
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
-        if data.pop("certificate") != _KIND or data.pop("format") != _FORMAT:
+        if data["certificate"] != _KIND or data["format"] != _FORMAT:
             raise ValueError(f"it is no certificate of a diagram of format {_FORMAT}")
+        checkable, data = tuple(data["checkable"]), data["summary"]
         branches = tuple(
             BranchSummary(**{**b, "gaps": tuple(Gap(**g) for g in b["gaps"])})
             for b in data.pop("branches")
@@ -229,6 +238,8 @@ def load_diagram_certificate(path: Any) -> DiagramCertificate:
             EventSummary(**{**e, "branches": tuple(e["branches"])}) for e in data.pop("events")
         )
         low, high = data.pop("range")
-        return DiagramCertificate(branches=branches, events=events, range=(low, high), **data)
+        return DiagramCertificate(
+            branches=branches, events=events, range=(low, high), checkable=checkable, **data
+        )
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise ResultFileError(f"cannot read {file}: {error}; give a certificate.json") from error

@@ -110,6 +110,8 @@ def test_a_folder_gets_a_certificate_and_a_column(
     assert all(float(row["proved"]) < 1e-30 for row in rows)
     data = json.loads((folder / "certificate.json").read_text())
     assert data["certificate"] == "diagram"
+    assert main(["verify", str(folder / "certificate.json")]) == 0
+    assert capsys.readouterr().out.startswith(f"yes: {len(data['checkable'])} events")
     run_study(read_study(path), folder, force=True)  # what it says is of the run before
     assert not (folder / "certificate.json").exists()
 
