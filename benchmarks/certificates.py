@@ -3,6 +3,7 @@
 python -m benchmarks.certificates orbits 1000      random scenes of coulomb: share proved, by class
 python -m benchmarks.certificates events           the events of several diagrams, by kind
 python -m benchmarks.certificates branches         the branches of Fig. 5, share of the arclength
+python -m benchmarks.certificates diagram          the whole of Fig. 5, and the check of its events
 python -m benchmarks.certificates cheats 10000     changed certificates: how many are verified
 """
 
@@ -112,6 +113,21 @@ def branches() -> None:
     print(f"{100 * covered / whole:.3f} % of the arclength of the diagram")
 
 
+def diagram() -> None:
+    """The whole diagram of Fig. 5: events and branches, on one core, and its check."""
+    params, parameter, span = SCENES["Omega (Fig. 5)"]
+    found = cf.explore(cf.find_orbit("coulomb", params), parameter, span)
+    begin, busy = time.perf_counter(), time.process_time()
+    certificate = found.certify()
+    print(certificate)
+    print(
+        f"{time.perf_counter() - begin:.1f} s, {time.process_time() - busy:.1f} s of the processor"
+    )
+    text = json.dumps({"certificate": "diagram", "format": 1, "checkable": certificate.checkable})
+    busy = time.process_time()
+    print(f"{check_text(text)}, {time.process_time() - busy:.1f} s of the processor")
+
+
 def cheats(count: int) -> None:
     """Change true certificates, and decide by 60 digits those that are verified."""
     from tests.certificate_oracle import false_statements, mutated
@@ -150,4 +166,4 @@ if __name__ == "__main__":
     if task in tasks:
         tasks[task](int(counts[0]) if counts else 100)
     else:
-        {"events": events, "branches": branches}[task]()
+        {"events": events, "branches": branches, "diagram": diagram}[task]()

@@ -34,6 +34,10 @@ from contfric.models.balls.numbers import Vector
 _BITS = 80
 #: Halvings of a step of the branch: events are left with as little about them.
 _HALVINGS = 12
+#: Shortest step that is halved, as a share of the branch: what is about events is left so short.
+_SHORTEST = 1e-5
+#: A box is tried only if it is at most this much longer than the last one that was proved.
+_GROWTH = 2.5
 #: Most boxes that are tried along a branch: some minutes of work.
 _MOST = 30_000
 
@@ -181,7 +185,8 @@ class _Tracer:
         self.segments: Segments = segments_of(self.system)
         self.build: Builder = self._build
         self.last: Box | None = None
-        self.count, self.ended = 0, ""
+        self.count, self.ended, self.length = 0, "", math.inf
+        self.shortest = _SHORTEST * float(branch.arc[-1] - branch.arc[0])
 
     def _model(self, value: arb) -> BallModel:
         return ball_model(self.branch.model, self.orbit.params, self.parameter, value)
@@ -232,15 +237,23 @@ class _Tracer:
     def _cover(
         self, first: Vector, last: Vector, arcs: tuple[float, float], level: int
     ) -> list[Piece]:
+        length = arcs[1] - arcs[0]
+        splits = level < _HALVINGS and length > self.shortest and self._goes_on()
+        if length > _GROWTH * self.length and splits:
+            halves = self._halves(first, last, arcs, level)
+            if halves is not None:
+                return halves
         self.count += 1
         box = box_between(self.segments, self.build, first, last)
         admissible = Finding(Verdict.UNDECIDED, "no box") if box is None else self._admissible(box)
         whole = box is not None and admissible.proved and box.monotone and box.no_flip
         refuted = admissible.verdict is Verdict.REFUTED  # by all orbits of the box
-        if not (whole or refuted) and level < _HALVINGS and self._goes_on():
+        if not (whole or refuted) and splits:
+            self.length = length / 2
             halves = self._halves(first, last, arcs, level)
             if halves is not None:
                 return halves
+        self.length = max(self.length, length) if whole else math.inf
         if box is None:
             return [self._nothing(arcs, first, last)]
         linked = self.last is None or are_linked(self.segments, self.build, self.last, box)
