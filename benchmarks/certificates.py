@@ -130,7 +130,7 @@ def diagram() -> None:
 
 
 #: In the plane of Fig. 9: (Omega, S), and the most returns of a horseshoe.
-CHAOTIC = ((0.288, 0.129, 9), (0.396, 0.082, 6), (0.441, 0.135, 9), (0.347, 0.159, 6))
+CHAOTIC = ((0.282, 0.122, 6), (0.292, 0.126, 6), (0.288, 0.129, 9), (0.396, 0.082, 6))
 
 
 def chaos() -> None:
