@@ -3,6 +3,8 @@
 python -m benchmarks.certificates orbits 1000      random scenes of coulomb: share proved, by class
 python -m benchmarks.certificates events           the events of several diagrams, by kind
 python -m benchmarks.certificates branches         the branches of Fig. 5, share of the arclength
+python -m benchmarks.certificates diagram          the whole of Fig. 5, and the check of its events
+python -m benchmarks.certificates chaos            horseshoes of the release map in the plane of Fig. 9
 python -m benchmarks.certificates cheats 10000     changed certificates: how many are verified
 """
 
@@ -112,6 +114,34 @@ def branches() -> None:
     print(f"{100 * covered / whole:.3f} % of the arclength of the diagram")
 
 
+def diagram() -> None:
+    """The whole diagram of Fig. 5: events and branches, on one core, and its check."""
+    params, parameter, span = SCENES["Omega (Fig. 5)"]
+    found = cf.explore(cf.find_orbit("coulomb", params), parameter, span)
+    begin, busy = time.perf_counter(), time.process_time()
+    certificate = found.certify()
+    print(certificate)
+    print(
+        f"{time.perf_counter() - begin:.1f} s, {time.process_time() - busy:.1f} s of the processor"
+    )
+    text = json.dumps({"certificate": "diagram", "format": 1, "checkable": certificate.checkable})
+    busy = time.process_time()
+    print(f"{check_text(text)}, {time.process_time() - busy:.1f} s of the processor")
+
+
+#: In the plane of Fig. 9: (Omega, S), and the most returns of a horseshoe.
+CHAOTIC = ((0.282, 0.122, 6), (0.292, 0.126, 6), (0.288, 0.129, 9), (0.396, 0.082, 6))
+
+
+def chaos() -> None:
+    """Horseshoes of the release map in chaotic regions of the plane of Fig. 9."""
+    for omega, s, most in CHAOTIC:
+        params = {"Omega": omega, "S": s, "S0": 0.4}
+        begin = time.process_time()
+        found = cf.release_map("coulomb", params, count=8000).horseshoe(most)
+        print(f"{params}: {found}; {found.pieces} pieces, {time.process_time() - begin:.1f} s")
+
+
 def cheats(count: int) -> None:
     """Change true certificates, and decide by 60 digits those that are verified."""
     from tests.certificate_oracle import false_statements, mutated
@@ -150,4 +180,4 @@ if __name__ == "__main__":
     if task in tasks:
         tasks[task](int(counts[0]) if counts else 100)
     else:
-        {"events": events, "branches": branches}[task]()
+        {"events": events, "branches": branches, "diagram": diagram, "chaos": chaos}[task]()

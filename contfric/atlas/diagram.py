@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation, End, Kind, Proposal
-from contfric.extras import need_pandas
+from contfric.extras import need_flint, need_pandas
 from contfric.models.definition import Model
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from concurrent.futures import Executor
     from os import PathLike
     from pathlib import Path
 
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
     from contfric.atlas.scenario import Scenario
     from contfric.atlas.verification import Verification
+    from contfric.certify.diagram_certificate import DiagramCertificate
     from contfric.plot.live.frame import Frame
     from contfric.quantities.registry import QuantityLike
     from contfric.response.sweep import Sweep
@@ -179,6 +182,40 @@ class Diagram:
     def verified(self) -> bool | None:
         """Whether :meth:`verify` found nothing that differs; None before it was asked."""
         return None if self.verification is None else self.verification.passed
+
+    def certify(
+        self,
+        *,
+        executor: Executor | None = None,
+        time_limit: float | None = None,
+        progress: Callable[[str], None] | None = None,
+    ) -> DiagramCertificate:
+        """Prove the diagram: a tube along every branch, every event to 30 digits (needs python-flint).
+
+        Mirror images of branches are not proved again, and not counted.
+
+        Parameters
+        ----------
+        executor : any :class:`concurrent.futures.Executor` of processes; by default one after the other here
+        time_limit : seconds after which what is left is listed as not reached
+        progress : hears how far it is
+
+        Raises
+        ------
+        ParameterError
+            If proofs are not offered for the model, or a setting is wrong.
+
+        Examples
+        --------
+        >>> import contfric as cf
+        >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.6, "S": 0.3, "S0": 0.4})
+        >>> cf.explore(orbit, "Omega", (0.59, 0.61)).certify().covered > 0.99
+        True
+        """
+        need_flint()
+        from contfric.certify.diagram import certify_diagram
+
+        return certify_diagram(self, executor, time_limit, progress)
 
     @property
     def bifurcations(self) -> tuple[Bifurcation, ...]:

@@ -10,6 +10,9 @@ ends of a branch, where an inequality vanishes, and about its events.
 
 from __future__ import annotations
 
+import math
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from flint import arb, ctx
@@ -31,6 +34,10 @@ from contfric.models.balls.numbers import Vector
 _BITS = 80
 #: Halvings of a step of the branch: events are left with as little about them.
 _HALVINGS = 12
+#: Shortest step that is halved, as a share of the branch: what is about events is left so short.
+_SHORTEST = 1e-5
+#: A box is tried only if it is at most this much longer than the last one that was proved.
+_GROWTH = 2.5
 #: Most boxes that are tried along a branch: some minutes of work.
 _MOST = 30_000
 
@@ -64,6 +71,11 @@ class Piece:
         """Whether it is one curve of admissible orbits."""
         return self.exists and self.admissible.proved
 
+    @property
+    def why(self) -> str:
+        """What is not proved; empty if all is."""
+        return "" if self.proved else self.admissible.why
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BranchCertificate:
@@ -75,10 +87,13 @@ class BranchCertificate:
         The printed branch.
     pieces : tuple of Piece
         Along the branch, in its order.
+    ended : str
+        What ended the work before all was tried; empty if nothing did.
     """
 
     branch: Branch
     pieces: tuple[Piece, ...]
+    ended: str = ""
 
     @property
     def covered(self) -> float:
@@ -106,8 +121,7 @@ class BranchCertificate:
     def gaps(self) -> list[str]:
         """What is not proved, a line each: where, and why."""
         return [
-            f"{self.branch.parameter} from {p.values[0]:.12g} to {p.values[1]:.12g}: "
-            + (p.admissible.why if p.exists else "no box")
+            f"{self.branch.parameter} from {p.values[0]:.12g} to {p.values[1]:.12g}: {p.why}"
             for p in self.pieces
             if not p.proved
         ]
@@ -124,8 +138,15 @@ class BranchCertificate:
         )
 
 
-def certify_branch(branch: Branch) -> BranchCertificate:
+def certify_branch(
+    branch: Branch, until: float = math.inf, progress: Callable[[str], None] | None = None
+) -> BranchCertificate:
     """Prove what can be proved of a branch.
+
+    Parameters
+    ----------
+    until : when to end, by ``time.time``; what is left then is listed as such
+    progress : hears how far it is
 
     Raises
     ------
@@ -140,16 +161,19 @@ def certify_branch(branch: Branch) -> BranchCertificate:
     True
     """
     with ctx.workprec(_BITS):
-        tracer = _Tracer(branch)
-        pieces = [piece for k in range(len(branch) - 1) for piece in tracer.step(k)]
-    return BranchCertificate(branch, tuple(pieces))
+        tracer, pieces, steps = _Tracer(branch, until), [], len(branch) - 1
+        for k in range(steps):
+            pieces += tracer.step(k)
+            if progress is not None:
+                progress(f"{branch.name}, step {k + 1} of {steps}, {tracer.count} boxes")
+    return BranchCertificate(branch, tuple(pieces), tracer.ended)
 
 
 class _Tracer:
     """Covers the steps of a branch with boxes."""
 
-    def __init__(self, branch: Branch) -> None:
-        self.branch, self.parameter = branch, branch.parameter
+    def __init__(self, branch: Branch, until: float) -> None:
+        self.branch, self.parameter, self.until = branch, branch.parameter, until
         half = branch.system.half
         orbit = branch[len(branch) // 2]
         self.orbit = orbit
@@ -161,7 +185,8 @@ class _Tracer:
         self.segments: Segments = segments_of(self.system)
         self.build: Builder = self._build
         self.last: Box | None = None
-        self.count = 0
+        self.count, self.ended, self.length = 0, "", math.inf
+        self.shortest = _SHORTEST * float(branch.arc[-1] - branch.arc[0])
 
     def _model(self, value: arb) -> BallModel:
         return ball_model(self.branch.model, self.orbit.params, self.parameter, value)
@@ -187,30 +212,48 @@ class _Tracer:
     def step(self, k: int) -> list[Piece]:
         """Cover the step from point k to the next one."""
         first, last = self._point(k), self._point(k + 1)
+        arcs = (float(self.branch.arc[k]), float(self.branch.arc[k + 1]))
+        if not self._goes_on():
+            return [self._nothing(arcs, first, last)]
         plane = [b - a for a, b in zip(first, last, strict=True)]
         ends = [solved(self.segments, self.build, point, plane) for point in (first, last)]
-        arcs = (float(self.branch.arc[k]), float(self.branch.arc[k + 1]))
         if ends[0] is None or ends[1] is None:
             return [self._nothing(arcs, first, last)]
         return self._cover(ends[0], ends[1], arcs, 0)
 
+    def _goes_on(self) -> bool:
+        """Tell whether more boxes may be tried; else it is said what ended the work."""
+        if time.time() > self.until:
+            self.ended = "the time limit ended it"
+        elif self.count >= _MOST:
+            self.ended = f"{_MOST} boxes were tried"
+        return not self.ended
+
     def _nothing(self, arcs: tuple[float, float], first: Vector, last: Vector) -> Piece:
         self.last = None
-        why = Finding(Verdict.UNDECIDED, "no box")
+        why = Finding(Verdict.UNDECIDED, self.ended or "no box")
         return Piece(*arcs, (float(first[-1].mid()), float(last[-1].mid())), False, why)
 
     def _cover(
         self, first: Vector, last: Vector, arcs: tuple[float, float], level: int
     ) -> list[Piece]:
+        length = arcs[1] - arcs[0]
+        splits = level < _HALVINGS and length > self.shortest and self._goes_on()
+        if length > _GROWTH * self.length and splits:
+            halves = self._halves(first, last, arcs, level)
+            if halves is not None:
+                return halves
         self.count += 1
         box = box_between(self.segments, self.build, first, last)
         admissible = Finding(Verdict.UNDECIDED, "no box") if box is None else self._admissible(box)
         whole = box is not None and admissible.proved and box.monotone and box.no_flip
         refuted = admissible.verdict is Verdict.REFUTED  # by all orbits of the box
-        if not (whole or refuted) and level < _HALVINGS and self.count < _MOST:
+        if not (whole or refuted) and splits:
+            self.length = length / 2
             halves = self._halves(first, last, arcs, level)
             if halves is not None:
                 return halves
+        self.length = max(self.length, length) if whole else math.inf
         if box is None:
             return [self._nothing(arcs, first, last)]
         linked = self.last is None or are_linked(self.segments, self.build, self.last, box)

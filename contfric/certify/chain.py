@@ -104,32 +104,32 @@ class Move:
     speed: arb_mat
 
 
-@dataclass(frozen=True, eq=False)
-class Wide:
-    """What is known of a wide box: durations, and the model at the middle of the parameter.
-
-    Attributes
-    ----------
-    durations : of the segments, narrower than the differences of the joints
-    middle : the model at the middle of the parameter, with slopes
-    offset : the parameter less its middle
-    """
-
-    durations: Vector
-    middle: BallModel
-    offset: arb
-
-
-class Chain:
-    """The equations of a chain at a model in balls.
+def block_exponential(terms: list[arb_mat], duration: arb) -> list[arb_mat]:
+    """Return Taylor's coefficients by the parameter of exp(M d) from those of M.
 
     Parameters
     ----------
-    wide : what is known of a wide box, so that its dependences are not lost; None for narrow ones
+    terms : M, M_p, M_pp / 2, ...
     """
+    size, count = terms[0].nrows(), len(terms)
+    block = zeros(count * size, count * size)
+    for k in range(count):
+        for j in range(k, count):
+            for a in range(size):
+                for b in range(size):
+                    block[k * size + a][j * size + b] = terms[j - k][a, b]
+    whole = (arb_mat(block) * duration).exp()
+    return [
+        arb_mat([[whole[a, k * size + b] for b in range(size)] for a in range(size)])
+        for k in range(count)
+    ]
 
-    def __init__(self, segments: Segments, model: BallModel, wide: Wide | None = None) -> None:
-        self.segments, self.model, self.wide = segments, model, wide
+
+class Chain:
+    """The equations of a chain at a model in balls."""
+
+    def __init__(self, segments: Segments, model: BallModel) -> None:
+        self.segments, self.model = segments, model
         self.n = segments.states
         self.m = self.n + 1
         self.size = segments.count * self.m
@@ -162,43 +162,13 @@ class Chain:
         if reset is not None:
             start, by_time = reset * start, reset * by_time
         field = model.fields[self.segments.modes[i]]
-        flow = self._flow(self.segments.modes[i], self.duration(i, z))
+        flow = (field * self.duration(i, z)).exp()
         end = flow * start
         return Move(field, start, by_time, reset, flow, end, field * end)
 
-    def _flow(self, mode: str, duration: arb) -> arb_mat:
-        """Return exp(M d).
-
-        For a wide box by the mean value theorem in the parameter, at the middle d_m of the durations, times
-        exp(M (d - d_m)): the exponential of a wide matrix loses much, that of a small one little.
-        """
-        field = self.model.fields[mode]
-        if self.wide is None:
-            return (field * duration).exp()
-        middle = duration.mid()
-        slope = self._exponential(mode, middle)[1]
-        flow = (self.wide.middle.fields[mode] * middle).exp() + slope * self.wide.offset
-        return flow * (field * (duration - middle)).exp()
-
-    def _exponential(self, mode: str, duration: arb) -> tuple[arb_mat, arb_mat]:
-        """Return exp(M d) and its derivative by the parameter, from the exponential of the block matrix."""
-        assert self.model.slopes is not None
-        size, field = self.model.size, self.model.fields[mode]
-        slope = self.model.slopes.fields[mode]
-        block = zeros(2 * size, 2 * size)
-        for a in range(size):
-            for b in range(size):
-                block[a][b] = block[size + a][size + b] = field[a, b]
-                block[a][size + b] = slope[a, b]
-        whole = (arb_mat(block) * duration).exp()
-        return (
-            arb_mat([[whole[a, b] for b in range(size)] for a in range(size)]),
-            arb_mat([[whole[a, size + b] for b in range(size)] for a in range(size)]),
-        )
-
     def duration(self, i: int, z: list[Vector]) -> arb:
         """Return the duration of segment i."""
-        return z[i + 1][0] - z[i][0] if self.wide is None else self.wide.durations[i]
+        return z[i + 1][0] - z[i][0]
 
     # ------------------------------------------------------------------ first derivatives
 
@@ -304,12 +274,8 @@ class Chain:
         model = self.model
         assert model.slopes is not None
         mode = self.segments.modes[i]
-        slope, middle = model.slopes.fields[mode], duration.mid()
-        whole, flow = self._exponential(mode, middle if self.wide is not None else duration)
-        if self.wide is not None:  # exp(M d) = exp(M d_m) exp(M (d - d_m))
-            rest = duration - middle
-            short, by_parameter = self._exponential(mode, rest)
-            flow = flow * short + whole * by_parameter
+        slope = model.slopes.fields[mode]
+        flow = block_exponential([model.fields[mode], slope], duration)[1]
         start = column(model.by_parameter(joint[0], 0))
         if move.reset is not None:
             before = column(model.extended(joint[0], joint[1:]))

@@ -18,6 +18,7 @@ from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import numbers, zeros
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.structure import mirror_mode
+from contfric.orbit.system import System
 
 
 def closure_matrix(segments: Segments, model: BallModel, half: bool) -> arb_mat:
@@ -51,19 +52,19 @@ def is_symmetry(orbit: Orbit, segments: Segments, model: BallModel) -> bool:
     symmetry = orbit.model.symmetry
     if symmetry is None or symmetry.fraction != 0.5 or orbit.periods % 2 == 0 or model.resets:
         return False
-    if model.slopes is not None and not _keeps(orbit, segments, model, model.slopes):
+    if model.slopes is not None and not keeps(orbit.system, segments, model, model.slopes):
         return False
-    return _keeps(orbit, segments, model, model)
+    return keeps(orbit.system, segments, model, model)
 
 
-def _keeps(orbit: Orbit, segments: Segments, model: BallModel, matrices: BallModel) -> bool:
+def keeps(system: System, segments: Segments, model: BallModel, matrices: BallModel) -> bool:
     """Tell whether the images of fields and surfaces (or of their slopes) are those of the image mode."""
-    symmetry = orbit.model.symmetry
+    symmetry = system.model.symmetry
     assert symmetry is not None
-    matrix, image = closure_matrix(segments, model, True), mirror_mode(orbit.model)
+    matrix, image = closure_matrix(segments, model, True), mirror_mode(system.model)
     gaps = [
         matrices.fields[image[mode]] * matrix - matrix * matrices.fields[mode]
-        for mode in {mode for mode, _ in orbit.system.word}
+        for mode in {mode for mode, _ in system.word}
     ]
     gaps += [
         matrices.surfaces[to] * matrix + matrices.surfaces[name]

@@ -9,6 +9,7 @@ falls (SS), a touch has a second derivative.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from flint import arb, arb_mat, ctx
@@ -54,6 +55,10 @@ class EventCertificate:
         The event is of its kind.
     admissible : Finding
         The orbit obeys every other inequality over the whole of every segment.
+    location : Location or None
+        Its orbit on the shortest problem, and what vanishes there.
+    zero : tuple of arb
+        The zero of the extended system: joints, what the event needs beside them, the parameter.
     """
 
     event: Bifurcation
@@ -63,6 +68,8 @@ class EventCertificate:
     simple: Finding
     kind: Finding
     admissible: Finding
+    location: Location | None = None
+    zero: tuple[arb, ...] = ()
 
     @property
     def proved(self) -> bool:
@@ -77,6 +84,20 @@ class EventCertificate:
     @property
     def _whole(self) -> Finding:
         return all_of([self.exists, self.simple, self.kind, self.admissible])
+
+    def save(self, path: Any) -> None:
+        """Write the certificate as a JSON file, which ``contfric verify`` checks.
+
+        Raises
+        ------
+        ParameterError
+            If the event is not proved, or is none that the checker knows.
+        ResultFileError
+            If the file cannot be written.
+        """
+        from contfric.certify.files import event_data, write_data
+
+        write_data(event_data(self), path)
 
     @property
     def radius(self) -> float:
@@ -171,6 +192,8 @@ def _attempt(event: Bifurcation, location: Location, parameter: str, bits: int) 
         _simple(event, location, chain, z, touch),
         _of_kind(event, location, chain, z, touch),
         _admissible(orbit, chain, z, touch),
+        location,
+        tuple(inclusion.zero),
     )
 
 

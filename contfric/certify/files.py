@@ -15,11 +15,14 @@ from contfric.verify.file import CHECKED_MODELS, Answer, check_text
 
 if TYPE_CHECKING:
     from contfric.certify.certificate import Certificate
+    from contfric.certify.events import EventCertificate
 
 #: Digits of a printed ball: more than the 30 that an enclosure has.
 _DIGITS = 40
 #: Discs of multipliers are printed this much wider: another way to compute them rounds otherwise.
 _WIDER = 1e-25
+#: Bits with which the balls of events are printed.
+_EVENT_BITS = 320
 #: A larger file is no certificate: 400 segments take 200 kB.
 _LARGEST = 10_000_000
 
@@ -72,6 +75,46 @@ def certificate_data(certificate: Certificate) -> dict[str, Any]:
     }
 
 
+def event_data(proof: EventCertificate) -> dict[str, Any]:
+    """Return the certificate of an event as plain data.
+
+    Raises
+    ------
+    ParameterError
+        If a file cannot state it: not proved, another model, with holds, AS, GS or T.
+    """
+    event, location = proof.event, proof.location
+    if not proof.proved or location is None or proof.value is None:
+        raise ParameterError(f"there is nothing to write: {proof.why}")
+    orbit, condition = location.orbit, location.condition
+    model = orbit.model.name
+    kinds = ("SN", "PD", "BP", "CS", "SS")
+    if model not in CHECKED_MODELS or orbit.system.holds or event.kind.value not in kinds:
+        raise ParameterError(
+            f"certificate files of events are for {', '.join(kinds)} of orbits without holds of "
+            f"{', '.join(CHECKED_MODELS)}: that is what the checker knows"
+        )
+    m = orbit.joints.shape[1]
+    with ctx.workprec(_EVENT_BITS):
+        balls = [_printed(x) for x in proof.zero[: orbit.joints.size]]
+        at = [condition.segment, 1 if condition.surface == "F+" else -1] if condition else None
+        value = _printed(proof.value)
+    return {
+        "certificate": "event",
+        "format": 1,
+        "model": model,
+        "params": dict(event.params),
+        "parameter": proof.parameter,
+        "kind": event.kind.value,
+        "value": value,
+        "periods": orbit.periods,
+        "half": bool(orbit.system.half),
+        "segments": [list(pair) for pair in orbit.system.word],
+        "near": [balls[i : i + m] for i in range(0, len(balls), m)],
+        "at": at,
+    }
+
+
 def _printed(x: arb) -> str:
     """Return a ball as a text, which contains it."""
     return _text(x + arb(0, (_WIDER * 1e-5) * (1 + abs(x).upper())))
@@ -96,7 +139,18 @@ def write_certificate(certificate: Certificate, path: Any) -> None:
     ResultFileError
         If it cannot be written.
     """
-    text = json.dumps(certificate_data(certificate), indent=1)
+    write_data(certificate_data(certificate), path)
+
+
+def write_data(data: dict[str, Any], path: Any) -> None:
+    """Write plain data as a JSON file.
+
+    Raises
+    ------
+    ResultFileError
+        If it cannot be written.
+    """
+    text = json.dumps(data, indent=1)
     with replacing(path_of("a certificate file", path)) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
 

@@ -9,6 +9,8 @@ what they are.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from flint import arb, arb_mat
 
 from contfric.models.balls.model import BallModel
@@ -21,26 +23,34 @@ def in_phases(model: BallModel) -> BallModel:
     two_pi = 2 * arb.pi()
     scale, slopes = model.period / two_pi, None
     if model.slopes is not None:
-        slope = model.slopes.period / two_pi
-        fields = {
-            name: _mixed(model, field, model.slopes.fields[name], scale, slope)
-            for name, field in model.fields.items()
-        }
-        still = [arb(0)] * len(model.turns)
-        slopes = BallModel(
-            model.states,
-            still,
-            fields,
-            model.slopes.surfaces,
-            arb(0),
-            model.turns,
-            model.slopes.resets,
-        )
+        slopes = _slopes(model, model.slopes, scale, model.slopes.period / two_pi)
     turns = [arb(n) for n in model.turns]
     fields = {name: _scaled(model, field, scale) for name, field in model.fields.items()}
     return BallModel(
         model.states, turns, fields, model.surfaces, two_pi, model.turns, model.resets, slopes
     )
+
+
+def _slopes(model: BallModel, slopes: BallModel, scale: arb, change: arb) -> BallModel:
+    """Return the derivatives of a model in phases, and the second ones where they are known."""
+    fields = {
+        name: _sum(model.states, [(slopes.fields[name], scale), (field, change)])
+        for name, field in model.fields.items()
+    }
+    still = [arb(0)] * len(model.turns)
+    second = slopes.slopes
+    bend = None
+    if second is not None:
+        twice = second.period / (2 * arb.pi())
+        bends = {
+            name: _sum(
+                model.states,
+                [(second.fields[name], scale), (slopes.fields[name], 2 * change), (field, twice)],
+            )
+            for name, field in model.fields.items()
+        }
+        bend = replace(second, frequencies=still, fields=bends, period=arb(0))
+    return replace(slopes, frequencies=still, fields=fields, period=arb(0), slopes=bend)
 
 
 def _scaled(model: BallModel, field: arb_mat, scale: arb) -> arb_mat:
@@ -55,10 +65,11 @@ def _scaled(model: BallModel, field: arb_mat, scale: arb) -> arb_mat:
     return found
 
 
-def _mixed(model: BallModel, field: arb_mat, slope: arb_mat, scale: arb, change: arb) -> arb_mat:
-    """Return the derivative of a scaled field by the parameter."""
-    found = arb_mat(model.size, model.size)
-    for a in range(model.states):
-        for b in range(model.size):
-            found[a, b] = slope[a, b] * scale + field[a, b] * change
+def _sum(states: int, parts: list[tuple[arb_mat, arb]]) -> arb_mat:
+    """Return a sum of fields times factors, its rows of the states only."""
+    size = parts[0][0].nrows()
+    found = arb_mat(size, size)
+    for a in range(states):
+        for b in range(size):
+            found[a, b] = sum((matrix[a, b] * factor for matrix, factor in parts), arb(0))
     return found

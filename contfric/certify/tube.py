@@ -1,41 +1,43 @@
 r"""One box of a tube about a branch: for every value of a section there is exactly one orbit in it.
 
-Between two orbits A and B of the curve, ``X = (z, p)``, let ``c(s) = A + s (B - A)``. The sections are
-the planes ``n (X - A) = s`` with ``n = d / |d|^2``, d = B - A. For all s of an interval a little longer
-than (0, 1),
+Between two orbits A and B of the curve, ``X = (z, p)``, let ``c(s) = m + s d``, m the middle, d = B - A. The
+sections are the planes ``n (X - m) = s`` with ``n = d / |d|^2``. For each s of an interval [-h, h] a little
+longer than (-1/2, 1/2), Krawczyk's operator (:mod:`contfric.certify.krawczyk`) of
 
-    G(X) = (F(X), n (X - A) - s) = 0
+    G(X) = (F(X), n (X - m) - s)
 
-has exactly one solution in ``c(s) +- R`` if Krawczyk's image of it, with the interval of s in the place
-of a number, lies inside (:mod:`contfric.certify.krawczyk`). There the residual is bounded by the mean
-value theorem,
+is used on ``X_s = c(s) +- R`` with a preconditioner that depends on s, too. With the Jacobian
+``J_0 + s J_1 + J_r`` in the box (:mod:`contfric.certify.ray`), C near the inverse of J_0, ``B = C J_1`` it is
+``C(s) = (1 - s B) C``, and
 
-    G(c(s)) = (F(c(1/2)) + F_X(c) d (s - 1/2), 0),
+    1 - C(s) J = (1 - s B) (1 - C J_0) + s^2 B^2 - (1 - s B) C J_r ,
 
-which is of second order in |d|, as d is nearly tangential. So the solutions are one smooth curve through
-the box. Its direction T solves ``G_X T = (0, 1)``: where its last entry has a sign, p is monotone along
-the box and there is no fold in it. Where the Jacobian with a closure of the opposite sign is regular, no
-multiplier of a turn is -1.
+which is of second order in |d|. So are ``F(c(s)) = F(m) + s J_0 d + s^2 J_1 d / 2 + s J_r d`` (J_r of the
+chord) and R. So the solutions are one smooth curve through the box, whose direction T solves
+``G_X T = (0, 1)``: where its last entry has a sign, p is monotone along the box (no fold is in it). Where
+the Jacobian with a closure of the other sign is regular, no multiplier of a turn is -1.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from flint import arb, arb_mat
 
-from contfric.certify.chain import Chain, Segments, Wide
+from contfric.certify.bounds import Bounds, regular_along, supersolution
+from contfric.certify.chain import Chain, Segments
 from contfric.certify.extended import Builder
-from contfric.certify.krawczyk import approximate_inverse, krawczyk
+from contfric.certify.krawczyk import krawczyk
+from contfric.certify.ray import Chord, Linear, Ray
 from contfric.certify.verdict import Verdict
-from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector, around, column, numbers, row_norm
+from contfric.models.balls.numbers import Vector, around, column, numbers
+from contfric.models.definition import FloatArray
 
 #: How far a box reaches beyond its two orbits, as a share of it: boxes of a tube overlap.
 OVERLAP = 0.02
-#: First half-widths of a box, in units of how far the curve is from its chord at the middle, and how often
-#: they are doubled.
-_WIDE, _TRIES = 4, 3
+#: Half-widths of a box in units of what would suffice if it were narrow, and how often others are tried.
+_MORE, _TRIES = 1.3, 3
 #: Least half-widths, relative to 1 + the size of each number: rounding of 80 bits.
 _LEAST = 2.0**-60
 
@@ -64,14 +66,11 @@ class Box:
 
     def holds(self, point: Vector) -> bool:
         """Tell whether a solution that is known to lie in some balls is on the curve of this box."""
-        difference = [b - a for a, b in zip(self.first, self.last, strict=True)]
-        off = [p - a for p, a in zip(point, self.first, strict=True)]
-        whole, part = (
-            sum((n * c for n, c in zip(self.normal, other, strict=True)), arb(0))
-            for other in (difference, off)
-        )
-        s = part / whole
-        if not (s > -OVERLAP and s < 1 + OVERLAP):
+        difference = [(b - a).mid() for a, b in zip(self.first, self.last, strict=True)]
+        middle = [((a + b) / 2).mid() for a, b in zip(self.first, self.last, strict=True)]
+        off = [p - m for p, m in zip(point, middle, strict=True)]
+        s = sum((n * c for n, c in zip(self.normal, off, strict=True)), arb(0))
+        if not abs(s) < 0.5 + OVERLAP:
             return False
         return all(abs(o - s * c) < r for o, c, r in zip(off, difference, self.radii, strict=True))
 
@@ -109,67 +108,50 @@ def box_between(segments: Segments, build: Builder, first: Vector, last: Vector)
         return None
     normal = [(c / square).mid() for c in difference]
     middle = [((a + b) / 2).mid() for a, b in zip(first, last, strict=True)]
-    central = build(middle[-1])
-    residual, rows = Chain(segments, central).linearised(middle[:-1])
-    inverse = approximate_inverse(arb_mat([*rows, normal]))
-    if inverse is None:
+    central, half = build(middle[-1]), arb(0, 0.5 + OVERLAP)
+    line = [m + half * d for m, d in zip(middle, difference, strict=True)]
+
+    def linear(radii: FloatArray) -> Linear:
+        chord = Chord(middle, difference, [arb(r) for r in radii], half)
+        return Ray(segments, central, build(chord.box[-1]), chord).linear()
+
+    found = linear(np.zeros(len(middle)))  # on the chord itself
+    straight = Bounds.of(_bordered(found, normal), 0.5 + OVERLAP)
+    if straight is None:
         return None
-    shares = arb(0.5, 0.5 + OVERLAP)
-    chord = [m + (shares - 0.5) * c for m, c in zip(middle, difference, strict=True)]
-    centre = column([*residual, arb(0)])
-    off = numbers(inverse * centre)
-    radii = [
-        _WIDE * o.abs_upper() + _LEAST * (1 + m.abs_upper())
-        for o, m in zip(off, middle, strict=True)
-    ]
+    moved = straight.moved([*found.residual, arb(0)], difference)
+    least = np.array([_LEAST * float(1 + m.abs_upper()) for m in middle])
+    bounds = straight
     for _ in range(_TRIES):
-        box = [around(c, r) for c, r in zip(chord, radii, strict=True)]
-        model = build(box[-1])
-        lasting = _durations(segments, model, middle, difference, shares - 0.5, radii)
-        whole = Chain(segments, model, Wide(lasting, central, box[-1] - middle[-1]))
-        _, wide = whole.linearised(box[:-1])
-        jacobian = arb_mat([*wide, normal])
-        drift = numbers(arb_mat(wide) * column(difference))
-        moved = column(
-            [r + d * (shares - 0.5) for r, d in zip(residual, drift, strict=True)] + [arb(0)]
-        )
-        size = len(middle)
-        identity = arb_mat([[int(i == j) for j in range(size)] for i in range(size)])
-        gap = identity - inverse * jacobian
-        image = numbers(gap * column([arb(0, r) for r in radii]) - inverse * moved)
-        if all(k.abs_upper() < r for k, r in zip(image, radii, strict=True)):
-            found = [c + k for c, k in zip(chord, image, strict=True)]
-            monotone = _is_monotone(inverse, jacobian, gap, difference)
-            return Box(first, last, normal, found, radii, monotone, _has_no_flip(whole, found))
-        if not all(k.is_finite() for k in image):
+        wanted = supersolution(bounds.gap, moved)
+        if wanted is None:
             return None
-        radii = [max(2 * k.abs_upper(), r, key=float) for k, r in zip(image, radii, strict=True)]
+        radii = _MORE * wanted + least
+        found = linear(radii)
+        bounds = straight.over(_bordered(found, normal))
+        if np.all((bounds.gap @ radii + moved) * (1 + 1e-9) < radii):
+            return Box(
+                first,
+                last,
+                normal,
+                [around(c, arb(r)) for c, r in zip(line, radii, strict=True)],
+                [arb(r) for r in radii],
+                bounds.keeps_sign(len(middle) - 1),
+                regular_along(_square(found, -1), 0.5 + OVERLAP),
+            )
     return None
 
 
-def _durations(
-    segments: Segments,
-    model: BallModel,
-    middle: Vector,
-    difference: Vector,
-    shares: arb,
-    radii: Vector,
-) -> Vector:
-    """Return the durations of segments in a box: along the chord the joints move together."""
-    m, found = segments.states + 1, []
-    for i in range(segments.count):
-        at, after = i * m, (i + 1) * m
-        if i + 1 < segments.count:
-            rest, change = middle[after] - middle[at], difference[after] - difference[at]
-            spread = radii[at] + radii[after]
-        elif segments.turn != 0.0:  # by the closure, t_N = t_0 + turn T
-            rest = middle[0] + arb(segments.turn) * model.period - middle[at]
-            change = difference[0] - difference[at]
-            spread = radii[0] + radii[at] if i else arb(0)
-        else:
-            rest, change, spread = -middle[at], -difference[at], radii[at]
-        found.append(around(rest + shares * change, spread))
-    return found
+def _bordered(found: Linear, normal: Vector) -> list[arb_mat]:
+    """Return the Jacobian with the row of the sections: value, slope, rest."""
+    nothing = [arb(0)] * len(normal)
+    rows = (normal, nothing, nothing)
+    return [arb_mat([*m.tolist(), row]) for m, row in zip(found.whole(1), rows, strict=True)]
+
+
+def _square(found: Linear, sigma: int) -> list[arb_mat]:
+    """Return the Jacobian by the joints, with sigma times the closure."""
+    return [arb_mat([row[:-1] for row in m.tolist()]) for m in found.whole(sigma)]
 
 
 def are_linked(segments: Segments, build: Builder, before: Box, after: Box) -> bool:
@@ -186,29 +168,3 @@ def are_linked(segments: Segments, build: Builder, before: Box, after: Box) -> b
     if found.verdict is not Verdict.PROVED:
         return False
     return before.holds(found.zero) and after.holds(found.zero)
-
-
-def _is_monotone(inverse: arb_mat, jacobian: arb_mat, gap: arb_mat, difference: Vector) -> bool:
-    """Tell whether the parameter is monotone along a box, from an enclosure of the direction T of the curve.
-
-    ``T - d = e' + (I - C G_X) (T - d)`` with ``e' = -C (G_X d - (0, 1))`` bounds all entries of T - d
-    together, and put in once more the last one.
-    """
-    contraction = row_norm(gap)
-    if not contraction < 1:
-        return False
-    wanted = column([*[arb(0)] * (len(difference) - 1), arb(1)])
-    error = numbers(inverse * (jacobian * column(difference) - wanted))
-    worst = max((c.abs_upper() for c in error), key=float) / (1 - contraction)
-    last = sum((gap[gap.nrows() - 1, j].abs_upper() for j in range(gap.ncols())), arb(0))
-    return bool(abs(difference[-1]) > error[-1].abs_upper() + last * worst)
-
-
-def _has_no_flip(chain: Chain, box: Vector) -> bool:
-    _, rows = chain.linearised(box[:-1], -1)
-    jacobian = arb_mat([row[: chain.size] for row in rows])
-    inverse = approximate_inverse(jacobian)
-    if inverse is None:
-        return False
-    identity = arb_mat([[int(i == j) for j in range(chain.size)] for i in range(chain.size)])
-    return bool(row_norm(identity - inverse * jacobian) < 1)

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from contfric.cli import commands, doctor, verify, view
+from contfric.cli import certify, commands, doctor, verify, view
 from contfric.errors import ContfricError, did_you_mean
 from contfric.models import DEFAULT_MODEL
 
 _COMMANDS = (
     *("run", "explain", "info", "signatures", "check", "graph", "simulate", "census", "view"),
-    *("doctor", "verify"),
+    *("doctor", "verify", "certify"),
 )
 _DEBUG = "show the traceback of an error"
 
@@ -89,6 +89,7 @@ def _parser() -> _Parser:
     _fill_simulate(add("simulate", commands.simulate, "print the events of a trajectory as CSV"))
     _fill_census(add("census", commands.census, "list all periodic orbits, stable or not"))
     _fill_view(add("view", view.view, "write the diagram of a run folder as a page to click on"))
+    _fill_certify(add("certify", certify.certify, "prove the diagram of a run folder"))
     _fill_verify(add("verify", verify.verify, "check a certificate file, independently"))
     _fill_doctor(add("doctor", doctor.doctor, "say what is compiled, and compile what is not"))
     return parser
@@ -122,6 +123,14 @@ def _fill_info(parser: argparse.ArgumentParser) -> None:
 def _fill_view(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", metavar="DIR", type=Path, help="folder of a run")
     parser.add_argument("--open", action="store_true", help="open the page in a browser")
+
+
+def _fill_certify(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("folder", metavar="DIR", type=Path, help="folder of a run")
+    add("--jobs", type=_count, default=1, metavar="N", help="processes (%(default)s)")
+    add("--time-limit", type=_number, metavar="SECONDS", help="end after this many seconds")
+    add("--quiet", action="store_true", help="no progress")
 
 
 def _fill_verify(parser: argparse.ArgumentParser) -> None:

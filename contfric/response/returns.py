@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from contfric.certify.horseshoe import Horseshoe
+
 
 @dataclass(frozen=True, eq=False)
 class Returns:
@@ -199,6 +201,32 @@ class ReleaseMap:
                 break
             x = float(np.interp(x, *on[0]))
         return np.array(found)
+
+    def horseshoe(self, most: int = 6) -> Horseshoe:
+        """Prove that the map is chaotic: positive topological entropy by covering relations (python-flint).
+
+        Where intervals that cover each other are is sampled (2000 phases or more serve well); that they are
+        such ones is proved.
+
+        Parameters
+        ----------
+        most : most returns of the iterate whose intervals cover each other
+
+        Raises
+        ------
+        ParameterError
+            If proofs are not offered for the model.
+
+        Examples
+        --------
+        >>> import contfric as cf
+        >>> found = cf.release_map("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, count=400)
+        >>> print(found.horseshoe(2))
+        undecided: no horseshoe was seen
+        """
+        from contfric.response.proved import horseshoe_of
+
+        return horseshoe_of(self, whole_number("most", most, least=1))
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row for each release: phase, image, time between, branch, state (needs pandas)."""

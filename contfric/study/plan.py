@@ -25,6 +25,8 @@ BRANCH = "branch.npz"
 DIAGRAM = "diagram.npz"
 #: Written by ``contfric view``; a new run removes it, as it shows the old one.
 VIEW = "diagram.html"
+#: Written by ``contfric certify``; a new run removes it, too.
+CERTIFICATE = "certificate.json"
 LYAPUNOV = "lyapunov.npz"
 LYAPUNOV_TABLE = "lyapunov.csv"
 PLANE = "plane.npz"
@@ -34,7 +36,18 @@ REGIONS = "regions.csv"
 _TABLES = (POINTS, BIFURCATIONS, CURVES, SPECIAL, REGIONS, LYAPUNOV_TABLE)
 #: Files that every run may write, figures apart.
 _RESPONSES = tuple(name for f in responses.FILES.values() for name in (f.table, f.data))
-RESULT_FILES = (RECORD, *_TABLES, ORBIT, BRANCH, DIAGRAM, VIEW, PLANE, LYAPUNOV, *_RESPONSES)
+RESULT_FILES = (
+    RECORD,
+    *_TABLES,
+    ORBIT,
+    BRANCH,
+    DIAGRAM,
+    VIEW,
+    CERTIFICATE,
+    PLANE,
+    LYAPUNOV,
+    *_RESPONSES,
+)
 
 
 class StepName(str, Enum):

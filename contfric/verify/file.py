@@ -8,13 +8,13 @@ from typing import Any
 
 from flint import ctx
 
-from contfric.verify.law import check_admissible, check_multipliers
+from contfric.verify.law import check_admissible, check_event, check_multipliers
 from contfric.verify.solution import Refused, Scene, Undecided
 
-#: Bits that are asked for, one after the other, until all is decided.
-BITS = (106, 212, 424, 848)
-#: Models whose equation of motion the checker states.
+BITS = (106, 212, 424, 848)  # asked for one after the other, until all is decided
+_DAMAGE = (AttributeError, KeyError, TypeError, ValueError, IndexError, OverflowError)
 CHECKED_MODELS = ("coulomb",)
+KINDS = ("diagram", "event", "orbit")
 _STATED = ("exists", "unique", "admissible", "stable")
 
 
@@ -32,53 +32,46 @@ def check_text(text: str) -> Answer:
     """Check the text of a certificate file."""
     try:
         data = json.loads(text)
-        if not isinstance(data, dict):
-            raise Refused("it is no certificate")
-    except (ValueError, RecursionError, Refused) as error:
+    except (ValueError, RecursionError) as error:
         return Answer(False, f"cannot be read: {error}")
     why = ""
     for bits in BITS:
         with ctx.workprec(bits):
             try:
-                return Answer(True, "", _check(data), bits)
+                return Answer(True, "", _check(data, KINDS), bits)
             except Refused as error:
                 return Answer(False, str(error), bits=bits)
-            except Undecided as error:
+            except (Undecided, ZeroDivisionError) as error:
                 why = str(error)
-            except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
+            except _DAMAGE as error:
                 return Answer(False, f"damaged: {type(error).__name__}: {error}", bits=bits)
-            except ZeroDivisionError:
-                why = "the equations are singular"
     return Answer(False, f"not decided with {BITS[-1]} bits: {why}", bits=BITS[-1])
 
 
-def _check(data: dict[str, Any]) -> tuple[str, ...]:
-    claims = _claims(data)
-    scene = Scene(data)
+def _check(data: dict[str, Any], kinds: tuple[str, ...]) -> tuple[str, ...]:
+    kind = data.get("certificate")
+    if kind not in kinds or data.get("format") != 1:
+        raise Refused("it is no certificate of format 1")
+    if kind == "diagram":
+        return (f"{sum(bool(_check(part, kinds[1:2])) for part in data['checkable'])} events",)
+    if data.get("model") not in CHECKED_MODELS:
+        raise Refused(f"the checker does not know the model {str(data.get('model'))[:40]}")
+    return tuple(check_event(data) if kind == "event" else _check_orbit(data))
+
+
+def _check_orbit(data: dict[str, Any]) -> list[str]:
+    claims, scene = dict(data["statements"]), Scene(data)
+    if set(claims) != set(_STATED) or claims["exists"] != "proved":
+        raise Refused("its statements are not those of an orbit")
+    allowed = {"proved", "undecided"}
+    if not {claims[k] for k in _STATED[:3]} <= allowed or claims["stable"] not in allowed | {
+        "refuted"
+    }:
+        raise Refused("a statement is neither proved nor undecided")
     printed, radii = scene.box(data)
     zero = scene.solution(printed, radii, unique=claims["unique"] == "proved")
-    done = ["exists"]
-    if claims["unique"] == "proved":
-        done.append("unique")
     scene.check_enclosure(data, zero)
     if claims["admissible"] == "proved":
         check_admissible(scene, zero)
-        done.append("admissible")
-    done += check_multipliers(scene, data, zero, claims["stable"])
-    return tuple(done)
-
-
-def _claims(data: dict[str, Any]) -> dict[str, str]:
-    if data.get("certificate") != "orbit" or data.get("format") != 1:
-        raise Refused("it is no certificate of an orbit of format 1")
-    if data.get("model") not in CHECKED_MODELS:
-        raise Refused(f"the checker does not know the model {str(data.get('model'))[:40]}")
-    claims = dict(data["statements"])
-    if set(claims) != set(_STATED):
-        raise Refused("its statements are not those of an orbit")
-    for name, claim in claims.items():
-        if claim not in ("proved", "undecided") and (name, claim) != ("stable", "refuted"):
-            raise Refused(f"it does not state that it {name}")
-    if claims["exists"] != "proved":
-        raise Refused("it does not state that the orbit exists")
-    return claims
+    done = check_multipliers(scene, data, zero, claims["stable"])
+    return [name for name in _STATED[:3] if claims[name] == "proved"] + done

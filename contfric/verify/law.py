@@ -1,4 +1,9 @@
-"""The law of friction over the whole of every segment, and the multipliers (see the package)."""
+"""The law of friction over the whole of every segment, multipliers, and events (see the package).
+
+At an event something changes its sign over a ball of one parameter, along the curve of orbits. At a fold
+one equation phi is left out for one joint s: phi(s) = 0 has two solutions at one end of the ball, none at the
+other, and so a double zero in between.
+"""
 
 from __future__ import annotations
 
@@ -8,104 +13,69 @@ from flint import acb, arb, arb_mat
 
 from contfric.verify.solution import Refused, Scene, Undecided, ball, decided
 
-#: Most pieces of a slide or a stick, and how often one may be halved.
-MOST_PIECES, MOST_HALVINGS = 20_000, 90
+#: Most pieces of a slide or a stick, halvings of one, half-widths about a fold in roots of the ball's radius.
+MOST_PIECES, MOST_HALVINGS, WIDER = 20_000, 90, (64, 1024, 16384)
 
 
-def check_admissible(scene: Scene, zero: list[arb]) -> None:
-    """See that the solution is one of the law of friction, over the whole of every segment."""
+def check_admissible(scene: Scene, zero: list[arb], at: int = -1, level: int = 0) -> None:
+    """See that the solution obeys the law of friction; at the end of segment ``at`` the load is S0."""
     for i, (direction, side) in enumerate(scene.segments):
         (t, x), (end, y) = scene.joint(zero, i), scene.joint(zero, i + 1)
-        decided(end > t, end <= t, f"segment {i + 1} lasts")
-        after, after_side = scene.segments[(i + 1) % scene.count]
-        if scene.half and i + 1 == scene.count:
-            after, after_side = -after, -after_side
+        what = f"segment {i + 1}"
+        decided(end > t, end <= t, f"{what} lasts")
+        after = scene.segments[(i + 1) % scene.count][0]
+        after *= -1 if scene.half and i + 1 == scene.count else 1
+        rate = (direction or side) * scene.observed(zero, i, "v" if direction else "F+", end - t)[1]
         if direction:
-            before = scene.segments[i - 1]
-            _check_slide(scene, i, t, x, end, released=before[0] == 0)
-            _check_stop(scene, i, y - scene.force(end), after, direction)
-        else:
-            _check_stick(scene, i, t, x, end, side)
-            if after != -side:
-                raise Refused(f"segment {i + 1}: a release at that load leads elsewhere")
+            decided(rate < 0, rate > 0, f"{what} stops transversally")
+            limit, load = level * (i == at), y - scene.force(end)
+            if after == direction or (limit and after not in (0, -limit)):
+                raise Refused(f"{what}: a stop does not lead on in that direction")
+            size = -after * load if after else abs(load)
+            sides = bool(size < scene.s0), bool(size > scene.s0)
+            if not limit:  # at an event the load is S0
+                decided(*(sides[::-1] if after else sides), f"{what}: what follows its end")
+            released = scene.segments[i - 1][0] == 0
+            smooth = released and (scene.s0 - scene.s).is_zero()  # it starts with acceleration 0
+            _positive(scene, zero, i, "v", direction, 1 + smooth, True)
+            continue
+        decided(rate > 0, rate < 0, f"{what} is released transversally")
+        if after != -side:
+            raise Refused(f"{what}: a release at that load leads elsewhere")
+        start = level * (at == (i - 1) % scene.count) * (-1 if scene.half and i == 0 else 1)
+        for limit, name in ((1, "F+"), (-1, "F-")):
+            load = limit * (x - scene.force(t))
+            if limit != start:
+                decided(load < scene.s0, load > scene.s0, f"{what} begins within its limits")
+            _positive(scene, zero, i, name, -limit, int(limit == start), limit == side)
 
 
-def _check_stop(scene: Scene, i: int, load: arb, after: int, direction: int) -> None:
-    """See that a stop rests where the load is less than S0, and leaves against it where it is more."""
-    if after == 0:
-        held, left = abs(load) < scene.s0, abs(load) > scene.s0
-        decided(held, left, f"segment {i + 1}: the mass is held at its end")
-        return
-    if after == direction:
-        raise Refused(f"segment {i + 1}: a stop does not lead on in the same direction")
-    left = -after * load
-    decided(left > scene.s0, left < scene.s0, f"segment {i + 1}: the mass leaves at its end")
+def _positive(
+    scene: Scene, z: list[arb], i: int, surface: str, sign: int, order: int, ends: bool
+) -> None:
+    """See that an observable has a sign inside of a segment; by derivatives where it vanishes.
 
-
-def _check_slide(scene: Scene, i: int, t: arb, x: arb, end: arb, released: bool) -> None:
-    """See that the velocity keeps its sign between start and end, where it vanishes."""
-    direction, duration = scene.segments[i][0], (end - t).upper()
-    what = f"segment {i + 1}: the slide keeps its direction"
-    smooth = released and (scene.s0 - scene.s).is_zero()  # it starts with acceleration 0
-
-    def velocity(tau: arb) -> arb:
-        return direction * scene.slide(direction, t, x, tau)[1]
-
-    def rates(tau: arb) -> tuple[arb, arb]:
-        y, v = scene.slide(direction, t, x, tau)
-        a = scene.acceleration(direction, t + tau, y, v)
-        return direction * a, direction * (scene.force(t + tau, 1) - v - 2 * scene.zeta * a)
-
-    def starts(tau: arb) -> bool:
-        return bool(rates(tau)[1 if smooth else 0] > 0)
-
-    def stops(tau: arb) -> bool:
-        return bool(rates(tau)[0] < 0)
-
-    def sign(tau: arb) -> arb:  # the mean value form, which a wide piece needs
-        middle = arb(tau.mid())
-        return velocity(middle) + rates(tau)[0] * (tau - middle)
-
-    decided(stops(end - t), bool(rates(end - t)[0] > 0), f"segment {i + 1} stops transversally")
-    _positive(sign, duration, starts, stops, what)
-
-
-def _check_stick(scene: Scene, i: int, t: arb, x: arb, end: arb, side: int) -> None:
-    """See that the load stays below S0 in modulus, and reaches it from inside at the end."""
-    what, duration = f"segment {i + 1}: the mass is held", (end - t).upper()
-    load = x - scene.force(t)
-    decided(abs(load) < scene.s0, abs(load) > scene.s0, what)
-    out = -side * scene.force(end, 1)
-    decided(out > 0, out < 0, f"segment {i + 1} is released transversally")
-    for level in (1, -1):
-
-        def sign(tau: arb, level: int = level) -> arb:
-            middle = arb(tau.mid())
-            margin = scene.s0 - level * (x - scene.force(t + middle))
-            return margin + level * scene.force(t + tau, 1) * (tau - middle)
-
-        def ends(tau: arb, level: int = level) -> bool:
-            return level == side and bool(-side * scene.force(t + tau, 1) > 0)
-
-        _positive(sign, duration, lambda tau: False, ends, what)
-
-
-def _positive(sign: Any, duration: arb, starts: Any, ends: Any, what: str) -> None:
-    """See that a function is positive on (0, duration); where it vanishes at an end, by its rate."""
-    waiting = [(0, 0)]
+    At the start ``order`` of it and its rate vanish by construction, at the end it does if ``ends``.
+    """
+    duration = (scene.joint(z, i + 1)[0] - scene.joint(z, i)[0]).upper()
+    waiting, what = [(0, 0)], f"segment {i + 1}: {surface} is not met inside"
     for _ in range(MOST_PIECES):
         if not waiting:
             return
         level, index = waiting.pop()
         width = duration / 2**level
         piece = (width * index).union(width * (index + 1))
-        value = sign(piece)
+        middle = arb(piece.mid())
+        _, rate, bend = (sign * c for c in scene.observed(z, i, surface, piece))
+        # the mean value form, which a wide piece needs
+        value = sign * scene.observed(z, i, surface, middle)[0] + rate * (piece - middle)
         if value > 0:
             continue
         if value < 0:
             raise Refused(f"false: {what}")
         first, last = index == 0, index == 2**level - 1
-        if (first and not last and starts(piece)) or (last and not first and ends(piece)):
+        starts = first and not last and order > 0 and (rate, bend)[order - 1] > 0
+        if starts or (last and not first and ends and rate < 0):
             continue
         if level >= MOST_HALVINGS:
             break
@@ -113,8 +83,8 @@ def _positive(sign: Any, duration: arb, starts: Any, ends: Any, what: str) -> No
     raise Undecided(what)
 
 
-def turn_matrix(scene: Scene, zero: list[arb]) -> arb_mat:
-    """Return the derivative of (t, x) after a turn by (t, x): v = 0 is the section."""
+def turn(scene: Scene, zero: list[arb]) -> tuple[arb, arb]:
+    """Return trace and determinant of the derivative of (t, x) after a turn: v = 0 is the section."""
     total = arb_mat([[1, 0], [0, 1]])
     for i, (direction, _) in enumerate(scene.segments):
         (t, x), (end, y) = scene.joint(zero, i), scene.joint(zero, i + 1)
@@ -126,34 +96,96 @@ def turn_matrix(scene: Scene, zero: list[arb]) -> arb_mat:
             last = scene.acceleration(direction, end, y, arb(0))
             step = arb_mat([[first * dd / last, -dc / last], [-first * d, c]])
         total = step * total
-    return arb_mat([[1, 0], [0, -1 if scene.half else 1]]) * total
-
-
-def check_multipliers(
-    scene: Scene, data: dict[str, Any], zero: list[arb], stable: str
-) -> list[str]:
-    """Check the multipliers of a turn; return which statements on them hold."""
-    matrix, done = turn_matrix(scene, zero), []
-    trace = matrix[0, 0] + matrix[1, 1]
+    total = arb_mat([[1, 0], [0, -1 if scene.half else 1]]) * total
     sticks = any(direction == 0 for direction, _ in scene.segments)
-    det = arb(0) if sticks else matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
+    return total[0, 0] + total[1, 1], arb(0) if sticks else total.det()
+
+
+def check_multipliers(scene: Scene, data: Any, zero: list[arb], stable: str) -> list[str]:
+    """Check the multipliers of a turn; return which statements on them hold."""
+    (trace, det), done = turn(scene, zero), []
     inside = bool(abs(det) < 1 and abs(trace) < 1 + det)  # Jury
     outside = bool(abs(det) > 1 or abs(trace) > 1 + det)
-    if stable == "proved":
-        decided(inside, outside, "the multipliers lie inside of the unit circle")
-        done.append("stable")
-    elif stable == "refuted":
-        decided(outside, inside, "a multiplier lies outside of the unit circle")
-        done.append("unstable")
+    if stable != "undecided":
+        claim, opposite = (inside, outside) if stable == "proved" else (outside, inside)
+        decided(claim, opposite, "the multipliers lie on their side of the unit circle")
+        done = ["stable" if stable == "proved" else "unstable"]
     root = acb(trace * trace - 4 * det).sqrt()
-    found = [acb(trace), acb(0)] if sticks else [(trace + root) / 2, (trace - root) / 2]
+    found = [acb(trace), acb(0)] if det.is_zero() else [(trace + root) / 2, (trace - root) / 2]
     stated = [acb(ball(mu["re"]), ball(mu["im"])) for mu in data["multipliers"]]
     if not stated:
         return done
-    if len(stated) != 2:
-        raise Refused("there are not two multipliers")
     pairs = [list(zip(stated, order, strict=True)) for order in (found, found[::-1])]
     inside = any(all(disc.contains(mu) for disc, mu in pair) for pair in pairs)
     outside = all(any(not disc.overlaps(mu) for disc, mu in pair) for pair in pairs)
     decided(inside, outside, "the multipliers lie in their discs")
     return [*done, "multipliers"]
+
+
+def check_event(data: dict[str, Any]) -> list[str]:
+    """Check that an event of its kind happens within the ball of its parameter."""
+    name, kind, value, half = data["parameter"], data["kind"], ball(data["value"]), data["half"]
+    known = kind in ("SN", "PD" if not half else "BP", "CS", "SS") and name in data["params"]
+    if not known or not value.rad() > 0:
+        raise Refused(f"a {kind} in {name} is not checked here")
+    ends = (value.mid() - value.rad(), value.mid() + value.rad())
+    scene, *sides = (Scene(data, {name: p}) for p in (value, *ends))
+    near = [arb(ball(row[k]).mid()) for row in data["near"] for k in (0, 1)]
+    at, level = data["at"] if kind in ("CS", "SS") else (-1, 0)
+    stops = level in (-1, 1) and at in range(scene.count) and scene.segments[at][0] != 0
+    if len(near) != 2 * scene.count or stops != (kind in ("CS", "SS")):
+        raise Refused("it has not one joint for each segment, or no such stop")
+    if kind == "SN":
+        zero = _fold(scene, sides, near, value.rad())
+    else:
+        zero, widths = scene.enclosed(near, None, "an orbit")
+        found = [_vanishing(own, own.enclosed(near, widths, "ends")[0], at, level) for own in sides]
+        product = found[0] * found[1]
+        decided(product < 0, product > 0, f"what vanishes at a {kind} changes its sign")
+    if level:
+        out = level * scene.force(scene.joint(zero, at + 1)[0], 1) * (-1 if kind == "CS" else 1)
+        decided(out > 0, out < 0, f"the load moves as at a {kind}")
+    check_admissible(scene, zero, at, level)
+    return ["exists", f"is a {kind} in {name}", "admissible"]
+
+
+def _vanishing(scene: Scene, z: list[arb], at: int, level: int) -> arb:
+    """Return the load less its limit at a stop; without one det(M + 1), M the map of a turn."""
+    (end, y), (trace, det) = scene.joint(z, at + 1), turn(scene, z)
+    return y - scene.force(end) - level * scene.s0 if level else 1 + trace + det
+
+
+def _fold(scene: Scene, ends: list[Scene], near: list[arb], radius: arb) -> list[arb]:
+    """See that two orbits over one end of the ball become none over the other; return where they are."""
+    inverse, size = scene.equations(near)[1].mid().inv().mid(), len(near)
+    k, j = max(
+        ((a, b) for a in range(size) for b in range(size)), key=lambda at: abs(float(inverse[at]))
+    )
+
+    def phi(own: Scene, s: arb, widths: Any) -> tuple[arb, arb, list[arb], list[arb]]:
+        z, widths = own.enclosed([*near[:k], s, *near[k + 1 :]], widths, "a curve", (j, k))
+        values, jacobian = own.equations(z)
+        rows, columns = ([a for a in range(size) if a != left] for left in (j, k))
+        inner = arb_mat([[jacobian[a, b] for b in columns] for a in rows])
+        change = inner.solve(arb_mat([[jacobian[a, k]] for a in rows]))
+        slope = sum((jacobian[j, b] * change[n, 0] for n, b in enumerate(columns)), arb(0))
+        return values[j], jacobian[j, k] - slope, z, widths
+
+    for half in (factor * radius.sqrt() for factor in WIDER):
+        _, _, zero, widths = phi(scene, near[k] + arb(0, half), None)
+        sides = [phi(scene, near[k] + side * half, widths)[0] for side in (-1, 1)]
+        sign = 1 if sides[0] > 0 else -1
+        middles = [phi(own, near[k], widths)[0] * sign for own in ends]
+        if all(c > 0 for c in middles):
+            raise Refused("over neither end of the ball are two orbits nearby")
+        if not all(c * sign > 0 for c in sides) or not any(c < 0 for c in middles):
+            continue
+        other, waiting = ends[int(middles[0] < middles[1])], [(near[k], half)]
+        for _ in range(MOST_HALVINGS * 4):
+            if not waiting:
+                return zero
+            middle, width = waiting.pop()
+            slope = phi(other, middle + arb(0, width), widths)[1] * arb(0, width)
+            if not (phi(other, middle, widths)[0] + slope) * sign > 0:
+                waiting += [(middle + side * width / 2, width / 2) for side in (-1, 1)]
+    raise Undecided("two orbits over one end of the ball, and none over the other")

@@ -30,7 +30,9 @@ def coulomb_balls(params: Mapping[str, arb], free: str | None = None) -> BallMod
     if free is not None:
         unit = {name: arb(1 if name == free else 0) for name in params}
         period = -two_pi / (omega * omega) if free == "Omega" else arb(0)
-        slopes = _model(unit, unit["h"], arb(0), harmonics, period)
+        none = dict.fromkeys(params, arb(0))  # all is linear, but for the period
+        second = _model(none, arb(0), arb(0), harmonics, -2 * period / omega)
+        slopes = _model(unit, unit["h"], arb(0), harmonics, period, second)
     return _model(params, h, arb(1), harmonics, two_pi / omega, slopes)
 
 

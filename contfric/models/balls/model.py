@@ -44,7 +44,8 @@ class BallModel:
     turns : list of int
         The whole numbers ``w_k T / (2 pi)``.
     slopes : BallModel or None
-        Derivatives by the free parameter, if there is one.
+        Derivatives by the free parameter, if there is one; of a model of slopes the second ones, if they are
+        known.
     """
 
     states: int

@@ -1,0 +1,199 @@
+"""Prove a whole diagram: a tube along every branch, and every event.
+
+Mirror images of branches are not proved again and not counted: the symmetry of the model makes them
+of the others. Branches and events are independent of each other, so that any executor may prove them.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from contfric.atlas.diagram import Diagram
+from contfric.certify.branch import BranchCertificate, certify_branch
+from contfric.certify.diagram_certificate import (
+    BranchSummary,
+    DiagramCertificate,
+    EventSummary,
+    Gap,
+    merged,
+)
+from contfric.certify.events import EventCertificate, certify_event
+from contfric.certify.files import event_data
+from contfric.chaos.running import Progress, check_executor, compute_all
+from contfric.continuation.branch import Branch
+from contfric.continuation.events import Bifurcation
+from contfric.errors import ParameterError
+from contfric.models.balls.build import ball_model
+
+#: What is said of a part that a time limit has left out.
+_NOT_REACHED = "not reached within the time limit"
+_INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """A branch or an event to prove, until some time (that of ``time.time``)."""
+
+    what: Branch | Bifurcation
+    parameter: str
+    until: float
+
+
+def certify_diagram(
+    diagram: Diagram,
+    executor: Executor | None = None,
+    time_limit: float | None = None,
+    progress: Progress | None = None,
+) -> DiagramCertificate:
+    """Prove what can be proved of a diagram; see :meth:`contfric.Diagram.certify`.
+
+    Raises
+    ------
+    ParameterError
+        If proofs are not offered for the model, or the time limit is not positive.
+    """
+    check_executor(executor)
+    if time_limit is not None and not time_limit > 0:
+        raise ParameterError(f"time_limit is a number of seconds above 0, got {time_limit}")
+    began = time.time()
+    until = math.inf if time_limit is None else began + time_limit
+    branches = [(i, b) for i, b in enumerate(diagram.branches) if not b.mirrored]
+    nodes = diagram.events
+    for _, branch in branches[:1]:
+        ball_model(branch.model, branch[0].params)  # whether proofs are offered
+    # events first: they take milliseconds
+    things: list[Branch | Bifurcation] = [node.bifurcation for node in nodes]
+    things += [branch for _, branch in branches]
+    tasks = {k: _Task(thing, diagram.parameter, until) for k, thing in enumerate(things)}
+    found, ended = _proved(tasks, executor, progress or _silent)
+    late = [k for k in tasks if k not in found or _is_unfinished(found[k])]
+    if late and not ended and time_limit is not None and time.time() > until:
+        ended = f"the time limit of {time_limit:g} s ended the run"
+    if late and ended:
+        ended += f": {_parts(late, len(nodes))} not done"
+    events = [
+        _event_summary(node.bifurcation, tuple(i + 1 for i in node.branches), found.get(k))
+        for k, node in enumerate(nodes)
+    ]
+    tubes = [
+        _branch_summary(i + 1, branch, found.get(len(nodes) + k))
+        for k, (i, branch) in enumerate(branches)
+    ]
+    return DiagramCertificate(
+        diagram.model.name,
+        diagram.parameter,
+        diagram.range,
+        tuple(tubes),
+        tuple(events),
+        time.time() - began,
+        ended,
+        _checkable([found[k] for k in range(len(nodes)) if k in found]),
+    )
+
+
+def _is_unfinished(proof: BranchCertificate | EventCertificate) -> bool:
+    return isinstance(proof, BranchCertificate) and bool(proof.ended)
+
+
+def _silent(_: str) -> None:
+    """Nobody listens."""
+
+
+def _parts(late: list[int], events: int) -> str:
+    """Return how many events and branches are left, in words."""
+    count = sum(k < events for k in late)
+    named = [(count, "event", "s"), (len(late) - count, "branch", "es")]
+    return " and ".join(f"{n} {name}{many if n > 1 else ''}" for n, name, many in named if n)
+
+
+def _proved(
+    tasks: dict[int, _Task], executor: Executor | None, progress: Progress
+) -> tuple[dict[int, Any], str]:
+    """Return what was found by number of the task, and what ended the run early."""
+    found: dict[int, Any] = {}
+    try:
+        for number, certificate in _certificates(tasks, executor, progress):
+            if certificate is not None:
+                found[number] = certificate
+            progress(f"{len(found)} of {len(tasks)} branches and events")
+    except KeyboardInterrupt:
+        return found, _INTERRUPTED
+    return found, ""
+
+
+def _certificates(
+    tasks: dict[int, _Task], executor: Executor | None, progress: Progress
+) -> Iterator[tuple[int, Any]]:
+    if executor is not None:
+        yield from compute_all(tasks, executor, progress, prove)
+        return
+    # one after the other: the precision of flint belongs to the whole process
+    for number, task in tasks.items():
+        heard = partial(_within, progress, f"{number + 1} of {len(tasks)} branches and events")
+        yield number, prove(task, progress=heard)
+
+
+def _within(progress: Progress, before: str, text: str) -> None:
+    progress(f"{before}: {text}")
+
+
+def prove(
+    task: _Task, stop: object = None, progress: Callable[[str], None] | None = None
+) -> BranchCertificate | EventCertificate | None:
+    """Prove a branch or an event; None if the time was over before it began."""
+    if time.time() > task.until:
+        return None
+    if isinstance(task.what, Branch):
+        return certify_branch(task.what, until=task.until, progress=progress)
+    return certify_event(task.what, task.parameter)
+
+
+def _checkable(proofs: list[EventCertificate]) -> tuple[dict[str, Any], ...]:
+    """Return the certificates that the checker knows, as plain data."""
+    found = []
+    for proof in proofs:
+        try:
+            found.append(event_data(proof))
+        except ParameterError:  # not proved, or none of those that it knows
+            continue
+    return tuple(found)
+
+
+def _event_summary(
+    event: Bifurcation, branches: tuple[int, ...], proof: EventCertificate | None
+) -> EventSummary:
+    if proof is None:
+        return EventSummary(
+            event.label, event.kind.value, branches, math.nan, "", None, _NOT_REACHED
+        )
+    printed = event.params[proof.parameter]
+    if proof.value is None:
+        return EventSummary(event.label, event.kind.value, branches, printed, "", None, proof.why)
+    text = str(proof.value.str(45, more=True)).strip("[]")
+    return EventSummary(
+        event.label, event.kind.value, branches, printed, text, proof.radius, proof.why
+    )
+
+
+def _branch_summary(number: int, branch: Branch, proof: BranchCertificate | None) -> BranchSummary:
+    length = float(branch.arc[-1] - branch.arc[0])
+    ends = (float(branch.values[0]), float(branch.values[-1]))
+    if proof is None:
+        gaps: tuple[Gap, ...] = (Gap(*ends, length, _NOT_REACHED),)
+        return BranchSummary(number, branch.name, length, 0.0, 0.0, 0, gaps)
+    gaps = merged([Gap(*p.values, p.stop - p.start, p.why) for p in proof.pieces if not p.proved])
+    return BranchSummary(
+        number,
+        branch.name,
+        length,
+        length * proof.covered,
+        length * proof.regular,
+        len(proof.pieces),
+        gaps,
+    )

@@ -1,0 +1,245 @@
+"""What was proved of a diagram: plain data, on disk and back."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from contfric.errors import ResultFileError, path_of
+from contfric.files import replacing
+
+_KIND, _FORMAT = "diagram", 1
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Where a branch is not proved.
+
+    Attributes
+    ----------
+    start, stop : the parameter at its ends
+    length : in arclength
+    why : the reason
+    """
+
+    start: float
+    stop: float
+    length: float
+    why: str
+
+    def __str__(self) -> str:
+        return f"from {self.start:.12g} to {self.stop:.12g}: {self.why}"
+
+
+@dataclass(frozen=True)
+class BranchSummary:
+    """What was proved of a branch.
+
+    Attributes
+    ----------
+    number : as in the tables of the diagram, from 1
+    name : its signature
+    length : its arclength
+    covered : arclength on which it is proved to be one curve of admissible orbits
+    regular : arclength on which it has neither a fold nor a multiplier -1 in addition
+    boxes : number of boxes of its tube
+    gaps : where it is not proved, and why
+    """
+
+    number: int
+    name: str
+    length: float
+    covered: float
+    regular: float
+    boxes: int
+    gaps: tuple[Gap, ...]
+
+
+@dataclass(frozen=True)
+class EventSummary:
+    """What was proved of an event.
+
+    Attributes
+    ----------
+    label, kind : as the event has them
+    branches : numbers of the branches that meet there, from 1
+    printed : the parameter that was printed
+    ball : decimals that contain the parameter, such as ``0.25 +/- 1e-40``; empty if none are known
+    radius : of the ball; None if it is not known
+    why : what is not proved; empty if all is
+    """
+
+    label: str
+    kind: str
+    branches: tuple[int, ...]
+    printed: float
+    ball: str
+    radius: float | None
+    why: str
+
+    @property
+    def proved(self) -> bool:
+        """Whether all of it is proved."""
+        return not self.why
+
+    @property
+    def digits(self) -> int:
+        """Digits of the parameter that are proved."""
+        if self.radius is None or not self.proved:
+            return 0
+        size = abs(self.printed) or 1.0
+        return int(-math.log10(max(self.radius, 1e-300) / size))
+
+    @property
+    def text(self) -> str:
+        """The radius of the proved ball, or ``undecided`` with the reason: a cell of a table."""
+        return f"{self.radius:.1e}" if self.proved else self.why
+
+
+@dataclass(frozen=True)
+class DiagramCertificate:
+    """What was proved of a diagram.
+
+    Attributes
+    ----------
+    model, parameter, range : of the diagram
+    branches : tuple of BranchSummary
+        The computed ones; mirror images are not counted.
+    events : tuple of EventSummary
+        Each event once, in the order of the parameter.
+    seconds : float
+        How long it took.
+    ended : str
+        What ended the run before all was tried (a time limit, an interrupt); empty if nothing did.
+    checkable : tuple of dict
+        Certificates of events as plain data, which ``contfric verify`` checks.
+    """
+
+    model: str
+    parameter: str
+    range: tuple[float, float]
+    branches: tuple[BranchSummary, ...]
+    events: tuple[EventSummary, ...]
+    seconds: float
+    ended: str = ""
+    checkable: tuple[dict[str, Any], ...] = ()
+
+    @property
+    def covered(self) -> float:
+        """Share of the arclength on which the branches are proved."""
+        return self._share([b.covered for b in self.branches])
+
+    @property
+    def regular(self) -> float:
+        """Share of the arclength on which they have neither a fold nor a multiplier -1 in addition."""
+        return self._share([b.regular for b in self.branches])
+
+    def _share(self, parts: list[float]) -> float:
+        whole = sum(b.length for b in self.branches)
+        return sum(parts) / whole if whole else 0.0
+
+    @property
+    def undecided(self) -> tuple[str, ...]:
+        """What is not proved, a line each, the longest gaps first."""
+        events = [f"{e.label}: {e.why}" for e in self.events if not e.proved]
+        gaps = [(b, gap) for b in self.branches for gap in b.gaps]
+        gaps.sort(key=lambda pair: -pair[1].length)
+        lines = [f"branch {b.number} ({b.name}), {self.parameter} {gap}" for b, gap in gaps]
+        return (*events, *lines)
+
+    def save(self, path: Any) -> None:
+        """Write it as a JSON file; :func:`load_diagram_certificate` reads it.
+
+        ``contfric verify`` checks the events in it that are ``checkable``, and not the summary.
+
+        Raises
+        ------
+        ResultFileError
+            If the file cannot be written.
+        """
+        summary = asdict(self)
+        checkable = summary.pop("checkable")
+        data = {"certificate": _KIND, "format": _FORMAT, "checkable": checkable, "summary": summary}
+        text = json.dumps(data, indent=1)
+        with replacing(path_of("a certificate file", path)) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
+
+    def __str__(self) -> str:
+        """Say what is proved, and the ten most important things that are not."""
+        good = [e for e in self.events if e.proved]
+        events = f"{len(good)} of {len(self.events)} events proved"
+        if good:
+            events += f", to {min(e.digits for e in good)} digits or more"
+        boxes = sum(b.boxes for b in self.branches)
+        lines = [
+            f"{self.model}, {self.parameter} in [{self.range[0]:g}, {self.range[1]:g}]: "
+            f"{len(self.branches)} branches, {boxes} boxes, {self.seconds:.3g} s",
+            f"  {_percent(self.covered)} of the arclength proved, "
+            f"{_percent(self.regular)} without a fold or a multiplier -1",
+            f"  {events}",
+            *(f"  {self.ended}" for _ in [0] if self.ended),
+        ]
+        left = self.undecided
+        lines += [f"  undecided: {text}" for text in left[:_SHOWN]]
+        if len(left) > _SHOWN:
+            lines.append(f"  and {len(left) - _SHOWN} more")
+        return "\n".join(lines)
+
+
+#: Lines on what is undecided in the summary.
+_SHOWN = 10
+
+
+def _percent(share: float) -> str:
+    """Return a share as a text that is never rounded up to all.
+
+    Examples
+    --------
+    >>> _percent(0.99999), _percent(1.0), _percent(0.5)
+    ('99.99 %', '100 %', '50.00 %')
+    """
+    return "100 %" if share == 1.0 else f"{math.floor(share * 1e4) / 100:.2f} %"
+
+
+def merged(gaps: list[Gap]) -> tuple[Gap, ...]:
+    """Return gaps with those in one that touch each other and have the same reason."""
+    found: list[Gap] = []
+    for gap in gaps:
+        last = found[-1] if found else None
+        if last is not None and last.stop == gap.start and last.why == gap.why:
+            found[-1] = Gap(last.start, gap.stop, last.length + gap.length, gap.why)
+        else:
+            found.append(gap)
+    return tuple(found)
+
+
+def load_diagram_certificate(path: Any) -> DiagramCertificate:
+    """Read what :meth:`DiagramCertificate.save` wrote.
+
+    Raises
+    ------
+    ResultFileError
+        If the file cannot be read, or holds no certificate of a diagram.
+    """
+    file: Path = path_of("a certificate file", path)
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+        if data["certificate"] != _KIND or data["format"] != _FORMAT:
+            raise ValueError(f"it is no certificate of a diagram of format {_FORMAT}")
+        checkable, data = tuple(data["checkable"]), data["summary"]
+        branches = tuple(
+            BranchSummary(**{**b, "gaps": tuple(Gap(**g) for g in b["gaps"])})
+            for b in data.pop("branches")
+        )
+        events = tuple(
+            EventSummary(**{**e, "branches": tuple(e["branches"])}) for e in data.pop("events")
+        )
+        low, high = data.pop("range")
+        return DiagramCertificate(
+            branches=branches, events=events, range=(low, high), checkable=checkable, **data
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ResultFileError(f"cannot read {file}: {error}; give a certificate.json") from error

@@ -1,0 +1,128 @@
+"""`diagram.certify()` and `contfric certify DIR`: what is proved, what is not and why, on disk and back."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import contfric as cf
+from contfric.atlas.diagram import Diagram
+from contfric.certify.diagram_certificate import (
+    DiagramCertificate,
+    Gap,
+    load_diagram_certificate,
+    merged,
+)
+from contfric.cli import main
+from contfric.study import read_study, run_study
+
+STUDY = """
+model: coulomb
+params: {Omega: 0.54, S: 0.32, S0: 0.4}
+start: simulate
+explore: {parameter: Omega, range: [0.535, 0.545], bridges: false}
+want: [stability]
+"""
+
+
+@cache
+def diagram() -> Diagram:
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.54, "S": 0.32, "S0": 0.4})
+    return cf.explore(orbit, "Omega", (0.535, 0.545))
+
+
+@cache
+def proved() -> DiagramCertificate:
+    return diagram().certify()
+
+
+def test_a_diagram_is_proved() -> None:
+    found = proved()
+    assert found.covered > 0.99
+    assert [e.kind for e in found.events] == [b.kind.value for b in diagram().bifurcations]
+    assert all(e.proved and e.digits >= 30 for e in found.events)
+    assert len(found.branches) == sum(not b.mirrored for b in diagram().branches)
+    assert not found.ended
+    text = str(found)
+    assert "% of the arclength proved" in text
+    assert f"{len(found.events)} of {len(found.events)} events proved" in text
+
+
+def test_what_is_not_proved_has_its_place_and_reason() -> None:
+    for branch in proved().branches:
+        missing = sum(gap.length for gap in branch.gaps)
+        assert branch.covered + missing == pytest.approx(branch.length)
+        assert all(gap.why for gap in branch.gaps)
+
+
+def test_saved_and_read(tmp_path: Path) -> None:
+    proved().save(tmp_path / "c.json")
+    assert load_diagram_certificate(tmp_path / "c.json") == proved()
+    (tmp_path / "c.json").write_text("{}")
+    with pytest.raises(cf.ResultFileError, match=r"certificate\.json"):
+        load_diagram_certificate(tmp_path / "c.json")
+
+
+def test_a_time_limit_is_named() -> None:
+    found = diagram().certify(time_limit=1e-6)
+    assert found.ended.startswith("the time limit of 1e-06 s ended the run")
+    assert found.covered == 0.0
+    assert "time limit" in str(found)
+    with pytest.raises(cf.ParameterError, match="time_limit"):
+        diagram().certify(time_limit=-1)
+
+
+def test_progress_and_executor() -> None:
+    said: list[str] = []
+    with ProcessPoolExecutor(1) as pool:
+        found = diagram().certify(executor=pool, progress=said.append)
+    assert found.branches == proved().branches
+    assert found.events == proved().events
+    assert said
+    with pytest.raises(cf.ParameterError, match="executor"):
+        diagram().certify(executor=3)  # type: ignore[arg-type]
+
+
+def test_gaps_that_touch_are_one() -> None:
+    gaps = [Gap(0.0, 1.0, 2.0, "a"), Gap(1.0, 3.0, 1.0, "a"), Gap(3.0, 4.0, 1.0, "b")]
+    assert merged(gaps) == (Gap(0.0, 3.0, 3.0, "a"), Gap(3.0, 4.0, 1.0, "b"))
+
+
+def test_a_folder_gets_a_certificate_and_a_column(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "near-fold.yaml"
+    path.write_text(STUDY)
+    folder = tmp_path / "run"
+    run_study(read_study(path), folder)
+    for _ in range(2):  # a second time nothing is added twice
+        assert main(["certify", str(folder), "--quiet"]) == 0
+    assert "events proved" in capsys.readouterr().out
+    with (folder / "bifurcations.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]).count("proved") == 1
+    assert all(float(row["proved"]) < 1e-30 for row in rows)
+    data = json.loads((folder / "certificate.json").read_text())
+    assert data["certificate"] == "diagram"
+    assert main(["verify", str(folder / "certificate.json")]) == 0
+    assert capsys.readouterr().out.startswith(f"yes: {len(data['checkable'])} events")
+    run_study(read_study(path), folder, force=True)  # what it says is of the run before
+    assert not (folder / "certificate.json").exists()
+
+
+def test_what_is_no_run_folder_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["certify", str(tmp_path)]) == 2
+    assert main(["certify", str(tmp_path / "none")]) == 2
+    monkeypatch.setitem(sys.modules, "flint", None)
+    assert main(["certify", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert "holds no diagram" in said
+    assert "pip install 'contfric[certify]'" in said
