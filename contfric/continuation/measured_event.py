@@ -1,4 +1,4 @@
-"""How the location of an event moves with the other parameters."""
+"""What an event belongs to, and how its location moves with the other parameters."""
 
 from __future__ import annotations
 
@@ -10,7 +10,29 @@ if TYPE_CHECKING:
 
 
 class MeasuredEvent:
-    """The derivatives of an event: a part of :class:`contfric.continuation.events.Bifurcation`."""
+    """Contacts and derivatives of an event: a part of :class:`contfric.continuation.events.Bifurcation`."""
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """Contacts of a structure at which the event happens; none at smooth events and in other models.
+
+        Examples
+        --------
+        >>> import contfric as cf
+        >>> orbit = cf.find_orbit("blade-damper")
+        >>> branch = cf.continue_orbit(orbit, "W", (0.4, 1.0))
+        >>> {event.contacts for event in branch.bifurcations if event.tests}
+        {('damper',)}
+        """
+        from contfric.quantities.inside import laws_of
+
+        event = cast("Bifurcation", self)
+        model, met = event.orbit.model, {test.surface for test in event.tests}
+        surfaces = met | {
+            s.name for s in model.surfaces if s.observable in met
+        }  # a tangency has one
+        names = [law.name for law in laws_of(model)]
+        return tuple(name for name in names if surfaces & {name, f"{name}+", f"{name}-"})
 
     def gradient(self, parameter: str | None = None) -> Gradient:
         """Return the derivatives of the parameter at which the event happens by every other parameter.

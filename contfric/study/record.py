@@ -102,6 +102,7 @@ def _diagram_entries(diagram: Diagram) -> dict[str, Any]:
                 "branches": [i + 1 for i in node.branches],
                 "params": node.bifurcation.params,
                 "group": node.bifurcation.group,
+                "contacts": list(node.bifurcation.contacts),
                 "scenario": getattr(diagram.scenario(node), "value", None),
                 "stable_before": node.bifurcation.stable_before,
                 "stable_after": node.bifurcation.stable_after,

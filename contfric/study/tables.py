@@ -12,6 +12,7 @@ import numpy as np
 from contfric.atlas.diagram import Diagram, Node
 from contfric.continuation.branch import Branch
 from contfric.orbit.orbit import Orbit
+from contfric.quantities.inside import laws_of
 from contfric.results import replacing
 from contfric.study.read import Study
 from contfric.study.schema import Want
@@ -63,7 +64,7 @@ def _columns(study: Study, source: Branch | Orbit) -> dict[str, list[Any]]:
 
 def write_bifurcations(path: Path, diagram: Diagram) -> None:
     """Write one row for each bifurcation, in the order of the parameter; mirror images are not."""
-    names = diagram.model.parameter_names
+    names, contacts = diagram.model.parameter_names, bool(laws_of(diagram.model))
     rows = (
         (
             node.bifurcation.kind.value,
@@ -73,11 +74,12 @@ def write_bifurcations(path: Path, diagram: Diagram) -> None:
             _known(node.bifurcation.stable_before),
             _known(node.bifurcation.stable_after),
             getattr(diagram.scenario(node), "value", ""),
+            *([" ".join(node.bifurcation.contacts)] if contacts else []),
         )
         for node in listed_nodes(diagram)
     )
     header = ["kind", "branch", "signature", *names, "stable_before", "stable_after", "scenario"]
-    write_table(path, header, rows)
+    write_table(path, [*header, *(["contacts"] if contacts else [])], rows)
 
 
 def listed_nodes(diagram: Diagram) -> list[Node]:

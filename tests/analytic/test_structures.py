@@ -216,3 +216,20 @@ def test_a_stick_lasts_until_waves_have_come_back() -> None:
     options = {"events": load, "rtol": 1e-12, "atol": 1e-13}
     stuck = solve_ivp(rates, (times[0], 40.0), found.states[0], "DOP853", **options)
     assert stuck.t_events[0][0] == pytest.approx(times[1], abs=1e-9)
+
+
+def test_events_know_their_contacts() -> None:
+    """At a joint that an event is about its contact rests; events of two contacts name both."""
+    orbit = cf.find_orbit("storeys")
+    floors, numbers = {"low": 0, "middle": 2, "high": 4}, set()
+    for event in cf.explore(orbit, "W", (0.585, 0.6)).bifurcations:
+        assert event.contacts
+        numbers.add(len(event.contacts))
+        for test in event.tests:
+            assert test.surface.strip("+-").removeprefix("u_") in event.contacts
+            if test.margin.value in ("joint", "exit") and test.surface in floors:
+                joint, k = event.orbit.ends[test.segment][1:], floors[test.surface]
+                assert abs(joint[6 + k] - (joint[5 + k] if k else 0.0)) < 1e-8
+    assert numbers == {1, 2}
+    smooth = cf.continue_orbit(cf.find_orbit("coulomb", {"Omega": 0.54}), "Omega", (0.5, 0.6))
+    assert all(event.contacts == () for event in smooth.bifurcations)
