@@ -142,7 +142,9 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
     start = orbit.begins[i]
     rises = orbit.flow.rate(orbit.word[i][0], observable, float(start[0]), start[1:])
     gap = orbit.flow.observe(observable, float(start[0]), start[1:]) - level
-    if abs(rises) < _ZERO and abs(gap) < _EQUAL * (1.0 + abs(level)):
+    # behind a reset that has just touched, the motion is at its start again: no touch of its own
+    rests = surface not in model.reset_by_surface
+    if rests and abs(rises) < _ZERO and abs(gap) < _EQUAL * (1.0 + abs(level)):
         return np.array(start)  # it begins with the touch
     if not found:
         raise NotationError(f"segment {i + 1} touches {surface} nowhere inside")

@@ -66,7 +66,7 @@ def _lines(probe: Probe, mode: str) -> Iterator[tuple[str, Line, float, float]]:
             yield "t", partial(_at_time, state), time, time + probe.period
         for k, name in enumerate(probe.model.states):
             yield name, partial(_at_state, time, state, k), -widths[k], widths[k]
-        if seen == _STATES:
+        if seen == probe.share(_STATES):
             return
 
 

@@ -102,7 +102,7 @@ def _points(probe: Probe, mode: str | None) -> Iterator[FloatArray]:
             continue
         yield np.array([place[0], *place[1], *probe.vector])
         found += 1
-        if found == _STATES:
+        if found == (_STATES if mode is None else probe.share(_STATES)):
             return
 
 
