@@ -49,7 +49,7 @@ class Probe:
         return self.flow.period
 
     def share(self, states: int) -> int:
-        """Return in how many states each mode is looked at: of many modes, whose terms are alike, in fewer."""
+        """Return in how many states each mode is looked at: of many modes in fewer."""
         return max(1, states * _FEW_MODES // max(_FEW_MODES, len(self.model.modes)))
 
     def height(self, surface: str, t: float, y: FloatArray) -> float:
