@@ -157,6 +157,7 @@ def beam() -> tuple[np.ndarray, np.ndarray]:
     return (roots / roots[0]) ** 2, 2.0 * (-1.0) ** np.arange(12)
 
 
+@pytest.mark.slow
 def test_a_beam_of_twelve_modes_touches_where_the_linear_response_is_the_gap() -> None:
     frequencies, shape = beam()
     zeta, force, n = 0.02, 0.6, 12

@@ -73,6 +73,7 @@ def test_branches_in_coarse_and_in_fine_steps() -> None:
     assert pairs > 12
 
 
+@pytest.mark.slow
 def test_curves_in_coarse_and_in_fine_steps() -> None:
     """Along curves of sliding events and branch points a touch is a point of codimension two."""
     traced = seen = 0
