@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from flint import arb, ctx
+from flint import arb
 
 from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
@@ -28,7 +28,7 @@ from contfric.certify.zeros import Closing
 from contfric.continuation.branch import Branch
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector
+from contfric.models.balls.numbers import Vector, working
 
 #: Bits: rounding of 1e-24 is nothing to boxes that are 1e-7 long.
 _BITS = 80
@@ -160,7 +160,7 @@ def certify_branch(
     >>> certify_branch(cf.continue_orbit(orbit, "Omega", (0.495, 0.505))).proved
     True
     """
-    with ctx.workprec(_BITS):
+    with working(_BITS):
         tracer, pieces, steps = _Tracer(branch, until), [], len(branch) - 1
         for k in range(steps):
             pieces += tracer.step(k)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from flint import arb, arb_mat, ctx
+from flint import arb, arb_mat
 
 from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
@@ -25,7 +25,7 @@ from contfric.continuation.events import ACCURACY, Bifurcation, Kind, resting_do
 from contfric.errors import ParameterError
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector, column, row_norm
+from contfric.models.balls.numbers import Vector, column, row_norm, working
 from contfric.orbit.margins import Margin, Test
 from contfric.orbit.orbit import Orbit
 
@@ -149,7 +149,7 @@ def certify_event(event: Bifurcation, parameter: str = "") -> EventCertificate:
         return _undecided(event, parameter, str(error))
     found = None
     for bits in _BITS:
-        with ctx.workprec(bits):
+        with working(bits):
             found = _attempt(event, location, parameter, bits)
         if found.proved:
             break
@@ -173,7 +173,7 @@ def _attempt(event: Bifurcation, location: Location, parameter: str, bits: int) 
     equations, start = _extended(event, location, segments, build)
     inclusion = enclosed(equations, [*start, arb(params[parameter])], arb(2) ** (_SPARE - bits))
     if inclusion.verdict is not Verdict.PROVED:
-        return _undecided(event, parameter, "the extended system is singular")
+        return _undecided(event, parameter, f"the extended system: {inclusion.why}")
     value, z = inclusion.zero[-1], inclusion.zero[: orbit.joints.size]
     exact = build(arb(params[parameter]))  # at one value, and its slopes from there to the event
     between = replace(exact, slopes=build(value.union(arb(params[parameter]))).slopes)

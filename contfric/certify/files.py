@@ -6,11 +6,12 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flint import acb, arb, ctx
+from flint import acb, arb
 
 from contfric.certify.verdict import Verdict
 from contfric.errors import ParameterError, ResultFileError, path_of
 from contfric.files import replacing
+from contfric.models.balls.numbers import working
 from contfric.verify.file import CHECKED_MODELS, Answer, check_text
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def certificate_data(certificate: Certificate) -> dict[str, Any]:
     if not certificate.exists.proved:
         raise ParameterError(f"there is nothing to write: {certificate.why}")
     m = orbit.joints.shape[1]
-    with ctx.workprec(certificate.precision):
+    with working(certificate.precision):
         radii = [float(r.upper()) * (1 + 1e-12) for r in certificate.radii]
         balls = [_printed(x) for x in certificate.enclosure]
         multipliers = [_disc(mu) for mu in certificate.multipliers]
@@ -95,7 +96,7 @@ def event_data(proof: EventCertificate) -> dict[str, Any]:
             f"{', '.join(CHECKED_MODELS)}: that is what the checker knows"
         )
     m = orbit.joints.shape[1]
-    with ctx.workprec(_EVENT_BITS):
+    with working(_EVENT_BITS):
         balls = [_printed(x) for x in proof.zero[: orbit.joints.size]]
         at = [condition.segment, 1 if condition.surface == "F+" else -1] if condition else None
         value = _printed(proof.value)

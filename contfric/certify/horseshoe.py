@@ -13,9 +13,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from flint import arb, ctx
+from flint import arb
 
 from contfric.certify.returns import Line, Release, ReturnMap, UndecidedError
+from contfric.models.balls.numbers import working
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray
 
@@ -85,7 +86,7 @@ def find_horseshoe(
     """Return the largest entropy that could be proved from what was sampled, with at most so many returns."""
     params, why = model.mapping(vector), "no horseshoe was seen"
     found = sorted(_candidates(sampled, most), key=lambda c: -math.log(len(c[2])) / c[0])
-    with ctx.workprec(_BITS):
+    with working(_BITS):
         returns = ReturnMap(model, vector, release)
         for n, window, intervals in found[:_CANDIDATES]:
             try:

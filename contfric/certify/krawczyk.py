@@ -39,11 +39,13 @@ class Inclusion:
     verdict : whether there is exactly one zero in the box
     zero : an enclosure of it, if it was found
     inverse : the approximate inverse that was used; None if the Jacobian could not be inverted
+    why : what kept it from a proof; empty if nothing did
     """
 
     verdict: Verdict
     zero: Vector
     inverse: arb_mat | None = None
+    why: str = ""
 
 
 def approximate_inverse(jacobian: arb_mat) -> arb_mat | None:
@@ -72,7 +74,7 @@ def krawczyk(
     if inverse is None:
         inverse = approximate_inverse(jacobian)
     if inverse is None:
-        return Inclusion(Verdict.UNDECIDED, [])
+        return Inclusion(Verdict.UNDECIDED, [], why="the Jacobian cannot be inverted")
     box = [around(c, r) for c, r in zip(centre, radii, strict=True)]
     _, wide = equations(box)
     offset = column([arb(0, r.abs_upper()) for r in radii])
@@ -86,8 +88,8 @@ def krawczyk(
     if any(
         k.is_finite() and k.abs_lower() > r.abs_upper() for k, r in zip(moved, radii, strict=True)
     ):
-        return Inclusion(Verdict.REFUTED, [], inverse)
-    return Inclusion(Verdict.UNDECIDED, [], inverse)
+        return Inclusion(Verdict.REFUTED, [], inverse, "the box holds no zero")
+    return Inclusion(Verdict.UNDECIDED, [], inverse, "the Jacobian changes too much over the box")
 
 
 def refined(equations: Equations, start: Vector) -> tuple[Vector, Vector] | None:
@@ -121,7 +123,8 @@ def enclosed(equations: Equations, start: Vector, tiny: arb) -> Inclusion:
     """
     found = refined(equations, start)
     if found is None:
-        return Inclusion(Verdict.UNDECIDED, [])
+        why = "a step of Newton's method is not finite, or its Jacobian singular"
+        return Inclusion(Verdict.UNDECIDED, [], why=why)
     centre, steps = found
     radii = [_THIN * s + tiny * (1 + c.abs_upper()) for c, s in zip(centre, steps, strict=True)]
     for _ in range(_WIDER):
@@ -129,4 +132,4 @@ def enclosed(equations: Equations, start: Vector, tiny: arb) -> Inclusion:
         if inclusion.verdict is Verdict.PROVED or inclusion.inverse is None:
             return inclusion
         radii = [16 * r for r in radii]
-    return Inclusion(Verdict.UNDECIDED, [], inclusion.inverse)
+    return inclusion

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from flint import acb, arb, arb_mat, ctx
+from flint import acb, arb, arb_mat
 
 from contfric.certify.certificate import Certificate
 from contfric.certify.chain import Chain, Segments, segments_of
@@ -27,7 +27,7 @@ from contfric.certify.verdict import Finding, Verdict, all_of
 from contfric.certify.zeros import zeros_at_joints
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector
+from contfric.models.balls.numbers import Vector, working
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slack import margin_rounding
 
@@ -59,7 +59,7 @@ def certify_orbit(orbit: Orbit) -> Certificate:
     segments = segments_of(orbit.system)
     found: Certificate | None = None
     for bits in _BITS:
-        with ctx.workprec(bits):
+        with working(bits):
             found = _attempt(orbit, segments, bits)
         if found.proved or Verdict.REFUTED in (found.exists.verdict, found.admissible.verdict):
             break
@@ -71,7 +71,7 @@ def provable_form(orbit: Orbit) -> Orbit:
     """Return the orbit as the problem that is proved: on its half only where the symmetry is exact."""
     if not orbit.system.half:
         return orbit
-    with ctx.workprec(_BITS[0]):
+    with working(_BITS[0]):
         model = ball_model(orbit.model, orbit.params)
         return orbit if is_symmetry(orbit, segments_of(orbit.system), model) else orbit.as_whole()
 

@@ -9,11 +9,53 @@ F. Johansson, Arb: efficient arbitrary-precision midpoint-radius interval arithm
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import copyreg
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from threading import RLock
 
-from flint import arb, arb_mat
+from flint import acb, arb, arb_mat, ctx
 
 Vector = list[arb]
+
+#: The working precision of flint belongs to the whole process: who sets it keeps all others waiting.
+_PRECISION = RLock()
+#: Bits of the mantissa of a radius (``MAG_BITS`` of Arb).
+_RADIUS_BITS = 30
+
+
+@contextmanager
+def working(bits: int) -> Iterator[None]:
+    """Compute with so many bits, in one thread at a time (``flint.ctx.workprec`` alone is for one thread)."""
+    with _PRECISION, ctx.workprec(bits):
+        yield
+
+
+def _restored(mantissa: int, exponent: int, radius: int, scale: int) -> arb:
+    return arb((mantissa, exponent), (radius, scale))
+
+
+def _reduced(ball: arb) -> tuple[object, tuple[object, ...]]:
+    """Return how a ball is pickled: exactly (python-flint pickles none)."""
+    if not ball.is_finite():
+        return arb, ("nan" if ball.mid().is_nan() else "[+/- inf]",)
+    mantissa, exponent = (int(part) for part in ball.mid().man_exp())
+    radius, scale = (int(part) for part in ball.rad().man_exp())
+    # Arb rounds a radius of 30 bits up by one in the last: what is one less gives it back
+    shift = max(_RADIUS_BITS - radius.bit_length(), 0)
+    wide, fine = radius << shift, scale - shift
+    for pair in ((radius, scale), (wide - 1, fine), (2 * wide - 1, fine - 1)):
+        if _restored(mantissa, exponent, *pair).rad() == ball.rad():
+            return _restored, (mantissa, exponent, *pair)
+    return _restored, (mantissa, exponent, radius, scale)  # contains the ball
+
+
+def _reduced_disc(disc: acb) -> tuple[object, tuple[object, ...]]:
+    return acb, (disc.real, disc.imag)
+
+
+copyreg.pickle(arb, _reduced)  # type: ignore[arg-type] # the stub knows classes of Python only
+copyreg.pickle(acb, _reduced_disc)  # type: ignore[arg-type]
 
 
 def column(values: Sequence[arb]) -> arb_mat:
