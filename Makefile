@@ -1,4 +1,4 @@
-# make setup | demo | test | test-all | gate | bench | stress | studies | gallery | docs | clean
+# make setup | demo | test | test-all | gate | bench | stress | studies | gallery | docs | notebooks | clean
 PYTHON ?= python3
 WORKERS ?= 2
 
@@ -12,7 +12,7 @@ DEMO := demo
 STRESS := .stress
 
 .DEFAULT_GOAL := help
-.PHONY: help setup kernels demo test lint types contracts unit test-all gate bench stress studies gallery docs clean
+.PHONY: help setup kernels demo test lint types contracts unit test-all gate bench stress studies gallery docs notebooks clean
 MAKEFLAGS += --no-print-directory
 
 help:
@@ -25,6 +25,7 @@ help:
 	@echo "make studies  every bundled study from the shell, each with a time limit, to docs/studies.md"
 	@echo "make gallery  the figures of docs/gallery"
 	@echo "make docs     the documentation as a site, in $(SITE)/; a warning or a broken link fails it"
+	@echo "make notebooks  the notebooks of docs/tutorial, executed anew in place"
 	@echo "make setup    a virtual environment in $(VENV)/, and all kernels compiled"
 	@echo "make clean    removes what make and the tests wrote, and keeps $(VENV)/"
 
@@ -136,6 +137,10 @@ docs: $(DOCS_STAMP)
 	@echo "== docs"
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir $(SITE)
 	@echo "$(SITE)/index.html (its search needs a server: python3 -m http.server -d $(SITE))"
+
+notebooks: $(STAMP)
+	@echo "== notebooks"
+	@$(BIN)/python docs/_site/notebooks.py
 
 clean:
 	@rm -rf build dist $(DEMO) $(SITE) .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache

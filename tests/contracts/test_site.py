@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +15,8 @@ import contfric
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-PAGES = sorted(DOCS.rglob("*.md"))
+NOTEBOOKS = sorted(DOCS.rglob("*.ipynb"))
+PAGES = sorted([*DOCS.rglob("*.md"), *NOTEBOOKS])
 SECTIONS = ["Tutorial", "How-to", "Theory", "Gallery", "Reference", "Evidence"]
 
 
@@ -47,7 +49,10 @@ def relative(page: Path) -> str:
 
 
 def test_every_page_is_in_the_navigation_once() -> None:
-    assert sorted(named(navigation())) == sorted(p.relative_to(DOCS).as_posix() for p in PAGES)
+    pages = [
+        p.relative_to(DOCS).with_suffix(".md").as_posix() for p in PAGES
+    ]  # as the site has them
+    assert sorted(named(navigation())) == sorted(pages)
 
 
 def test_sections_stand_in_their_order() -> None:
@@ -70,7 +75,11 @@ def test_a_warning_fails_the_build() -> None:
 
 def prose(page: Path) -> str:
     """Return the text of a page without what stands as code."""
-    text = re.sub(r"^( *)```.*?^\1```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    text = page.read_text(encoding="utf-8")
+    if page.suffix == ".ipynb":
+        cells = [c for c in json.loads(text)["cells"] if c["cell_type"] == "markdown"]
+        text = "\n\n".join("".join(cell["source"]) for cell in cells)
+    text = re.sub(r"^( *)```.*?^\1```", "", text, flags=re.M | re.S)
     return re.sub(r"`[^`\n]*`", lambda m: re.sub(r"[\[\]()]", "", m[0]), text)
 
 

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import doctest
 import importlib
+import json
 import pkgutil
 import re
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import pytest
@@ -17,21 +21,57 @@ matplotlib.use("Agg")
 ROOT = Path(__file__).parents[2]
 
 
+DOCS = ROOT / "docs"
+#: Pages whose code a test of their own runs.
+ELSEWHERE = {
+    *("bridges", "census", "certificates", "curves", "equilibria", "lyapunov", "models"),
+    *("quantities", "response"),
+}
+#: Pages whose code is run here, and what it prints or makes.
+HERE = {
+    "README": "SN_1a",
+    "docs/guide": "SN_1a",
+    "docs/index": "",
+    "docs/live-diagram": "",
+    "docs/lugre": "Branch 0s, 2seg",
+    "docs/gallery/impact-friction": "",
+}
+
+
 def blocks(name: str) -> list[str]:
     return re.findall(r"```python\n(.*?)```", (ROOT / name).read_text(), re.DOTALL)
 
 
-@pytest.mark.parametrize("name", ["README.md", "docs/guide.md"])
-def test_code_runs(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    found = blocks(name)
+@pytest.mark.parametrize("name", HERE)
+def test_code_runs(
+    name: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    found = blocks(f"{name}.md")
     assert found
+    monkeypatch.chdir(tmp_path)  # pages save files
     scope: dict[str, object] = {}
     for block in found:  # one after the other, as a reader would type them
         exec(compile(block, name, "exec"), scope)
-    assert "SN_1a" in capsys.readouterr().out
+    assert HERE[name] in capsys.readouterr().out
 
 
-#: Of each page of the tutorial: a word that it prints. The second one compiles its model first.
+def test_no_page_has_code_that_is_not_run() -> None:
+    with_code = set()
+    for page in DOCS.rglob("*.md"):
+        text, name = page.read_text(encoding="utf-8"), page.relative_to(ROOT).with_suffix("")
+        if "```python" in text:
+            with_code.add(name.as_posix())
+        assert not re.search(r"\n\n    (?:import |from |.*\bcf\.)", text), f"{name}: not a block"
+    assert with_code == {f"docs/{name}" for name in ELSEWHERE} | (set(HERE) - {"README"})
+    for name in ELSEWHERE:
+        own = (ROOT / f"tests/examples/test_{name}_page.py").read_text(encoding="utf-8")
+        assert f"{name}.md" in own and "exec(" in own
+
+
+#: Of each notebook of the tutorial: a word that it prints. The second one compiles its model first.
 TUTORIAL = [
     ("first-diagram", "SS_a"),
     pytest.param("own-model", "RANGE|range", marks=pytest.mark.slow),
@@ -49,19 +89,61 @@ def test_tutorial_runs(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    page = f"docs/tutorial/{name}.md"
-    for model in re.findall(r"```yaml\n(.*?)```", (ROOT / page).read_text(), re.DOTALL):
-        (tmp_path / "bilinear.yaml").write_text(model, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)  # pages save files
+    monkeypatch.chdir(tmp_path)  # they save files
     scope: dict[str, object] = {}
-    for block in blocks(page):
-        exec(compile(block, page, "exec"), scope)
+    for cell in code_of(json.loads((DOCS / f"tutorial/{name}.ipynb").read_text(encoding="utf-8"))):
+        source = "".join(cell["source"])
+        if file := re.match(r"%%writefile (\S+)\n", source):
+            Path(file[1]).write_text(source[file.end() :], encoding="utf-8")
+        else:
+            exec(compile(source, name, "exec"), scope)
     assert re.search(printed, capsys.readouterr().out)
 
 
-def test_every_page_of_the_tutorial_is_run() -> None:
+NOTEBOOKS = sorted((DOCS / "tutorial").glob("*.ipynb"))
+
+
+def code_of(notebook: dict[str, Any]) -> list[dict[str, Any]]:
+    return [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+
+
+def said(notebook: dict[str, Any]) -> list[str]:
+    """Return what each cell of code prints or shows: text, and the kinds of what else there is."""
+    found = []
+    for cell in code_of(notebook):
+        shown = [output.get("data", {"text": output.get("text", "")}) for output in cell["outputs"]]
+        kinds = [kind for data in shown for kind in sorted(data)]
+        plain = ["".join(data.get("text/plain", data.get("text", ""))) for data in shown]
+        found.append("\n".join([*kinds, *plain]))
+    return found
+
+
+def test_every_notebook_of_the_tutorial_is_run() -> None:
     named = {getattr(p, "values", p)[0] for p in TUTORIAL}
-    assert named == {page.stem for page in (ROOT / "docs/tutorial").glob("*.md")}
+    assert named == {path.stem for path in NOTEBOOKS}
+    assert len(NOTEBOOKS) == 5
+    assert not list((DOCS / "tutorial").glob("*.md"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebooks_say_what_they_say(path: Path) -> None:
+    """In a kernel of their own they run from top to bottom, and what is stored in them comes out."""
+    script = (
+        "import json, runpy, sys; from pathlib import Path;"
+        f"ran = runpy.run_path({str(DOCS / '_site/notebooks.py')!r})['execute'](Path(sys.argv[1]));"
+        "print(json.dumps(ran))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    now = said(json.loads(done.stdout.splitlines()[-1]))
+    number = re.compile(r"[-+]?\d+\.\d+(?:e[-+]?\d+)?")
+    for old, new in zip(said(json.loads(path.read_text(encoding="utf-8"))), now, strict=True):
+        assert number.sub("#", new) == number.sub("#", old)
+        values = [[float(v) for v in number.findall(text)] for text in (old, new)]
+        assert values[1] == pytest.approx(values[0], rel=1e-5, abs=1e-9)
 
 
 def test_the_model_in_the_readme_is_one(tmp_path: Path) -> None:
