@@ -30,6 +30,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import polish
 from contfric.orbit.system import Margin, build_system
+from contfric.shown import Shown
 from contfric.signature.cyclic import least_rotation, primitive_length
 from contfric.signature.edits import concatenate
 
@@ -46,7 +47,7 @@ _MOST_STEPS, _RESOLUTION = 60, 1e-15
 
 
 @dataclass(frozen=True, eq=False)
-class Window:
+class Window(Shown):
     """The orbits of one word, from one end of its window to the other.
 
     Attributes

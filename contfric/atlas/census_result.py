@@ -13,6 +13,7 @@ from contfric.atlas.census_conditions import Fate, Walk
 from contfric.extras import need_pandas
 from contfric.models.definition import Model
 from contfric.orbit.orbit import DEGENERATE, Orbit
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,7 +54,7 @@ class SectionSearch:
 
 
 @dataclass(frozen=True, eq=False)
-class Census:
+class Census(Shown):
     """All periodic orbits that :func:`contfric.census` found at one set of parameters.
 
     Attributes

@@ -12,6 +12,7 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation, End, Kind, Proposal
 from contfric.extras import need_flint, need_pandas
 from contfric.models.definition import Model
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -98,7 +99,7 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False)
-class Diagram:
+class Diagram(Shown):
     """What :func:`contfric.explore` found.
 
     Attributes

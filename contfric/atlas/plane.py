@@ -14,6 +14,7 @@ from contfric.curves.curve import Curve
 from contfric.curves.special import SpecialPoint
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +33,7 @@ class Family:
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class Region(Shown):
     """A part of the plane that no curve crosses.
 
     Attributes
@@ -65,7 +66,7 @@ class Region:
 
 
 @dataclass(frozen=True, eq=False)
-class Plane:
+class Plane(Shown):
     """What :func:`contfric.explore_plane` found.
 
     Attributes

@@ -29,6 +29,7 @@ from contfric.continuation.branch import Branch
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, working
+from contfric.shown import Shown
 
 #: Bits: rounding of 1e-24 is nothing to boxes that are 1e-7 long.
 _BITS = 80
@@ -78,7 +79,7 @@ class Piece:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BranchCertificate:
+class BranchCertificate(Shown):
     """What was proved of a branch.
 
     Attributes

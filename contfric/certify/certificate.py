@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from contfric.certify.verdict import Finding, Verdict, all_of
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     from flint import acb, arb
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Certificate:
+class Certificate(Shown):
     """What was proved of an orbit, at its parameters taken as the exact binary numbers that they are.
 
     Attributes

@@ -10,6 +10,7 @@ from typing import Any
 
 from contfric.errors import ResultFileError, path_of
 from contfric.files import replacing
+from contfric.shown import Shown
 
 _KIND, _FORMAT = "diagram", 1
 
@@ -99,8 +100,8 @@ class EventSummary:
         return f"{self.radius:.1e}" if self.proved else self.why
 
 
-@dataclass(frozen=True)
-class DiagramCertificate:
+@dataclass(frozen=True, repr=False)
+class DiagramCertificate(Shown):
     """What was proved of a diagram.
 
     Attributes
@@ -166,6 +167,13 @@ class DiagramCertificate:
         text = json.dumps(data, indent=1)
         with replacing(path_of("a certificate file", path)) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
+
+    def __repr__(self) -> str:
+        proved = sum(e.proved for e in self.events)
+        return (
+            f"<DiagramCertificate of {self.model}: {proved} of {len(self.events)} events and "
+            f"{self.covered:.1%} of the branches proved>"
+        )
 
     def __str__(self) -> str:
         """Say what is proved, and the ten most important things that are not."""

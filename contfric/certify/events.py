@@ -28,6 +28,7 @@ from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, row_norm, working
 from contfric.orbit.margins import Margin, Test
 from contfric.orbit.orbit import Orbit
+from contfric.shown import Shown
 
 #: Bits tried one after the other: 160 leave 30 digits where the condition is 1e10.
 _BITS = (160, 320)
@@ -36,7 +37,7 @@ _SPARE = 30
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class EventCertificate:
+class EventCertificate(Shown):
     """What was proved of an event.
 
     Attributes

@@ -14,10 +14,11 @@ from contfric.errors import ParameterError, real_number, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
+from contfric.shown import Shown
 
 
 @dataclass(frozen=True, eq=False)
-class LyapunovExponents:
+class LyapunovExponents(Shown):
     """The Lyapunov exponents of one motion, per unit of time.
 
     Attributes

@@ -15,6 +15,7 @@ from contfric.chaos.status import Motion
 from contfric.chaos.tiles import TileRows
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,7 +27,7 @@ _DIFFERENT = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class LyapunovMap:
+class LyapunovMap(Shown):
     """Lyapunov exponents on a grid of two parameters; the result of :func:`contfric.lyapunov_map`.
 
     Attributes

@@ -19,6 +19,7 @@ from contfric.orbit.orbit import Orbit, Status, of_two_halves
 from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
 from contfric.orbit.system import IntArray, System, build_system
 from contfric.orbit.words import decode, encode, mirror_pairs
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +33,7 @@ BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class Branch(Shown):
     """A family of orbits of one reduced word, from one end to the other.
 
     Attributes

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
+from contfric.shown import Shown
+
 if TYPE_CHECKING:
     from contfric.continuation.events import Bifurcation
     from contfric.orbit.gradient import Gradient
 
 
-class MeasuredEvent:
+class MeasuredEvent(Shown):
     """Contacts and derivatives of an event: a part of :class:`contfric.continuation.events.Bifurcation`."""
 
     @property

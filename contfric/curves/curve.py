@@ -19,6 +19,7 @@ from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System, Test
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,7 +86,7 @@ class CurvePart:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class Curve(Shown):
     """A curve of bifurcations in two parameters, from one end to the other.
 
     Attributes

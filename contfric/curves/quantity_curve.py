@@ -17,6 +17,7 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import System
 from contfric.quantities.measure import of_orbits
 from contfric.quantities.registry import quantity_of
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class QuantityCurve:
+class QuantityCurve(Shown):
     """Orbits of one signature on which a quantity has one value, in the plane of two parameters.
 
     Attributes

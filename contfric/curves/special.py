@@ -8,6 +8,7 @@ from enum import Enum
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Test
+from contfric.shown import Shown
 
 
 class CodimTwo(str, Enum):
@@ -43,7 +44,7 @@ class CurveEndReason(str, Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class SpecialPoint:
+class SpecialPoint(Shown):
     """A point of codimension two on a curve.
 
     Attributes

@@ -15,6 +15,7 @@ from contfric.equilibria.result import Equilibrium, Location
 from contfric.errors import ParameterError, did_you_mean
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +35,7 @@ class BranchEnd(str, Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class EquilibriumBranch:
+class EquilibriumBranch(Shown):
     """Equilibria along a parameter; the result of :func:`contfric.continue_equilibrium`.
 
     Attributes

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from contfric.equilibria.boundary import Unfolding
 from contfric.equilibria.hopf import Centre
 from contfric.equilibria.result import Equilibrium
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
@@ -24,7 +25,7 @@ class EquilibriumKind(str, Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class EquilibriumEvent:
+class EquilibriumEvent(Shown):
     """An event of a branch of equilibria.
 
     Attributes

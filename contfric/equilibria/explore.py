@@ -20,6 +20,7 @@ from contfric.extras import need_pandas
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,7 +31,7 @@ _SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class EquilibriumDiagram:
+class EquilibriumDiagram(Shown):
     """Branches of equilibria over a range; the result of :func:`contfric.explore_equilibria`.
 
     Attributes

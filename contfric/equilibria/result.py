@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +35,7 @@ class Location(str, Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
+class Rest(Shown):
     """A state at which one mode rests: what an equilibrium and a set of them have in common."""
 
     region: Region
@@ -166,8 +167,8 @@ class EquilibriumSet(Rest):
         return f"<set of equilibria of {self.mode}, dimension {self.dimension}, {where}>"
 
 
-@dataclass(frozen=True, eq=False)
-class Equilibria:
+@dataclass(frozen=True, eq=False, repr=False)
+class Equilibria(Shown):
     """All equilibria that were found at some parameters; the result of :func:`contfric.find_equilibria`.
 
     Attributes
@@ -184,6 +185,11 @@ class Equilibria:
     points: tuple[Equilibrium, ...]
     sets: tuple[EquilibriumSet, ...]
     complete: Mapping[str, bool]
+
+    def __repr__(self) -> str:
+        return (
+            f"<Equilibria of {self.model.name}: {len(self.points)} points, {len(self.sets)} sets>"
+        )
 
     def __iter__(self) -> Iterator[Equilibrium]:
         """Go through the equilibria where motion can rest: those that are admissible."""

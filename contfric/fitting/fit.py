@@ -27,6 +27,7 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
 from contfric.quantities.inside import Inside
 from contfric.quantities.registry import number_quantity
+from contfric.shown import Shown
 
 #: Residual, in standard deviations, of a trial without an orbit: so far off that the step is taken back.
 _NO_ORBIT = 1e6
@@ -38,7 +39,7 @@ _CONVERGED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Fit(Shown):
     """What :func:`contfric.fit` found.
 
     Attributes

@@ -47,6 +47,7 @@ from contfric.models.parts import (
     Symmetry,
 )
 from contfric.models.transition_maps import TransitionMaps
+from contfric.shown import Shown
 from contfric.stored import given
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ __all__ = [
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Model(TransitionMaps):
+class Model(Shown, TransitionMaps):
     """A piecewise-smooth oscillator: its definition, and a factory of its compiled flow.
 
     Attributes

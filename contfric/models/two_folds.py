@@ -38,6 +38,7 @@ from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Domain, FloatArray, Model
 from contfric.models.numbers import function_of_numbers
 from contfric.models.tied import tied
+from contfric.shown import Shown
 
 #: Newton's method: steps, and what is short, relative to the natural sizes.
 _STEPS, _SHORT = 60, 1e-12
@@ -61,7 +62,7 @@ class TwoFoldKind(str, Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class TwoFold:
+class TwoFold(Shown):
     """A two-fold, or one place of a set of them.
 
     Attributes

@@ -21,13 +21,14 @@ from contfric.orbit.sensitivity import joint_sensitivities
 from contfric.quantities.measure import differentiated
 from contfric.quantities.motion import Directions
 from contfric.quantities.registry import number_quantity
+from contfric.shown import Shown
 
 #: A margin below this (nondimensional) vanishes: the orbit is at an event. Located events are good to 1e-12.
 _AT_EVENT = 1e-9
 
 
-@dataclass(frozen=True)
-class Gradient(Mapping[str, float]):
+@dataclass(frozen=True, repr=False)
+class Gradient(Shown, Mapping[str, float]):
     """Derivatives of a quantity by every parameter; a mapping of names to numbers.
 
     Attributes
@@ -68,6 +69,10 @@ class Gradient(Mapping[str, float]):
 
     def __len__(self) -> int:
         return len(self.ahead)
+
+    def __repr__(self) -> str:
+        slopes = ", ".join(f"{name}: {slope:.6g}" for name, slope in self.items())
+        return f"<Gradient of {self.quantity} = {self.value:.6g}: {slopes}>"
 
 
 def gradient_of(orbit: Orbit, name: str) -> Gradient:

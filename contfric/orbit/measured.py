@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, cast
 
+from contfric.shown import Shown
+
 if TYPE_CHECKING:
     from contfric.orbit.gradient import Gradient
     from contfric.orbit.orbit import Orbit
     from contfric.quantities.registry import QuantityLike
 
 
-class MeasuredOrbit:
+class MeasuredOrbit(Shown):
     """The quantities of an orbit: a part of :class:`contfric.orbit.orbit.Orbit`."""
 
     def quantity(self, name: QuantityLike) -> Any:

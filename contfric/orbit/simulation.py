@@ -19,6 +19,7 @@ from contfric.orbit.pace import Pace
 from contfric.orbit.starts import checked_state, start_of
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import surfaces_under, tables
+from contfric.shown import Shown
 
 
 class SimulationEnd(str, Enum):
@@ -68,8 +69,8 @@ def joined(pieces: list[EventRows]) -> EventRows:
     )
 
 
-@dataclass(frozen=True)
-class Trajectory:
+@dataclass(frozen=True, repr=False)
+class Trajectory(Shown):
     """The events of a trajectory.
 
     Attributes
@@ -93,6 +94,9 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.modes)
+
+    def __repr__(self) -> str:
+        return f"<Trajectory of {self.model.name}: {len(self)} events, ended by {self.end.name}>"
 
     @property
     def word(self) -> tuple[tuple[str, str], ...]:

@@ -15,6 +15,7 @@ from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.response.attractors import named
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,7 +46,7 @@ class Share:
 
 
 @dataclass(frozen=True, eq=False)
-class Basins:
+class Basins(Shown):
     """What starts on a grid converge to; the result of :func:`contfric.basins`.
 
     Attributes

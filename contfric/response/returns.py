@@ -12,6 +12,7 @@ from contfric.errors import ParameterError, shown, whole_number
 from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.response.outcome import Outcome
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Returns:
+class Returns(Shown):
     """Points of a solution on a section, in order; the result of :func:`contfric.poincare`.
 
     Attributes
@@ -118,7 +119,7 @@ class Returns:
 
 
 @dataclass(frozen=True, eq=False)
-class ReleaseMap:
+class ReleaseMap(Shown):
     """The map from the phase of one release to that of the next; the result of :func:`contfric.release_map`.
 
     Attributes

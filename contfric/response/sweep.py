@@ -15,6 +15,7 @@ from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.response.outcome import Outcome
 from contfric.response.sections import STOPS
+from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,7 +58,7 @@ class SweepRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class Sweep(Shown):
     """Points of simulated solutions along a parameter; the result of :func:`contfric.sweep`.
 
     Attributes

@@ -15,6 +15,7 @@ from typing import Any
 
 from contfric.errors import NotationError, shown
 from contfric.models import Model, load_model, model_names
+from contfric.shown import Shown
 from contfric.signature.cyclic import least_rotation, rotated
 from contfric.signature.graph import crossing, successors, unknown_domain
 from contfric.signature.holds import TOUCH, hold_at, hold_fault, is_hold, surface_into
@@ -38,7 +39,7 @@ _ALIASES = {"x0v0": "stick"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Signature:
+class Signature(Shown):
     """A closed walk through the domains of a model, and how many forcing periods it takes.
 
     Attributes

@@ -11,6 +11,7 @@ from contfric.atlas.diagram import Diagram
 from contfric.continuation.branch import Branch
 from contfric.errors import ResultFileError
 from contfric.orbit.orbit import Orbit
+from contfric.shown import Shown
 from contfric.study.read import Study
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ class RunStatus(str, Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class StudyResult:
+class StudyResult(Shown):
     """What a run found and where it is.
 
     Attributes

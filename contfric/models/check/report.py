@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from contfric.shown import Shown
+
 
 class Topic(str, Enum):
     """What is verified; the text says it."""
@@ -47,8 +49,8 @@ class Finding:
         return f"{self.severity.value}: {self.message}"
 
 
-@dataclass
-class ModelReport:
+@dataclass(repr=False)
+class ModelReport(Shown):
     """The outcome of :func:`contfric.check_model`.
 
     Attributes
@@ -65,6 +67,10 @@ class ModelReport:
     findings: list[Finding] = field(default_factory=list)
     closed: tuple[str, ...] = ()
     integrated: dict[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        found = "ok" if self.ok else "wrong"
+        return f"<ModelReport of {self.model}: {found}, {len(self.findings)} findings>"
 
     @property
     def ok(self) -> bool:
