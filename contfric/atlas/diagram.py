@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from contfric.atlas.verification import Verification
     from contfric.certify.diagram_certificate import DiagramCertificate
     from contfric.plot.live.frame import Frame
+    from contfric.plot.live.serve import Live
     from contfric.quantities.registry import QuantityLike
     from contfric.response.sweep import Sweep
 
@@ -317,6 +318,27 @@ class Diagram(Shown):
         from contfric.plot.live.frame import Frame
 
         return Frame.of(self, height)
+
+    def live(self, height: int = 950) -> Live:
+        """Serve the live diagram with a slider for every fixed parameter (needs bokeh: the extra ``live``).
+
+        Whoever drags one has the diagram explored anew, again and again. A notebook shows it in a frame;
+        elsewhere open ``live.url`` in a browser of this machine, and call ``live.run()``.
+
+        Parameters
+        ----------
+        height : int
+            Height of the frame in pixels.
+
+        Raises
+        ------
+        MissingPackageError
+            If bokeh is not installed.
+        """
+        from contfric.atlas.anew import anew
+        from contfric.plot.live.serve import serve
+
+        return serve(self, anew, height)
 
     def to_html(self, path: str | PathLike[str]) -> Path:
         """Write the diagram as one page for a browser (needs bokeh: the extra ``live``).

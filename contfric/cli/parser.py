@@ -123,6 +123,9 @@ def _fill_info(parser: argparse.ArgumentParser) -> None:
 def _fill_view(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", metavar="DIR", type=Path, help="folder of a run")
     parser.add_argument("--open", action="store_true", help="open the page in a browser")
+    parser.add_argument(
+        "--live", action="store_true", help="serve it with sliders for the fixed parameters"
+    )
 
 
 def _fill_certify(parser: argparse.ArgumentParser) -> None:

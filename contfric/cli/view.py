@@ -10,7 +10,9 @@ from contfric.errors import ResultFileError
 
 
 def view(options: argparse.Namespace) -> int:
-    """Write the page next to the results; its path goes to stdout."""
+    """Write the page next to the results, or serve it with sliders; where it is goes to stdout."""
+    import webbrowser
+
     from contfric.atlas.diagram import Diagram
     from contfric.extras import need_bokeh
     from contfric.results import load
@@ -23,10 +25,15 @@ def view(options: argparse.Namespace) -> int:
     diagram = load(source)
     if not isinstance(diagram, Diagram):
         raise ResultFileError(f"{source} holds no diagram, but a {type(diagram).__name__.lower()}")
+    if options.live:
+        live = diagram.live()
+        print(live.url, flush=True)
+        if options.open:
+            webbrowser.open(live.url)
+        live.run()
+        return Exit.DONE
     path = diagram.to_html(options.folder / VIEW)
     print(path)
     if options.open:
-        import webbrowser
-
         webbrowser.open(path.resolve().as_uri())
     return Exit.DONE

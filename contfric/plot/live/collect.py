@@ -60,19 +60,26 @@ def collect(
 
     ``orbits`` keeps those that were sampled, by branch and point, for a call that asks for fewer.
     """
-    branches = diagram.branches
-    colours = branch_colours(b.name for b in branches if not b.bridge)
     return {
+        **lines_and_marks(diagram, detail, tuple(ROWS)),
         "parameter": symbol(diagram.parameter),
         "range": list(diagram.range),
         "model": diagram.model.name,
         "autonomous": diagram.model.autonomous,
         "states": list(diagram.model.states),
-        "rows": [_row(diagram, name) for name in ROWS],
         "domains": domain_colours(diagram.model),
-        "branches": [_branch(b, colours) for b in branches],
-        "runs": [run for i in range(len(branches)) for run in _runs(diagram, i, detail)],
         "points": list(_points(diagram, detail, orbits)),
+    }
+
+
+def lines_and_marks(diagram: Diagram, detail: Detail, rows: tuple[str, ...]) -> dict[str, Any]:
+    """Return what is seen of a diagram in some rows; without an orbit to click on it takes milliseconds."""
+    branches = diagram.branches
+    colours = branch_colours(b.name for b in branches if not b.bridge)
+    return {
+        "rows": [_row(diagram, name) for name in rows],
+        "branches": [_branch(b, colours) for b in branches],
+        "runs": [run for i in range(len(branches)) for run in _runs(diagram, i, detail, rows)],
     }
 
 
@@ -122,10 +129,12 @@ def _branch(branch: Branch, colours: dict[str, str]) -> dict[str, Any]:
     }
 
 
-def _runs(diagram: Diagram, i: int, detail: Detail) -> Iterator[dict[str, Any]]:
+def _runs(
+    diagram: Diagram, i: int, detail: Detail, rows: tuple[str, ...]
+) -> Iterator[dict[str, Any]]:
     """Yield the pieces of one stability of a branch: x once, y of every row."""
     branch = diagram.branches[i]
-    of_rows = [stability_runs(branch, name) for name in ROWS]
+    of_rows = [stability_runs(branch, name) for name in rows]
     width = diagram.range[1] - diagram.range[0]
     for pieces in zip(*of_rows, strict=True):
         x = pieces[0].x
@@ -140,7 +149,7 @@ def _runs(diagram: Diagram, i: int, detail: Detail) -> Iterator[dict[str, Any]]:
             "x": floats(x[at]),
             "y": {
                 name: [floats(column) for column in piece.y[at].T]
-                for name, piece in zip(ROWS, pieces, strict=True)
+                for name, piece in zip(rows, pieces, strict=True)
             },
         }
 

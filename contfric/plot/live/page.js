@@ -25,7 +25,7 @@ function draw() {
   let [low, high] = [Infinity, -Infinity];
   for (const run of data.runs) {
     if (!is_shown(run.branch)) continue;
-    for (const column of run.y[row().name]) {
+    for (const column of run.y[row().name] ?? []) {
       const y = floats(column);
       found[run.style].x.push(floats(run.x));
       found[run.style].y.push(y);
@@ -170,15 +170,33 @@ function fill(select, names, index) {
 fill(by_id("row"), data.rows.map((r) => r.label), 0);
 fill(by_id("abscissa"), data.states, 0);
 fill(by_id("ordinate"), data.states, 1);
-for (const name of new Set(data.branches.filter((b) => !b.bridge).map((b) => b.name))) {
-  const label = document.createElement("label");
-  const box = Object.assign(document.createElement("input"), {type: "checkbox", checked: true, value: name});
-  const text = document.createElement("span");
-  text.textContent = " " + name;
-  text.style.color = data.branches.find((b) => b.name === name && !b.bridge).colour;
-  label.append(box, text);
-  by_id("branches").append(label);
+
+function list_branches() {
+  by_id("branches").replaceChildren();
+  for (const name of new Set(data.branches.filter((b) => !b.bridge).map((b) => b.name))) {
+    const label = document.createElement("label");
+    const box = Object.assign(document.createElement("input"), {type: "checkbox", checked: !hidden.has(name), value: name});
+    const text = document.createElement("span");
+    text.textContent = " " + name;
+    text.style.color = data.branches.find((b) => b.name === name && !b.bridge).colour;
+    label.append(box, text);
+    by_id("branches").append(label);
+  }
 }
+
+// Another diagram of the same model: all of it, or what is seen of one row while a parameter is dragged.
+function renew(found) {
+  for (const r of found.rows) data.rows[data.rows.findIndex((old) => old.name === r.name)] = r;
+  Object.assign(data, {branches: found.branches, runs: found.runs, points: found.points ?? []});
+  by_id("fixed").textContent = found.fixed;
+  list_branches();
+  const [low, high] = draw();
+  if (low < top.y_range.start || high > top.y_range.end) fit([low, high]);
+  if (found.points) pick(selected?.x ?? (data.range[0] + data.range[1]) / 2, chosen.data.y[0] ?? (low + high) / 2);
+  else chosen.data = {x: [], y: []};
+}
+
+list_branches();
 by_id("controls").addEventListener("change", (event) => {
   if (event.target.closest("#branches")) {
     if (event.target.checked) hidden.delete(event.target.value);
@@ -190,7 +208,7 @@ by_id("controls").addEventListener("change", (event) => {
   mark_selected();
 });
 for (const id of ["abscissa", "ordinate"]) by_id(id).addEventListener("change", draw_orbit);
-window.contfric = {data, pick, show, thin};
+window.contfric = {data, pick, show, thin, row, renew};
 fit(draw());
 thin();
 const stable = data.points.filter((p) => p.stable);

@@ -97,32 +97,46 @@ def _page(diagram: Diagram, data: dict[str, Any]) -> str:
     """Return the text of the page."""
     from bokeh.document import Document
     from bokeh.embed import file_html
-    from bokeh.models import CustomJS
     from bokeh.resources import INLINE
 
-    data["looks"] = _looks()
-    data["state_colours"] = [_STATE_COLOURS[k % 7] for k in range(len(data["states"]))]
-    figures, sources = _figures(diagram, data)
     document = Document()
-    for figure in figures.values():
-        document.add_root(figure)
-    script = CustomJS(args={**figures, **sources}, code=_resource("page.js"))
-    document.js_on_event("document_ready", script)
-    values = fixed_parameters(diagram.branches).items()
-    fixed = ", ".join(f"{parameter_label(name)} = {value:.6g}" for name, value in values)
+    fill(document, diagram, data)
+    variables = document.template_variables
     return str(
         file_html(
             document,
             INLINE,
-            title=f"{diagram.model.name}: {diagram.parameter}",
-            template=_resource("page.html"),
-            template_variables={
-                "heading": escape(f"{diagram.model.title or diagram.model.name}"),
-                "fixed": escape(_plain(fixed)),
-                "data": _embedded(data),
-            },
+            title=document.title,
+            template=str(document.template),
+            template_variables=variables,
         )
     )
+
+
+def fill(document: Any, diagram: Diagram, data: dict[str, Any]) -> None:
+    """Give a document of bokeh its figures, its script and its template."""
+    from bokeh.models import CustomJS
+
+    data["looks"] = _looks()
+    data["state_colours"] = [_STATE_COLOURS[k % 7] for k in range(len(data["states"]))]
+    figures, sources = _figures(diagram, data)
+    for figure in figures.values():
+        document.add_root(figure)
+    script = CustomJS(args={**figures, **sources}, code=resource("page.js"))
+    document.js_on_event("document_ready", script)
+    document.title = f"{diagram.model.name}: {diagram.parameter}"
+    document.template = resource("page.html")
+    document.template_variables.update(
+        heading=escape(f"{diagram.model.title or diagram.model.name}"),
+        fixed=escape(fixed_text(diagram)),
+        data=_embedded(data),
+    )
+
+
+def fixed_text(diagram: Diagram) -> str:
+    """Return the fixed parameters of a diagram, but zeros, in one line."""
+    values = fixed_parameters(diagram.branches).items()
+    return _plain(", ".join(f"{parameter_label(name)} = {value:.6g}" for name, value in values))
 
 
 def _plain(mathematics: str) -> str:
@@ -144,7 +158,8 @@ def _embedded(data: dict[str, Any]) -> str:
     return text.replace("</", "<\\/")
 
 
-def _resource(name: str) -> str:
+def resource(name: str) -> str:
+    """Return a file that the page consists of."""
     return files("contfric.plot.live").joinpath(name).read_text(encoding="utf-8")
 
 
@@ -186,15 +201,16 @@ def _diagram_glyphs(top: Any) -> dict[str, Any]:
     from bokeh.models import ColumnDataSource, CustomJS, HoverTool, LabelSet
 
     sources: dict[str, Any] = {}
+    kept_here = {"syncable": False}  # filled by the script: nothing of it goes back to a server
     for style, dash in _DASHES.items():
-        source = ColumnDataSource(data={"x": [], "y": [], "colour": []}, name=style)
+        source = ColumnDataSource(data={"x": [], "y": [], "colour": []}, name=style, **kept_here)
         width = _WIDTHS.get(style, LINE_WIDTH) * 1.2  # a screen is coarser than paper
         top.multi_line(
             "x", "y", source=source, line_color="colour", line_dash=dash, line_width=width
         )
         sources[f"{style}_lines"] = source
     names = ("x", "y", "shape", "angle", "face", "size", "label", "meaning")
-    marks = ColumnDataSource(data={name: [] for name in names}, name="marks")
+    marks = ColumnDataSource(data={name: [] for name in names}, name="marks", **kept_here)
     markers = top.scatter(
         "x",
         "y",
@@ -209,7 +225,7 @@ def _diagram_glyphs(top: Any) -> dict[str, Any]:
     top.add_tools(
         HoverTool(renderers=[markers], tooltips=[("@label", "@meaning"), ("at", "@x{0.000000}")])
     )
-    labels = ColumnDataSource(data={"x": [], "y": [], "label": []}, name="labels")
+    labels = ColumnDataSource(data={"x": [], "y": [], "label": []}, name="labels", **kept_here)
     top.add_layout(
         LabelSet(
             x="x",
@@ -221,7 +237,7 @@ def _diagram_glyphs(top: Any) -> dict[str, Any]:
             text_font_size="11px",
         )
     )
-    chosen = ColumnDataSource(data={"x": [], "y": []}, name="chosen")
+    chosen = ColumnDataSource(data={"x": [], "y": []}, name="chosen", **kept_here)
     top.scatter("x", "y", source=chosen, size=15, fill_alpha=0, line_color=BLACK, line_width=2)
     top.js_on_event("tap", CustomJS(code="window.contfric.pick(cb_obj.x, cb_obj.y)"))
     top.js_on_event("rangesupdate", CustomJS(code="window.contfric.thin()"))
