@@ -290,16 +290,24 @@ class Diagram(Shown):
         legend: bool = True,
         names: Mapping[str, str] | None = None,
         colours: Mapping[str, str] | None = None,
+        inset: bool | tuple[float, float] = False,
     ) -> Axes:
         """Draw one quantity of all branches with the bifurcations; behind them the points of a sweep.
 
         ``names`` and ``colours`` say what branches are called in the legend, and their colours, by their
-        signature's name.
+        signature's name. ``inset`` draws a part once more, larger: where events crowd, or (low, high).
         """
         from contfric.plot.diagram import plot_diagram_row
 
         return plot_diagram_row(
-            self, row, ax=ax, overlay=overlay, legend=legend, names=names, colours=colours
+            self,
+            row,
+            ax=ax,
+            overlay=overlay,
+            legend=legend,
+            names=names,
+            colours=colours,
+            inset=inset,
         )
 
     def show(self, height: int = 900) -> Frame:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from contfric.errors import either
 from contfric.plot.events import Mark, draw_marks, label_marks, marks_of
+from contfric.plot.inset import Inset, add_inset
 from contfric.plot.labels import settle
+from contfric.plot.legend import handles_of
 from contfric.plot.look import Look
 from contfric.plot.response import draw_overlay
 from contfric.plot.runs import stability_runs
@@ -20,13 +20,9 @@ from contfric.plot.style import (
     BESIDE,
     BRIDGE,
     BRIDGE_COLOUR,
-    BRIDGE_NAME,
     BRIDGE_WIDTH,
-    GREY,
     LINE_WIDTH,
-    MARKERS,
     MIRROR_WIDTH,
-    OTHER_MARKER,
     SMALL,
     STABLE,
     TEXT,
@@ -106,6 +102,7 @@ def plot_diagram_row(
     overlay: Sweep | None = None,
     names: Mapping[str, str] | None = None,
     colours: Mapping[str, str] | None = None,
+    inset: Inset = False,
 ) -> Axes:
     """Draw one quantity of all branches of a diagram, with its bifurcations.
 
@@ -124,6 +121,8 @@ def plot_diagram_row(
         Simulated points of the same parameter, drawn behind the branches.
     names, colours : mapping, optional
         What branches are called in the legend, and colours of theirs, by their names.
+    inset : bool or (float, float)
+        Whether to draw the part in which events crowd once more, larger; or which part.
 
     Examples
     --------
@@ -133,7 +132,7 @@ def plot_diagram_row(
     """
     row_of(row, _model_of(diagram.branches))  # before a figure is opened for it
     found = diagram.bifurcations if events else ()
-    look = Look.of(diagram.branches, names, colours, legend=legend)
+    look = Look.of(diagram.branches, names, colours, legend=legend, inset=inset)
     new = axes_or_new(ax)
     new.set_xlim(*diagram.range)
     draw_overlay([new], [row], diagram.parameter, overlay)
@@ -150,6 +149,7 @@ def plot_diagram(
     legend: bool = True,
     names: Mapping[str, str] | None = None,
     colours: Mapping[str, str] | None = None,
+    inset: Inset = False,
 ) -> list[Axes]:
     """Draw a diagram in several rows over one parameter axis, as Figs. 4-7 of the reference.
 
@@ -164,7 +164,7 @@ def plot_diagram(
         Simulated points of the same parameter, drawn behind the branches.
     title : str, optional
         What stands above; names of parameters become symbols. The fixed parameters by default.
-    legend, names, colours : optional
+    legend, names, colours, inset : optional
         As for :func:`plot_diagram_row`.
 
     Returns
@@ -179,7 +179,7 @@ def plot_diagram(
     >>> axes = plot_diagram(cf.explore(orbit, "Omega", (0.4, 0.6)), rows=("x_max", "psi"))
     """
     looks = [row_of(row, _model_of(diagram.branches)) for row in rows]
-    look = Look.of(diagram.branches, names, colours, legend=legend)
+    look = Look.of(diagram.branches, names, colours, legend=legend, inset=inset)
     fig = figure_or_new(fig, 8.4, 1.2 + 2.4 * len(rows))
     axes = list(fig.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0])
     axes[0].set_xlim(*diagram.range)
@@ -198,14 +198,14 @@ def plot_diagram(
     fig.align_ylabels(axes)
     if legend:
         mirrors = any(not shown.even for shown in looks)
-        handles = _handles(diagram.branches, marks[0], look, mirrors=mirrors)
+        handles = handles_of(diagram.branches, marks[0], look, mirrors=mirrors)
         if fig.get_layout_engine() is None:
             axes[0].legend(handles=handles, fontsize=sized(SMALL), **BESIDE)
         else:
             legend_of(fig, handles)
     settle(axes[0])
-    for ax, found in zip(axes, marks, strict=True):
-        label_marks(ax, found)
+    for ax, row, found in zip(axes, rows, marks, strict=True):
+        _label_row(ax, diagram.branches, found, row, look)
     return axes
 
 
@@ -237,17 +237,30 @@ def _plot_row(
     mirrors = not row_of(row, _model_of(branches)).even
     _draw_row(ax, branches, marks, row, look)
     if look.legend and outside:
-        handles = _handles(branches, marks, look, mirrors=mirrors)
+        handles = handles_of(branches, marks, look, mirrors=mirrors)
         if for_journal() and isinstance(ax.figure, Figure):
             legend_of(ax.figure, handles)
         else:
             ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **BESIDE)
     settle(ax)
-    label_marks(ax, marks)
+    _label_row(ax, branches, marks, row, look)
     if look.legend and not outside:  # there is no space for the meaning of the markers
-        handles = _handles(branches, (), look, mirrors=mirrors)
+        handles = handles_of(branches, (), look, mirrors=mirrors)
         ax.legend(handles=handles, fontsize=sized(SMALL - 1.0), loc="best")
     return ax
+
+
+def _label_row(
+    ax: Axes, branches: Sequence[Branch], marks: Sequence[Mark], row: QuantityLike, look: Look
+) -> None:
+    """Write the labels of a row: those in an inset there."""
+    inner, others = add_inset(
+        ax, marks, look.inset, lambda inner: _draw_row(inner, branches, marks, row, look)
+    )
+    label_marks(ax, others)
+    if inner is not None:
+        low, high = inner.get_xlim()
+        label_marks(inner, [m for m in marks if low <= m.x <= high])
 
 
 def _draw_row(
@@ -303,39 +316,3 @@ def _draw_bridge(ax: Axes, branch: Branch, row: QuantityLike) -> None:
         )
         for line in lines:
             line.set_gid(branch.name)
-
-
-def _handles(
-    branches: Sequence[Branch], marks: Sequence[Mark], look: Look, *, mirrors: bool
-) -> list[Line2D]:
-    """Return the entries of the legend: branches, meaning of the lines, meaning of the markers.
-
-    Where all rows are even, ``mirrors`` is false: images lie on their originals.
-    """
-    handles = [_line(look.names[name], colour) for name, colour in look.colours.items()]
-    if mirrors and any(b.mirrored for b in branches):
-        handles.append(_line("mirror image: lighter", lighter(GREY), width=MIRROR_WIDTH))
-    regular = [b for b in branches if not b.bridge]
-    known = {bool(s) for b in regular if b.stable is not None for s in b.stable}
-    if True in known:
-        handles.append(_line("stable", GREY))
-    if False in known:
-        handles.append(_line("unstable", GREY, style=UNSTABLE))
-    if any(b.stable is None for b in regular):
-        handles.append(_line("stability not computed", GREY, width=UNKNOWN_WIDTH))
-    if len(regular) < len(branches):
-        handles.append(_line(BRIDGE_NAME, BRIDGE_COLOUR, style=BRIDGE, width=BRIDGE_WIDTH))
-    kinds: dict[str, str] = {}
-    for m in marks:
-        kinds[m.kind.value] = either(kinds.get(m.kind.value, ""), m.meaning)
-    order = [*MARKERS, *(k for k in kinds if k not in MARKERS)]
-    return handles + [_marker(k, kinds[k]) for k in order if k in kinds]
-
-
-def _line(label: str, colour: str, style: Any = STABLE, width: float = LINE_WIDTH) -> Line2D:
-    return Line2D([], [], color=colour, linestyle=style, linewidth=sized(width), label=label)
-
-
-def _marker(kind: str, meaning: str) -> Line2D:
-    marker = MARKERS.get(kind, OTHER_MARKER)
-    return Line2D([], [], label=f"{kind}: {meaning}", **marker.look())

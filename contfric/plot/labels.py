@@ -22,6 +22,9 @@ _DIRECTIONS = 16
 _LINE, _MARKER, _LABEL, _BEYOND = 1.0, 15.0, 500.0, 500.0
 #: Spacing at which lines are sampled, and distance at which equal labels are one, in pixels.
 _SPACING, _ONE = 3.0, 14.0
+#: Of more labels than this equal ones are one within a greater distance (points), and none stands far away:
+#: leader lines that cross tell nothing. Nor does one of many hide more than this (a cost).
+_FEW, _ONE_OF_MANY, _NEAREST, _HIDES = 14, 60.0, 3, 30.0
 #: Radius of a neighbourhood, in points.
 _NEAR = 18.0
 
@@ -43,8 +46,14 @@ def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
     of the axes are set and the layout has converged (:func:`settle`).
     """
     pixels = _point_size(ax)
-    todo = _merged(ax, sorted(anchors, key=lambda a: (a.x, a.y)))
-    lines, markers = _line_pixels(ax), _marker_pixels(ax)
+    todo = _merged(ax, sorted(anchors, key=lambda a: (a.x, a.y)), _ONE)
+    distances: Sequence[float] = _DISTANCES
+    most = _LABEL
+    if len(todo) > _FEW:
+        most = _HIDES
+        todo = _merged(ax, todo, _ONE_OF_MANY * pixels)
+        distances = _DISTANCES[:_NEAREST]
+    lines, markers = line_pixels(ax), marker_pixels(ax)
     taken: list[Bbox] = []
     placed: list[Annotation] = []
     for anchor in todo:
@@ -52,10 +61,12 @@ def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
         label = _annotation(ax, anchor, (0.0, 0.0), leader=False)
         size = np.asarray(label.get_window_extent().size) + 2.0 * pixels
         label.remove()
-        centre, distance, cost = _best_place(ax, at, size, pixels, lines, markers, taken)
-        if cost >= _LABEL:
-            continue  # wherever it stood it would hide another one
+        centre, distance, cost = _best_place(ax, at, size, pixels, lines, markers, taken, distances)
+        if cost >= most:
+            continue  # wherever it stood it would hide another one, or too much
         taken.append(_box(centre, size))
+        if distance > _DISTANCES[0]:  # later labels do not stand on its leader line
+            markers = np.vstack([markers, np.linspace(at, centre, 12)])
         offset = (centre - at) / pixels
         leader = distance > _DISTANCES[0]
         placed.append(_annotation(ax, anchor, (float(offset[0]), float(offset[1])), leader=leader))
@@ -90,12 +101,12 @@ def _root(ax: Axes) -> Figure | None:
     return found if isinstance(found, Figure) else None
 
 
-def _merged(ax: Axes, anchors: Sequence[Anchor]) -> list[Anchor]:
+def _merged(ax: Axes, anchors: Sequence[Anchor], reach: float) -> list[Anchor]:
     kept: list[Anchor] = []
     for anchor in anchors:
         at = ax.transData.transform((anchor.x, anchor.y))
         same = (k for k in kept if k.text == anchor.text)
-        if all(np.hypot(*(ax.transData.transform((k.x, k.y)) - at)) > _ONE for k in same):
+        if all(np.hypot(*(ax.transData.transform((k.x, k.y)) - at)) > reach for k in same):
             kept.append(anchor)
     return kept
 
@@ -125,10 +136,11 @@ def _best_place(
     lines: FloatArray,
     markers: FloatArray,
     taken: Sequence[Bbox],
+    distances: Sequence[float],
 ) -> tuple[FloatArray, float, float]:
     """Return the centre of the cheapest place, in pixels, its distance in points, and its cost."""
     best, place = math.inf, (at, _DISTANCES[0])
-    for distance in _DISTANCES:
+    for distance in distances:
         for k in range(_DIRECTIONS):
             angle = 2.0 * math.pi * (k + 1) / _DIRECTIONS
             towards = np.array([math.cos(angle), math.sin(angle)])
@@ -156,7 +168,7 @@ def _contains(outer: Bbox, inner: Bbox) -> bool:
     return bool(np.all(inner.min >= outer.min) and np.all(inner.max <= outer.max))
 
 
-def _line_pixels(ax: Axes) -> FloatArray:
+def line_pixels(ax: Axes) -> FloatArray:
     """Return points along all lines of the axes, evenly spaced in pixels, shape (m, 2)."""
     found = [np.empty((0, 2))]
     for line in ax.lines:
@@ -175,7 +187,7 @@ def _sampled(points: FloatArray) -> FloatArray:
     return np.column_stack([np.interp(at, along, column) for column in points.T])
 
 
-def _marker_pixels(ax: Axes) -> FloatArray:
+def marker_pixels(ax: Axes) -> FloatArray:
     """Return points all over the markers of the axes, in pixels, shape (m, 2)."""
     angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
     ring = np.column_stack([np.cos(angles), np.sin(angles)])

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from matplotlib.colors import is_color_like
 
 from contfric.errors import ParameterError, did_you_mean
+from contfric.plot.inset import Inset, checked_inset
 from contfric.plot.style import branch_colours
 
 if TYPE_CHECKING:
@@ -17,11 +18,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Look:
-    """How the branches of a diagram are drawn: whether with a legend, and names and colours by signature."""
+    """How a diagram is drawn: with a legend, with insets, and names and colours by signature."""
 
     legend: bool
     names: Mapping[str, str]
     colours: Mapping[str, str]
+    inset: Inset = False
 
     @classmethod
     def of(
@@ -31,6 +33,7 @@ class Look:
         colours: Mapping[str, str] | None,
         *,
         legend: bool,
+        inset: Inset = False,
     ) -> Look:
         """Return the look of some branches; bridges have one colour and one name.
 
@@ -49,4 +52,5 @@ class Look:
                 raise ParameterError(f"colours['{name}']: {colour!r} is no colour of matplotlib")
         own = branch_colours(regular)
         shown = {name: (colours or {}).get(name, own[name]) for name in regular}
-        return cls(legend, {name: (names or {}).get(name, name) for name in regular}, shown)
+        called = {name: (names or {}).get(name, name) for name in regular}
+        return cls(legend, called, shown, checked_inset(inset))

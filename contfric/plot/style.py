@@ -19,11 +19,12 @@ BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 GREY = "#6E6E6E"
 
-#: Colours of the four typical branches; the others take `_OTHERS` in the order of their names.
-_TYPICAL = {"2s": BLUE, "0s": BLACK, "1a": VERMILLION, "2a": GREEN}
+#: Colours of the four typical branches; the others take `_OTHERS` in the order of their names. These four
+#: differ in lightness, too, and the first three others from them to every kind of colour blindness.
+_TYPICAL = {"2s": "#005A9C", "0s": BLACK, "1a": VERMILLION, "2a": "#3DBE95"}
 #: Brightness of a colour that is used a second time.
 _DARKER = 0.6
-_OTHERS = (PURPLE, ORANGE, SKY, "#8B6B00", "#7A3E9D", "#A50F15", GREY)
+_OTHERS = ("#8000E6", "#66331A", "#CC99FF", ORANGE, "#1A1A8C", "#A50F15", GREY)
 
 #: Dark and light of one hue for a domain and its mirror image.
 _DOMAIN_PAIRS = ((BLUE, SKY), (VERMILLION, "#F2A45C"), (GREEN, "#7BCBA9"), (PURPLE, "#EBC3D8"))
@@ -252,7 +253,7 @@ def branch_colours(names: Iterable[str]) -> dict[str, str]:
     Examples
     --------
     >>> branch_colours(["1a", "2s"])
-    {'1a': '#D55E00', '2s': '#0072B2'}
+    {'1a': '#D55E00', '2s': '#005A9C'}
     """
     distinct = list(dict.fromkeys(names))
     others = iter(sorted(set(distinct) - set(_TYPICAL)))

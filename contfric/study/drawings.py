@@ -16,12 +16,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure to draw: its kind, the rows of a diagram, the name of its file, and its width."""
+    """A figure to draw: its kind, the rows of a diagram, its file, its width, and whether it has insets."""
 
     kind: FigureKind
     rows: tuple[Row | str, ...]
     file: str
     journal: Journal | None = None
+    inset: bool = False
 
 
 def drawings_of(located: LocatedYaml, content: StudyFile) -> tuple[Drawing, ...]:
@@ -30,7 +31,7 @@ def drawings_of(located: LocatedYaml, content: StudyFile) -> tuple[Drawing, ...]
     for index, figure in enumerate(content.figures):
         rows = _rows(located, content, index)
         file = _file_name(located, figure, index, [drawing.file for drawing in drawings])
-        drawings.append(Drawing(figure.kind, rows, file, figure.journal))
+        drawings.append(Drawing(figure.kind, rows, file, figure.journal, figure.inset))
     return tuple(drawings)
 
 
@@ -39,6 +40,8 @@ def _rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row | s
     if figure.kind is not FigureKind.DIAGRAM:
         if figure.rows is not None:
             located.fail(("figures", index, "rows"), "only a diagram has rows")
+        if figure.inset:
+            located.fail(("figures", index, "inset"), "only a diagram has insets")
         if figure.kind is FigureKind.BRANCHES:
             _check_task(located, content, index, "a graph of branches")
         if figure.kind is FigureKind.LYAPUNOV and content.lyapunov is None:

@@ -117,7 +117,9 @@ def _paint(path: Path, drawing: Drawing, found: Findings, title: str) -> None:
         assert diagram is not None
         if drawing.kind is FigureKind.DIAGRAM:
             rows = [row_name(row) for row in drawing.rows]
-            axes_of_rows = plot_diagram(diagram, rows, figure, _behind(found, rows), title)
+            axes_of_rows = plot_diagram(
+                diagram, rows, figure, _behind(found, rows), title, inset=drawing.inset
+            )
             _draw_equilibria(axes_of_rows, rows, found)
         else:
             axes = figure.add_subplot()

@@ -277,6 +277,9 @@ class Figure(_Part):
     format: Annotated[Format, Field(strict=False)] | None = Field(
         None, description="one of png, svg, pdf"
     )
+    inset: bool = Field(
+        False, description="true: the part of a diagram in which events crowd is drawn larger"
+    )
     journal: Annotated[Journal, Field(strict=False)] | None = Field(
         None,
         description="single or double: as wide as a column (88 mm) or the page (180 mm) of a journal",

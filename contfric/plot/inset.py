@@ -1,0 +1,113 @@
+"""Insets: the part of a row in which events crowd, drawn larger in an empty corner."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.transforms import Bbox
+
+from contfric.errors import ParameterError
+from contfric.plot.events import Mark
+from contfric.plot.labels import line_pixels, marker_pixels
+from contfric.plot.style import SMALL, sized
+
+#: False, True (where events crowd), or the part of the parameter that is enlarged.
+Inset: TypeAlias = bool | tuple[float, float]
+
+#: Events crowd where so many lie within this share of the range.
+_CROWD, _WINDOW = 4, 0.08
+#: Space on both sides of the first and last of them, as a share of their distance.
+_BESIDE = 0.3
+#: Size of an inset, its distance from the frame, and what is too near to it, as shares of the axes.
+_WIDTH, _HEIGHT, _EDGE, _NEAR = 0.3, 0.4, 0.06, 0.03
+#: An inset rather hides lines than markers: by this factor.
+_MARKERS = 10
+
+
+def checked_inset(inset: object) -> Inset:
+    """Return the part that is asked for.
+
+    Raises
+    ------
+    ParameterError
+        If it is neither a truth value nor two numbers in their order.
+    """
+    if isinstance(inset, bool):
+        return inset
+    try:
+        low, high = (float(value) for value in inset)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        low, high = 1.0, 0.0
+    if not -np.inf < low < high < np.inf:
+        raise ParameterError(
+            f"inset is True, False, or (low, high) of the parameter, got {inset!r}"
+        )
+    return low, high
+
+
+def crowd(marks: Sequence[Mark], width: float) -> tuple[float, float] | None:
+    """Return where the most events lie close together, with space beside them; None where none do.
+
+    Tangencies and events of bridges, which give way to others, do not count.
+    """
+    at = sorted(m.x for m in marks if m.kind.value != "T" and not m.on_bridges)
+    counts = [sum(1 for x in at if 0.0 <= x - first <= _WINDOW * width) for first in at]
+    if not counts or max(counts) < _CROWD:
+        return None
+    k = int(np.argmax(counts))
+    low, high = at[k], at[k + counts[k] - 1]
+    margin = max(_BESIDE * (high - low), 1e-3 * width)
+    return low - margin, high + margin
+
+
+def add_inset(
+    ax: Axes, marks: Sequence[Mark], inset: Inset, draw: Callable[[Axes], None]
+) -> tuple[Axes | None, list[Mark]]:
+    """Draw a part of a row once more, larger; return it, and the marks that it leaves to the others.
+
+    The axes have their limits and their place. Two lines lead from the part to the inset.
+    """
+    low, high = sorted(ax.get_xlim())
+    part = crowd(marks, high - low) if inset is True else inset
+    if not part:
+        return None, list(marks)
+    inner = ax.inset_axes(_emptiest_corner(ax), zorder=5.5)
+    draw(inner)
+    inner.set_xlim(*part)
+    inner.set_ylim(*_extent(inner, marks, *part))
+    inner.set(xlabel="", ylabel="")
+    inner.locator_params(nbins=4)
+    inner.tick_params(labelsize=sized(SMALL - 1.5))
+    ax.indicate_inset_zoom(inner, edgecolor="black", linewidth=0.6)
+    return inner, [m for m in marks if not part[0] <= m.x <= part[1]]
+
+
+def _extent(ax: Axes, marks: Sequence[Mark], low: float, high: float) -> tuple[float, float]:
+    """Return the range of the events between two values of the parameter; of the lines, if there are none."""
+    values = [m.y for m in marks if low <= m.x <= high]
+    if not values:
+        for line in ax.lines:
+            x, y = np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float)
+            values.append(y[(x >= low) & (x <= high) & np.isfinite(y)])
+    found = np.concatenate([*values, np.empty(0)])
+    if not len(found):
+        return ax.get_ylim()
+    margin = 0.2 * float(np.ptp(found)) or 0.1
+    return float(found.min()) - margin, float(found.max()) + margin
+
+
+def _emptiest_corner(ax: Axes) -> tuple[float, float, float, float]:
+    """Return the corner in which least is drawn, as a share of the axes."""
+    points = np.vstack([line_pixels(ax), *[marker_pixels(ax)] * _MARKERS])
+    shares = ax.transAxes.inverted().transform(points) if len(points) else points
+    best, corner = np.inf, (0.0, 0.0)
+    for left in (_EDGE + 0.03, 0.5 * (1.0 - _WIDTH), 1.0 - _EDGE - _WIDTH):
+        for bottom in (1.0 - _EDGE - _HEIGHT, _EDGE + 0.12):
+            box = Bbox.from_bounds(left, bottom, _WIDTH, _HEIGHT).padded(_NEAR)
+            inside = np.all((shares > box.min) & (shares < box.max), axis=1)
+            if (count := int(np.count_nonzero(inside))) < best:
+                best, corner = count, (left, bottom)
+    return (*corner, _WIDTH, _HEIGHT)

@@ -1,0 +1,86 @@
+"""The legend of a diagram: what is seen in it, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.lines import Line2D
+
+from contfric.errors import either
+from contfric.plot.events import Mark
+from contfric.plot.look import Look
+from contfric.plot.style import (
+    BRIDGE,
+    BRIDGE_COLOUR,
+    BRIDGE_NAME,
+    BRIDGE_WIDTH,
+    GREY,
+    LINE_WIDTH,
+    MARKERS,
+    MIRROR_WIDTH,
+    OTHER_MARKER,
+    STABLE,
+    UNKNOWN_WIDTH,
+    UNSTABLE,
+    lighter,
+    sized,
+)
+
+if TYPE_CHECKING:
+    from contfric.continuation.branch import Branch
+
+#: A bridge that is shorter than this share of the axis lies beneath the markers of its ends, and so does a
+#: tangency that is this near to an event.
+_SMALLEST = 0.01
+
+
+def handles_of(
+    branches: Sequence[Branch], marks: Sequence[Mark], look: Look, *, mirrors: bool
+) -> list[Line2D]:
+    """Return the entries of the legend: branches, meaning of the lines, meaning of the markers.
+
+    Where all rows are even, ``mirrors`` is false: images lie on their originals.
+    """
+    handles = [_line(look.names[name], colour) for name, colour in look.colours.items()]
+    if mirrors and any(b.mirrored for b in branches):
+        handles.append(_line("mirror image: lighter", lighter(GREY), width=MIRROR_WIDTH))
+    regular = [b for b in branches if not b.bridge]
+    known = {bool(s) for b in regular if b.stable is not None for s in b.stable}
+    if True in known:
+        handles.append(_line("stable", GREY))
+    if False in known:
+        handles.append(_line("unstable", GREY, style=UNSTABLE))
+    if any(b.stable is None for b in regular):
+        handles.append(_line("stability not computed", GREY, width=UNKNOWN_WIDTH))
+    width = max((float(b.values.max()) for b in branches), default=0.0)
+    width -= min((float(b.values.min()) for b in branches), default=0.0)
+    zoomed = bool(look.inset)
+    bridges = [b for b in branches if b.bridge]
+    if any(zoomed or float(np.ptp(b.values)) > _SMALLEST * width for b in bridges):
+        handles.append(_line(BRIDGE_NAME, BRIDGE_COLOUR, style=BRIDGE, width=BRIDGE_WIDTH))
+    kinds: dict[str, str] = {}
+    for m in marks if zoomed else _seen(marks, width):
+        kinds[m.kind.value] = either(kinds.get(m.kind.value, ""), m.meaning)
+    order = [*MARKERS, *(k for k in kinds if k not in MARKERS)]
+    return handles + [_marker(k, kinds[k]) for k in order if k in kinds]
+
+
+def _line(label: str, colour: str, style: Any = STABLE, width: float = LINE_WIDTH) -> Line2D:
+    return Line2D([], [], color=colour, linestyle=style, linewidth=sized(width), label=label)
+
+
+def _marker(kind: str, meaning: str) -> Line2D:
+    marker = MARKERS.get(kind, OTHER_MARKER)
+    return Line2D([], [], label=f"{kind}: {meaning}", **marker.look())
+
+
+def _seen(marks: Sequence[Mark], width: float) -> list[Mark]:
+    """Return the marks that do not lie beneath others: a tangency is a small stroke."""
+    large = [m.x for m in marks if m.kind.value != "T"]
+    return [
+        m
+        for m in marks
+        if m.kind.value != "T" or all(abs(m.x - x) > _SMALLEST * width for x in large)
+    ]

@@ -1,0 +1,165 @@
+"""Figures for papers: colours that everybody can tell apart, insets, labels that thin out."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+from matplotlib.text import Annotation, Text
+
+import contfric as cf
+from contfric.plot import new_figure, plot_diagram
+from contfric.plot.inset import crowd
+from contfric.plot.labels import Anchor, place_labels
+from contfric.plot.style import _OTHERS, _TYPICAL, MARKERS, STABLE, UNSTABLE
+
+#: Severe colour blindness, in linear RGB (Machado, Oliveira and Fernandes, 2009).
+BLIND = {
+    "none": np.eye(3),
+    "protanopia": [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ],
+    "deuteranopia": [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ],
+    "tritanopia": [
+        [1.255528, -0.076749, -0.178779],
+        [-0.078411, 0.930809, 0.147602],
+        [0.004733, 0.691367, 0.303900],
+    ],
+}
+#: sRGB to CIE XYZ, and its white.
+XYZ = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+WHITE = [0.9505, 1.0, 1.089]
+#: The branches that most diagrams have, and the first of those that they have besides.
+FIRST = [*_TYPICAL.values(), *_OTHERS[:3]]
+
+
+def linear(colour: str) -> np.ndarray:
+    c = np.array(to_rgb(colour))
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+def lab(rgb: np.ndarray) -> np.ndarray:
+    """Return CIE L*a*b*, in which a distance of 2 is just noticed."""
+    xyz = np.asarray(XYZ) @ np.clip(rgb, 0.0, 1.0) / WHITE
+    f = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16.0 / 116.0)
+    return np.array([116.0 * f[1] - 16.0, 500.0 * (f[0] - f[1]), 200.0 * (f[1] - f[2])])
+
+
+def test_the_measure_knows_red_from_green() -> None:
+    """The check itself: what looks the same to the colour-blind is near."""
+    seen = {
+        name: [lab(np.asarray(m) @ linear(c)) for c in ("#D55E00", "#8B6B00")]
+        for name, m in BLIND.items()
+    }
+    assert np.linalg.norm(np.subtract(*seen["protanopia"])) < 5.0
+    assert np.linalg.norm(np.subtract(*seen["none"])) > 30.0
+
+
+@pytest.mark.parametrize("kind", BLIND)
+def test_branches_are_told_apart_by_the_colour_blind(kind: str) -> None:
+    seen = {c: lab(np.asarray(BLIND[kind]) @ linear(c)) for c in FIRST}
+    for one, other in combinations(FIRST, 2):
+        assert np.linalg.norm(seen[one] - seen[other]) > 25.0, (one, other)
+
+
+def test_the_typical_branches_are_told_apart_without_colours() -> None:
+    grey = sorted(lab(linear(c))[0] for c in _TYPICAL.values())
+    assert min(np.diff(grey)) > 14.0
+    assert max(grey) < 75.0  # and seen on white paper
+
+
+def test_what_matters_is_told_by_more_than_colour() -> None:
+    """Stability by dashes, kinds of events by shapes."""
+    assert STABLE != UNSTABLE
+    assert len({look.shape for look in MARKERS.values()}) == len(MARKERS)
+
+
+# ------------------------------------------------------------------------------------ insets
+
+
+@pytest.fixture(scope="module")
+def diagram() -> cf.Diagram:
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    return cf.explore(orbit, "Omega", (0.4, 0.6))
+
+
+def labels(ax: Any) -> set[str]:
+    return {t.get_text() for t in ax.texts if isinstance(t, Annotation) and t.get_text()}
+
+
+@pytest.mark.parametrize("row", ["x_max", "psi"])
+def test_an_inset_has_the_labels_of_its_part_and_hides_little(
+    diagram: cf.Diagram, row: str
+) -> None:
+    ax = diagram.plot(row=row, inset=(0.4875, 0.4935))
+    (inner,) = ax.child_axes
+    assert inner.get_xlim() == (0.4875, 0.4935)
+    assert {t[9:11] for t in labels(inner)} == {"BP", "SS"}
+    assert {t[9:11] for t in labels(ax)} == {"SN", "CS"}
+    ax.figure.canvas.draw()
+    frame = inner.get_window_extent()
+    points = np.vstack([ax.transData.transform(line.get_xydata()) for line in ax.lines])
+    assert not any(frame.contains(x, y) for x, y in points)
+    for line in inner.lines:
+        if line.get_gid() == "2a" and line.get_marker() == "None":
+            low, high = inner.get_ylim()
+            assert low < np.nanmin(line.get_ydata()) and np.nanmax(line.get_ydata()) < high
+
+
+def test_where_events_crowd_is_found(diagram: cf.Diagram) -> None:
+    marks = _marks(diagram)
+    assert crowd(marks, 0.2) is None  # there are three, and tangencies do not count
+    wide = crowd(marks, 1.0)
+    assert wide is not None and wide[0] < 0.4887 and wide[1] > 0.5419
+    assert plot_diagram(diagram, ("psi",), inset=True)[0].child_axes == []
+
+
+def _marks(diagram: cf.Diagram) -> Any:
+    from contfric.plot.events import marks_of
+
+    return marks_of(diagram.bifurcations, diagram.branches, "psi", "Omega")
+
+
+def test_an_inset_makes_the_legend_say_more(diagram: cf.Diagram) -> None:
+    def known(ax: Any) -> list[str]:
+        return [t.get_text() for t in ax.get_legend().get_texts()]
+
+    more = set(known(diagram.plot(inset=(0.4875, 0.4935)))) - set(known(diagram.plot()))
+    assert {word.split(":")[0].split()[0] for word in more} == {"bridge", "T"}
+
+
+@pytest.mark.parametrize("inset", [3, "x", (0.5,), (0.6, 0.5), (0.4, float("nan")), None])
+def test_insets_that_are_none(diagram: cf.Diagram, inset: Any) -> None:
+    with pytest.raises(cf.ParameterError, match="inset is True, False, or"):
+        diagram.plot(inset=inset)
+
+
+# ------------------------------------------------------------------------------------ labels
+
+
+def test_many_labels_stand_near_their_points_and_are_not_repeated() -> None:
+    """A thicket: forty events along a line, of three names."""
+    ax = new_figure(7.0, 4.0).add_subplot()
+    ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+    anchors = [Anchor(0.02 + k / 41, 0.5, f"event {k % 3}") for k in range(40)]
+    placed = place_labels(ax, anchors)
+    FigureCanvasAgg(ax.figure).draw()
+    assert 10 < len(placed) < 40
+    boxes = [Text.get_window_extent(label) for label in placed]
+    assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
+    pixels = ax.figure.dpi / 72.0
+    for label in placed:
+        assert np.hypot(*label.xyann) < 45.0  # points
+        same = [o for o in placed if o is not label and o.get_text() == label.get_text()]
+        gaps = [abs(np.subtract(*ax.transData.transform([o.xy, label.xy]))[0]) for o in same]
+        assert min(gaps) > 60.0 * pixels
