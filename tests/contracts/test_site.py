@@ -114,7 +114,11 @@ def test_lists_go_on_where_they_do_on_github(page: Path) -> None:
     assert re.findall(r"^ {4}[^ *\n-].*\n(?:[*-]|\d+\.) .*", prose(page), re.MULTILINE) == []
 
 
-@pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=relative)
+@pytest.mark.parametrize(
+    "page",
+    [*(ROOT / f"{n}.md" for n in ("README", "CONTRIBUTING", "CHANGELOG")), *PAGES],
+    ids=relative,
+)
 def test_links_resolve(page: Path) -> None:
     assert wrong_links(page) == []
 

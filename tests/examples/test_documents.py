@@ -32,6 +32,7 @@ HERE = {
     "README": "SN_1a",
     "docs/guide": "SN_1a",
     "docs/index": "",
+    "docs/figures": "",
     "docs/live-diagram": "",
     "docs/lugre": "Branch 0s, 2seg",
     "docs/gallery/impact-friction": "",
@@ -146,8 +147,8 @@ def test_notebooks_say_what_they_say(path: Path) -> None:
         assert values[1] == pytest.approx(values[0], rel=1e-5, abs=1e-9)
 
 
-def test_the_model_in_the_readme_is_one(tmp_path: Path) -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_the_model_on_the_first_page_is_one(tmp_path: Path) -> None:
+    text = (DOCS / "index.md").read_text(encoding="utf-8")
     (found,) = [b for b in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if "modes:" in b]
     path = tmp_path / "bilinear.yaml"
     path.write_text(found, encoding="utf-8")
