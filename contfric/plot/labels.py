@@ -54,7 +54,8 @@ def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
         todo = _merged(ax, todo, _ONE_OF_MANY * pixels)
         distances = _DISTANCES[:_NEAREST]
     lines, markers = line_pixels(ax), marker_pixels(ax)
-    taken: list[Bbox] = []
+    insets = [child.get_tightbbox() for child in ax.child_axes if isinstance(child, Axes)]
+    taken: list[Bbox] = [box for box in insets if box is not None]  # with their numbers
     placed: list[Annotation] = []
     for anchor in todo:
         at = np.asarray(ax.transData.transform((anchor.x, anchor.y)))

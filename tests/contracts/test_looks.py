@@ -108,6 +108,9 @@ def test_an_inset_has_the_labels_of_its_part_and_hides_little(
     assert {t[9:11] for t in labels(ax)} == {"SN", "CS"}
     ax.figure.canvas.draw()
     frame = inner.get_window_extent()
+    frame_and_numbers = inner.get_tightbbox()
+    texts = [Text.get_window_extent(t) for t in ax.texts if isinstance(t, Annotation)]
+    assert not any(frame_and_numbers.overlaps(box) for box in texts)
     points = np.vstack([ax.transData.transform(line.get_xydata()) for line in ax.lines])
     assert not any(frame.contains(x, y) for x, y in points)
     for line in inner.lines:
