@@ -7,6 +7,7 @@ import importlib
 import json
 import pkgutil
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,8 @@ import matplotlib
 import pytest
 
 import contfric
+from contfric.cli.parser import parse
+from contfric.study import read_study
 
 matplotlib.use("Agg")
 ROOT = Path(__file__).parents[2]
@@ -70,6 +73,34 @@ def test_no_page_has_code_that_is_not_run() -> None:
     for name in ELSEWHERE:
         own = (ROOT / f"tests/examples/test_{name}_page.py").read_text(encoding="utf-8")
         assert f"{name}.md" in own and "exec(" in own
+
+
+def test_commands_are_commands() -> None:
+    """Every line of a console is understood by the program, or is a target of make."""
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    tried = 0
+    for page in [ROOT / "README.md", *DOCS.rglob("*.md")]:
+        for block in re.findall(r"```console\n(.*?)```", page.read_text("utf-8"), re.DOTALL):
+            for line in re.findall(r"^\$ (.*)", block, re.MULTILINE):
+                program, *arguments = shlex.split(line, comments=True)
+                tried += 1
+                if program == "make":
+                    assert set(arguments) <= targets, line
+                elif program == "python":  # a measurement, which takes long
+                    (code,) = re.findall(r"<<'EOF'\n(.*?)^EOF$", block, re.DOTALL | re.MULTILINE)
+                    compile(code, str(page), "exec")
+                else:
+                    assert program == "contfric", line
+                    parse(arguments)  # ends the program if it does not understand
+    assert tried >= 8
+
+
+def test_the_study_on_the_first_page_is_one(tmp_path: Path) -> None:
+    (found,) = re.findall(
+        r"```yaml\n(title:.*?)```", (DOCS / "index.md").read_text("utf-8"), re.DOTALL
+    )
+    (tmp_path / "study.yaml").write_text(found, encoding="utf-8")
+    assert read_study(tmp_path / "study.yaml").title == "Asymmetry against kinetic friction"
 
 
 #: Of each notebook of the tutorial: a word that it prints. The second one compiles its model first.
