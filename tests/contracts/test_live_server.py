@@ -144,6 +144,37 @@ def test_a_browser_drags(url: str) -> None:
         browser.quit()
 
 
+NOTEBOOK = """
+import contfric as cf
+orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+live = cf.explore(orbit, "Omega", (0.49, 0.51)).live()
+live
+---
+import asyncio, urllib.request
+page = await asyncio.to_thread(lambda: urllib.request.urlopen(live.url).read().decode())
+live.stop()
+page.count("contfric-data")
+"""
+
+
+@pytest.mark.slow
+def test_a_notebook_serves_it_while_it_goes_on() -> None:
+    """In a process of its own: the libraries of notebooks warn of much that is not ours."""
+    script = (
+        "import sys, nbformat.v4 as v4; from nbclient import NotebookClient;"
+        "cells = [v4.new_code_cell(text) for text in sys.argv[1].split('---')];"
+        "book = NotebookClient(v4.new_notebook(cells=cells), timeout=300).execute();"
+        "print(*[o['data'] for c in book.cells for o in c['outputs']], sep='\\n')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, NOTEBOOK], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    frame, count = done.stdout.splitlines()
+    assert '<iframe src="http://localhost:' in frame
+    assert "'1'" in count or "'2'" in count
+
+
 def test_without_a_diagram_nothing_is_served(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
