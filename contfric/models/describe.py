@@ -16,6 +16,7 @@ from contfric.models.measuring import measured
 from contfric.models.names import Names
 from contfric.models.quantity_entries import check_quantities, read_quantities
 from contfric.models.shorthand import expanded
+from contfric.models.units import APPLIED, KEY, read_units
 
 KEYS = (
     *("name", "title", "references", "states", "parameters", "constraints", "period"),
@@ -32,6 +33,8 @@ KEYS = (
     ),
     "max_step",
     "quantities",
+    KEY,
+    APPLIED,
     LAWS,
 )
 _PARAMETER = ("default", "meaning")
@@ -115,6 +118,7 @@ def _described(data: dict[str, Any]) -> Description:
         max_step=_max_step(top),
         quantities=read_quantities(top),
         laws=read_laws(top),
+        units=tuple(read_units(top, APPLIED, states).items()),
     )
     _check_expressions(found, names)
     return measured(found)
