@@ -17,6 +17,7 @@ from contfric.models.names import Names
 from contfric.models.quantity_entries import check_quantities, read_quantities
 from contfric.models.shorthand import expanded
 from contfric.models.units import APPLIED, KEY, read_units
+from contfric.yaml_lines import comma_hint
 
 KEYS = (
     *("name", "title", "references", "states", "parameters", "constraints", "period"),
@@ -177,7 +178,8 @@ def _period(top: Part) -> str:
 def _expression(part: Part, key: str) -> str:
     value = part.data[key]
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        part.fail(key, f"'{key}' must be an expression, got {value!r}")
+        hint = comma_hint(key, value)
+        part.fail(key, f"'{key}' must be an expression, got {value!r}{hint}")
     return " ".join(str(value).split())
 
 
