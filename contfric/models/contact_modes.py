@@ -23,12 +23,13 @@ from contfric.models.grammar import Scope, names_in, number_of, parse
 from contfric.models.matrices import summed, times
 from contfric.models.not_affine import NotAffineError
 from contfric.models.structure import COORDINATES, Structure, defaults_of
+from contfric.models.units import read_units
 
 #: What a model of a structure has of its own; everything else is as in any model.
 KEYS = (COORDINATES, "mass", "damping", "stiffness", "force", "contacts")
 _OTHERS = (
     *("name", "title", "references", "parameters", "constraints", "period", "autonomous", "define"),
-    *("observables", "symmetry", "spread", "integration", "max_step", "quantities"),
+    *("observables", "symmetry", "spread", "units", "integration", "max_step", "quantities"),
 )
 _T = TypeVar("_T")
 #: How far the order of a harmonic may be from an odd number: rounding.
@@ -85,8 +86,9 @@ class _Modes:
             "modes": modes,
             "forces": laws_of(self.structure, self.states),
             "departures": [d for c in self.contacts for d in self._departures(c)],
-            "spread": {**dict.fromkeys(states, "1"), **mapping_in(kept, "spread")},
+            "spread": mapping_in(kept, "spread"),
         }
+        found |= {"units": self._units(stretches)} if "units" in kept else {}
         resets = self._resets()
         found |= {"resets": resets} if resets else {}
         if "symmetry" not in kept and self._is_symmetric():
@@ -95,6 +97,14 @@ class _Modes:
                 [*images, *(["t -> t + T/2"] if "period" in kept else [])]
             )
         return found
+
+    def _units(self, stretches: Sequence[str]) -> dict[str, Any]:
+        """Return the units that are given, and what follows for velocities and stretches."""
+        given = mapping_in(self.top.data, "units")
+        numbers = read_units(self.top, "units", (*self.coordinates, *self.velocities, *stretches))
+        time, lengths = numbers.get("t", 1.0), [numbers.get(q, 1.0) for q in self.coordinates]
+        found: dict[str, Any] = {v: q / time for v, q in zip(self.velocities, lengths, strict=True)}
+        return {**found, **dict.fromkeys(stretches, max(lengths)), **given}
 
     def _is_symmetric(self) -> bool:
         """Tell whether the motion of the opposite states half a period later is one, too, at the defaults."""

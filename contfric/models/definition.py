@@ -115,6 +115,8 @@ class Model(Shown, TransitionMaps):
     ball_factory : callable or None
         ``ball_factory(params, free)`` returns the model in balls (:mod:`contfric.models.balls`), of a
         model that is not declared by its equations; None if it has none.
+    units : tuple of (str, float)
+        The unit of each state, and of the time ``t``, that has one: results are numbers in these units.
     definition : str
         Text from which the model can be built; empty if it is known by its name only.
     """
@@ -143,6 +145,7 @@ class Model(Shown, TransitionMaps):
     rounding: float = 1e-13
     displacement: str = ""
     quantities: tuple[tuple[str, str], ...] = ()
+    units: tuple[tuple[str, float], ...] = ()
     ball_factory: Callable[[Mapping[str, Any], str | None], BallModel] | None = field(
         default=None, repr=False
     )
@@ -181,6 +184,8 @@ class Model(Shown, TransitionMaps):
         """Say what the model is, and how its modes move."""
         values = ", ".join(f"{p.name} = {p.default:g}" for p in self.parameters)
         lines = [f"Model {self.name}: {self.title}", f"  states: {', '.join(self.states)}"]
+        if self.units:
+            lines.append(f"  in units of: {', '.join(f'{n} {u:g}' for n, u in self.units)}")
         closed = [f"  closed form: {', '.join(self.closed_form)}"] if self.closed_form else []
         rest = [f"  integrated: {mode} ({reason})" for mode, reason in self.integrated.items()]
         return "\n".join([*lines, f"  parameters: {values}", *closed, *rest])

@@ -103,6 +103,7 @@ def model_from(description: Description) -> Model:
         turned=turned_modes(sampler, surfaces, declared),
         max_step=description.max_step,
         quantities=description.quantities,
+        units=description.units,
         definition=description.text,
     )
     if undecided := model.undecided():

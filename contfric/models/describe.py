@@ -16,6 +16,8 @@ from contfric.models.measuring import measured
 from contfric.models.names import Names
 from contfric.models.quantity_entries import check_quantities, read_quantities
 from contfric.models.shorthand import expanded
+from contfric.models.units import APPLIED, KEY, read_units
+from contfric.yaml_lines import comma_hint
 
 KEYS = (
     *("name", "title", "references", "states", "parameters", "constraints", "period"),
@@ -32,6 +34,8 @@ KEYS = (
     ),
     "max_step",
     "quantities",
+    KEY,
+    APPLIED,
     LAWS,
 )
 _PARAMETER = ("default", "meaning")
@@ -115,6 +119,7 @@ def _described(data: dict[str, Any]) -> Description:
         max_step=_max_step(top),
         quantities=read_quantities(top),
         laws=read_laws(top),
+        units=tuple(read_units(top, APPLIED, states).items()),
     )
     _check_expressions(found, names)
     return measured(found)
@@ -173,7 +178,8 @@ def _period(top: Part) -> str:
 def _expression(part: Part, key: str) -> str:
     value = part.data[key]
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        part.fail(key, f"'{key}' must be an expression, got {value!r}")
+        hint = comma_hint(key, value)
+        part.fail(key, f"'{key}' must be an expression, got {value!r}{hint}")
     return " ".join(str(value).split())
 
 

@@ -61,6 +61,7 @@ class Description:
     max_step : largest step of a continuation where the user gives none; None for the engine's
     quantities : (name, expression) of each quantity that the file declares
     laws : what the contacts of a structure carry and dissipate
+    units : (state or t, its unit): all formulas are in these (:mod:`contfric.models.units`)
     """
 
     name: str
@@ -89,6 +90,7 @@ class Description:
     max_step: float | None = None
     quantities: tuple[tuple[str, str], ...] = ()
     laws: tuple[ContactLaws, ...] = ()
+    units: tuple[tuple[str, float], ...] = ()
 
     def data(self) -> dict[str, Any]:
         """Return the description in the schema of the YAML files, with nothing left out."""
@@ -141,6 +143,8 @@ class Description:
             found["quantities"] = dict(self.quantities)
         if self.laws:
             found[LAWS] = written(self.laws)
+        if self.units:
+            found["in_units"] = dict(self.units)
         return found
 
     def _mode(self, mode: ModeText) -> dict[str, Any]:
@@ -158,9 +162,9 @@ class Description:
     @cached_property
     def motion(self) -> str:
         """The same of what motion depends on: without steps of a continuation, and what is measured."""
-        if self.max_step is None and not self.quantities and not self.laws:
+        if self.max_step is None and not self.quantities and not self.laws and not self.units:
             return self.text
-        return replace(self, max_step=None, quantities=(), laws=()).text
+        return replace(self, max_step=None, quantities=(), laws=(), units=()).text
 
     @cached_property
     def names(self) -> Names:

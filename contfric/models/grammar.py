@@ -32,6 +32,7 @@ FUNCTIONS = (*UNARY, "min", "max", "where")
 #: Names with a fixed meaning: time, and the period of the excitation (in a symmetry only).
 TIME, PERIOD, PI = "t", "T", "pi"
 RESERVED = (TIME, PERIOD, PI, *FUNCTIONS)
+_MEANINGS = {TIME: "the time", PERIOD: "the period of the excitation", PI: "the number pi"}
 
 #: A formula is a line or two; a longer text is a mistake, and Python's parser has limits of its own.
 _LONGEST, _DEEPEST = 5000, 60
@@ -232,7 +233,8 @@ def check_name(name: object, what: str) -> str:
     if keyword.iskeyword(name):
         raise ModelError(f"{what} '{name}': this is a word of Python; take another name")
     if name in RESERVED:
-        raise ModelError(f"{what} '{name}': this name has a fixed meaning; take another one")
+        meaning = _MEANINGS.get(name, "a function")
+        raise ModelError(f"{what} '{name}': this name means {meaning}; take another one")
     if unicodedata.normalize("NFKC", name) != name:
         raise ModelError(f"{what} '{name}': write it with plain letters")
     return name

@@ -108,6 +108,7 @@ class OscillatorModel:
     integration: ClassVar[Mapping[str, Any]] = {}
     max_step: ClassVar[float | None] = None
     quantities: ClassVar[Mapping[str, str]] = {}
+    units: ClassVar[Mapping[str, float]] = {}
 
     def period(self, p: Symbols) -> Any:
         """Return the period of the excitation; None (as here) if there is none."""
@@ -190,6 +191,7 @@ def _data(oscillator: OscillatorModel) -> dict[str, Any]:
         "integration": dict(oscillator.integration),
         "max_step": oscillator.max_step,
         "quantities": dict(oscillator.quantities),
+        "units": dict(oscillator.units),
     }
     data.update({"autonomous": True} if period is None else {"period": _text(period)})
     return data

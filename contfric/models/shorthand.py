@@ -1,4 +1,4 @@
-"""What a model says in short, written out: structures, ties, clocks, angles, sliding that is derived.
+"""What a model says in short, written out: structures, ties, clocks, angles, units, sliding that is derived.
 
 Each is put into the data of a model, before it is read, as if it had been typed: nothing behind knows of it.
 """
@@ -14,6 +14,7 @@ from contfric.models.contact_modes import with_contacts
 from contfric.models.description import Description
 from contfric.models.entries import Part
 from contfric.models.tied import with_ties_put_in
+from contfric.models.units import in_units
 
 
 def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]) -> Description:
@@ -32,6 +33,7 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
     if not _is_regular(data):
         return read(data)  # which says what is wrong, and where
     surfaces, plain = _derived_sliding(with_angles(with_clock(with_ties_put_in(data))))
+    plain = in_units(plain, read)
     found = read(plain)
     if surfaces:
         from contfric.models.filippov import sliding_parts

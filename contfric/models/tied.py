@@ -158,7 +158,7 @@ def _named(name: str, ties: Mapping[str, str]) -> str:
 
 def _substituted(data: dict[str, Any], ties: Mapping[str, str]) -> dict[str, Any]:
     """Return a model's data with expressions in the place of parameters."""
-    put = _Put(ties)
+    put = Substitution(ties)
     found = dict(data)
     found["parameters"] = {k: v for k, v in data["parameters"].items() if k not in ties}
     found["constraints"] = {put.condition(text): why for text, why in data["constraints"].items()}
@@ -186,7 +186,7 @@ def _substituted(data: dict[str, Any], ties: Mapping[str, str]) -> dict[str, Any
     return found
 
 
-class _Put(ast.NodeTransformer):
+class Substitution(ast.NodeTransformer):
     """Puts expressions in the place of names."""
 
     def __init__(self, ties: Mapping[str, str]) -> None:

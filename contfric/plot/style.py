@@ -121,6 +121,20 @@ _GREEK = frozenset(
 )
 
 
+#: Rows that are times; those that are states; a diagram of other rows has no unit of the model in it.
+_TIMES, _STATES = frozenset({"period"}), frozenset({"x_max", "x_min", "stops"})
+
+
+def _in_units(row: Row, name: str, model: Model | None) -> Row:
+    """Return a row whose label says in what unit of the model it is."""
+    units = dict(model.units) if model is not None else {}
+    if model is not None and name in _STATES:
+        unit = units.get(model.states[0], 1.0)
+    else:
+        unit = units.get("t", 1.0) if name in _TIMES else 1.0
+    return row if unit == 1.0 else Row(f"{row.label} / {unit:g}", row.even)
+
+
 def row_of(asked: QuantityLike, model: Model | None) -> Row:
     """Return a row: any quantity of the model; without a model, one of :data:`ROWS`.
 
@@ -130,7 +144,7 @@ def row_of(asked: QuantityLike, model: Model | None) -> Row:
         If there is no such quantity.
     """
     if isinstance(asked, str) and asked in ROWS:
-        return ROWS[asked]
+        return _in_units(ROWS[asked], asked, model)
     names = [*NAMED, *(n for n, _ in model.quantities)] if model is not None else [*ROWS]
     word = isinstance(asked, str) and asked.isidentifier()
     if model is None or (word and asked not in names):

@@ -32,7 +32,6 @@ JUMPS = {
     "sign": "sign(cos(w*t))",
     "pole": "0.1*tan(w*t/2)",
     "step in x": "where(x > 0.1, 0.5, 0)",
-    "pole in x": "0.01/(x - 0.2)",
 }
 #: Steep, but smooth; kinks; and a jump that the modes' sides decide.
 SMOOTH = {
@@ -60,6 +59,15 @@ def test_jumps_are_refused(tmp_path, name) -> None:
     assert "surface" in found.message
 
 
+@pytest.mark.parametrize("force", ["0.01/(x - 0.2)", "v*x/(1 + x)"])
+def test_a_pole_in_a_state_is_warned_of(tmp_path, force: str) -> None:
+    """Prey and predators are positive: a pole where no motion comes is no fault."""
+    report = report_of(tmp_path, "pole", force)
+    assert report.ok
+    (found,) = {f.message for f in report.findings if f.topic.name == "CONTINUITY"} or [""]
+    assert "has a pole along x" in found
+
+
 @pytest.mark.parametrize("name", SMOOTH)
 def test_what_is_steep_or_has_kinks_is_no_jump(tmp_path, name) -> None:
     report = report_of(tmp_path, name, SMOOTH[name])
@@ -75,3 +83,38 @@ def test_an_observable_that_jumps_is_refused(tmp_path) -> None:
         f for f in cf.check_model(tmp_path / "model.yaml").findings if f.topic.name == "CONTINUITY"
     ]
     assert "the observable 'u'" in found.message
+
+
+SAMPLED = """
+name: sampled
+states: [x, s]
+parameters: {{ref: 0.3, Ts: 0.4}}
+period: Ts
+{modes}
+resets: {{tick: {{s: '{map}'}}}}
+"""
+
+
+#: The same motion in one mode, and in two with a surface between them at which nothing changes.
+ONE = "modes: {only: {field: {x: -x + s, s: 0}}}"
+TWO = """surfaces: {mid: {observable: x, level: ref}}
+field: {x: -x + s, s: 0}
+modes: {low: {in: {mid: -}}, high: {in: {mid: +}}}"""
+
+
+@pytest.mark.parametrize("modes", [ONE, TWO])
+@pytest.mark.parametrize(
+    ("map", "jumps"),
+    [
+        ("sign(ref - x)", True),
+        ("where(x > ref, -1, 0.5*x)", True),
+        ("tanh(40*(ref - x))", False),
+        ("max(ref - x, 0)", False),
+        ("where(x > ref, 0, x - ref)", False),
+    ],
+)
+def test_a_reset_that_jumps_is_refused(tmp_path, modes: str, map: str, jumps: bool) -> None:
+    (tmp_path / "model.yaml").write_text(SAMPLED.format(map=map, modes=modes), encoding="utf-8")
+    report = cf.check_model(tmp_path / "model.yaml")
+    assert report.ok != jumps
+    assert any("behind the reset at 'tick' jumps" in f.message for f in report.findings) == jumps

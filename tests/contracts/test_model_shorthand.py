@@ -78,6 +78,11 @@ RAMP = "low + (high - low)*{}/Ts"
         ("pendulum", "angles", ["phi"], "angles", "'phi' is no state"),
         ("pendulum", "surfaces/theta+", {"observable": "theta"}, "surfaces", "begins again"),
         ("relay", "modes/third", {"field": {"x": "v", "v": "0"}}, "modes", "to: third"),
+        ("relay", "units", {"y": 2.0}, "units", "unknown key 'y'"),
+        ("relay", "units", {"x": "h"}, "units", "a positive number"),
+        ("relay", "units", {"x": -1.0}, "units", "a positive number"),
+        ("relay", "units", [2.0], "units", "a mapping of states and t"),
+        ("pendulum", "units", {"theta": 2.0}, "units", "is an angle"),
     ],
 )
 def test_mistakes_are_told_in_their_place(

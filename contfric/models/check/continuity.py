@@ -3,12 +3,13 @@
 A field that jumps (a sawtooth written as ``atan(tan(t))``, a condition on time) is integrated across the jump
 as if there were none: orbits are wrong, or called aperiodic. Fields and observables are followed along time
 and along each state, as far as the mode goes; where they change most over one sample the interval is halved.
-What does not shrink with it is a jump.
+What does not shrink with it is a jump. So are maps of resets, between states that meet their surface.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from itertools import pairwise
 
@@ -16,7 +17,8 @@ import numpy as np
 
 from contfric.models.check.probe import ON, Probe
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.definition import FloatArray
+from contfric.models.check.structure import arrivals
+from contfric.models.definition import Domain, FloatArray, Reset
 
 #: States of each mode from which lines are followed, and samples of a line.
 _STATES, _SAMPLES = 2, 160
@@ -30,24 +32,37 @@ _HALVINGS = 52
 
 #: A line in a mode: its point (t, y) at a place.
 Line = Callable[[float], tuple[float, FloatArray]]
+Sides = frozenset[tuple[str, int]]
 
 
 def check_continuity(report: ModelReport, probe: Probe) -> None:
     """Check that no field and no observable jumps inside of a mode."""
+    pole = False
     for mode in probe.model.modes:
         for name, line, low, high in _lines(probe, mode.name):
             report.count(Topic.CONTINUITY)
-            found = _jump_along(probe, mode.name, line, low, high)
+            found = jump_along(partial(_values_on, probe, mode.name, line), low, high)
             if found is None:
                 continue
-            what, at, by = found
+            k, at, by = found
+            what = _names(probe)[k]
             t, y = line(at)
             where = ", ".join(f"{s} = {v:.6g}" for s, v in zip(probe.model.states, y, strict=True))
+            where = f"along {name}, at t = {t:.9g}, {where}"
+            if name != "t" and not math.isfinite(by):  # motion that comes there ends, and says so
+                if not pole:
+                    report.warn(
+                        Topic.CONTINUITY,
+                        f"{what} in mode '{mode.name}' has a pole {where}: motion that comes there cannot be "
+                        "followed. If none does, this is no fault",
+                    )
+                pole = True
+                continue
             report.error(
                 Topic.CONTINUITY,
-                f"{what} in mode '{mode.name}' jumps by {by:.3g} along {name}, at t = {t:.9g}, {where}: "
-                "it is integrated as if it were smooth. Make the place a surface, with a mode on each "
-                "side (of time: an observable such as sin(2*pi*t/T) that changes its sign there)",
+                f"{what} in mode '{mode.name}' jumps by {by:.3g} {where}: it is integrated as if it were "
+                "smooth. Make the place a surface, with a mode on each side (of time: an observable such "
+                "as sin(2*pi*t/T) that changes its sign there)",
             )
             return
 
@@ -80,24 +95,74 @@ def _at_state(t: float, y: FloatArray, k: int, value: float) -> tuple[float, Flo
     return t, moved
 
 
-def _jump_along(
-    probe: Probe, mode: str, line: Line, low: float, high: float
-) -> tuple[str, float, float] | None:
-    """Return (what jumps, where, by how much) along a line; None if nothing does."""
+def check_reset_jumps(report: ModelReport, probe: Probe) -> None:
+    """Check that no reset jumps between states that meet its surface in one mode."""
+    for reset in probe.model.resets:
+        known: dict[Sides, tuple[float, FloatArray]] = {}
+        for domain, t, y in arrivals(probe, reset):
+            here = known.setdefault(_real_sides(probe, reset, domain.signs), (t, y))
+            if here[1] is y:
+                continue
+            values = partial(_behind, probe, reset, domain, here, (t, y))
+            report.count(Topic.CONTINUITY)
+            found = jump_along(values, 0.0, 1.0)
+            if found is None:
+                continue
+            state = probe.model.states[found[0]]
+            report.error(
+                Topic.CONTINUITY,
+                f"'{state}' behind the reset at '{reset.surface}' jumps by {found[2]:.3g} between states "
+                f"that meet it in mode '{domain.own_mode}': a branch would end where an orbit comes there. "
+                "Only modes may change by leaps; what a reset does has to be continuous",
+            )
+            return
+
+
+def _behind(
+    probe: Probe,
+    reset: Reset,
+    domain: Domain,
+    a: tuple[float, FloatArray],
+    b: tuple[float, FloatArray],
+    share: float,
+) -> FloatArray | None:
+    """Return the state behind a reset from between two states; None where that is in another domain."""
+    t, y = a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
+    beside = _real_sides(probe, reset, probe.signs(t, y))
+    if beside != _real_sides(probe, reset, domain.signs):
+        return None
+    return probe.reset(reset.surface, t, y).copy()
+
+
+def _real_sides(probe: Probe, reset: Reset, signs: Mapping[str, int]) -> Sides:
+    """Return on which sides of surfaces a state is; those at which nothing changes apart."""
+    left_out = {reset.surface, *probe.model.section_surfaces}
+    return frozenset((s, v) for s, v in signs.items() if s not in left_out)
+
+
+def jump_along(
+    values: Callable[[float], FloatArray | None], low: float, high: float
+) -> tuple[int, float, float] | None:
+    """Return (which value jumps, where, by how much) along a line; None if nothing does.
+
+    Parameters
+    ----------
+    values : what may jump, at a place of the line; None where that does not count
+    """
     # an irrational share: samples do not fall onto the places that people choose
     places = low + (high - low) * (np.arange(_SAMPLES) + 0.381966) / _SAMPLES
-    values = [_values(probe, mode, *line(float(s))) for s in places]
-    known = [v for v in values if v is not None]
+    found = [values(float(s)) for s in places]
+    known = [v for v in found if v is not None]
     if not known:
         return None
     size = 1.0 + np.max(np.abs(np.where(np.isfinite(known), known, 0.0)), axis=0)
-    suspicion = _suspicion(values, size)
+    suspicion = _suspicion(found, size)
     for k in np.argsort(suspicion)[::-1][:_INTERVALS]:
         if suspicion[k] < _LOOKED_INTO:
             return None
-        found = _halved(probe, mode, line, (float(places[k]), float(places[k + 1])), size)
-        if found is not None:
-            return found
+        jump = _halved(values, (float(places[k]), float(places[k + 1])), size)
+        if jump is not None:
+            return jump
     return None
 
 
@@ -114,8 +179,15 @@ def _suspicion(values: list[FloatArray | None], size: FloatArray) -> FloatArray:
     return np.asarray(np.max(np.where(poles, np.inf, np.nan_to_num(apart)), axis=1))
 
 
-def _values(probe: Probe, mode: str, t: float, y: FloatArray) -> FloatArray | None:
-    """Return rates and observables at a state; None outside of the mode."""
+def _names(probe: Probe) -> list[str]:
+    """Return what :func:`_values_on` has, in words."""
+    rates = [f"the rate of '{s}'" for s in probe.model.states]
+    return [*rates, *(f"the observable '{c}'" for c in probe.model.observable_index)]
+
+
+def _values_on(probe: Probe, mode: str, line: Line, place: float) -> FloatArray | None:
+    """Return rates and observables at a place of a line; None outside of the mode."""
+    t, y = line(place)
     signs = probe.signs(t, y)
     domains = [d for d in probe.model.domains if d.own_mode == mode]
     if not any(d.signs == signs for d in domains):
@@ -133,14 +205,13 @@ def _change(a: FloatArray | None, b: FloatArray | None, size: FloatArray) -> flo
 
 
 def _halved(
-    probe: Probe, mode: str, line: Line, ends: tuple[float, float], size: FloatArray
-) -> tuple[str, float, float] | None:
+    values: Callable[[float], FloatArray | None], ends: tuple[float, float], size: FloatArray
+) -> tuple[int, float, float] | None:
     """Return the jump inside of an interval, if its change does not shrink with it."""
-    (a, b), before, after = ends, _values(probe, mode, *line(ends[0])), None
-    after = _values(probe, mode, *line(b))
+    (a, b), before, after = ends, values(ends[0]), values(ends[1])
     for _ in range(_HALVINGS):
         middle = 0.5 * (a + b)
-        there = _values(probe, mode, *line(middle))
+        there = values(middle)
         if there is None or middle in (a, b):
             break
         if _change(before, there, size) >= _change(there, after, size):
@@ -151,8 +222,4 @@ def _halved(
         return None
     change = np.abs(before - after) / size
     k = int(np.argmax(np.where(np.isfinite(change), change, np.inf)))
-    if change[k] < _LEFT:
-        return None
-    names = [*(f"the rate of '{s}'" for s in probe.model.states)]
-    names += [f"the observable '{c}'" for c in probe.model.observable_index]
-    return names[k], 0.5 * (a + b), float(abs(before[k] - after[k]))
+    return None if change[k] < _LEFT else (k, 0.5 * (a + b), float(abs(before[k] - after[k])))

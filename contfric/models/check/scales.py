@@ -12,8 +12,12 @@ from contfric.models.check.report import ModelReport, Topic
 #: Sizes of states, or times in which they change, that are this far apart: Newton's method and distances in
 #: a diagram weigh all states alike.
 _APART = 1e6
+#: States, or times, this far from 1 ask for units: what is short or near is decided at a thousandth of 1.
+_FAR = 50.0
 #: States that are asked for their times.
 _STATES = 40
+#: Phases of an excitation at which its force is looked at.
+_PHASES = 16
 
 
 def check_reached(report: ModelReport, probe: Probe) -> None:
@@ -58,12 +62,68 @@ def check_scales(report: ModelReport, probe: Probe) -> None:
         for state, width, rate in zip(model.states, widths, fastest, strict=True)
         if rate > 0.0 and width > 0.0
     }
-    typical = math.exp(float(np.mean([math.log(v) for v in times.values()]))) if times else 1.0
-    if not 1.0 / _APART < typical < _APART:
-        report.note(
-            Topic.SCALES,
-            f"states change in times of about {typical:.1g}: measure time in units of that",
-        )
+    typical = min(times.values(), key=lambda v: abs(math.log(v)), default=1.0)
+    _propose_units(report, probe, sizes, typical)
+
+
+def _propose_units(
+    report: ModelReport, probe: Probe, sizes: dict[str, float], typical: float
+) -> None:
+    """Say which units make states and times numbers of order 1, where they are far from it."""
+    model, sizes = probe.model, dict(sizes)
+    shift = probe.period / math.tau if probe.period else typical
+    if "clock" in sizes:  # the time since the last tick: half a period is its spread
+        shift = sizes["clock"] / math.pi
+    for state, size in _forced_sizes(probe).items():
+        if sizes[state] == 1.0:  # nobody has said how large it is
+            sizes[state] = size
+    angles = {n[:-1] for n in model.reset_by_surface if n[:-1] in sizes}
+    wanted = {n: v for n, v in sizes.items() if n != "clock" and n not in angles} | {"t": shift}
+    # small states next to large ones are small by their nature: the high modes of a beam, bristles
+    largest = max((n for n in wanted if n != "t"), key=wanted.__getitem__)
+    far = {n: wanted[n] for n in (largest, "t") if not 1.0 / _FAR < wanted[n] < _FAR}
+    if not far or not all(v > 0.0 for v in far.values()):
+        return
+    units = {n: 1.0 for n, v in wanted.items() if v > 0.0} | dict(model.units)
+    line = ", ".join(
+        f"{n}: {_rounded(v * units[n])}"
+        for n, v in wanted.items()
+        if n in units and (v * units[n] < 0.1 or v * units[n] > 10.0)
+    )
+    named = ", ".join(f"{n} {v:.0e}" for n, v in far.items())
+    report.warn(
+        Topic.SCALES,
+        f"states or times are far from 1 ({named}): orbits are told apart, and short segments from none, at "
+        f"thousandths of 1, so that events may be missed. Write units: {{{line}}}",
+    )
+
+
+def _rounded(value: float) -> str:
+    """Return a number with one digit as YAML reads it.
+
+    Examples
+    --------
+    >>> _rounded(0.000312), _rounded(27.0)
+    ('3.0e-04', '30.0')
+    """
+    text = f"{value:.0e}"
+    return f"{float(text):.1f}" if 0.1 <= value < 1e4 else text.replace("e", ".0e")
+
+
+def _forced_sizes(probe: Probe) -> dict[str, float]:
+    """Return how far an excitation alone moves each state of the first mode that does not slide."""
+    model, n = probe.model, len(probe.model.states)
+    moving = [mode.name for mode in model.modes if not mode.sliding]
+    if not probe.period or not moving:
+        return {}
+    rest = np.zeros(n)
+    fields = [probe.field(moving[0], k * probe.period / _PHASES, rest) for k in range(_PHASES)]
+    force = np.max(np.abs(np.array(fields) - np.mean(fields, axis=0)), axis=0)
+    columns = [probe.field(moving[0], 0.0, e) - fields[0] for e in np.eye(n)]
+    system = 1j * math.tau / probe.period * np.eye(n) - np.array(columns).T
+    if not (np.all(np.isfinite(system)) and np.linalg.cond(system) < 1e12):
+        return {}
+    return dict(zip(model.states, np.abs(np.linalg.solve(system, force)).tolist(), strict=True))
 
 
 def _apart(report: ModelReport, values: dict[str, float], what: str, advice: str) -> None:

@@ -121,7 +121,7 @@ def check_resets(report: ModelReport, probe: Probe) -> None:
     """
     for reset in probe.model.resets:
         faults, fine = [], 0
-        for domain, t, y in _arrivals(probe, reset):
+        for domain, t, y in arrivals(probe, reset):
             report.count(Topic.RESETS)
             fault = _reset_fault(probe, reset, domain, t, y)
             fine += not fault
@@ -133,7 +133,7 @@ def check_resets(report: ModelReport, probe: Probe) -> None:
             report.error(Topic.RESETS, faults[0])
 
 
-def _arrivals(probe: Probe, reset: Reset) -> Iterator[tuple[Domain, float, FloatArray]]:
+def arrivals(probe: Probe, reset: Reset) -> Iterator[tuple[Domain, float, FloatArray]]:
     """Yield (domain, time, state) of motion that meets the surface of a reset."""
     for t, y in probe.on(reset.surface, _ON_SURFACE // 2):
         signs = probe.signs(t, y)
