@@ -5,6 +5,7 @@ python -m benchmarks.certificates events           the events of several diagram
 python -m benchmarks.certificates branches         the branches of Fig. 5, share of the arclength
 python -m benchmarks.certificates diagram          the whole of Fig. 5, and the check of its events
 python -m benchmarks.certificates chaos            horseshoes of the release map in the plane of Fig. 9
+python -m benchmarks.certificates census           ten values of Omega of Fig. 5: nothing else is there
 python -m benchmarks.certificates cheats 10000     changed certificates: how many are verified
 """
 
@@ -142,6 +143,14 @@ def chaos() -> None:
         print(f"{params}: {found}; {found.pieces} pieces, {time.process_time() - begin:.1f} s")
 
 
+def census() -> None:
+    """All period-1 orbits with a stick at ten values of Omega of Fig. 5 (and one in the gap of a bridge)."""
+    for omega in (0.41, 0.43, 0.45, 0.47, 0.48, 0.4918, 0.5, 0.52, 0.54, 0.58):
+        begin = time.process_time()
+        found = cf.certify_census("coulomb", {"Omega": omega, "S": 0.32, "S0": 0.4})
+        print(f"{found}\n  {found.intervals} intervals, {time.process_time() - begin:.1f} s")
+
+
 def cheats(count: int) -> None:
     """Change true certificates, and decide by 60 digits those that are verified."""
     from tests.certificate_oracle import false_statements, mutated
@@ -180,4 +189,5 @@ if __name__ == "__main__":
     if task in tasks:
         tasks[task](int(counts[0]) if counts else 100)
     else:
-        {"events": events, "branches": branches, "diagram": diagram, "chaos": chaos}[task]()
+        others = {"events": events, "branches": branches, "diagram": diagram, "chaos": chaos}
+        (others | {"census": census})[task]()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
 
 import numpy as np
 from flint import arb
@@ -21,8 +22,8 @@ _BITS = 100
 #: Intervals of a period at first; sets of narrower ones than a share of the period may be split; undecided
 #: strips are narrower than that share.
 _FIRST, _SPLITS, _STRIP = 64, 1 / 400, 2.0**-34
-#: Most intervals that are tried: a minute of work.
-_MOST = 20_000
+#: Most intervals that are tried: half a minute of work.
+_MOST = 4_000
 #: Steps of interval Newton towards a zero, and how narrow it is to be.
 _NEWTON, _NARROW = 12, 1e-24
 
@@ -90,9 +91,12 @@ class _Search:
         begin = self._begin(period)
         ends = begin + period * np.linspace(0.0, 1.0, _FIRST + 1)
         ends[-1] = max(ends[-1], float((begin + self.period).upper()) * (1 + 1e-15))
-        waiting = list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
-        while waiting:
-            first, last = waiting.pop()
+        waiting = [
+            (a - b, a, b) for a, b in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)
+        ]
+        heapify(waiting)
+        while waiting:  # the widest first
+            _, first, last = heappop(waiting)
             self.count += 1
             why = self._decided(first, last, period)
             if not why:
@@ -101,7 +105,8 @@ class _Search:
                 self.strips.append(Strip(first, last, why))
                 continue
             middle = 0.5 * (first + last)
-            waiting += [(middle, last), (first, middle)]
+            heappush(waiting, (first - middle, first, middle))
+            heappush(waiting, (middle - last, middle, last))
 
     def _begin(self, period: float) -> float:
         """Return a phase at which no release is possible: intervals begin and end there."""
@@ -142,7 +147,7 @@ class _Search:
         return 1 if apart > 0 else -1 if apart < 0 else 0
 
     def _at(self, t: arb, like: Returned) -> list[Returned]:
-        """Return the releases after that at one phase (or a narrow ball), up to the one with the same word."""
+        """Return the releases after that in a narrow ball of phases, up to the one with the same word."""
         returns = self.follower.follow(Line(arb(t.mid()), arb(t.rad()), arb(0)), splits=False)
         at = [k for k, r in enumerate(returns) if r.word == like.word]
         if not at:

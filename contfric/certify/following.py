@@ -1,14 +1,15 @@
-r"""All solutions of ``coulomb`` that are released in an interval of phases, followed for one period, in balls.
+r"""All solutions of a dry friction oscillator that are released in an interval of phases, in balls.
 
-A release on F+ at phase t has the state ``x = S0 + f(t), v = 0``. What follows is read off the law: a slide ends
-where v vanishes for the first time; at a stop it rests if ``|u| < S0``, and reverses if ``|u| > S0``; rest ends
-where ``|u| = S0`` for the first time, and the slide that follows has the direction ``-sgn u``. Each segment is
-first tried for the interval as a whole: its end is met transversally (:mod:`contfric.certify.stretch`) and
-not before (:mod:`contfric.certify.sign`); then the time of the end is a smooth function of the phase. Where that is
-not so, and the interval is narrow, the set is *split*: the first times are known to lie in some clusters
-(:mod:`contfric.certify.first_times`), each of which is followed by itself, with its whole width as a ball; at
-a stop whose load may lie on either side of S0, rest and reversal are both followed. Every solution of the
-law is one of those that are followed, whatever it does at a jump of the map; some that are followed are none.
+A release on F+ at phase t has the state ``x = S0 + f(t), v = 0``. What follows is read off the law: a slide
+ends where v vanishes for the first time; at a stop it rests if ``|u| < S0``, and reverses if ``|u| > S0``;
+rest ends where ``|u| = S0`` for the first time, and the slide that follows has the direction ``-sgn u``. Each
+segment is first tried for the interval as a whole: its end is met transversally
+(:mod:`contfric.certify.stretch`) and not before (:mod:`contfric.certify.sign`); then the time of the end is a
+smooth function of the phase. Where that is not so, and the interval is narrow, the set is *split*: the first
+times are known to lie in some clusters (:mod:`contfric.certify.first_times`), each of which is followed by
+itself, with its whole width as a ball; at a stop whose load may lie on either side of S0, rest and reversal
+are both followed. Every solution of the law is one of those that are followed, whatever it does at a jump
+of the map; some that are followed are none.
 
 The derivative of the time of a release by the phase of the first one is the product of the derivatives of the
 segments, for disturbances (dt, dx) of time and place of a stop: with the free response E of a slide, and the
@@ -28,7 +29,7 @@ import numpy as np
 from flint import arb, arb_mat
 
 from contfric.certify.affine import Affine
-from contfric.certify.first_times import first_times
+from contfric.certify.first_times import FirstTimes, first_times
 from contfric.certify.sign import Path, positive
 from contfric.certify.stretch import HALF, Line, UndecidedError, ended, released, with_zero
 from contfric.models.balls.model import BallModel
@@ -40,6 +41,8 @@ Word = tuple[tuple[str, str], ...]
 _X, _V = 0, 1
 #: Steps of a period in which the end of a segment is looked for, and how far beyond the period.
 _STEPS, _BEYOND = 256, 1.04
+#: Longest spread of the times of a set that is split, as a share of the period.
+_SPREAD = 0.01
 #: Most segments of all solutions of one set.
 _SEGMENTS = 200
 _LIMIT = {"F+": 1, "F-": -1}
@@ -100,7 +103,7 @@ class Follower:
 
     Parameters
     ----------
-    balls : the model ``coulomb`` in balls
+    balls : the oscillator with the modes slide+, slide- and stick and the surfaces F+, F- and v
     """
 
     def __init__(self, balls: BallModel) -> None:
@@ -174,18 +177,30 @@ class Follower:
         self, stretch: Stretch, longest: arb, splits: bool
     ) -> list[tuple[str, str, Stretch]]:
         """Return mode and exit of a segment with what starts after it, for all that may follow in a time."""
+        if not stretch.smooth and stretch.time.whole.rad() > _SPREAD * self.balls.period:
+            raise UndecidedError("what follows a split is spread over a long time")
         try:
-            return self._together(stretch, longest, splits)
+            return self._together(stretch, self._guess(stretch), longest, splits)
         except UndecidedError:
-            if not splits:
+            if not splits and stretch.time.slope > _SPREAD:  # a shorter interval is cheaper
                 raise
-        return self._apart(stretch, longest)
+        times = self._times(stretch, longest)
+        ends = [
+            (float(low.union(high).mid()), exit_) for exit_, f in times for low, high in f.clusters
+        ]
+        if len(ends) == 1:  # one that steps of the period are too long for
+            try:
+                return self._together(stretch, ends[0][::-1], longest, splits)
+            except UndecidedError:
+                pass
+        if not splits:
+            raise UndecidedError("a contact may be a grazing one")
+        return self._apart(stretch, times)
 
     def _together(
-        self, stretch: Stretch, longest: arb, splits: bool
+        self, stretch: Stretch, guess: tuple[str, float] | None, longest: arb, splits: bool
     ) -> list[tuple[str, str, Stretch]]:
         """Return what follows a segment that ends in one way for all solutions of the set."""
-        guess = self._guess(stretch)
         exits = self._exits(stretch.mode)
         path = Path(self.balls.fields[stretch.mode], stretch.state.whole, longest)
         if guess is None:
@@ -282,15 +297,20 @@ class Follower:
 
     # ------------------------------------------------------------------ a set that is split
 
-    def _apart(self, stretch: Stretch, longest: arb) -> list[tuple[str, str, Stretch]]:
-        """Return what may follow a segment, for each cluster of times at which it may end."""
-        field = self.balls.fields[stretch.mode]
-        path = Path(field, stretch.state.whole, longest)
+    def _times(self, stretch: Stretch, longest: arb) -> list[tuple[str, FirstTimes]]:
+        """Return for each exit when it may be met first."""
+        path = Path(self.balls.fields[stretch.mode], stretch.state.whole, longest)
         order = 0 if stretch.mode == "stick" else stretch.begins
-        times = [
+        return [
             (exit_, first_times(path, self.balls.surfaces[exit_] * sign, order))
             for exit_, sign in self._exits(stretch.mode)
         ]
+
+    def _apart(
+        self, stretch: Stretch, times: list[tuple[str, FirstTimes]]
+    ) -> list[tuple[str, str, Stretch]]:
+        """Return what may follow a segment, for each cluster of times at which it may end."""
+        field, start = self.balls.fields[stretch.mode], stretch.state.whole
         if any(found.all_end and not found.clusters for _, found in times):
             raise UndecidedError(f"{stretch.mode}: the times of its end are not known")
         lasts = [found.clusters[-1][1] for _, found in times if found.all_end]
@@ -302,7 +322,7 @@ class Follower:
                 if any(low > last for last in lasts):
                     continue
                 duration = low.union(high)
-                state = _within(field, path.start, duration)
+                state = _within(field, start, duration)
                 time = _ball(stretch.time.whole + duration)
                 after += self._onward(split, exit_, time, state, nowhere, True)
         return after

@@ -96,6 +96,8 @@ def ended(
         beside = arb(0, width.abs_upper() if width.is_finite() else 0)
         wide = _moved(field, there, slope, beside)
         rate = (row * field * wide.whole)[0, 0]
+        if rate.contains(0):
+            break  # a wider one contains 0, too
         rest = -missed / rate
         if rest.is_finite() and beside.contains_interior(rest):
             end = _moved(field, there, slope, rest)
