@@ -89,20 +89,20 @@ def test_no_solution_is_left_out() -> None:
 
 
 def test_no_solution_is_left_out_at_a_jump() -> None:
-    def releases(phase: float) -> list[str]:
-        return [surface for surface, _ in simulated(PARAMS, phase)]
+    def releases(params: dict[str, float], phase: float) -> list[str]:
+        return [surface for surface, _ in simulated(params, phase)]
 
     split = 0
     with working(100):
-        follower = Follower(ball_model(MODEL, MODEL.mapping(MODEL.vector(PARAMS))))
-        for ends in ((0.95, 1.37), (11.55, 11.98)):
-            low, high = ends
-            before = releases(low)
-            assert before != releases(high)
-            while high - low > 2e-6:
-                middle = (low + high) / 2
-                low, high = (middle, high) if releases(middle) == before else (low, middle)
-            split += bool(agrees(follower, PARAMS, (low + high) / 2, 2e-5))
+        for omega, low, high in ((0.5, 0.95, 1.37), (0.47, 1.5, 1.7)):
+            params = PARAMS | {"Omega": omega}
+            follower = Follower(ball_model(MODEL, params))
+            ends, before = [low, high], releases(params, low)
+            assert before != releases(params, high)
+            while ends[1] - ends[0] > 2e-6:
+                middle = sum(ends) / 2
+                ends[releases(params, middle) != before] = middle
+            split += bool(agrees(follower, params, sum(ends) / 2, 2e-5))
     assert split == 2
 
 
