@@ -4,7 +4,7 @@ python -m benchmarks.certificates orbits 1000      random scenes of coulomb: sha
 python -m benchmarks.certificates events           the events of several diagrams, by kind
 python -m benchmarks.certificates branches         the branches of Fig. 5, share of the arclength
 python -m benchmarks.certificates diagram          the whole of Fig. 5, and the check of its events
-python -m benchmarks.certificates figures DIR      Figs. 4, 5, 6, 7, 13 of the paper; writes DIR/fig05.json ...
+python -m benchmarks.certificates figures DIR      Figs. 4, 5, 6, 7, 13 of the paper, with their files
 python -m benchmarks.certificates chaos            horseshoes of the release map in the plane of Fig. 9
 python -m benchmarks.certificates census           ten values of Omega of Fig. 5: nothing else is there
 python -m benchmarks.certificates cheats 10000     changed certificates: how many are verified

@@ -134,8 +134,11 @@ class _Search:
         signs = [self._sign(t, again[0]) for t in (first, last)]
         if 0 in signs:
             return "the end of an interval may be the release of an orbit"
-        if signs[0] != signs[1]:
-            self._narrow(first, last, again[0])
+        try:
+            if signs[0] != signs[1]:
+                self._narrow(first, last, again[0])
+        except UndecidedError as error:
+            return str(error)
         return ""
 
     def _sign(self, t: float, like: Returned) -> int:

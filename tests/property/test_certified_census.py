@@ -74,7 +74,7 @@ def agrees(follower: Follower, params: dict[str, float], first: float, width: fl
 def test_no_solution_is_left_out() -> None:
     rng = np.random.default_rng(7)
     decided = 0
-    for _ in range(4):
+    for _ in range(3):
         limit = float(rng.uniform(0.2, 0.5))
         values = {"Omega": rng.uniform(0.35, 0.7), "S": limit * rng.uniform(0.4, 0.9), "S0": limit}
         values |= {"h": rng.choice([0.0, 0.1]), "zeta": rng.choice([0.0, 0.05])}
@@ -82,10 +82,10 @@ def test_no_solution_is_left_out() -> None:
         with working(100):
             follower = Follower(ball_model(MODEL, params))
             period = float(follower.balls.period.mid())
-            for first in rng.uniform(0.0, period, 6).tolist():
+            for first in rng.uniform(0.0, period, 5).tolist():
                 width = period * 10.0 ** rng.uniform(-6.0, -2.6)
                 decided += agrees(follower, params, first, width) is not None
-    assert decided > 12
+    assert decided > 9
 
 
 def test_no_solution_is_left_out_at_a_jump() -> None:
@@ -123,7 +123,7 @@ def test_the_derivative_of_a_return_is_that_of_secants() -> None:
     assert checked
 
 
-@pytest.mark.parametrize("omega", [0.5, pytest.param(0.541, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("omega", [0.541, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_the_orbits_are_those_of_the_search(omega: float) -> None:
     params = PARAMS | {"Omega": omega}
     proved = cf.certify_census("coulomb", params)
