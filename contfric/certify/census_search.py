@@ -194,7 +194,9 @@ class _Search:
         last = zero.returns[-1]
         system = build_system(self.model, last.word, 1)
         joints = np.array([[t, x, 0.0] for t, x in last.joints])
-        orbit = settle(Orbit(system, joints, self.vector, np.inf))
+        near = Orbit(system, joints, self.vector, np.inf)
+        settled = settle(near)
+        orbit = settled if settled.converged else near
         phases = [self._folded(self.zeros[k].phase) for k in own]
         multiplier = arb(last.slope)
         return ProvedOrbit(orbit, tuple(phases), multiplier, symmetric, not symmetric)
