@@ -4,7 +4,9 @@ python -m benchmarks.certificates orbits 1000      random scenes of coulomb: sha
 python -m benchmarks.certificates events           the events of several diagrams, by kind
 python -m benchmarks.certificates branches         the branches of Fig. 5, share of the arclength
 python -m benchmarks.certificates diagram          the whole of Fig. 5, and the check of its events
+python -m benchmarks.certificates figures DIR      Figs. 4, 5, 6, 7, 13 of the paper, with their files
 python -m benchmarks.certificates chaos            horseshoes of the release map in the plane of Fig. 9
+python -m benchmarks.certificates census           ten values of Omega of Fig. 5: nothing else is there
 python -m benchmarks.certificates cheats 10000     changed certificates: how many are verified
 """
 
@@ -129,6 +131,27 @@ def diagram() -> None:
     print(f"{check_text(text)}, {time.process_time() - busy:.1f} s of the processor")
 
 
+#: Studies of the diagrams of the paper, and seconds after which a proof of one is ended.
+FIGURES, LIMIT = ("fig06", "fig07", "fig13", "fig04", "fig05"), 600.0
+
+
+def figures(folder: str) -> None:
+    """The diagrams of the paper, with their events and branches, on one core."""
+    import tempfile
+    from pathlib import Path
+
+    for name in FIGURES:
+        with tempfile.TemporaryDirectory() as out:
+            cf.run_study(name, out=out)
+            found = cf.load(Path(out) / "diagram.npz")
+        begin, busy = time.perf_counter(), time.process_time()
+        certificate = found.certify(time_limit=LIMIT)
+        spent = time.perf_counter() - begin, time.process_time() - busy
+        certificate.save(Path(folder) / f"{name}.json")
+        print(f"{name}: {certificate}")
+        print(f"{spent[0]:.1f} s, {spent[1]:.1f} s of the processor", flush=True)
+
+
 #: In the plane of Fig. 9: (Omega, S), and the most returns of a horseshoe.
 CHAOTIC = ((0.282, 0.122, 6), (0.292, 0.126, 6), (0.288, 0.129, 9), (0.396, 0.082, 6))
 
@@ -140,6 +163,14 @@ def chaos() -> None:
         begin = time.process_time()
         found = cf.release_map("coulomb", params, count=8000).horseshoe(most)
         print(f"{params}: {found}; {found.pieces} pieces, {time.process_time() - begin:.1f} s")
+
+
+def census() -> None:
+    """All period-1 orbits with a stick at ten values of Omega of Fig. 5 (and one in the gap of a bridge)."""
+    for omega in (0.41, 0.43, 0.45, 0.47, 0.48, 0.4918, 0.5, 0.52, 0.54, 0.58):
+        begin = time.process_time()
+        found = cf.certify_census("coulomb", {"Omega": omega, "S": 0.32, "S0": 0.4})
+        print(f"{found}\n  {found.intervals} intervals, {time.process_time() - begin:.1f} s")
 
 
 def cheats(count: int) -> None:
@@ -177,7 +208,10 @@ def _certificates(rng: np.random.Generator) -> list[str]:
 if __name__ == "__main__":
     task, *counts = sys.argv[1:] or ["orbits"]
     tasks = {"orbits": orbits, "cheats": cheats}
-    if task in tasks:
+    if task == "figures":
+        figures(counts[0] if counts else ".")
+    elif task in tasks:
         tasks[task](int(counts[0]) if counts else 100)
     else:
-        {"events": events, "branches": branches, "diagram": diagram, "chaos": chaos}[task]()
+        others = {"events": events, "branches": branches, "diagram": diagram, "chaos": chaos}
+        (others | {"census": census})[task]()

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from contfric.atlas.plane import Plane
     from contfric.atlas.plane_explore import explore_plane
     from contfric.atlas.seeds import Seeds
+    from contfric.certify.census import certify_census
+    from contfric.certify.census_result import CensusCertificate
     from contfric.chaos.compute import lyapunov_map
     from contfric.chaos.exponents import LyapunovExponents, lyapunov_exponent
     from contfric.chaos.map import LyapunovMap
@@ -83,6 +85,7 @@ _HOMES = {
     "BoundaryPoint": "contfric.equilibria.events",
     "Branch": "contfric.continuation.branch",
     "Census": "contfric.atlas.census_result",
+    "CensusCertificate": "contfric.certify.census_result",
     "CodimTwo": "contfric.curves.special",
     "ContfricError": "contfric.errors",
     "ConvergenceError": "contfric.errors",
@@ -127,6 +130,7 @@ _HOMES = {
     "Window": "contfric.atlas.adding",
     "basins": "contfric.response.basin_map",
     "census": "contfric.atlas.census",
+    "certify_census": "contfric.certify.census",
     "check_model": "contfric.models.check",
     "continue_bifurcation": "contfric.curves.trace",
     "continue_equilibrium": "contfric.equilibria.trace",
@@ -164,6 +168,7 @@ __all__ = [
     "BoundaryPoint",
     "Branch",
     "Census",
+    "CensusCertificate",
     "CodimTwo",
     "ContfricError",
     "ConvergenceError",
@@ -208,6 +213,7 @@ __all__ = [
     "__version__",
     "basins",
     "census",
+    "certify_census",
     "check_model",
     "continue_bifurcation",
     "continue_equilibrium",

@@ -16,6 +16,8 @@ from tests.certificate_oracle import DIGITS, Truth, ball
 
 #: How far to each side of the ball: multipliers are differences that are known to 1e-22.
 BESIDE = mpf(10) ** -18
+#: What is touched within a segment, by kind: whether it slides, and the surface.
+_TOUCHES = {"GS": (True, "v"), "T": (True, "F"), "AS": (False, "F")}
 #: About a fold, where orbits are the root of it away.
 BESIDE_FOLD = mpf(10) ** -14
 
@@ -33,8 +35,28 @@ def _vanishing(data: dict[str, Any], truth: Truth, z: list[mpf]) -> mpf:
         i, level = data["at"]
         t, x = truth.joint(z, i + 1)
         return x - truth.force(t) - level * truth.s0
+    if data["kind"] in _TOUCHES:
+        return _touched(data, truth, z)
     one, other = truth.multipliers(z)
     return mp.re((1 + one) * (1 + other))
+
+
+def _touched(data: dict[str, Any], truth: Truth, z: list[mpf]) -> mpf:
+    """Return an observable where its rate vanishes, by Newton's method with differences."""
+    i, surface, text = data["at"]
+    (t, x), mode = truth.joint(z, i), truth.segments[i][0]
+    sign = {"slide+": 1, "slide-": -1, "stick": 0}[mode]
+    level = {"v": 0, "F+": truth.s0, "F-": -truth.s0}[surface]
+
+    def observed(tau: mpf) -> mpf:
+        y, v, _ = truth.slide(sign, t, x, tau) if sign else (x, mpf(0), [])
+        return v if surface == "v" else y - truth.force(t + tau) - level
+
+    tau, step = ball(text)[0], mpf(10) ** -15
+    for _ in range(6):
+        low, here, high = (observed(tau + k * step) for k in (-1, 0, 1))
+        tau -= (high - low) * step / 2 / (high - 2 * here + low)
+    return observed(tau)
 
 
 def _is_fold(data: dict[str, Any], value: mpf, radius: mpf, start: list[mpf]) -> bool:
@@ -49,6 +71,11 @@ def _is_fold(data: dict[str, Any], value: mpf, radius: mpf, start: list[mpf]) ->
 
 def _obeys(data: dict[str, Any], truth: Truth, z: list[mpf]) -> bool:
     """Tell whether the orbit is admissible a little beside the limit that it meets."""
+    if data["kind"] in _TOUCHES:
+        i, surface, _ = data["at"]
+        slides = truth.segments[i][0] != "stick"
+        if (slides, surface[0]) != _TOUCHES[data["kind"]]:
+            return False
     if data["kind"] not in ("CS", "SS"):
         return truth.admissible(z)
     i, level = data["at"]

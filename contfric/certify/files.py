@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from flint import acb, arb
 
 from contfric.certify.verdict import Verdict
+from contfric.continuation.events import Kind
 from contfric.errors import ParameterError, ResultFileError, path_of
 from contfric.files import replacing
 from contfric.models.balls.numbers import working
@@ -82,23 +83,30 @@ def event_data(proof: EventCertificate) -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        If a file cannot state it: not proved, another model, with holds, AS, GS or T.
+        If a file cannot state it: not proved, another model, with holds, or an AS, GS or T at a joint.
     """
     event, location = proof.event, proof.location
     if not proof.proved or location is None or proof.value is None:
         raise ParameterError(f"there is nothing to write: {proof.why}")
     orbit, condition = location.orbit, location.condition
     model = orbit.model.name
-    kinds = ("SN", "PD", "BP", "CS", "SS")
-    if model not in CHECKED_MODELS or orbit.system.holds or event.kind.value not in kinds:
+    if model not in CHECKED_MODELS or orbit.system.holds:
         raise ParameterError(
-            f"certificate files of events are for {', '.join(kinds)} of orbits without holds of "
-            f"{', '.join(CHECKED_MODELS)}: that is what the checker knows"
+            f"certificate files of events are for orbits without holds of {', '.join(CHECKED_MODELS)}: "
+            "that is what the checker knows"
+        )
+    if condition is not None and not condition.within and event.kind not in (Kind.CS, Kind.SS):
+        raise ParameterError(
+            f"a {event.kind.value} at a joint has no certificate file: the checker knows others only"
         )
     m = orbit.joints.shape[1]
     with working(_EVENT_BITS):
         balls = [_printed(x) for x in proof.zero[: orbit.joints.size]]
-        at = [condition.segment, 1 if condition.surface == "F+" else -1] if condition else None
+        at: list[Any] | None = None
+        if condition is not None and condition.within:
+            at = [condition.segment, condition.surface, _printed(proof.zero[-2])]
+        elif condition is not None:
+            at = [condition.segment, 1 if condition.surface == "F+" else -1]
         value = _printed(proof.value)
     return {
         "certificate": "event",

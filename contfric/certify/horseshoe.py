@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from flint import arb
 
-from contfric.certify.returns import Line, Release, ReturnMap, UndecidedError
+from contfric.certify.returns import Release, ReturnMap
+from contfric.certify.stretch import Line, UndecidedError
 from contfric.models.balls.numbers import working
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray

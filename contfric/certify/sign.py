@@ -65,8 +65,8 @@ class Path:
         return found
 
 
-def _range(path: Path, rows: list[arb_mat], level: int, index: int) -> arb:
-    """Return an enclosure of an observable over a piece."""
+def range_over(path: Path, rows: list[arb_mat], level: int, index: int) -> arb:
+    """Return an enclosure of an observable over piece ``index`` of 2^level, from its derivatives."""
     half = (path.duration / 2 ** (level + 1)).upper()
     state = path.middle(level, index)
     size = max((x.abs_upper() for x in state.entries()), key=float)
@@ -87,7 +87,7 @@ def positive(path: Path, row: arb_mat, start_order: int, ends: bool) -> Finding:
     ends : whether q vanishes at the end by construction
     """
     rows = path.derivatives(row)
-    first = path.derivatives(_power(path, row, start_order)) if start_order else rows
+    first = path.derivatives(higher(path, row, start_order)) if start_order else rows
     last = path.derivatives(-row * path.field) if ends else rows
     level = 0
     while (path.norm * path.duration).upper() > 2**level and 2**level < _MOST:
@@ -97,15 +97,15 @@ def positive(path: Path, row: arb_mat, start_order: int, ends: bool) -> Finding:
         if not waiting:
             return Finding(Verdict.PROVED)
         level, index = waiting.pop()
-        value = _range(path, rows, level, index)
+        value = range_over(path, rows, level, index)
         if value < 0 or (row * path.middle(level, index))[0, 0] < 0:
             return Finding(Verdict.REFUTED, f"negative after {_share(level, index)} of it")
         at_start, at_end = index == 0 and start_order > 0, index == 2**level - 1 and ends
         if value > 0:
             continue
-        if at_start and not at_end and _range(path, first, level, index) > 0:
+        if at_start and not at_end and range_over(path, first, level, index) > 0:
             continue
-        if at_end and not at_start and _range(path, last, level, index) > 0:
+        if at_end and not at_start and range_over(path, last, level, index) > 0:
             continue
         if level >= _NARROW:
             return Finding(Verdict.UNDECIDED, f"no sign after {_share(level, index)} of it")
@@ -131,7 +131,8 @@ def touched(path: Path, row: arb_mat, start_order: int, after: arb | None) -> Fi
     return positive(Path(path.field, state, (path.duration - at).upper()), row, 2, True)
 
 
-def _power(path: Path, row: arb_mat, order: int) -> arb_mat:
+def higher(path: Path, row: arb_mat, order: int) -> arb_mat:
+    """Return the row of a derivative of an observable."""
     for _ in range(order):
         row = row * path.field
     return row

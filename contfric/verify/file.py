@@ -6,10 +6,10 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from flint import ctx
+from flint import arb, ctx
 
 from contfric.verify.law import check_admissible, check_event, check_multipliers
-from contfric.verify.solution import Refused, Scene, Undecided
+from contfric.verify.solution import Refused, Scene, Undecided, ball, decided
 
 BITS = (106, 212, 424, 848)  # asked for one after the other, until all is decided
 _DAMAGE = (AttributeError, KeyError, TypeError, ValueError, IndexError, OverflowError)
@@ -61,17 +61,20 @@ def _check(data: dict[str, Any], kinds: tuple[str, ...]) -> tuple[str, ...]:
 
 def _check_orbit(data: dict[str, Any]) -> list[str]:
     claims, scene = dict(data["statements"]), Scene(data)
-    if set(claims) != set(_STATED) or claims["exists"] != "proved":
+    known = {name: {"proved", "undecided"} for name in _STATED} | {"exists": {"proved"}}
+    known["stable"] |= {"refuted"}
+    if set(claims) != set(known) or not all(claims[name] in known[name] for name in known):
         raise Refused("its statements are not those of an orbit")
-    allowed = {"proved", "undecided"}
-    if not {claims[k] for k in _STATED[:3]} <= allowed or claims["stable"] not in allowed | {
-        "refuted"
-    }:
-        raise Refused("a statement is neither proved nor undecided")
     printed, radii = scene.box(data)
-    zero = scene.solution(printed, radii, unique=claims["unique"] == "proved")
-    scene.check_enclosure(data, zero)
+    zero, _ = scene.enclosed(printed, None, "a solution near the printed joints")
+    for off, r in ((abs(z - p), r) for z, p, r in zip(zero, printed, radii, strict=True)):
+        decided(off < r, off > r, "the solution lies in the box around the printed joints")
+    if claims["unique"] == "proved":
+        scene.enclosed(printed, radii, "there is one solution only in the box")
+    for i, row in zip(range(scene.count), data["enclosure"], strict=True):
+        for wide, value in zip(map(ball, row), (*scene.joint(zero, i), arb(0)), strict=True):
+            decided(wide.contains(value), not wide.overlaps(value), "balls hold the joints")
     if claims["admissible"] == "proved":
-        check_admissible(scene, zero)
+        check_admissible(scene, zero, -1, 0, {})
     done = check_multipliers(scene, data, zero, claims["stable"])
     return [name for name in _STATED[:3] if claims[name] == "proved"] + done

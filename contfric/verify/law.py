@@ -1,8 +1,9 @@
 """The law of friction over the whole of every segment, multipliers, and events (see the package).
 
-At an event something changes its sign over a ball of one parameter, along the curve of orbits. At a fold
-one equation phi is left out for one joint s: phi(s) = 0 has two solutions at one end of the ball, none at the
-other, and so a double zero in between.
+At an event something changes its sign over a ball of one parameter, along the curve of orbits: the load at a
+stop less its limit, det(M + 1), or what is touched, where it is stationary. At a fold one equation phi is
+left out for one joint s: phi(s) = 0 has two solutions at one end of the ball, none at the other, and so a
+double zero in between.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from contfric.verify.solution import Refused, Scene, Undecided, ball, decided
 
 #: Most pieces of a slide or a stick, halvings of one, half-widths about a fold in roots of the ball's radius.
 MOST_PIECES, MOST_HALVINGS, WIDER = 20_000, 90, (64, 1024, 16384)
+BESIDE = 2.0**-40  # half-width of the box of times about a touch
 
 
-def check_admissible(scene: Scene, zero: list[arb], at: int = -1, level: int = 0) -> None:
-    """See that the solution obeys the law of friction; at the end of segment ``at`` the load is S0."""
+def check_admissible(scene: Scene, zero: list[arb], at: int, level: int, touches: Any) -> None:
+    """See that the law of friction is obeyed; the load is S0 at the end of segment ``at`` if ``level``."""
     for i, (direction, side) in enumerate(scene.segments):
         (t, x), (end, y) = scene.joint(zero, i), scene.joint(zero, i + 1)
         what = f"segment {i + 1}"
@@ -35,9 +37,9 @@ def check_admissible(scene: Scene, zero: list[arb], at: int = -1, level: int = 0
             sides = bool(size < scene.s0), bool(size > scene.s0)
             if not limit:  # at an event the load is S0
                 decided(*(sides[::-1] if after else sides), f"{what}: what follows its end")
-            released = scene.segments[i - 1][0] == 0
-            smooth = released and (scene.s0 - scene.s).is_zero()  # it starts with acceleration 0
-            _positive(scene, zero, i, "v", direction, 1 + smooth, True)
+            # after rest with S0 = S it starts with acceleration 0
+            smooth = scene.segments[i - 1][0] == 0 and (scene.s0 - scene.s).is_zero()
+            _positive(scene, zero, i, "v", direction, 1 + smooth, True, touches.get((i, "v")))
             continue
         decided(rate > 0, rate < 0, f"{what} is released transversally")
         if after != -side:
@@ -47,15 +49,16 @@ def check_admissible(scene: Scene, zero: list[arb], at: int = -1, level: int = 0
             load = limit * (x - scene.force(t))
             if limit != start:
                 decided(load < scene.s0, load > scene.s0, f"{what} begins within its limits")
-            _positive(scene, zero, i, name, -limit, int(limit == start), limit == side)
+            touch, ends = touches.get((i, name)), limit == side
+            _positive(scene, zero, i, name, -limit, int(limit == start), ends, touch)
 
 
 def _positive(
-    scene: Scene, z: list[arb], i: int, surface: str, sign: int, order: int, ends: bool
+    scene: Scene, z: list[arb], i: int, surface: str, sign: int, order: int, ends: bool, touch: Any
 ) -> None:
     """See that an observable has a sign inside of a segment; by derivatives where it vanishes.
 
-    At the start ``order`` of it and its rate vanish by construction, at the end it does if ``ends``.
+    ``order`` of it and its rate do at the start, it does at the end if ``ends``, and both do at a touch.
     """
     duration = (scene.joint(z, i + 1)[0] - scene.joint(z, i)[0]).upper()
     waiting, what = [(0, 0)], f"segment {i + 1}: {surface} is not met inside"
@@ -75,7 +78,8 @@ def _positive(
             raise Refused(f"false: {what}")
         first, last = index == 0, index == 2**level - 1
         starts = first and not last and order > 0 and (rate, bend)[order - 1] > 0
-        if starts or (last and not first and ends and rate < 0):
+        lowest = touch is not None and piece.overlaps(touch) and bend > 0
+        if starts or lowest or (last and not first and ends and rate < 0):
             continue
         if level >= MOST_HALVINGS:
             break
@@ -86,16 +90,9 @@ def _positive(
 def turn(scene: Scene, zero: list[arb]) -> tuple[arb, arb]:
     """Return trace and determinant of the derivative of (t, x) after a turn: v = 0 is the section."""
     total = arb_mat([[1, 0], [0, 1]])
-    for i, (direction, _) in enumerate(scene.segments):
-        (t, x), (end, y) = scene.joint(zero, i), scene.joint(zero, i + 1)
-        if direction == 0:
-            step = arb_mat([[arb(0), 1 / scene.force(end, 1)], [0, 1]])
-        else:
-            c, dc, d, dd = scene.free(end - t)
-            first = scene.acceleration(direction, t, x, arb(0))
-            last = scene.acceleration(direction, end, y, arb(0))
-            step = arb_mat([[first * dd / last, -dc / last], [-first * d, c]])
-        total = step * total
+    for i in range(scene.count):
+        _, own, after = scene.segment(zero, i)
+        total = arb_mat(after).solve(arb_mat(own)) * total * -1
     total = arb_mat([[1, 0], [0, -1 if scene.half else 1]]) * total
     sticks = any(direction == 0 for direction, _ in scene.segments)
     return total[0, 0] + total[1, 1], arb(0) if sticks else total.det()
@@ -104,12 +101,11 @@ def turn(scene: Scene, zero: list[arb]) -> tuple[arb, arb]:
 def check_multipliers(scene: Scene, data: Any, zero: list[arb], stable: str) -> list[str]:
     """Check the multipliers of a turn; return which statements on them hold."""
     (trace, det), done = turn(scene, zero), []
-    inside = bool(abs(det) < 1 and abs(trace) < 1 + det)  # Jury
-    outside = bool(abs(det) > 1 or abs(trace) > 1 + det)
+    sides = [abs(det) < 1 and abs(trace) < 1 + det, abs(det) > 1 or abs(trace) > 1 + det]  # Jury
     if stable != "undecided":
-        claim, opposite = (inside, outside) if stable == "proved" else (outside, inside)
-        decided(claim, opposite, "the multipliers lie on their side of the unit circle")
         done = ["stable" if stable == "proved" else "unstable"]
+        inside, outside = sides if stable == "proved" else sides[::-1]
+        decided(inside, outside, "the multipliers lie on their side of the unit circle")
     root = acb(trace * trace - 4 * det).sqrt()
     found = [acb(trace), acb(0)] if det.is_zero() else [(trace + root) / 2, (trace - root) / 2]
     stated = [acb(ball(mu["re"]), ball(mu["im"])) for mu in data["multipliers"]]
@@ -124,52 +120,80 @@ def check_multipliers(scene: Scene, data: Any, zero: list[arb], stable: str) -> 
 
 def check_event(data: dict[str, Any]) -> list[str]:
     """Check that an event of its kind happens within the ball of its parameter."""
-    name, kind, value, half = data["parameter"], data["kind"], ball(data["value"]), data["half"]
-    known = kind in ("SN", "PD" if not half else "BP", "CS", "SS") and name in data["params"]
-    if not known or not value.rad() > 0:
+    name, kind, value = data["parameter"], data["kind"], ball(data["value"])
+    if name not in data["params"] or not value.rad() > 0:
         raise Refused(f"a {kind} in {name} is not checked here")
     ends = (value.mid() - value.rad(), value.mid() + value.rad())
     scene, *sides = (Scene(data, {name: p}) for p in (value, *ends))
     near = [arb(ball(row[k]).mid()) for row in data["near"] for k in (0, 1)]
-    at, level = data["at"] if kind in ("CS", "SS") else (-1, 0)
-    stops = level in (-1, 1) and at in range(scene.count) and scene.segments[at][0] != 0
-    if len(near) != 2 * scene.count or stops != (kind in ("CS", "SS")):
-        raise Refused("it has not one joint for each segment, or no such stop")
+    at, level, surface, box = _place(scene, kind, data["at"])
+    touches, widths = dict[tuple[int, str], arb](), list[arb]()
+    if len(near) != 2 * scene.count:
+        raise Refused("there is not one joint for each segment")
     if kind == "SN":
         zero = _fold(scene, sides, near, value.rad())
     else:
         zero, widths = scene.enclosed(near, None, "an orbit")
-        found = [_vanishing(own, own.enclosed(near, widths, "ends")[0], at, level) for own in sides]
-        product = found[0] * found[1]
+    if surface:
+        touches = {(at, surface): _stationary(scene, zero, at, surface, box)}
+        left = scene.joint(zero, at + 1)[0] - scene.joint(zero, at)[0] - box
+        decided(box > 0 and left > 0, left < 0, "it is touched inside")
+
+    def vanishing(own: Scene) -> arb:
+        z = own.enclosed(near, widths, "ends")[0]
+        if surface:
+            return own.observed(z, at, surface, _stationary(own, z, at, surface, box))[0]
+        (end, y), (trace, det) = own.joint(z, at + 1), turn(own, z)
+        return y - own.force(end) - level * own.s0 if level else 1 + trace + det
+
+    if kind != "SN":
+        product = vanishing(sides[0]) * vanishing(sides[1])
         decided(product < 0, product > 0, f"what vanishes at a {kind} changes its sign")
     if level:
         out = level * scene.force(scene.joint(zero, at + 1)[0], 1) * (-1 if kind == "CS" else 1)
         decided(out > 0, out < 0, f"the load moves as at a {kind}")
-    check_admissible(scene, zero, at, level)
+    check_admissible(scene, zero, at, level, touches)
     return ["exists", f"is a {kind} in {name}", "admissible"]
 
 
-def _vanishing(scene: Scene, z: list[arb], at: int, level: int) -> arb:
-    """Return the load less its limit at a stop; without one det(M + 1), M the map of a turn."""
-    (end, y), (trace, det) = scene.joint(z, at + 1), turn(scene, z)
-    return y - scene.force(end) - level * scene.s0 if level else 1 + trace + det
+def _place(scene: Scene, kind: str, at: Any) -> tuple[int, int, str, Any]:
+    """Return the segment of an event, the load's limit at its end, or what is touched in it and when."""
+    if kind in ("SN", "BP" if scene.half else "PD") and at is None:
+        return -1, 0, "", None
+    if at and at[0] in range(scene.count):
+        slides, what = scene.segments[at[0]][0] != 0, at[1]
+        if kind in ("CS", "SS") and slides and what in (-1, 1):
+            return at[0], what, "", None
+        if (slides, what[0]) == {"GS": (True, "v"), "T": (True, "F"), "AS": (False, "F")}[kind]:
+            return at[0], 0, what, arb(ball(at[2]).mid()) + arb(0, BESIDE)
+    raise Refused(f"a {kind} at {at} is not checked here")
+
+
+def _stationary(scene: Scene, z: list[arb], i: int, surface: str, box: arb) -> arb:
+    """Return when an observable is stationary, which it is once in a box of times."""
+    found = box
+    for again in range(6):
+        rate = scene.observed(z, i, surface, arb(found.mid()))[1]
+        image = found.mid() - rate / scene.observed(z, i, surface, found)[2]
+        if not (again or box.contains_interior(image)):
+            raise Undecided("a surface is touched")
+        found = image
+    return found
 
 
 def _fold(scene: Scene, ends: list[Scene], near: list[arb], radius: arb) -> list[arb]:
     """See that two orbits over one end of the ball become none over the other; return where they are."""
     inverse, size = scene.equations(near)[1].mid().inv().mid(), len(near)
-    k, j = max(
-        ((a, b) for a in range(size) for b in range(size)), key=lambda at: abs(float(inverse[at]))
-    )
+    pairs = [(a, b) for a in range(size) for b in range(size)]
+    k, j = max(pairs, key=lambda at: abs(float(inverse[at])))
 
     def phi(own: Scene, s: arb, widths: Any) -> tuple[arb, arb, list[arb], list[arb]]:
         z, widths = own.enclosed([*near[:k], s, *near[k + 1 :]], widths, "a curve", (j, k))
         values, jacobian = own.equations(z)
         rows, columns = ([a for a in range(size) if a != left] for left in (j, k))
         inner = arb_mat([[jacobian[a, b] for b in columns] for a in rows])
-        change = inner.solve(arb_mat([[jacobian[a, k]] for a in rows]))
-        slope = sum((jacobian[j, b] * change[n, 0] for n, b in enumerate(columns)), arb(0))
-        return values[j], jacobian[j, k] - slope, z, widths
+        slope = (-1) ** (j + k) * jacobian.det() / inner.det()
+        return values[j], slope, z, widths
 
     for half in (factor * radius.sqrt() for factor in WIDER):
         _, _, zero, widths = phi(scene, near[k] + arb(0, half), None)

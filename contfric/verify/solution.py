@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from flint import arb, arb_mat, ctx
+from flint import acb, arb, arb_mat, ctx
 
 #: Direction and exit: (1 or -1, 0) of a slide, (0, 1 or -1) of a stick that ends at +-S0.
 SEGMENTS = {"slide+ v": (1, 0), "slide- v": (-1, 0), "stick F+": (0, 1), "stick F-": (0, -1)}
@@ -63,8 +63,7 @@ class Scene:
     def box(self, data: dict[str, Any]) -> tuple[list[arb], list[arb]]:
         """Return printed times and displacements with the half-widths of the box around them."""
         found = [[[number(c) for c in row] for row in data[name]] for name in ("joints", "radius")]
-        wide = all(r > 0 for row in found[1] for r in row)
-        if not wide or any([len(row) for row in rows] != [3] * self.count for rows in found):
+        if len(found[0]) != self.count or not all(r > 0 for row in found[1] for r in row):
             raise Refused("there is not one joint with its box for each segment")
         for (_, _, v), (_, _, wide) in zip(*found, strict=True):
             decided(abs(v) <= wide, abs(v) > wide, "the printed velocity is 0 within its box")
@@ -73,11 +72,9 @@ class Scene:
 
     def force(self, t: arb, order: int = 0) -> arb:
         """Return f(t) or a derivative of it."""
-        total = arb(0)
-        for w, amplitude in ((self.omega, arb(1)), (3 * self.omega, self.h)):
-            sine, cosine = (w * t).sin_cos()
-            total += amplitude * w**order * (cosine, -sine, -cosine, sine)[order % 4]
-        return total
+        waves = ((arb(1), self.omega), (self.h, 3 * self.omega))
+        found = (a * (acb(0, w) ** order * acb(0, w * t).exp()).real for a, w in waves)
+        return sum(found, arb(0))
 
     def forced(self, t: arb, tau: arb) -> tuple[arb, arb]:
         """Return what f adds to displacement and velocity some time after t, from rest at 0."""
@@ -85,32 +82,25 @@ class Scene:
         for w, amplitude in ((self.omega, arb(1)), (3 * self.omega, self.h)):
             if amplitude.is_zero():
                 continue
-            (sine, cosine), (later, end) = (w * t).sin_cos(), (w * (t + tau)).sin_cos()
             if self.zeta.is_zero():  # also at resonance
+                sine, cosine = (w * t).sin_cos()
                 near, far = ((1 - w) * tau / 2).sinc(), (1 + w) * tau / 2
                 p, q = tau * tau / 2 * far.sinc() * near, tau * far.cos() * near
                 x += amplitude * (cosine * p - sine * (tau.sin() - q) / (1 + w))
                 v += amplitude * (cosine * (q + (w * tau).sin()) / (1 + w) - sine * w * p)
                 continue
-            near, lost = 1 - w * w, 2 * self.zeta * w
-            size, (c, dc, d, dd) = amplitude / (near * near + lost * lost), self.free(tau)
-            from_x, from_v = near * cosine + lost * sine, w * (lost * cosine - near * sine)
-            x += size * (near * end + lost * later - from_x * c - from_v * d)
-            v += size * (w * (lost * end - near * later) - from_x * dc - from_v * dd)
+            response = amplitude / acb(1 - w * w, 2 * self.zeta * w)  # of the steady state
+            now, later = (response * acb(0, w * s).exp() for s in (t, t + tau))
+            c, dc, d, dd = self.free(tau)
+            x += later.real - now.real * c + w * now.imag * d
+            v += w * now.imag * dd - w * later.imag - now.real * dc
         return x, v
 
     def free(self, tau: arb) -> tuple[arb, arb, arb, arb]:
         """Return C, C', D and D' after a duration."""
-        z, stiff = self.zeta, 1 - self.zeta * self.zeta
-        decay = (-z * tau).exp()
-        if stiff.is_zero():
-            c, d = 1 + z * tau, tau
-            return decay * c, -decay * tau, decay * d, decay * (1 - z * tau)
-        decided(stiff > 0 or stiff < 0, False, "how the damping compares with the critical one")
-        rate = abs(stiff).sqrt()
-        sine, cosine = (rate * tau).sin_cos() if stiff > 0 else (rate * tau).sinh_cosh()
-        d = sine / rate
-        c, slope = cosine + z * d, cosine - z * d
+        angle, decay = acb(1 - self.zeta * self.zeta).sqrt() * tau, (-self.zeta * tau).exp()
+        near, d = angle.cos().real, tau * angle.sinc().real  # real beyond critical damping, too
+        c, slope = near + self.zeta * d, near - self.zeta * d
         return decay * c, -decay * d, decay * d, decay * slope
 
     def slide(self, direction: int, t: arb, x: arb, tau: arb) -> tuple[arb, arb]:
@@ -141,39 +131,34 @@ class Scene:
             return z[2 * i], z[2 * i + 1]
         return z[0] + self.turn, -z[1] if self.half else z[1]
 
+    def segment(self, z: list[arb], i: int) -> tuple[list[arb], Any, Any]:
+        """Return what vanishes for a segment, with its derivatives by (t, x) at its start and at its end."""
+        (t, x), (end, y) = self.joint(z, i), self.joint(z, i + 1)
+        direction, side = self.segments[i]
+        zero, one = arb(0), arb(1)
+        if not direction:
+            values, slope = [y - x, y - self.force(end) - side * self.s0], -self.force(end, 1)
+            return values, ((zero, -one), (zero, zero)), ((zero, one), (slope, one))
+        reached, v = self.slide(direction, t, x, end - t)
+        first = self.acceleration(direction, t, x, zero)
+        last = self.acceleration(direction, end, reached, v)
+        c, dc, d, dd = self.free(end - t)
+        own = ((-first * d, c), (-first * dd, dc))
+        return [reached - y, v], own, ((v, -one), (last, zero))
+
     def equations(self, z: list[arb]) -> tuple[list[arb], arb_mat]:
         """Return what vanishes for a solution, and its Jacobian, two rows a segment."""
-        size, zero, one = 2 * self.count, arb(0), arb(1)
-        values: list[arb] = []
-        rows = [[zero] * size for _ in range(size)]
-        for i, (direction, side) in enumerate(self.segments):
-            (t, x), (end, y), k = self.joint(z, i), self.joint(z, i + 1), 2 * i
-            if direction:
-                reached, v = self.slide(direction, t, x, end - t)
-                first = self.acceleration(direction, t, x, zero)
-                last = self.acceleration(direction, end, reached, v)
-                c, dc, d, dd = self.free(end - t)
-                values += [reached - y, v]
-                own, after = ((-first * d, c), (-first * dd, dc)), ((v, -one), (last, zero))
-            else:
-                values += [y - x, y - self.force(end) - side * self.s0]
-                own, after = ((zero, -one), (zero, zero)), ((zero, one), (-self.force(end, 1), one))
+        size, values = 2 * self.count, list[arb]()
+        rows = [[arb(0)] * size for _ in range(size)]
+        for i in range(self.count):
+            found, own, after = self.segment(z, i)
+            values += found
             closing = -1 if i + 1 == self.count and self.half else 1
-            for row, (by_t, by_x), (by_end, by_y) in zip((k, k + 1), own, after, strict=True):
-                rows[row][k] += by_t
-                rows[row][k + 1] += by_x
-                rows[row][(k + 2) % size] += by_end
-                rows[row][(k + 3) % size] += closing * by_y
+            for row, start, end in zip(rows[2 * i :], own, after, strict=False):
+                for k in (0, 1):
+                    row[2 * i + k] += start[k]
+                    row[(2 * i + 2 + k) % size] += end[k] * closing**k
         return values, arb_mat(rows)
-
-    def solution(self, printed: list[arb], radii: list[arb], unique: bool) -> list[arb]:
-        """Return a narrow enclosure of a solution in the box; check that it is the only one there."""
-        zero, _ = self.enclosed(printed, None, "a solution near the printed joints")
-        for off, r in ((abs(z - p), r) for z, p, r in zip(zero, printed, radii, strict=True)):
-            decided(off < r, off > r, "the solution lies in the box around the printed joints")
-        if unique:
-            self.enclosed(printed, radii, "there is one solution only in the box")
-        return zero
 
     def enclosed(
         self, centre: list[arb], widths: list[arb] | None, what: str, left: Any = (-1, -1)
@@ -202,17 +187,7 @@ class Scene:
         identity = arb_mat([[int(a == b) for b in columns] for a in columns])
         inverse = near.mid().solve(identity, algorithm="approx").mid()
         spread = arb_mat([[box[n] - centre[n]] for n in columns])
-        moved = (identity - inverse * wide) * spread - inverse * arb_mat(
-            [[values[n]] for n in rows]
-        )
+        residual = arb_mat([[values[n]] for n in rows])
+        moved = (identity - inverse * wide) * spread - inverse * residual
         found = dict(zip(columns, moved.entries(), strict=True))
         return [c + found[n] if n in found else c for n, c in enumerate(centre)]
-
-    def check_enclosure(self, data: dict[str, Any], zero: list[arb]) -> None:
-        """See that the stated balls contain the solution."""
-        stated = data["enclosure"]
-        if len(stated) != self.count or any(len(row) != 3 for row in stated):
-            raise Refused("there is not one ball for each joint")
-        for i, row in enumerate(stated):
-            for wide, value in zip(map(ball, row), (*self.joint(zero, i), arb(0)), strict=True):
-                decided(wide.contains(value), not wide.overlaps(value), "balls hold the joints")

@@ -52,9 +52,11 @@ class Row:
     branches: str
     says: str
     accuracy: float
+    proved: str = ""
 
     def __str__(self) -> str:
-        return f"| {self.event} | {self.value:.{DIGITS}f} | {self.branches} | {self.says} |"
+        proved = f" {self.proved} |" if self.proved else ""
+        return f"| {self.event} | {self.value:.{DIGITS}f} | {self.branches} | {self.says} |{proved}"
 
 
 def study_of(name: str) -> Study:
@@ -83,9 +85,21 @@ def rows_of(name: str, diagram: cf.Diagram) -> list[Row]:
         says = _published(name, event.kind.value, value)
         label = event.label
         joined = "; ".join(sorted(set(names)))
-        rows.append(Row(label, value, joined, says, event.accuracy * (high - low)))
+        proved = proof_of(event, diagram.parameter)
+        rows.append(Row(label, value, joined, says, event.accuracy * (high - low), proved))
     # events that differ by less than they are located to stand in the order of their names
     return sorted(rows, key=lambda r: (round(r.value, 6), r.event, r.branches, r.value))
+
+
+def proof_of(event: cf.Bifurcation, parameter: str) -> str:
+    """Return within what radius the parameter of an event is proved, or why not; empty if none is offered."""
+    try:
+        proof = event.certify(parameter)
+    except cf.ParameterError:  # motion is integrated
+        return ""
+    if proof.proved:
+        return f"{proof.radius:.0e}"
+    return "open: " + proof.why.removeprefix("undecided (").removesuffix(")")
 
 
 def _published(name: str, kind: str, value: float) -> str:
@@ -108,7 +122,13 @@ def table_of(name: str, result: cf.StudyResult) -> list[str]:
             f"| multiplier | {orbit.multipliers[0].real:.{DIGITS}f} |",
         ]
     head = f"| event | {result.diagram.parameter} | branches that meet there | the paper |"
-    return [head, "|---|---|---|---|", *map(str, rows_of(name, result.diagram))]
+    rows = rows_of(name, result.diagram)
+    proved = any(row.proved for row in rows)
+    return [
+        head + " proved within |" * proved,
+        "|---|---|---|---|" + "---|" * proved,
+        *map(str, rows),
+    ]
 
 
 def windows_of(diagram: cf.Diagram) -> list[str]:

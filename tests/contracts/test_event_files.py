@@ -3,45 +3,63 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import contfric as cf
 from contfric.certify.files import event_data, verify
+from contfric.errors import ParameterError
 from contfric.verify.file import check_text
 from tests.event_oracle import changed, false_event
 
 PARAMS = {"Omega": 0.54, "S": 0.32, "S0": 0.4}
 
 
+#: Where each kind is found: an orbit, and the branch through it.
+SCENES: tuple[tuple[dict[str, float], str, tuple[float, float], str], ...] = (
+    ({"Omega": 0.5}, "Omega", (0.45, 0.6), "1a"),
+    ({"Omega": 0.5}, "Omega", (0.45, 0.6), "2s"),
+    ({"Omega": 0.55}, "Omega", (0.45, 0.6), "0s"),
+    ({"Omega": 0.5, "S": 0.072}, "S", (0.06, 0.09), ""),
+    ({"Omega": 0.5, "S": 0.3, "h": 0.25}, "h", (0.15, 0.3), ""),
+    ({"Omega": 0.5, "S": 0.3, "h": 0.2885}, "h", (0.28, 0.3), "1a"),
+)
+KINDS = ("SN", "PD", "BP", "CS", "SS", "AS", "GS", "T")
+
+
 @cache
 def files() -> dict[str, str]:
-    """Return the events of Fig. 5 on 1a, 2s and 0s, and a period doubling, by kind."""
-    found: dict[str, Any] = {}
-    for name, omega in (("1a", 0.5), ("2s", 0.5), ("0s", 0.55)):
-        orbit = cf.solve_orbit("coulomb", name, {**PARAMS, "Omega": omega})
-        for event in cf.continue_orbit(orbit, "Omega", (0.45, 0.6)).bifurcations:
-            found.setdefault(event.kind.value, event)
-    doubled = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.05, "S0": 0.3})
-    for event in cf.continue_orbit(doubled, "S", (0.0, 0.3)).bifurcations:
-        found.setdefault(event.kind.value, event)
-    checked = ("SN", "PD", "BP", "CS", "SS")
-    return {k: json.dumps(event_data(e.certify())) for k, e in found.items() if k in checked}
+    """Return one event of each kind."""
+    found: dict[str, str] = {}
+    for change, parameter, span, name in SCENES:
+        params = {**PARAMS, **change}
+        orbit = cf.find_orbit("coulomb", params)
+        if name:
+            orbit = cf.solve_orbit("coulomb", name, params)
+        for event in cf.continue_orbit(orbit, parameter, span).bifurcations:
+            if event.kind.value not in found:
+                with suppress(ParameterError):  # at a joint
+                    found[event.kind.value] = json.dumps(event_data(event.certify()))
+    return found
 
 
-@pytest.mark.parametrize("kind", ["SN", "BP", "CS", "SS"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_true_events_are_verified(kind: str) -> None:
     answer = check_text(files()[kind])
     assert answer.yes, answer.why
-    assert f"is a {kind} in Omega" in answer.statements
+    parameter = json.loads(files()[kind])["parameter"]
+    assert f"is a {kind} in {parameter}" in answer.statements
 
 
 # a fold is decided by brute force in 60 digits, which takes minutes
-_DECIDED = [pytest.param("SN", marks=pytest.mark.slow), "BP", "CS", "SS"]
+_SLOW = pytest.mark.slow
+_DECIDED = [
+    pytest.param(k, marks=_SLOW) if k in ("SN", "PD", "BP", "AS", "GS", "T") else k for k in KINDS
+]
 
 
 @pytest.mark.parametrize("kind", _DECIDED)
@@ -53,7 +71,7 @@ def test_true_events_are_not_false(kind: str) -> None:
 def test_no_false_event_is_verified(kind: str) -> None:
     rng = np.random.default_rng(5)
     refused = 0
-    count = 3 if kind == "SN" else 12
+    count = {"SN": 3, "GS": 8}.get(kind, 12)
     for _ in range(count):
         data = changed(json.loads(files()[kind]), rng)
         if check_text(json.dumps(data)).yes:
@@ -81,3 +99,26 @@ def test_a_load_is_no_multiplier() -> None:
     data = json.loads(files()["BP"])
     data |= {"kind": "CS", "at": [-1, 0]}
     assert not check_text(json.dumps(data)).yes
+
+
+@pytest.mark.parametrize("kind", ["AS", "GS", "T"])
+def test_a_touch_of_another_kind_elsewhere_or_at_another_time_is_refused(kind: str) -> None:
+    data = json.loads(files()[kind])
+    i, surface, time = data["at"]
+    other = (i + 1) % len(data["segments"])
+    centre, _, radius = time.partition(" +/- ")
+    later = f"{float(centre) + 1e-3!r} +/- {radius}"
+    wrong = [{"kind": k} for k in KINDS if k != kind]
+    wrong += [
+        {"at": at} for at in ([i, surface, later], [other, surface, time], [i, surface], None)
+    ]
+    for change in wrong:
+        assert not check_text(json.dumps(data | change)).yes, change
+
+
+def test_an_event_beside_the_place_that_it_states_is_refused() -> None:
+    for kind in ("PD", "AS", "GS", "T"):
+        data = json.loads(files()[kind])
+        centre, _, radius = data["value"].partition(" +/- ")
+        data["value"] = f"{float(centre) + 1e-12!r} +/- {radius}"
+        assert not check_text(json.dumps(data)).yes
