@@ -166,6 +166,8 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
         return _stop_on_surface(orbit, place)
     if place.surface in orbit.model.reset_by_surface:
         return _grazing_impact(orbit, place)
+    if place.margin is Margin.JOINT:  # a touch where the segment ends on a section
+        raise NoJump(f"{place.surface} is touched at a section: nothing can be held there")
     rests = orbit.model.mode_by_name[mode].sliding
     if place.margin is Margin.LASTING:
         return _pinned_at_stop(orbit, place)
