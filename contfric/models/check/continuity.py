@@ -116,9 +116,7 @@ def _suspicion(values: list[FloatArray | None], size: FloatArray) -> FloatArray:
 
 def _values(probe: Probe, mode: str, t: float, y: FloatArray) -> FloatArray | None:
     """Return rates and observables at a state; None outside of the mode."""
-    signs = probe.signs(t, y)
-    domains = [d for d in probe.model.domains if d.own_mode == mode]
-    if not any(d.signs == signs for d in domains):
+    if not probe.is_in(mode, probe.signs(t, y)):
         return None
     observed = [probe.flow.observe(name, t, y) for name in probe.model.observable_index]
     return np.array([*probe.field(mode, t, y), *observed])
