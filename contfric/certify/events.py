@@ -21,7 +21,8 @@ from contfric.certify.inequalities import Touch, inequalities
 from contfric.certify.krawczyk import Equations, Inclusion, approximate_inverse, enclosed
 from contfric.certify.locating import Location, NotLocatedError, location_of
 from contfric.certify.verdict import Finding, Verdict, all_of
-from contfric.continuation.events import ACCURACY, Bifurcation, Kind, resting_domain
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind
+from contfric.continuation.touching import resting_domain
 from contfric.errors import ParameterError
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel

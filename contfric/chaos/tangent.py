@@ -51,6 +51,7 @@ from contfric.orbit.trajectory import (
     StateWorkspace,
     copy_state,
     first_hit,
+    is_pressed,
     mode_after,
     sign_code,
     whole_turns,
@@ -150,7 +151,21 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
         code = sign_code(functions, observables, landed, t, y, p, workspace.none, workspace.empty)
         following = mode_after(tables, mode, surface, code)
         if following >= 0:
-            return ARRIVED, surface, following, duration, turns, t
+            pressed = reset and is_pressed(
+                functions,
+                tables,
+                mode,
+                surface,
+                following,
+                t,
+                workspace.after,
+                y,
+                p,
+                period,
+                workspace,
+            )
+            why = CHATTER if pressed else ARRIVED
+            return why, surface, following, duration, turns, t
         if reset:
             return IMPOSSIBLE, surface, mode, duration, turns, t
         on = 1 << surface

@@ -5,14 +5,16 @@ A margin that reaches zero is a sliding event; which one follows from the model'
 =========  ======================================  ==========================================
 margin     where                                   kind
 =========  ======================================  ==========================================
-interior   segment that stays on a surface         AS: the stick touches its limit inside
-interior   other segment, surface that switches    GS: the slide touches rest inside
+interior   segment that stays on a surface         AS: the stick touches its limit inside; GS where the
+                                                   surface is another contact's, and the stick goes on
+interior   other segment, surface that switches    GS: the slide touches rest inside, a slider its limit
 interior   surface with the same field behind      T
 any        surface with a reset                    GS: a grazing impact
 exit       as the interior of the same segment     AS, GS or T: the exit becomes tangential
 joint      the state at a stop meets a surface     CS if it leaves the stick there (distance to
                                                    the limit grows outward), SS if it enters it;
-                                                   CS where there is no rest
+                                                   CS where there is no rest that the surface ends;
+                                                   as the interior where a section is touched
 entry      behind a reset the state is on another  CS: another mode follows
            surface
 lasting    slide between two holds                 GS: the first can be left no more
@@ -33,9 +35,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.continuation.measured_event import MeasuredEvent
+from contfric.continuation.touching import (
+    begins_to_slide,
+    rate_along,
+    resting_domain,
+    touches_at_section,
+)
 from contfric.errors import ParameterError, did_you_mean
 from contfric.extras import need_flint
-from contfric.models.definition import Domain, Model
+from contfric.models.definition import Model
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import Outline, outline_of
@@ -327,8 +335,8 @@ def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
         resting = resting_domain(system, test)
         if resting is None and inside_sign(model, mode, test.surface) == 0:
             return Kind.T
-    if test.margin is not Margin.JOINT:
-        if model.mode_by_name[mode].sliding:
+    if test.margin is not Margin.JOINT or touches_at_section(system, test, orbit):
+        if model.mode_by_name[mode].sliding and not begins_to_slide(model, mode, test.surface):
             return Kind.AS
         return Kind.T if inside_sign(model, mode, test.surface) == 0 else Kind.GS
     # a load that stands still at rest: from beyond the limit the slide leads back into it, as at SS
@@ -364,20 +372,6 @@ def kind_of_hold(hold: Hold, test: Test) -> Kind:
     return Kind.AS if hold.after_rest else Kind.GS
 
 
-def resting_domain(system: System, test: Test) -> Domain | None:
-    """Return the domain of rest that a joint is next to, bounded by the surface of a test; None if none."""
-    model = system.model
-    mode, exit_ = system.word[test.segment]
-    resting = [
-        d
-        for d in model.domains
-        if model.mode_by_name[d.mode].sliding and d.signs[test.surface] != 0
-    ]
-    own = [d for d in resting if d.mode == mode]
-    beside = [d for d in resting if d.signs.get(exit_) == 0]
-    return next(iter([*own, *beside]), None)
-
-
 def outward_rate(system: System, test: Test, orbit: Orbit) -> float:
     """Rate at which a state that rests at the joint would leave the region where it can rest.
 
@@ -388,11 +382,3 @@ def outward_rate(system: System, test: Test, orbit: Orbit) -> float:
         return np.inf
     end = orbit.ends[test.segment]
     return -resting.signs[test.surface] * rate_along(orbit, resting.mode, test.surface, end)
-
-
-def rate_along(orbit: Orbit, mode: str, surface: str, joint: np.ndarray) -> float:
-    """Rate of a surface's observable along a mode at a joint (t, y)."""
-    observable = orbit.model.surface_by_name[surface].observable
-    time, n = float(joint[0]), len(joint) - 1
-    grad = orbit.flow.gradient(observable, time, joint[1:])
-    return float(grad[0] + grad[1:] @ orbit.flow.jacobian(mode, time, joint[1:], 0.0)[:, 1 + n])

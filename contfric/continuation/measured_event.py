@@ -26,10 +26,17 @@ class MeasuredEvent(Shown):
         >>> {event.contacts for event in branch.bifurcations if event.tests}
         {('damper',)}
         """
+        from contfric.orbit.structure import is_section
+        from contfric.orbit.system import Margin
         from contfric.quantities.inside import laws_of
 
         event = cast("Bifurcation", self)
-        model, met = event.orbit.model, {test.surface for test in event.tests}
+        model, word = event.orbit.model, event.orbit.system.word
+        met = {test.surface for test in event.tests}
+        for test in event.tests:  # what ends a segment where another surface is met belongs to it
+            mode, exit_ = word[test.segment]
+            if test.margin is Margin.JOINT and not is_section(model, mode, exit_):
+                met.add(exit_)
         surfaces = met | {
             s.name for s in model.surfaces if s.observable in met
         }  # a tangency has one

@@ -155,23 +155,24 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
     if place.margin is Margin.ENTRY:
         raise NotationError(f"another mode follows the impact before segment {place.segment + 1}")
     if place.margin is Margin.JOINT and place.surface in orbit.model.reset_by_surface:
-        raise NotationError(
-            f"the wall {place.surface} is met where segment {place.segment + 1} ends"
-        )
+        where = f"where segment {place.segment + 1} ends"
+        raise NotationError(f"the wall {place.surface} is met {where}")
     if kind is Kind.CS:
-        reason = f"swap stick and reversal at stop {place.segment + 1}, at {place.surface}"
-        edit = swap_edit(orbit.word, {place.segment: place.surface}, orbit.model)
-        return Outcome(edit, {(place.segment, 0): orbit.ends[place.segment]}, reason)
+        i, surface = place.segment, place.surface
+        edit, joints = swap_edit(orbit.word, {i: surface}, orbit.model), {(i, 0): orbit.ends[i]}
+        return Outcome(edit, joints, f"swap stick and reversal at stop {i + 1}, at {surface}")
     if kind is Kind.SS:
         return _stop_on_surface(orbit, place)
     if place.surface in orbit.model.reset_by_surface:
         return _grazing_impact(orbit, place)
-    rests = orbit.model.mode_by_name[mode].sliding
+    if place.margin is Margin.JOINT:
+        raise NoJump(f"{place.surface} is touched at a section: nothing can be held there")
     if place.margin is Margin.LASTING:
         return _pinned_at_stop(orbit, place)
-    if place.margin is Margin.EXIT:
-        return _released_tangentially(orbit, place) if rests else _stops_tangentially(orbit, place)
-    return _limit_touched(orbit, place) if rests else _rest_touched(orbit, place)
+    rests, ends = orbit.model.mode_by_name[mode].sliding, place.margin is Margin.EXIT
+    if rests:
+        return _released_tangentially(orbit, place) if ends else _limit_touched(orbit, place)
+    return _stops_tangentially(orbit, place) if ends else _rest_touched(orbit, place)
 
 
 def _stop_on_surface(orbit: Orbit, place: Test) -> Outcome:

@@ -11,14 +11,15 @@ from contfric.continuation.events import (
     Kind,
     hold_of_test,
     kind_of_margin,
-    rate_along,
 )
 from contfric.continuation.locate_change import locate_change
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import bifurcation_at
 from contfric.continuation.side import first_point
+from contfric.continuation.touching import is_rate_of, rate_along
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test
+from contfric.signature.holds import is_hold
 
 #: Margins below this at a located event vanish with it: they form a group. Located margins are
 #: zero to about 1e-13; distinct events this near are beyond what a diagram can tell apart.
@@ -176,13 +177,17 @@ def _grazed_stop(here: Orbit, point: Point, first: int) -> int:
 
     Where nothing jumps, a slide that comes to rest without acceleration has the load that rest is left
     with: both margins are one function, and which of them is located first is rounding. It is a grazing;
-    but not where the slide begins in its equilibrium, and goes nowhere.
+    but not where the slide begins in its equilibrium, and goes nowhere. So it is with a slider that reaches
+    its limit without velocity: that velocity is the rate of the exit, and has a surface of its own.
     """
     tests = here.system.tests
     test = tests[first]
-    if not here.model.filippov or test.margin is not Margin.JOINT:
+    if test.margin is not Margin.JOINT:
         return first
     i = test.segment
+    limit = _grazed_limit(here, point, first)
+    if limit != first or not here.model.filippov:
+        return limit
     if here.ends[i, 0] - here.cycle[i, 0] <= _VANISHED * here.period:
         return first
     at_start = rate_along(here, *here.word[i], here.begins[i])
@@ -193,6 +198,17 @@ def _grazed_stop(here: Orbit, point: Point, first: int) -> int:
         if tangential and other.segment == i:
             return k
     return first
+
+
+def _grazed_limit(here: Orbit, point: Point, first: int) -> int:
+    """Return the margin of the exit whose rate is what vanishes at the joint; else that of the joint."""
+    tests = here.system.tests
+    mode, exit_ = here.system.word[tests[first].segment]
+    if is_hold(exit_) or not is_rate_of(here.model, mode, exit_, tests[first].surface):
+        return first
+    wanted = Test(Margin.EXIT, tests[first].segment, exit_)
+    found = tests.index(wanted) if wanted in tests else first
+    return found if abs(point.tests[found]) < _NEARLY_REACHED else first
 
 
 def _located_before(

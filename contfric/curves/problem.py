@@ -14,8 +14,8 @@ from contfric.continuation.events import (
     Bifurcation,
     Kind,
     kind_of_margin,
-    resting_domain,
 )
+from contfric.continuation.touching import resting_domain
 from contfric.errors import ParameterError, checked_range, did_you_mean, items_of, mapping_of, shown
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.linear import jacobian_blocks

@@ -17,6 +17,7 @@ from contfric.errors import ModelError
 from contfric.models.coefficient_texts import text_of
 from contfric.models.coefficients import AFFINE, symbols
 from contfric.models.contact_laws import laws_of
+from contfric.models.contact_ranges import constraints_of
 from contfric.models.contacts import Contact, ContactKind, drift, factor_of
 from contfric.models.entries import EntryError, Part, mapping_in
 from contfric.models.grammar import Scope, names_in, number_of, parse
@@ -89,6 +90,8 @@ class _Modes:
             "spread": mapping_in(kept, "spread"),
         }
         found |= {"units": self._units(stretches)} if "units" in kept else {}
+        if ranges := dict(constraints_of(self.contacts, defaults_of(self.top))):
+            found["constraints"] = ranges | _with_meanings(kept.get("constraints"))
         resets = self._resets()
         found |= {"resets": resets} if resets else {}
         if "symmetry" not in kept and self._is_symmetric():
@@ -330,6 +333,13 @@ class _Modes:
                     for i, w in moved.items()
                 }
         return found
+
+
+def _with_meanings(given: Any) -> dict[str, str]:
+    """Return constraints as they are declared, as a list or with their meanings, with meanings."""
+    if isinstance(given, Mapping):
+        return {str(text): str(why or "") for text, why in given.items()}
+    return {str(text): "" for text in given or ()}
 
 
 def _subsets(items: Sequence[_T]) -> list[tuple[_T, ...]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 from contfric.errors import ModelError
@@ -51,6 +52,7 @@ _TOLERANCES = (1e-14, 1e-6)
 _STEPS = (1e-8, 1.0)
 
 
+@lru_cache(maxsize=16)
 def from_text(text: str) -> Description:
     """Read a description that :attr:`Description.text` wrote.
 

@@ -64,6 +64,7 @@ def _joined(key: _Key) -> dict[str, str]:
     domains = domains_of(description, engine_order(description))
     if len({tuple(d.signs.items()) for d in domains}) < len(domains):
         return first  # modes overlap: which of them motion is in is part of its state
+    places = {tuple(d.signs.items()): d.mode for d in domains}
     moving = [mode for mode in description.modes if 0 not in mode.sides.values()]
     going_on = True
     while going_on:
@@ -72,7 +73,7 @@ def _joined(key: _Key) -> dict[str, str]:
             if first[a.name] == first[b.name]:
                 continue
             both = {name for name, lead in first.items() if lead in (first[a.name], first[b.name])}
-            between = _between(description, domains, both, a.name, b.name)
+            between = _between(description, domains, places, both, (a.name, b.name))
             if between and _same_field(description, a, b, between):
                 lead = next(name for name in first if name in both)
                 first.update(dict.fromkeys(both, lead))
@@ -81,22 +82,25 @@ def _joined(key: _Key) -> dict[str, str]:
 
 
 def _between(
-    description: Description, domains: tuple[Domain, ...], both: set[str], a: str, b: str
+    description: Description,
+    domains: tuple[Domain, ...],
+    places: Mapping[tuple[tuple[str, int], ...], str],
+    both: set[str],
+    pair: tuple[str, str],
 ) -> set[str]:
     """Return the surfaces that divide two modes where all that is around them is one region; else none.
 
     Every surface that ends the region has to have it on one side: that is what a mode is.
     """
     own = [d for d in domains if d.mode in both]
-    place = {tuple(d.signs.items()): d.mode for d in domains}
     found: set[str] = set()
     for domain, surface in itertools.product(own, domains[0].signs):
-        beyond = place.get(tuple({**domain.signs, surface: -domain.signs[surface]}.items()))
-        on = place.get(tuple({**domain.signs, surface: 0}.items()))
+        beyond = places.get(tuple({**domain.signs, surface: -domain.signs[surface]}.items()))
+        on = places.get(tuple({**domain.signs, surface: 0}.items()))
         ends = surface in description.resets or on is not None
         if (ends or beyond not in (None, *both)) and len({d.signs[surface] for d in own}) > 1:
             return set()
-        if {domain.mode, beyond} == {a, b}:
+        if {domain.mode, beyond} == set(pair):
             found.add(surface)
     return found
 

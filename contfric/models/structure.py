@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from contfric.errors import ModelError, did_you_mean
+from contfric.models.contact_ranges import check_ranges
 from contfric.models.contacts import Contact, ContactKind, drift, factor_of, read_contacts
 from contfric.models.entries import EntryError, Part, mapping_in
 from contfric.models.grammar import names_in, parse
@@ -69,6 +70,7 @@ class Structure:
             _check_names(top, key, size, known)
         found = cls(top, coordinates, velocities, mass, forces, tuple(contacts))
         found.check()
+        check_ranges(contacts, params, mapping_in(top.data, "define"))
         return found
 
     # ------------------------------------------------------------------------------- checks

@@ -28,6 +28,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,9 @@ import sympy
 from contfric.errors import ParameterError, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Domain, FloatArray, Model
+from contfric.models.description import Description
 from contfric.models.numbers import function_of_numbers
+from contfric.models.symbols import Formulas
 from contfric.models.tied import tied
 from contfric.shown import Shown
 
@@ -167,6 +170,13 @@ def _pairs(model: Model) -> Iterator[tuple[str, str, str]]:
                     yield pair
 
 
+@lru_cache(maxsize=4)
+def _formulas(description: Description) -> tuple[Formulas, list[list[Any]]]:
+    """Return a description as formulas, and its fields: the same for all of its surfaces."""
+    formulas = Formulas(description)
+    return formulas, formulas.fields()
+
+
 @dataclass(frozen=True, eq=False)
 class _Tangencies:
     """The three equations of a surface and two modes, in (t, y)."""
@@ -187,17 +197,16 @@ class _Tangencies:
     ) -> _Tangencies:
         """Derive them from the formulas of a model."""
         from contfric.models.describe import from_text
-        from contfric.models.symbols import Formulas
 
         description = from_text(model.definition)
-        formulas = Formulas(description)
+        formulas, fields = _formulas(description)
         names = [mode.name for mode in description.modes]
         levels = dict(zip((s.name for s in description.surfaces), formulas.levels(), strict=True))
         observables = dict(
             zip((o.name for o in description.observables), formulas.observables(), strict=True)
         )
         height = observables[model.surface_by_name[surface].observable] - levels[surface]
-        fields, pieces = formulas.fields(), len(formulas.pieces)
+        pieces = len(formulas.pieces)
         own = [fields[names.index(mode) * pieces] for mode in (above, below)]
 
         def rate(formula: Any, field: list[Any]) -> Any:

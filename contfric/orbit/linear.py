@@ -114,10 +114,15 @@ def null_space(
 
 
 def pencil_of_turn(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:
-    """Return (P, Q) with ``P z_0 + Q z_N = 0`` for one turn, shape (2, m, m): without inner joints."""
+    """Return (P, Q) with ``P z_0 + Q z_N = 0`` for one turn, shape (2, m, m): without inner joints.
+
+    Where the rate of an exit does not matter it may vanish (:mod:`contfric.orbit.saltation`).
+    """
+    from contfric.orbit.saltation import pass_when_due
     from contfric.orbit.turn import turn_pencil
 
     a, b, _, _ = jacobian_blocks(system, joints, vector, parameters=False)
+    pass_when_due(system, joints, vector, a, b)
     pencil = np.empty((2, *a.shape[1:]))
     turn_pencil(a, b, pencil)
     return pencil

@@ -32,7 +32,8 @@ class SimulationEnd(str, Enum):
     INFINITE = "the solution diverged"
     QUIET = "the motion meets no surface any more: it has come to an equilibrium, or never changes"
     CHATTER = (
-        "impacts follow each other faster and faster (chatter): infinitely many in finite time"
+        "impacts follow each other faster and faster (chatter): infinitely many in finite time, and the "
+        "mass stays at the wall"
     )
 
 

@@ -159,7 +159,7 @@ def build_system(
         Domains of the segments if the word is in full seven-domain form; by default the word is
         reduced and each segment spans its whole mode.
     """
-    following = [mode for mode, _ in word[1:]] + [_mode_after(model, word, half)]
+    following = following_modes(model, word, half)
     surfaces = [s.name for s in model.surfaces]
     holds = holds_of(model, word)
     inside = [
@@ -215,10 +215,10 @@ def _turn(model: Model, periods: int, half: bool) -> float:
     return float(periods * (model.symmetry.fraction if half and model.symmetry else 1.0))
 
 
-def _mode_after(model: Model, word: Word, half: bool) -> str:
-    if not half:
-        return word[0][0]
-    return mirror_mode(model)[word[0][0]]
+def following_modes(model: Model, word: Word, half: bool) -> list[str]:
+    """Return the mode behind each segment of a turn; behind half an orbit it is the image of the first."""
+    first = mirror_mode(model)[word[0][0]] if half else word[0][0]
+    return [*(mode for mode, _ in word[1:]), first]
 
 
 def _segment_domains(

@@ -37,6 +37,7 @@ class Tables(NamedTuple):
     lies_on : surfaces that a mode moves on, as bits
     kept : surfaces that the state stays on where a surface is met, as bits: a reset takes it off others
     landed : surfaces that the state is on where motion goes on, as bits: the one met, but for a reset
+    walls : surfaces at which a reset sends motion back, as bits
     """
 
     observables: IntArray
@@ -47,6 +48,7 @@ class Tables(NamedTuple):
     lies_on: IntArray
     kept: IntArray
     landed: IntArray
+    walls: int
 
 
 @cache
@@ -81,6 +83,7 @@ def tables(model: Model) -> Tables:
         np.array([surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
         np.array([_surfaces_kept(model, s.name) for s in model.surfaces], dtype=np.int64),
         np.array([_bits(model, _landed(model, s.name)) for s in model.surfaces], dtype=np.int64),
+        _bits(model, (r.surface for r in model.resets if r.lands.get(r.surface, 0) > 0)),
     )
 
 

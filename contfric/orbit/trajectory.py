@@ -23,7 +23,7 @@ from contfric.orbit.tables import Tables
 
 #: Types of the model's tables and of the rows of events, as kernels take them.
 TablesType = types.NamedTuple(
-    [indices, table, indices, table, indices, indices, indices, indices], Tables
+    [indices, table, indices, table, indices, indices, indices, indices, i8], Tables
 )
 RowsType = types.NamedTuple([table, indices, vector, matrix], EventRows)
 
@@ -189,6 +189,25 @@ def shortest_flight(tables, mode):  # type: ignore[no-untyped-def]
 
 
 @helper
+def is_pressed(functions, tables, mode, surface, following, t, before, y, p, unit, workspace):  # type: ignore[no-untyped-def]
+    """Tell whether a state behind an impact is driven back at once: its next flight is too short to resolve.
+
+    It is if the mean rate of the gap over the shortest flight does not lead away from the wall. Impacts
+    with a small restitution come to that before there are many, one without restitution at once; a first
+    hit would be searched on the other side of the wall.
+    """
+    if tables.walls >> surface & 1 == 0:
+        return False  # the reset leads elsewhere
+    c, none, empty = tables.observables[surface], workspace.none, workspace.empty
+    toward = functions.rate(mode, c, t, before, p, none, empty)
+    h = NO_FLIGHT * unit
+    away = functions.rate(following, c, t, y, p, none, empty)
+    functions.flow(following, t, y, h, p, none, workspace.trial, workspace.nothing)
+    later = functions.rate(following, c, t + h, workspace.trial, p, none, empty)
+    return (away + later) * toward > 0.0
+
+
+@helper
 def too_large(y):  # type: ignore[no-untyped-def]
     """Tell whether a state has grown beyond all bounds, or is no number."""
     for j in range(y.shape[0]):
@@ -251,6 +270,20 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
             return (CHATTER if struck else IMPOSSIBLE), event, mode, cycle, t
         if reset and target < 0:
             return IMPOSSIBLE, event, mode, cycle, t
+        if reset and is_pressed(
+            functions,
+            tables,
+            mode,
+            surface,
+            target,
+            t,
+            rows.states[event],
+            y,
+            p,
+            unit,
+            workspace,
+        ):
+            return CHATTER, event, mode, cycle, t
         if target < 0:
             continue  # nothing leads there: the surface is touched and left to the same side
         write_event(rows, event, mode, surface, cycle, t)

@@ -174,6 +174,13 @@ def test_a_beam_of_twelve_modes_touches_where_the_linear_response_is_the_gap() -
     grazing = next(b for b in diagram.bifurcations if b.kind is cf.Kind.GS)
     assert grazing.params["W"] == pytest.approx(touches, abs=1e-10)
     hitting = next(b for b in diagram.branches if len(b[0].word) == 2 and b[0].word[0][1] == "stop")
+    first = min((hitting[0], hitting[-1]), key=lambda orbit: orbit.params["W"])
+    free = next(b for b in diagram.branches if b is not hitting)[-1]
+    assert free.params["W"] == pytest.approx(first.params["W"], abs=1e-9)
+    sizes = [
+        np.sort(np.abs(o.multipliers)) for o in (free, first)
+    ]  # the stop's stiffness adds nothing yet
+    assert sizes[1] == pytest.approx(sizes[0], abs=1e-9)
     other = hitting[len(hitting) // 2]
     p = other.params
 

@@ -171,6 +171,7 @@ def test_two_masses_that_hit_each_other_keep_their_momentum() -> None:
 
 RUBS = {"kind": "friction", "velocity": "v1", "kinetic": "S"}
 ELEMENT = {"kind": "jenkins", "displacement": "2*q1", "stiffness": "k", "limit": "S"}
+SPRING = {"kind": "spring", "gap": "1 - q1", "stiffness": "k"}
 WALL = {"kind": "impact", "gap": "1 - q1", "restitution": 0.5}
 
 WRONG: list[tuple[dict[str, Any], str]] = [
@@ -223,6 +224,23 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"stiffness": [["kk", 0.0], [0.0, 1.0]]}, "stiffness -> 0: unknown name 'kk'"),
     ({"force": {"q1": "cos(w*t)"}}, "force -> q1: unknown name 'w'"),
     ({"mass": [[1.0, 0.0], [0.0, float("nan")]]}, "mass -> 1: .* has to be a finite number"),
+    (
+        {"contacts": {"a": WALL | {"restitution": -0.2}}},
+        "contacts -> a -> restitution: .* at least 0",
+    ),
+    ({"contacts": {"a": WALL | {"restitution": "1.5*m"}}}, r"1.5\*m = 1.5 at the defaults"),
+    ({"contacts": {"a": RUBS | {"kinetic": "-S"}}}, "a -> kinetic: friction is at least 0"),
+    ({"contacts": {"a": RUBS | {"kinetic": "S*(k - 2)"}}}, "a -> kinetic: friction is at least 0"),
+    ({"contacts": {"a": RUBS | {"static": 0.1}}}, "a -> static: .* no larger than static friction"),
+    (
+        {"contacts": {"z": ELEMENT | {"stiffness": 0}}},
+        "z -> stiffness: .* above 0; 'z' has stiffness 0",
+    ),
+    ({"contacts": {"z": ELEMENT | {"limit": "-k"}}}, "z -> limit: .* slips is above 0"),
+    (
+        {"contacts": {"a": SPRING | {"stiffness": -1}}},
+        "a -> stiffness: .* of a spring is at least 0",
+    ),
 ]
 
 
@@ -240,6 +258,77 @@ def test_mistakes_say_what_and_where(change: dict[str, Any], message: str) -> No
     } | change
     with pytest.raises(ModelError, match=message):
         cf.Mechanism(given.pop("mass"), given.pop("damping"), given.pop("stiffness"), **given)
+
+
+@pytest.mark.parametrize(
+    ("contact", "valid", "wrong", "message"),
+    [
+        (WALL | {"restitution": "e"}, {"e": 0.0}, {"e": -0.01}, "needs 0 <= e"),
+        (WALL | {"restitution": "e"}, {"e": 1.0}, {"e": 1.01}, "needs e <= 1"),
+        (RUBS | {"kinetic": "mu*N"}, {"mu": 0.0}, {"N": -1.0}, "needs 0 <= N"),
+        (
+            RUBS | {"kinetic": "mu*N", "static": "mu0*N"},
+            {"mu": 0.5},
+            {"mu": 0.6},
+            "needs mu <= mu0",
+        ),
+        (RUBS | {"static": "S0"}, {"S": 0.3}, {"S": 0.31}, "needs S <= S0"),
+        (ELEMENT, {"k": 0.1}, {"k": 0.0}, "needs 0 < k"),
+        (SPRING, {"k": 0.0}, {"k": -0.1}, "needs 0 <= k"),
+    ],
+)
+def test_numbers_of_contacts_are_in_their_ranges(
+    contact: dict[str, str], valid: dict[str, float], wrong: dict[str, float], message: str
+) -> None:
+    eye = np.eye(2)
+    params = {"e": 0.5, "mu": 0.3, "mu0": 0.5, "N": 1.0, "S": 0.2, "S0": 0.3, "k": 1.0}
+    model = cf.Mechanism(eye, eye, eye, contacts={"a": contact}, parameters=params)
+    assert model.check_params(valid) == params | valid
+    with pytest.raises(cf.errors.ParameterError, match=message + ".* Contact 'a': "):
+        model.check_params(wrong)
+
+
+def test_a_mass_that_is_pressed_to_a_wall_stays_there() -> None:
+    """Impacts that follow each other too fast end a simulation before it goes through the wall."""
+    params = {"w": 1.3, "e": 0.5, "push": 2.0, "c": 0.1, "d": 0.1}
+    model = cf.Mechanism(
+        [[1.0]],
+        [["c"]],
+        [[1.0]],
+        contacts={"wall": {"kind": "impact", "gap": "d - q1", "restitution": "e"}},
+        force={"q1": "push + 0.3*cos(w*t)"},
+        parameters=params,
+        period="2*pi/w",
+    )
+    draw = np.random.default_rng(3)
+    for restitution in (0.0, 0.0, 0.02, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9) * 4:
+        wall = float(draw.uniform(-0.3, 0.3))
+        given_ = {"e": restitution, "push": draw.uniform(1.0, 3.0), "c": draw.uniform(0.0, 0.3)}
+        start = [wall - float(draw.uniform(0.0, 2.0)), 0.0]
+        found = cf.simulate(model, given_ | {"d": wall}, state=start, periods=60)
+        assert found.end.name == "CHATTER"
+        assert np.max(found.states[:, 0], initial=wall) <= wall + 1e-12
+        assert found.last[2][0] == pytest.approx(wall, abs=1e-12)
+
+
+def test_a_mass_without_restitution_leaves_a_wall_that_it_is_pulled_from() -> None:
+    model = cf.Mechanism(
+        [[1.0]],
+        [[0.0]],
+        [[1.0]],
+        contacts={"wall": {"kind": "impact", "gap": "0.5 - q1", "restitution": 0}},
+        force={"q1": "0.1*cos(w*t)"},
+        parameters={"w": 0.5},
+        period="2*pi/w",
+    )
+    found = cf.simulate(model, {}, state=[-1.0, 0.0], periods=0.9, events=1)
+    t = float(found.times[0])
+    ended = cf.simulate(model, {}, state=[-1.0, 0.0], periods=(t + 1.0) / (4.0 * np.pi))
+    forced = 0.1 / 0.75  # x = forced cos(t/2) + a cos(t - t0) + b sin(t - t0)
+    a, b = 0.5 - forced * np.cos(0.5 * t), 0.5 * forced * np.sin(0.5 * t)
+    x = forced * np.cos(0.5 * (t + 1.0)) + a * np.cos(1.0) + b * np.sin(1.0)
+    assert ended.last[2][0] == pytest.approx(x, abs=1e-12)
+    assert len(ended) == 1
 
 
 def test_contacts_that_share_their_load_and_too_many_are_refused() -> None:

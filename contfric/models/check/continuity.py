@@ -188,9 +188,7 @@ def _names(probe: Probe) -> list[str]:
 def _values_on(probe: Probe, mode: str, line: Line, place: float) -> FloatArray | None:
     """Return rates and observables at a place of a line; None outside of the mode."""
     t, y = line(place)
-    signs = probe.signs(t, y)
-    domains = [d for d in probe.model.domains if d.own_mode == mode]
-    if not any(d.signs == signs for d in domains):
+    if not probe.is_in(mode, probe.signs(t, y)):
         return None
     observed = [probe.flow.observe(name, t, y) for name in probe.model.observable_index]
     return np.array([*probe.field(mode, t, y), *observed])

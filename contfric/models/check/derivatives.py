@@ -10,6 +10,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache, lru_cache
 from typing import Any
 
 import mpmath
@@ -34,6 +35,10 @@ _SAME = 1e-9
 _COARSE, _COARSE_STEP = 1e-5, 6e-6
 
 Jacobian = tuple[FloatArray, FloatArray]
+#: Returns the points at which the functions of a mode (None: of all states) are compared.
+Points = Callable[[str | None], list[FloatArray]]
+#: Fields in many digits that are kept: those at the points of the differences of one mode.
+_KEPT = 256
 
 
 @dataclass(frozen=True)
@@ -55,16 +60,17 @@ def check_derivatives(report: ModelReport, probe: Probe) -> None:
     """Compare every compiled function with its formula, or with its own differences."""
     model = probe.model
     near = Probe(model, _nearby(model, probe))
-    _rates_along(report, near)
+    points = cache(lambda mode: list(_points(near, mode)))  # looked for among many states
+    _rates_along(report, near, points)
     for case in _described(near) if model.definition else _closed(near):
-        for point in _points(near, case.mode):
+        for point in points(case.mode):
             _compare(report, model, case, point, bool(model.definition))
 
 
-def _rates_along(report: ModelReport, probe: Probe) -> None:
+def _rates_along(report: ModelReport, probe: Probe, points: Points) -> None:
     """Compare the rate of each observable with its gradient along the field of the flow."""
     for mode in probe.model.modes:
-        for point in _points(probe, mode.name):
+        for point in points(mode.name):
             t, y = float(point[0]), point[1 : 1 + len(probe.model.states)].copy()
             velocity = np.array([1.0, *probe.field(mode.name, t, y)])
             for surface in probe.model.surfaces:
@@ -159,11 +165,13 @@ def _described(probe: Probe) -> list[Case]:
     model, description = probe.model, from_text(probe.model.definition)
     exact, field = digits(description), field_of(model.definition)
     split = _Split(model)
+    fields = lru_cache(maxsize=_KEPT)(_Fields(split, exact))
     found = [_observable(split, exact, o.name, c) for c, o in enumerate(model.observables)]
     for m, mode in enumerate(model.modes):
         found.append(_field(split, exact, field, mode.name, m))
         found += [
-            _rate(split, exact, mode.name, m, o.name, c) for c, o in enumerate(model.observables)
+            _rate(split, exact, fields, (mode.name, m), (o.name, c))
+            for c, o in enumerate(model.observables)
         ]
     found += [
         _reset(split, exact, description.resets[s.name], s.name, k)
@@ -244,10 +252,30 @@ def _field(split: _Split, exact: Evaluator[Any], field: Any, name: str, m: int) 
     return Case(what, split.vector(lambda *a: field(m, *a)), formula, name)
 
 
-def _rate(split: _Split, exact: Evaluator[Any], mode: str, m: int, observable: str, c: int) -> Case:
+@dataclass(frozen=True)
+class _Fields:
+    """Fields in many digits, at points: the rates of all observables of a mode need the same ones."""
+
+    split: _Split
+    exact: Evaluator[Any]
+
+    def __call__(self, mode: str, *point: Any) -> list[Any]:
+        t, y, p = self.split.named(point)
+        return self.exact.field(mode, p, t, y)
+
+
+def _rate(
+    split: _Split,
+    exact: Evaluator[Any],
+    fields: Callable[..., list[Any]],
+    mode_at: tuple[str, int],
+    observable_at: tuple[str, int],
+) -> Case:
+    (mode, m), (observable, c) = mode_at, observable_at
+
     def formula(point: list[Any]) -> list[Any]:
         t, y, p = split.named(point)
-        velocity = [mpmath.mpf(1), *exact.field(mode, p, t, y)]
+        velocity = [mpmath.mpf(1), *fields(mode, *point)]
 
         def along(h: Any) -> Any:
             place = [a + h * b for a, b in zip([t, *y], velocity, strict=True)]

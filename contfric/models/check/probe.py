@@ -54,7 +54,27 @@ class Probe:
 
     def height(self, surface: str, t: float, y: FloatArray) -> float:
         """Return (observable - level) of a surface."""
-        return self.flow.height(surface, t, y)
+        observable = self.model.surface_by_name[surface].observable
+        return self.flow.observe(observable, t, y) - self._levels[surface]
+
+    @cached_property
+    def _levels(self) -> dict[str, float]:
+        return {s.name: self.flow.level(s.name) for s in self.model.surfaces}
+
+    @cached_property
+    def _regions(self) -> dict[str, tuple[tuple[str, ...], frozenset[tuple[int, ...]]]]:
+        """The surfaces that each mode moves on, and the sides of all surfaces in its domains."""
+        order = [s.name for s in self.model.surfaces]
+        found: dict[str, tuple[tuple[str, ...], set[tuple[int, ...]]]] = {}
+        for domain in self.model.domains:
+            on = tuple(name for name, side in domain.signs.items() if side == 0)
+            _, sides = found.setdefault(domain.own_mode, (on, set()))
+            sides.add(tuple(domain.signs[name] for name in order))
+        return {mode: (on, frozenset(sides)) for mode, (on, sides) in found.items()}
+
+    def is_in(self, mode: str, signs: Mapping[str, int]) -> bool:
+        """Tell whether the sides of all surfaces are those of a domain of a mode."""
+        return tuple(signs[s.name] for s in self.model.surfaces) in self._regions[mode][1]
 
     def slope(self, surface: str, t: float, y: FloatArray) -> FloatArray:
         """Return the gradient of a surface's observable, shape (1 + n,)."""
@@ -95,13 +115,12 @@ class Probe:
 
     def inside(self, mode: str, t: float, y: FloatArray) -> tuple[float, FloatArray] | None:
         """Return a state of a mode near a state: on the surfaces that it moves on; None if outside."""
-        domains = [d for d in self.model.domains if d.own_mode == mode]
-        on = tuple(name for name, side in domains[0].signs.items() if side == 0)
+        on, _ = self._regions[mode]
         place = self.landed(on, t, y) if on else (t, y)
         if place is None:
             return None
         signs = {**self.signs(*place), **dict.fromkeys(on, 0)}
-        return place if any(d.signs == signs for d in domains) else None
+        return place if self.is_in(mode, signs) else None
 
     def landed(
         self, surfaces: tuple[str, ...], t: float, y: FloatArray
@@ -122,8 +141,10 @@ class Probe:
 
     def signs(self, t: float, y: FloatArray) -> dict[str, int]:
         """Return the side of every surface that a state is on."""
-        found = {}
+        found, values = {}, dict[str, float]()
         for surface in self.model.surfaces:
-            above = self.height(surface.name, t, y)
+            if surface.observable not in values:
+                values[surface.observable] = self.flow.observe(surface.observable, t, y)
+            above = values[surface.observable] - self._levels[surface.name]
             found[surface.name] = 0 if abs(above) <= ON else int(math.copysign(1, above))
         return found

@@ -1,0 +1,106 @@
+"""Surfaces that are only touched: where a joint does so, and whether sliding begins there or ends."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from contfric.models.definition import Domain, Model
+from contfric.models.view import FlowView
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.structure import is_section
+from contfric.orbit.system import System, Test
+
+#: A rate this small, at a joint on a section that is a rate itself, is rounding.
+_TANGENTIAL = 1e-9
+#: Random states by which two functions are compared.
+_STATES = 6
+
+
+def touches_at_section(system: System, test: Test, orbit: Orbit) -> bool:
+    """Tell whether the state at a joint touches a surface where the segment ends on a section.
+
+    A slider that begins to slip reaches its limit where its velocity vanishes, and that may be the section:
+    nothing stops there, and the touch is that inside of the segment, whose margin vanishes too.
+    """
+    mode, exit_ = system.word[test.segment]
+    if not is_section(system.model, mode, exit_):
+        return False
+    rate = rate_along(orbit, mode, test.surface, orbit.ends[test.segment])
+    return abs(rate) < _TANGENTIAL
+
+
+@cache
+def begins_to_slide(model: Model, mode: str, surface: str) -> bool:
+    """Tell whether motion that meets a surface goes on sliding on all that it slides on, and on that surface.
+
+    Where another contact sticks meanwhile, a touch of such a surface is a grazing: no rest comes to an end.
+    """
+    own = [d for d in model.domains if d.mode == model.whole_mode(mode)]
+    after = [
+        model.domain_by_name[target].signs
+        for d in own
+        for target in model.targets.get((d.name, surface), ())
+    ]
+    slides_on = {s for s, sign in own[0].signs.items() if all(d.signs[s] == 0 for d in own)}
+    return bool(after) and all(all(signs[s] == 0 for s in (*slides_on, surface)) for signs in after)
+
+
+def resting_domain(system: System, test: Test) -> Domain | None:
+    """Return the domain of rest that a joint is next to, which the surface of a test ends; None if none.
+
+    Where the surface is that of another contact, whose state changes at the same time, the rest goes on.
+    """
+    model = system.model
+    mode, exit_ = system.word[test.segment]
+    resting = [
+        d
+        for d in model.domains
+        if model.mode_by_name[d.mode].sliding and d.signs[test.surface] != 0
+    ]
+    own = [d for d in resting if d.mode == mode and _ends_rest(model, d, test.surface)]
+    beside = [
+        d for d in resting if d.signs.get(exit_) == 0 and _ends_rest(model, d, test.surface, exit_)
+    ]
+    return next(iter([*own, *beside]), None)
+
+
+def _ends_rest(model: Model, domain: Domain, surface: str, on: str = "") -> bool:
+    """Tell whether motion that meets a surface no longer rests: on one surface, or on any that it did."""
+    held = [on] if on else [name for name, sign in domain.signs.items() if sign == 0]
+    after = [
+        model.domain_by_name[target].signs
+        for target in model.targets.get((domain.name, surface), ())
+    ]
+    return any(signs[name] != 0 for signs in after for name in held)
+
+
+@cache
+def is_rate_of(model: Model, mode: str, exit_: str, surface: str) -> bool:
+    """Tell whether the observable of a surface is the rate of an exit's in a mode, up to a factor.
+
+    So is the velocity of a slider that of its stretch. At random states: a load is the rate of no velocity,
+    for friction stands between them.
+    """
+    view, draw = FlowView(model, model.vector({})), np.random.default_rng(2)
+    wide = np.abs(model.spread(model.defaults))
+    one, other = (model.surface_by_name[name].observable for name in (exit_, surface))
+    found = []
+    for _ in range(_STATES):
+        t, y = (
+            float(draw.uniform(0.0, view.period or 10.0)),
+            wide * draw.uniform(-1.0, 1.0, len(wide)),
+        )
+        found.append((view.rate(mode, one, t, y), view.observe(other, t, y)))
+    rates, values = np.array(found).T
+    factor = rates @ values / (values @ values) if np.any(values) else 0.0
+    return bool(factor and np.allclose(rates, factor * values, rtol=1e-9, atol=1e-12))
+
+
+def rate_along(orbit: Orbit, mode: str, surface: str, joint: np.ndarray) -> float:
+    """Rate of a surface's observable along a mode at a joint (t, y)."""
+    observable = orbit.model.surface_by_name[surface].observable
+    time, n = float(joint[0]), len(joint) - 1
+    grad = orbit.flow.gradient(observable, time, joint[1:])
+    return float(grad[0] + grad[1:] @ orbit.flow.jacobian(mode, time, joint[1:], 0.0)[:, 1 + n])

@@ -1,0 +1,171 @@
+"""Joints at which a disturbance is carried on whatever the rate of the exit, which may vanish there.
+
+Behind a joint at which the field jumps, a disturbance is multiplied by the saltation matrix, with the rate
+of the exit as divisor [1]_. Where a surface is only touched that rate is 0, and a segment behind it has no
+length. Two kinds of joints have a limit there, in which the rate does not stand:
+
+* the field is continuous (a contact with a spring; a slider that comes to rest; a section): the identity;
+* motion begins to slide on the surface h = 0, and the field changes along one direction e only (a slider
+  that begins to slip; friction that begins to stick): the projection ``1 - e h_y / (h_y . e)``.
+
+The rows of such an exit would divide zero by zero. They are replaced: the joint is passed when it was.
+Without excitation the last joint fixes the phase, and what is passed is a plane normal to the field.
+
+.. [1] R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, Springer
+   (2004), chapter 7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import Enum
+from functools import cache
+
+import numpy as np
+
+from contfric.models.definition import FloatArray, Model
+from contfric.models.view import FlowView
+from contfric.orbit.system import System, following_modes
+from contfric.signature.holds import is_hold
+
+#: Fields that differ by less than this share of each rate's size, at all states, are equal there: rounding.
+_SAME = 1e-9
+#: States at which fields are compared, beyond the number of states, and at how many sets of parameters.
+_MORE, _SETS = 4, 2
+#: What the second set is changed by: what vanishes at the defaults alone is an accident.
+_MOVED = 1.07
+#: Projections onto surfaces, and the distance that counts as on them.
+_STEPS, _ON = 50, 1e-11
+#: A rate at an exit below this share of an ordinary one counts as small: rows of the exit that divide by it
+#: lose as many digits, twice.
+_SMALL = 1e-2
+
+
+class Passage(Enum):
+    """What the field does at a joint."""
+
+    CONTINUOUS = "the same field on both sides"
+    PROJECTED = "sliding begins, and the field changes along one direction"
+    JUMP = "another field"
+
+
+def pass_when_due(
+    system: System, joints: FloatArray, vector: FloatArray, a: FloatArray, b: FloatArray
+) -> None:
+    """Replace the rows of joints at which the rate of the exit does not matter, in the blocks of a turn.
+
+    Parameters
+    ----------
+    a, b : blocks on z_i and z_{i+1}, shape (N, m, m); changed in place
+    """
+    model, word = system.model, system.word
+    after = following_modes(model, word, system.half)
+    view = FlowView(model, vector)
+    for i, ((mode, exit_), following) in enumerate(zip(word, after, strict=True)):
+        passage = passage_at(model, mode, exit_, following)
+        if passage is Passage.JUMP:
+            continue
+        last = i + 1 == len(word)
+        if passage is Passage.PROJECTED:
+            end = _end(system, joints, view.period, i)
+            slope = view.gradient(model.surface_by_name[exit_].observable, *end)
+            if not _is_small(slope, b[i, :-1, 0]):
+                continue
+            project = _projection(view, slope[1:], (mode, exit_, following))
+            a[i, :-1], b[i, :-1, 0] = project @ a[i, :-1], project @ b[i, :-1, 0]
+        a[i, -1], b[i, -1] = 0.0, 0.0
+        if not model.autonomous:
+            b[i, -1, 0] = 1.0
+        elif last:  # the column of the time at the end of a flow is the field there
+            field = b[i, :-1, 0]
+            b[i, -1, 1:] = field / (np.linalg.norm(field) or 1.0)
+        else:
+            a[i, -1, 0], b[i, -1, 0] = -1.0, 1.0
+
+
+def _end(system: System, joints: FloatArray, period: float, i: int) -> tuple[float, FloatArray]:
+    """Return time and state at the end of segment i: that of the last is the image of the first joint."""
+    if i + 1 < len(joints):
+        return float(joints[i + 1, 0]), joints[i + 1, 1:]
+    layout = system.layout
+    return float(joints[0, 0]) + layout.turn * period, layout.closure @ joints[0, 1:]
+
+
+def _is_small(slope: FloatArray, field: FloatArray) -> bool:
+    rate = slope[0] + slope[1:] @ field
+    return bool(abs(rate) < _SMALL * np.linalg.norm(slope) * np.linalg.norm([1.0, *field]))
+
+
+def _projection(view: FlowView, slope: FloatArray, joint: tuple[str, str, str]) -> FloatArray:
+    """Return the map of disturbances where sliding begins; e is that of the state at which it is largest."""
+    changes = [there - here for here, there in _fields(view, *joint)]
+    along = max(changes, key=lambda change: float(np.linalg.norm(change)))
+    return np.eye(len(slope)) - np.outer(along, slope) / (slope @ along)
+
+
+@cache
+def passage_at(model: Model, mode: str, surface: str, following: str) -> Passage:
+    """Return what the field does between a mode and the following one, on all of the surface between them.
+
+    Judged at random states on the surface, on which both modes slide as they do.
+    """
+    if is_hold(surface) or surface in model.reset_by_surface or surface in model.wraps:
+        return Passage.JUMP
+    if model.whole_mode(mode) == model.whole_mode(following):
+        return Passage.CONTINUOUS
+    slides = surface in _lies_on(model, following)
+    vector, worst = model.vector({}), Passage.CONTINUOUS
+    for k in range(_SETS):
+        pairs = list(_fields(FlowView(model, vector * _MOVED**k), mode, surface, following))
+        if len(pairs) < 2:
+            return Passage.JUMP
+        here, there = (np.array(fields) for fields in zip(*pairs, strict=True))
+        size = np.max(np.abs(here), axis=0) + np.max(np.abs(there), axis=0)
+        changes = (there - here)[:, size > 0.0] / size[size > 0.0]
+        if np.max(np.abs(changes), initial=0.0) <= _SAME:
+            continue
+        sizes = np.linalg.svd(changes, compute_uv=False)
+        if not slides or np.any(sizes[1:] > _SAME * sizes[0]):
+            return Passage.JUMP
+        worst = Passage.PROJECTED
+    return worst
+
+
+def _lies_on(model: Model, mode: str) -> set[str]:
+    """Return the surfaces that a mode slides on."""
+    whole = model.whole_mode(mode)
+    own = [d.signs for d in model.domains if d.mode == whole]
+    return {name for name in own[0] if all(signs[name] == 0 for signs in own)}
+
+
+def _fields(
+    view: FlowView, mode: str, surface: str, following: str
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield the fields of two modes at random states on the surface between them."""
+    model = view.model
+    surfaces = sorted({surface} | _lies_on(model, mode) | _lies_on(model, following))
+    draw = np.random.default_rng(1)
+    wide = np.abs(model.spread(model.mapping(view.vector)))
+    for _ in range(len(wide) + _MORE):
+        t, y = float(draw.uniform(0.0, view.period or 10.0)), draw.uniform(-2.0, 2.0, len(wide))
+        landed = _landed(view, surfaces, t, wide * y)
+        if landed is not None:
+            m = 1 + len(wide)  # the column of the duration
+            yield (
+                view.jacobian(mode, t, landed, 0.0)[:, m],
+                view.jacobian(following, t, landed, 0.0)[:, m],
+            )
+
+
+def _landed(view: FlowView, surfaces: list[str], t: float, y: FloatArray) -> FloatArray | None:
+    """Return a state on some surfaces, near another one, by projections; None where none is found."""
+    observables = [view.model.surface_by_name[s].observable for s in surfaces]
+    for _ in range(_STEPS):
+        missed = np.array([view.height(s, t, y) for s in surfaces])
+        if np.max(np.abs(missed)) <= _ON * (1.0 + np.max(np.abs(y))):
+            return y
+        slopes = np.array([view.gradient(o, t, y)[1:] for o in observables])
+        if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(missed))):
+            return None
+        y = y - np.linalg.lstsq(slopes, missed, rcond=None)[0]
+    return None

@@ -1,0 +1,77 @@
+"""Events of random structures have one name, whichever branch a diagram is explored from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import contfric as cf
+
+RANGE = (0.1, 1.7)
+
+
+def random_structure(seed: int, kinds: str) -> cf.Model:
+    """Return two masses with friction (f) or a Jenkins element (j) on each, or on the first alone."""
+    draw = np.random.default_rng([seed, {"jj": 0, "fj": 1, "j": 3}[kinds]])
+    k = draw.uniform(0.7, 1.5, 3)
+
+    def contact(kind: str, i: int) -> dict[str, Any]:
+        if kind == "f":
+            kinetic = f"{draw.uniform(0.1, 0.3):.4f}*s"
+            return {"kind": "friction", "velocity": f"v{i}", "kinetic": kinetic}
+        stiffness, limit = f"{draw.uniform(0.8, 2):.4f}", f"{draw.uniform(0.2, 0.6):.4f}*s"
+        return {"kind": "jenkins", "displacement": f"q{i}", "stiffness": stiffness, "limit": limit}
+
+    contacts = {"ab"[i]: contact(kind, i + 1) for i, kind in enumerate(kinds)}
+    return cf.Mechanism(
+        np.diag(draw.uniform(0.7, 1.5, 2)),
+        [[0.2, -0.05], [-0.05, 0.2]],
+        [[k[0] + k[1], -k[1]], [-k[1], k[1] + k[2]]],
+        contacts=contacts,
+        force={"q1": "F*cos(W*t)"},
+        parameters={"W": float(draw.uniform(0.5, 1.2)), "F": 1.0, "s": 1.0},
+        period="2*pi/W",
+        name=f"names-{kinds}-{seed}",
+    )
+
+
+def names(found: cf.Diagram) -> list[tuple[float, str, tuple[str, ...]]]:
+    return sorted(
+        (round(b.params["F"], 6), b.kind.value, b.contacts)
+        for b in found.bifurcations
+        if b.kind is not cf.Kind.T
+    )
+
+
+slow = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("kinds", "seed"),
+    [
+        ("j", 0),
+        *(pytest.param("j", seed, marks=slow) for seed in (1, 2, 3)),
+        *(pytest.param("jj", seed, marks=slow) for seed in range(5)),
+        *(pytest.param("fj", seed, marks=slow) for seed in (0, 3)),
+    ],
+)
+def test_events_have_the_same_names_from_every_branch(kinds: str, seed: int) -> None:
+    model = random_structure(seed, kinds)
+    first = cf.explore(cf.find_orbit(model, {"F": 1.4}), "F", RANGE, max_periods=1)
+    assert names(first)
+    for branch in first.branches[:3]:
+        again = cf.explore(branch[len(branch) // 2], "F", RANGE, max_periods=1)
+        assert names(again) == names(first)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_slider_that_begins_to_slip_grazes_its_limit(seed: int) -> None:
+    """Also where the touch lies on the section of the stuck motion, whose joint meets the limit."""
+    model = random_structure(seed, "j")
+    orbit = cf.find_orbit(model, {"F": 1.4})
+    down = cf.continue_orbit(orbit, "F", RANGE)
+    event = min(down.bifurcations, key=lambda b: b.params["F"])
+    assert event.kind is cf.Kind.GS
+    assert event.contacts == ("a",)

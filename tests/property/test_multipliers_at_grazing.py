@@ -1,0 +1,125 @@
+"""Multipliers where a surface is only touched: those of the orbit that touches nothing, or their limit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import contfric as cf
+
+VAN_DER_POL = """
+name: van-der-pol-with-a-spring
+states: [x, v]
+parameters: {mu: 0.7, d: 1.9, ks: 3.0}
+autonomous: true
+constraints: [ks > 0]
+surfaces: {stop: {observable: x, level: d}, v: {observable: v}}
+modes:
+  free: {in: {stop: -, v: +}, field: {x: v, v: mu*(1 - x**2)*v - x}}
+  back: {in: {stop: -, v: -}, field: {x: v, v: mu*(1 - x**2)*v - x}}
+  pressed: {in: {stop: +}, field: {x: v, v: mu*(1 - x**2)*v - x - ks*(x - d)}}
+spread: {x: 2, v: 2}
+"""
+
+
+def random_mass_on_a_stop(seed: int, size: int) -> tuple[cf.Model, float]:
+    """Return masses of which the last meets a spring, and the amplitude of its motion without."""
+    draw = np.random.default_rng([seed, size])
+    mass = np.diag(draw.uniform(0.5, 2.0, size))
+    roots = draw.normal(size=(size, size))
+    stiffness = roots @ roots.T + np.eye(size)
+    damping = 0.1 * stiffness + 0.05 * mass
+    w = float(draw.uniform(0.5, 1.8))
+    wave = np.linalg.solve(stiffness - w**2 * mass + 1j * w * damping, np.eye(size)[0])
+    model = cf.Mechanism(
+        mass,
+        damping,
+        stiffness,
+        contacts={
+            "stop": {"kind": "spring", "gap": f"d - q{size}", "stiffness": draw.uniform(0.5, 9.0)}
+        },
+        force={"q1": "cos(W*t)"},
+        parameters={"W": w, "d": 1.1 * abs(wave[-1])},
+        period="2*pi/W",
+        name=f"stop-{seed}-{size}",
+    )
+    return model, float(abs(wave[-1]))
+
+
+def at_grazing(found: cf.Diagram, name: str, value: float) -> list[cf.Orbit]:
+    """Return the ends of branches where a parameter has a value."""
+    tips = [branch[k] for branch in found.branches for k in (0, -1)]
+    return [orbit for orbit in tips if abs(orbit.params[name] - value) < 1e-6]
+
+
+def assert_same_set(mine: np.ndarray, other: np.ndarray, tolerance: float) -> None:
+    left = list(other)
+    for value in mine:
+        nearest = min(left, key=lambda o: abs(o - value))
+        assert abs(nearest - value) < tolerance
+        left.remove(nearest)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_a_spring_that_is_only_touched_changes_no_multiplier(seed: int, size: int) -> None:
+    model, amplitude = random_mass_on_a_stop(seed, size)
+    start = cf.find_orbit(model, {})
+    found = cf.explore(start, "d", (0.97 * amplitude, 1.1 * amplitude), max_periods=1)
+    event = next(b for b in found.bifurcations if b.kind is cf.Kind.GS)
+    assert event.params["d"] == pytest.approx(amplitude, rel=1e-9)
+    ends = at_grazing(found, "d", event.params["d"])
+    assert any("c" in mode for orbit in ends for mode, _ in orbit.system.word)
+    for orbit in ends:
+        assert_same_set(orbit.multipliers, start.multipliers, 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_slider_that_only_touches_its_limit_has_the_limit_of_those_that_slip(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    model = cf.Mechanism(
+        [[1.0]],
+        [[float(draw.uniform(0.05, 0.3))]],
+        [[float(draw.uniform(0.7, 1.5))]],
+        contacts={"z": {"kind": "jenkins", "displacement": "q1", "stiffness": "kt", "limit": "N"}},
+        force={"q1": "F*cos(W*t)"},
+        parameters={"W": 0.9, "F": 1.5, "kt": float(draw.uniform(1.0, 3.0)), "N": 0.8},
+        period="2*pi/W",
+        name=f"slider-{seed}",
+    )
+    found = cf.explore(cf.find_orbit(model, {}), "F", (0.2, 1.6), max_periods=1)
+    event = next(b for b in found.bifurcations if b.kind in (cf.Kind.GS, cf.Kind.CS))
+    slips = next(b for b in found.branches if any(m in "pn" for m, _ in b[0].system.word))
+    first = event.params["F"]
+    distances = (1e-4, 1e-5)
+    found_at = []
+    for distance in distances:
+        k = int(np.argmin(np.abs(slips.params["F"] - first - 10.0 * distance)))
+        branch = cf.continue_orbit(
+            slips[k], "F", (first + distance, slips.params["F"][k] + distance)
+        )
+        low = int(np.argmin(branch.params["F"]))
+        assert branch.params["F"][low] == pytest.approx(first + distance, abs=1e-10)
+        found_at.append(np.sort_complex(branch[low].multipliers))
+    far, near = found_at
+    ends = [o for o in at_grazing(found, "F", first) if any(m in "pn" for m, _ in o.system.word)]
+    assert ends
+    for orbit in ends:  # with the root of the distance
+        limit = near + (near - far) / (np.sqrt(distances[0] / distances[1]) - 1.0)
+        assert_same_set(orbit.multipliers, limit, 1e-3)
+
+
+def test_a_cycle_that_only_touches_a_spring_has_the_multiplier_of_the_free_one(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "cycle.yaml"
+    path.write_text(VAN_DER_POL)
+    start = cf.find_orbit(path, {"d": 2.1})
+    found = cf.explore(start, "d", (1.95, 2.1), max_periods=1)
+    event = next(b for b in found.bifurcations if b.kind is cf.Kind.GS)
+    ends = at_grazing(found, "d", event.params["d"])
+    assert len({orbit.system.word for orbit in ends}) >= 2
+    for orbit in ends:
+        assert orbit.multipliers == pytest.approx(start.multipliers, abs=1e-9)
