@@ -37,6 +37,7 @@ import numpy as np
 from contfric.continuation.measured_event import MeasuredEvent
 from contfric.continuation.touching import (
     begins_to_slide,
+    is_corner,
     rate_along,
     resting_domain,
     touches_at_section,
@@ -330,7 +331,7 @@ def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
     if test.margin is Margin.ENTRY:
         return Kind.CS
     if test.surface in model.reset_by_surface:
-        return Kind.GS
+        return Kind.CS if is_corner(system, test, orbit) else Kind.GS
     if test.margin is Margin.JOINT and test.surface in model.section_surfaces:
         resting = resting_domain(system, test)
         if resting is None and inside_sign(model, mode, test.surface) == 0:

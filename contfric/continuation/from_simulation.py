@@ -22,9 +22,9 @@ from contfric.orbit.structure import mode_domains
 from contfric.orbit.system import Word, build_system
 from contfric.signature import canonical_word
 
-#: Distances of the motions from the orbit at the event (nondimensional): the first where a turn amplifies
-#: little, the last where it amplifies much.
-_BESIDE = (1e-3, 1e-5, 1e-7)
+#: Distances of the motions from the orbit at the event (nondimensional), the nearest first: where a turn
+#: amplifies much only those are guesses that Newton's method takes, where little the others change the word.
+_BESIDE = (1e-7, 1e-5, 1e-3)
 #: A turn may last this much longer than that at the event: a grazing changes it by the root of a distance.
 _LONGER = 1.2
 

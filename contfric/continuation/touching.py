@@ -10,10 +10,12 @@ from contfric.models.definition import Domain, Model
 from contfric.models.view import FlowView
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.structure import is_section
-from contfric.orbit.system import System, Test
+from contfric.orbit.system import Margin, System, Test
 
 #: A rate this small, at a joint on a section that is a rate itself, is rounding.
 _TANGENTIAL = 1e-9
+#: A surface that is met faster than this is passed: a graze is located to the root of rounding.
+_PASSED = 1e-4
 #: Random states by which two functions are compared.
 _STATES = 6
 
@@ -29,6 +31,14 @@ def touches_at_section(system: System, test: Test, orbit: Orbit) -> bool:
         return False
     rate = rate_along(orbit, mode, test.surface, orbit.ends[test.segment])
     return abs(rate) < _TANGENTIAL
+
+
+def is_corner(system: System, test: Test, orbit: Orbit) -> bool:
+    """Tell whether two surfaces are met at once at a joint, each with a speed: neither is only touched."""
+    if test.margin is not Margin.JOINT:
+        return False
+    mode, _ = system.word[test.segment]
+    return abs(rate_along(orbit, mode, test.surface, orbit.ends[test.segment])) > _PASSED
 
 
 @cache
