@@ -408,3 +408,23 @@ def test_masses_side_by_side_move_as_one_alone() -> None:
     ]
     assert len(wanted) >= 8
     assert np.allclose(np.array(stops), np.array(wanted), atol=1e-10)
+
+
+def test_a_normal_force_that_vanishes_somewhere_is_warned_of() -> None:
+    """A pad whose normal force depends on a state: where it is negative, no mode is missing."""
+    pad = {
+        "kind": "friction",
+        "velocity": "v1 - vb",
+        "kinetic": "mu*(N0 + kc*q2)",
+        "static": "1.2*mu*(N0 + kc*q2)",
+    }
+    model = cf.Mechanism(
+        np.eye(2),
+        0.02 * np.eye(2),
+        [["1", "-0.3"], ["-0.3", "1.5 + kc"]],
+        contacts={"pad": pad},
+        parameters={"mu": 0.5, "N0": 1.0, "kc": 1.0, "vb": 0.4},
+    )
+    report = cf.check_model(model)
+    assert report.ok
+    assert any("friction limit that is negative" in f.message for f in report.findings)

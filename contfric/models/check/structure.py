@@ -60,6 +60,12 @@ def _behind_wall(probe: Probe, signs: dict[str, int]) -> bool:
     return False
 
 
+def _crossed_limits(signs: dict[str, int]) -> str:
+    """Return the contact whose moving limits are crossed: above the upper one, and below the lower."""
+    pairs = ((s[:-1], sign) for s, sign in signs.items() if s.endswith("+"))
+    return next((name for name, sign in pairs if sign > 0 and signs.get(f"{name}-", 0) < 0), "")
+
+
 def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> None:
     model = probe.model
     for t, y in probe.on(surface.name, _ON_SURFACE):
@@ -75,6 +81,13 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
                 continue
             report.count(Topic.TRANSITIONS)
             following = model.transitions.get((name, surface.name))
+            if following is None and (limit := _crossed_limits(signs)):
+                report.warn(
+                    Topic.TRANSITIONS,
+                    f"the limit '{limit}+' lies below '{limit}-' at some states: a friction limit that is "
+                    "negative. Where motion comes there (a normal force vanishes) the model does not hold",
+                )
+                continue
             if following is None:
                 report.error(
                     Topic.TRANSITIONS,
