@@ -63,7 +63,8 @@ def pass_when_due(
     view = FlowView(model, vector)
     for i, ((mode, exit_), following) in enumerate(zip(word, after, strict=True)):
         passage = passage_at(model, mode, exit_, following)
-        if passage is Passage.JUMP:
+        held = is_hold(word[(i + 1) % len(word)][1])  # what is held has equations of its own
+        if passage is Passage.JUMP or held:
             continue
         last = i + 1 == len(word)
         if passage is Passage.PROJECTED:

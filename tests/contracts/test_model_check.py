@@ -314,4 +314,4 @@ def test_sizes_and_times_that_are_far_apart_are_told(tmp_path: Path) -> None:
     assert "'q' (1e-09) and 'x' (1)" in sizes
     fast = APART.replace("- x,", "- 1.0e+9*x,").replace("q: x - q", "q: 1.0e+9*(x - q)")
     (times,) = findings(tmp_path, fast.replace("- 2*x", "- 1.0e+9*x"), Topic.SCALES)
-    assert "measure time" in times
+    assert "Write units: {x: 1.0e-09" in times

@@ -38,6 +38,7 @@ WORDS = {
     "dry": {("forward", "stop"), ("backward", "stop"), ("slide", "slide-"), ("slide", "slide+")},
     "element": {("stick+", "z+"), ("stick+", "z-"), ("slip+", "stop"), ("slip-", "stop")},
     "frame": {("p", "brake"), ("n", "brake"), ("s", "brake+"), ("s", "brake-")},
+    "machine": {("p", "pad"), ("n", "pad"), ("s", "pad+"), ("s", "pad-")},
 }
 
 

@@ -66,7 +66,9 @@ def test_events_have_the_same_names_from_every_branch(kinds: str, seed: int) -> 
         assert names(again) == names(first)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 4))]
+)
 def test_a_slider_that_begins_to_slip_grazes_its_limit(seed: int) -> None:
     """Also where the touch lies on the section of the stuck motion, whose joint meets the limit."""
     model = random_structure(seed, "j")

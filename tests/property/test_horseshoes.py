@@ -46,6 +46,7 @@ def test_the_map_in_balls_holds_the_sampled_one(sampled: ReleaseMap) -> None:
     assert decided > 6
 
 
+@pytest.mark.slow
 def test_a_horseshoe_is_proved(sampled: ReleaseMap) -> None:
     found: Horseshoe = sampled.horseshoe(6)
     assert found.proved, found.why

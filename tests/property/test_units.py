@@ -36,16 +36,17 @@ spread: {x: %r, v: %r}
 quantities: {energy: integral(R*abs(v))}
 """
 #: Models with a reset, a clock, an angle, sliding that is derived, memory, contacts, quantities.
-MODELS = (
+MODELS = ("impact", "relay-sliding", "thermostat", "jenkins", "blade-damper")
+OTHERS = (
     *(
-        "impact",
-        "impact-friction",
         "integrate-and-fire",
-        "relay-sliding",
         "rimless-wheel",
-        "jenkins",
+        "buck",
+        "pendulum",
+        "coulomb-yaml",
+        "pounding",
+        "iwan",
     ),
-    *("buck", "pendulum", "thermostat", "coulomb-yaml", "blade-damper", "pounding", "iwan"),
 )
 
 
@@ -59,7 +60,9 @@ def proposed(model: Model) -> dict[str, float]:
     return yaml.safe_load(texts[0].partition("Write units: ")[2]) if texts else {}
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 4))]
+)
 def test_a_block_in_si_units_has_the_diagram_of_the_paper(seed: int) -> None:
     rng = np.random.default_rng([91, seed])
     natural, length, m = (
@@ -86,7 +89,9 @@ def test_a_block_in_si_units_has_the_diagram_of_the_paper(seed: int) -> None:
         assert energy == pytest.approx(b.orbit.quantity("energy"), rel=1e-8)
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize(
+    "name", [*MODELS, *(pytest.param(name, marks=pytest.mark.slow) for name in OTHERS)]
+)
 def test_units_change_numbers_only(name: str) -> None:
     folder = bundled_dir("models")
     data = yaml.safe_load((folder / f"{name}.yaml").read_text(encoding="utf-8"))
