@@ -59,11 +59,9 @@ demo: $(STAMP)
 	@echo "Figures:"; find $(DEMO) -type f \( -name '*.png' -o -name '*.svg' -o -name '*.pdf' \) | sort | sed 's/^/  /'
 	@echo "Tables and restart data:"; find $(DEMO) -type f \( -name '*.csv' -o -name '*.json' -o -name '*.npz' \) | sort | sed 's/^/  /'
 
-# One after the other whatever -j says, pytest last: its closing line is the last line.
+# What can be done at once, then pytest: its closing line is the last line.
 test: $(STAMP)
-	@$(MAKE) lint
-	@$(MAKE) types
-	@$(MAKE) contracts
+	@$(MAKE) -j$(WORKERS) --output-sync=target lint types contracts kernels
 	@$(MAKE) unit
 
 lint: $(STAMP)

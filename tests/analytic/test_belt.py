@@ -118,6 +118,7 @@ def test_orbit_solved_from_its_signature() -> None:
     assert found.period == pytest.approx(known.period, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_exponents_of_the_cycle_and_of_the_equilibrium() -> None:
     cycle = cf.lyapunov_exponent(belt, {"V": 0.1, "S": S, "S0": S0, "zeta": 0.05})
     assert cycle.motion.name == "PERIODIC" and np.all(np.isneginf(cycle.exponents))

@@ -22,6 +22,7 @@ def folds(s: float) -> list[cf.Bifurcation]:
     return [b for b in branch.bifurcations if b.kind is cf.Kind.SN and b.params["Omega"] < 0.305]
 
 
+@pytest.mark.slow
 def test_cusp() -> None:
     """Two folds meet; their distance goes with the power 3/2 of the distance to the cusp."""
     gaps = {}

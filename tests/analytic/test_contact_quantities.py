@@ -10,6 +10,7 @@ import contfric as cf
 from contfric.errors import ParameterError
 
 
+@pytest.mark.slow
 def test_elements_dissipate_what_masing_says() -> None:
     """A loop between -A and A of an element with stiffness k and limit S encloses 4 S (A - S/k)."""
     orbit = cf.find_orbit("iwan", {"F": 0.3, "S": 0.05, "W": 1.2}, state=[0.8, 0.0, 0.05, 0.1, 0.2])

@@ -110,6 +110,7 @@ def test_the_field_on_both_surfaces_keeps_both() -> None:
     assert (ahead - beside)[[1, 3]] / 1e-6 == pytest.approx([mean, mean], abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_cycle_of_blocks_whose_friction_falls() -> None:
     """Its segments, by scipy along the equations as they are written here, end at the next joints."""
     text = BLOCKS.replace("S*sign(u - vb)", "S/(1 + 3*abs(u - vb))*sign(u - vb)")

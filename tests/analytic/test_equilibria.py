@@ -456,6 +456,7 @@ modes:
         assert event.product == pytest.approx((1 - slope) / (1 + slope), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_cycle_is_born_at_a_boundary_focus() -> None:
     """Fields that are affine at the point: the cycle's size is proportional to mu."""
     model = typed(FOCUS)

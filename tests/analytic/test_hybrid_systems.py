@@ -278,6 +278,7 @@ def test_a_pendulum_rotates_and_oscillates() -> None:
 # -------------------------------------------------------------------------------- derived sliding
 
 
+@pytest.mark.slow
 def test_derived_sliding_is_that_of_dry_friction(tmp_path) -> None:
     path = tmp_path / "derived.yaml"
     path.write_text(
@@ -322,6 +323,7 @@ def test_relay_feedback_slides() -> None:
     closes(cf.find_orbit(model), {"plus": field(1), "minus": field(-1), "slide": field(0)})
 
 
+@pytest.mark.slow
 def test_normal_force() -> None:
     p = {"W": 0.5, "mu": 0.3, "n": 0.4, "phi": 1.0}
 
@@ -345,6 +347,7 @@ def test_normal_force() -> None:
 # ---------------------------------------------------------------- out of a slide, through a surface
 
 
+@pytest.mark.slow
 def test_jenkins_element() -> None:
     p = cf.load_model("jenkins").defaults
 

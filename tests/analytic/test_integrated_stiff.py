@@ -57,6 +57,7 @@ def scipy_solution(p, t0, y, dt):
     return solve_ivp(field, (t0, t0 + dt), start, **options).y[:, -1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [1e2, 1e3, 1e4, 1e6])
 def test_slide_against_scipy(stiffness):
     p = parameters(stiffness, sigma1=0.02 / math.sqrt(stiffness), c=0.05)

@@ -283,6 +283,7 @@ def test_an_autonomous_cycle_has_a_period_and_a_gradient() -> None:
 # ------------------------------------------------------------------------------------- events
 
 
+@pytest.mark.slow
 def test_the_onset_of_sticking_moves_as_its_formula() -> None:
     """Den Hartog: 0s sticks where Omega^2 X = S0, X^2 = V^2 - S^2 U^2; differentiated at 40 digits."""
     orbit = cf.solve_orbit("coulomb", "0s", {**FIG5, "Omega": 0.56})
@@ -355,6 +356,7 @@ def test_the_resonance_peak_lies_where_its_formula_says(quantity: str) -> None:
     assert peak.orbit.gradient(quantity)["zeta"] == pytest.approx(slope, rel=1e-11)
 
 
+@pytest.mark.slow
 def test_extrema_of_a_branch_with_a_fold_are_those_of_fine_steps() -> None:
     branch = cf.continue_orbit(cf.solve_orbit("coulomb", "1a", FIG5), "Omega", (0.4, 0.6))
     fine = cf.continue_orbit(
@@ -418,6 +420,7 @@ def test_orbits_of_one_amplitude_lie_on_their_formula(quantity: str) -> None:
     assert np.max(np.abs(curve.measured("rms(x)") - size / np.sqrt(2))) < 1e-12
 
 
+@pytest.mark.slow
 def test_a_curve_of_one_energy_ends_at_events_and_edges() -> None:
     orbit = cf.solve_orbit("coulomb", "1a", FIG5)
     ranges = {"Omega": (0.45, 0.56), "S": (0.2, 0.39)}

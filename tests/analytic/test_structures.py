@@ -64,6 +64,7 @@ def test_two_blocks_on_a_belt() -> None:
                 assert v == pytest.approx(p["vb"], abs=1e-11)
 
 
+@pytest.mark.slow
 def test_a_blade_whose_damper_never_slips_is_linear() -> None:
     """Below the force at which the damper slips the response is that of three springs."""
     params = {"F": 0.01, "W": 0.7}
@@ -96,6 +97,7 @@ def test_an_orbit_that_grazes_is_not_followed_twice() -> None:
     assert all(len(b.proposals) < 20 for b in diagram.bifurcations)
 
 
+@pytest.mark.slow
 def test_a_drill_string_sticks_and_slips_as_an_integrator_says() -> None:
     """From the release to the next one, by scipy's own events."""
     w = 0.3

@@ -35,6 +35,7 @@ def plane():
     return cf.explore_plane(orbit, PLANE, RANGES, max_sections=2, max_periods=1, seeds=None)
 
 
+@pytest.mark.slow
 def test_sections_start_from_orbits_of_few_periods() -> None:
     # at S = 0.015 attractors have 54 periods; explored up to that number, fig11 did not end
     orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.6, "S0": 0.8})

@@ -43,8 +43,21 @@ def report_of(tmp_path: Path, text: str) -> cf.ModelReport:
     return check_model(path)
 
 
+#: Models of many modes, or with much to integrate: seconds each.
+LARGE = (
+    *("braced-chain", "storeys", "beam-stop", "drill-string", "iwan", "two-blocks"),
+    *("lugre", "belt-lugre", "popp"),
+)
+BUNDLED = sorted(p.stem for p in bundled_dir("models").glob("*.yaml"))
+
+
 @pytest.mark.parametrize(
-    "name", ["coulomb", *sorted(p.stem for p in bundled_dir("models").glob("*.yaml"))]
+    "name",
+    [
+        "coulomb",
+        *(n for n in BUNDLED if n not in LARGE),
+        *(pytest.param(n, marks=pytest.mark.slow) for n in LARGE),
+    ],
 )
 def test_bundled_models_pass(name: str) -> None:
     report = check_model(name)

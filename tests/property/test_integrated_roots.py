@@ -96,6 +96,7 @@ def search(request, tmp_path_factory):
 coefficient = st.floats(-1, 1).map(lambda x: 0.0 if abs(x) < 1e-3 else x)
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(
     rest=st.lists(coefficient, min_size=8, max_size=8),

@@ -61,6 +61,7 @@ def pulls(letters: dict[str, str], y: np.ndarray) -> np.ndarray:
     return found
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_every_mode_obeys_the_equations_of_motion(seed: int) -> None:

@@ -55,6 +55,7 @@ def orbits() -> dict[int, cf.Orbit]:
     return found
 
 
+@pytest.mark.slow
 def test_branches_in_coarse_and_in_fine_steps() -> None:
     pairs = seen = 0
     for index, orbit in orbits().items():

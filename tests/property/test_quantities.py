@@ -56,6 +56,7 @@ def test_extrema_by_any_way_agree(params: dict[str, float]) -> None:
     assert orbit.quantity("min(v)") == pytest.approx(-orbit.quantity("max(-v)"), abs=1e-12)
 
 
+@pytest.mark.slow
 @given(PARAMS)
 @settings(max_examples=10)
 def test_harmonics_sum_to_the_mean_square(params: dict[str, float]) -> None:

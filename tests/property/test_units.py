@@ -36,8 +36,9 @@ spread: {x: %r, v: %r}
 quantities: {energy: integral(R*abs(v))}
 """
 #: Models with a reset, a clock, an angle, sliding that is derived, memory, contacts, quantities.
-MODELS = ("impact", "relay-sliding", "thermostat", "jenkins", "blade-damper")
+MODELS = ("impact", "thermostat")
 OTHERS = (
+    *("relay-sliding", "jenkins", "blade-damper"),
     *(
         "integrate-and-fire",
         "rimless-wheel",
