@@ -56,6 +56,7 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish
 from contfric.orbit.system import Word
+from contfric.signature import canonical_word
 from contfric.signature.edits import show
 
 #: Where an orbit near an event is looked for, relative to the range.
@@ -123,19 +124,27 @@ def _follow_flow(state: Exploration, event: Event) -> None:
     active = orbit.model.index_of(settings.parameter)
     shifts = tuple((active, share * settings.width) for share in _SHARES)
     reason = "the word that the flow walks near the event"
+    refused: dict[Word, str] = {}
+    done: set[Word] = set()
     for found in walked(orbit.as_whole(), shifts):
         guess = replace(found, vector=orbit.vector)
+        word = canonical_word(guess.word, orbit.model)
+        if word in done:
+            continue
         branch = _through(state, guess)
         ends = [] if branch is None else [e for e in branch.ends if _meets(e, event, settings)]
         if branch is None or not ends or never_lasts(branch):
-            why = f"no orbit of {show(guess.word)} meets the event"
-            state.judge(event, reason, Verdict.REFUSED, why=why)
-        elif (known := state.known(branch[len(branch) // 2])) is not None:
+            refused.setdefault(word, f"no orbit of {show(guess.word)} meets the event")
+            continue
+        done.add(word)
+        if (known := state.known(branch[len(branch) // 2])) is not None:
             state.judge(event, reason, Verdict.KNOWN, known)
         else:
             state.accept(event, reason, branch)
             for end in ends:
                 state.merge(event, end)
+    for word in (w for w in refused if w not in done):
+        state.judge(event, reason, Verdict.REFUSED, why=refused[word])
 
 
 def _meets(end: End, event: Event, settings: Settings) -> bool:

@@ -32,19 +32,21 @@ _LONGER = 1.2
 def walked(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator[Orbit]:
     """Yield orbits, not solved, of the words that motions near an orbit walk in one turn.
 
+    The same word may come again, as a guess from a motion farther away.
+
     Parameters
     ----------
     orbit : the orbit at the event, on its whole cycle
     shifts : (parameter, change) of further motions, from the orbit itself at other parameters
     """
-    seen = {canonical_word(orbit.word, orbit.model)}
-    for vector, state in _beside(orbit, shifts):
+    own, seen = canonical_word(orbit.word, orbit.model), set()
+    for size, vector, state in _beside(orbit, shifts):
         found = _one_turn(orbit, vector, state)
         if found is None:
             continue
         word = canonical_word(found.word, orbit.model)
-        if word not in seen:
-            seen.add(word)
+        if word != own and (word, size) not in seen:  # from another distance it is another guess
+            seen.add((word, size))
             yield found
 
 
@@ -58,7 +60,8 @@ def _middle(orbit: Orbit) -> tuple[int, float]:
 
 def _beside(
     orbit: Orbit, shifts: tuple[tuple[int, float], ...]
-) -> Iterator[tuple[FloatArray, FloatArray]]:
+) -> Iterator[tuple[float, FloatArray, FloatArray]]:
+    """Yield the distance, the parameters and the state of motions beside an orbit, the nearest first."""
     _, time = _middle(orbit)
     middle = orbit.state(time)
     data = orbit.system.layout.conserved  # which are given: motions beside the orbit have the same
@@ -68,11 +71,11 @@ def _beside(
             apart[k] = size * (1.0 + abs(middle[k]))
             apart -= data.T @ (data @ apart)
             for sign in (1.0, -1.0):
-                yield orbit.vector, middle + sign * apart
+                yield size, orbit.vector, middle + sign * apart
     for index, change in shifts:
         vector = orbit.vector.copy()
         vector[index] += change
-        yield vector, middle
+        yield np.inf, vector, middle
 
 
 def _one_turn(orbit: Orbit, vector: FloatArray, state: FloatArray) -> Orbit | None:

@@ -38,7 +38,7 @@ _MOVED = 1.07
 _STEPS, _ON = 50, 1e-11
 #: A rate at an exit below this share of an ordinary one counts as small: rows of the exit that divide by it
 #: lose as many digits, twice.
-_SMALL = 1e-2
+_SMALL = 1e-4
 
 
 class Passage(Enum):
@@ -67,11 +67,11 @@ def pass_when_due(
         if passage is Passage.JUMP or held:
             continue
         last = i + 1 == len(word)
+        end = _end(system, joints, view.period, i)
+        slope = view.gradient(model.surface_by_name[exit_].observable, *end)
+        if not _is_small(slope, b[i, :-1, 0]):
+            continue
         if passage is Passage.PROJECTED:
-            end = _end(system, joints, view.period, i)
-            slope = view.gradient(model.surface_by_name[exit_].observable, *end)
-            if not _is_small(slope, b[i, :-1, 0]):
-                continue
             project = _projection(view, slope[1:], (mode, exit_, following))
             a[i, :-1], b[i, :-1, 0] = project @ a[i, :-1], project @ b[i, :-1, 0]
         a[i, -1], b[i, -1] = 0.0, 0.0
