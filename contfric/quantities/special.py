@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 #: Displacement of an orbit for the derivatives of multipliers, relative to its size: its fourth power, and
 #: rounding divided by it, are both about 1e-12.
 _STEP = 1e-3
+#: Shares of it tried where two steps differ by more than this, as they do near multipliers that meet.
+_SHARES, _AGREE = (1.0, 0.1, 0.01), 1e-6
 #: Derivatives of two steps that differ by more than this are those of no smooth function.
 _UNSURE = 1e-2
 
@@ -107,6 +109,13 @@ def _difference(orbit: Orbit, directions: Directions, k: int) -> tuple[float, fl
         moved = replace(orbit, joints=orbit.joints + by * joints, vector=orbit.vector + by * vector)
         return _largest_modulus(moved)
 
-    wide = (at(step) - at(-step)) / (2.0 * step)
-    narrow = (at(0.5 * step) - at(-0.5 * step)) / step
-    return (4.0 * narrow - wide) / 3.0, abs(narrow - wide)
+    best = 0.0, np.inf
+    for share in _SHARES:
+        h = share * step
+        wide = (at(h) - at(-h)) / (2.0 * h)
+        narrow = (at(0.5 * h) - at(-0.5 * h)) / h
+        if abs(narrow - wide) < best[1]:
+            best = (4.0 * narrow - wide) / 3.0, abs(narrow - wide)
+        if best[1] <= _AGREE * (1.0 + abs(best[0])):
+            break
+    return best

@@ -100,3 +100,16 @@ def test_gradients_are_differences_of_orbits(params: dict[str, float], name: str
     gradient = orbit.gradient(name)
     assert gradient[by] == pytest.approx(slope, rel=1e-6, abs=1e-7 + error)
     assert gradient.value == pytest.approx(orbit.quantity(name), abs=1e-13)
+
+
+def test_the_gradient_of_a_multiplier_next_to_another_one() -> None:
+    """Two multipliers, 0.281 and 0.251: differences over a step that is too long were off by a hundredth."""
+    params = {"Omega": 1.0, "S": 0.15625, "S0": 0.5, "zeta": 0.1875}
+    orbit = cf.find_orbit("coulomb", params)
+    ends = [
+        cf.find_orbit("coulomb", params | {"Omega": 1.0 + by}).quantity("multiplier")
+        for by in (1e-5, -1e-5)
+    ]
+    assert orbit.gradient("multiplier")["Omega"] == pytest.approx(
+        (ends[0] - ends[1]) / 2e-5, rel=1e-5
+    )
