@@ -43,7 +43,7 @@ def certify_census(model: ModelSource, params: Parameters | None = None) -> Cens
     Raises
     ------
     ParameterError
-        If the model is none whose law the checker knows, or the parameters are not valid.
+        If the checker does not know the law of the model, or the parameters are not valid.
 
     Examples
     --------

@@ -9,7 +9,7 @@ smooth function of the phase. Where that is not so, and the interval is narrow, 
 times are known to lie in some clusters (:mod:`contfric.certify.first_times`), each of which is followed by
 itself, with its whole width as a ball; at a stop whose load may lie on either side of S0, rest and reversal
 are both followed. Every solution of the law is one of those that are followed, whatever it does at a jump
-of the map; some that are followed are none.
+of the map; not all that are followed are solutions.
 
 The derivative of the time of a release by the phase of the first one is the product of the derivatives of the
 segments, for disturbances (dt, dx) of time and place of a stop: with the free response E of a slide, and the

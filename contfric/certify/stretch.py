@@ -93,13 +93,13 @@ def ended(
     missed = (_fixed(row) * along).whole[0, 0]
     width = 2 * missed.abs_upper() / (row * field * there.at)[0, 0].abs_lower()
     for _ in range(_TRIES):
-        beside = arb(0, width.abs_upper() if width.is_finite() else 0)
-        wide = _moved(field, there, slope, beside)
+        extra = arb(0, width.abs_upper() if width.is_finite() else 0)
+        wide = _moved(field, there, slope, extra)
         rate = (row * field * wide.whole)[0, 0]
         if rate.contains(0):
             break  # a wider one contains 0, too
         rest = -missed / rate
-        if rest.is_finite() and beside.contains_interior(rest):
+        if rest.is_finite() and extra.contains_interior(rest):
             end = _moved(field, there, slope, rest)
             return Line(middle, slope, rest), _on(end, row, balls.states)
         width = 4 * width
@@ -117,13 +117,13 @@ def _refined(field: arb_mat, row: arb_mat, state: Affine, guess: arb) -> arb:
     return guess
 
 
-def _moved(field: arb_mat, there: Affine, slope: arb, beside: arb) -> Affine:
-    """Return the state after a further time ``s slope + beside``."""
-    delta = slope * HALF + beside
+def _moved(field: arb_mat, there: Affine, slope: arb, extra: arb) -> Affine:
+    """Return the state after a further time ``s slope + extra``."""
+    delta = slope * HALF + extra
     size = field.nrows()
     one = arb_mat([[int(a == b) for b in range(size)] for a in range(size)])
     linear = (field * slope).mid()
-    rest = (field * slope - linear) * HALF + field * beside
+    rest = (field * slope - linear) * HALF + field * extra
     square = arb(0, (delta * delta / 2).abs_upper())
     rest += field * field * (field * (delta * HALF)).exp() * square
     return Affine(one, linear, rest, HALF) * there

@@ -61,7 +61,7 @@ def _middle(orbit: Orbit) -> tuple[int, float]:
 def _beside(
     orbit: Orbit, shifts: tuple[tuple[int, float], ...]
 ) -> Iterator[tuple[float, FloatArray, FloatArray]]:
-    """Yield the distance, the parameters and the state of motions beside an orbit, the nearest first."""
+    """Yield the distance, the parameters and the state of motions near an orbit, the nearest first."""
     _, time = _middle(orbit)
     middle = orbit.state(time)
     data = orbit.system.layout.conserved  # which are given: motions beside the orbit have the same

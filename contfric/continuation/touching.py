@@ -70,10 +70,10 @@ def resting_domain(system: System, test: Test) -> Domain | None:
         if model.mode_by_name[d.mode].sliding and d.signs[test.surface] != 0
     ]
     own = [d for d in resting if d.mode == mode and _ends_rest(model, d, test.surface)]
-    beside = [
+    others = [
         d for d in resting if d.signs.get(exit_) == 0 and _ends_rest(model, d, test.surface, exit_)
     ]
-    return next(iter([*own, *beside]), None)
+    return next(iter([*own, *others]), None)
 
 
 def _ends_rest(model: Model, domain: Domain, surface: str, on: str = "") -> bool:

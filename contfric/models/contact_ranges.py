@@ -1,9 +1,9 @@
 """What the numbers of a contact may be: a law of friction that drives, or a wall that pulls, is a mistake.
 
 ==========  ==============================================================================================
-friction    ``0 <= kinetic <= static``: of 0 it is none
+friction    ``0 <= kinetic <= static``; 0 means no friction
 jenkins     ``stiffness > 0`` and ``limit > 0``
-spring      ``stiffness >= 0``: of 0 it is none; a spring that pulls belongs to the matrix of stiffness
+spring      ``stiffness >= 0``; 0 means no spring. One that pulls belongs to the stiffness matrix
 impact      ``0 <= restitution <= 1``: energy is lost, or kept
 ==========  ==============================================================================================
 

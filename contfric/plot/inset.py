@@ -49,7 +49,7 @@ def checked_inset(inset: object) -> Inset:
 
 
 def crowd(marks: Sequence[Mark], width: float) -> tuple[float, float] | None:
-    """Return where the most events lie close together, with space beside them; None where none do.
+    """Return where the most events lie close together, with space around them; None where they do not.
 
     Tangencies and events of bridges, which give way to others, do not count.
     """

@@ -93,7 +93,7 @@ def test_an_orbit_that_grazes_is_not_followed_twice() -> None:
         orbit = branch[len(branch) // 2]
         assert shortest(orbit) is orbit
     assert not [b for b in diagram.bifurcations if b.kind is cf.Kind.BP]
-    # and a touch at its own start is none that one more impact is proposed at, again and again
+    # and a touch at its own start is not one at which one more impact is proposed at, again and again
     assert all(len(b.proposals) < 20 for b in diagram.bifurcations)
 
 

@@ -113,7 +113,7 @@ def check_reset_jumps(report: ModelReport, probe: Probe) -> None:
                 Topic.CONTINUITY,
                 f"'{state}' behind the reset at '{reset.surface}' jumps by {found[2]:.3g} between states "
                 f"that meet it in mode '{domain.own_mode}': a branch would end where an orbit comes there. "
-                "Only modes may change by leaps; what a reset does has to be continuous",
+                "A reset has to be continuous within a mode; only modes may jump",
             )
             return
 
@@ -128,8 +128,8 @@ def _behind(
 ) -> FloatArray | None:
     """Return the state behind a reset from between two states; None where that is in another domain."""
     t, y = a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
-    beside = _real_sides(probe, reset, probe.signs(t, y))
-    if beside != _real_sides(probe, reset, domain.signs):
+    sides = _real_sides(probe, reset, probe.signs(t, y))
+    if sides != _real_sides(probe, reset, domain.signs):
         return None
     return probe.reset(reset.surface, t, y).copy()
 
