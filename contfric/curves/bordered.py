@@ -249,7 +249,7 @@ def add_curvature(functions, second, layout, i, sign, z, p, which, workspace):  
     bend_flow(
         functions, second, layout, i, from_, lasts, p, which, along, bent, bordered, equations
     )
-    divided = is_divided(layout, i, lasts)
+    divided = is_divided(functions, layout, i, from_, lasts, p, which, equations)
     if divided:
         bend_mean_rate(functions, layout, i, from_, lasts, p, which, along, workspace)
     for k in range(grad.shape[0]):

@@ -73,10 +73,11 @@ def second_order(  # type: ignore[no-untyped-def]
 
 
 @helper
-def divides_exit(layout, i, z, workspace):  # type: ignore[no-untyped-def]
+def divides_exit(functions, layout, i, z, p, which, workspace):  # type: ignore[no-untyped-def]
     """Tell whether the exit row of segment i of an orbit is divided by its duration."""
     after = z[i + 1] if i + 1 < z.shape[0] else workspace.equations.last
-    return is_divided(layout, i, after[0] - z[i, 0])
+    lasts = after[0] - z[i, 0]
+    return is_divided(functions, layout, i, z[i], lasts, p, which, workspace.equations)
 
 
 @helper
@@ -86,7 +87,7 @@ def third_order(functions, second, layout, i, z, p, which, sign, workspace, out)
     v, u = bordered.v, bordered.u
     count, m = z.shape
     start, after = ends = workspace.z_ref[i], bordered.after
-    divided = divides_exit(layout, i, z, workspace)
+    divided = divides_exit(functions, layout, i, z, p, which, workspace)
     slopes = 0.0
     for level in range(2):
         step = _THIRD if level == 0 else 0.5 * _THIRD
@@ -109,7 +110,7 @@ def third_order(functions, second, layout, i, z, p, which, sign, workspace, out)
 def bend_segment(functions, second, layout, i, z, p, which, sign, others, twist, workspace, out):  # type: ignore[no-untyped-def]
     """Write F_i,zz v w of segment i of the orbit; w is ``others``, closed by ``twist``."""
     ends = z[i], (z[i + 1] if i + 1 < z.shape[0] else workspace.equations.last)
-    divided = divides_exit(layout, i, z, workspace)
+    divided = divides_exit(functions, layout, i, z, p, which, workspace)
     second_order(
         functions, second, layout, i, ends, p, which, sign, others, twist, divided, workspace, out
     )

@@ -45,9 +45,13 @@ from contfric.orbit.holds import NO_PIN, TOUCH_PIN
 from contfric.orbit.system import Layout
 
 #: Where a segment that begins on its exit surface is shorter than this (nondimensional), its exit row is
-#: divided by the duration: five points of Gauss are exact to rounding there (d^10 f^(10) / 5e32), and the
-#: row as it stands is well conditioned beyond.
+#: divided by the duration if five points of Gauss are exact there; the row as it stands is well conditioned
+#: beyond.
 _SHORT = 0.1
+#: Exact is a mean that gives the change of the observable to this (nondimensional, against scale): hundreds
+#: of roundings of a closed form over so short a time, and far below what an orbit is asked for. An
+#: integrated flow is allowed ten of its own.
+_EXACT, _ROUNDINGS = 1e-13, 10.0
 #: Abscissas and weights of Gauss and Legendre on (0, 1), five points.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _NODES, _WEIGHTS = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
@@ -86,6 +90,7 @@ class EquationWorkspace(NamedTuple):
     Attributes
     ----------
     state, jac : end of a segment with its derivatives, shapes (n,) and (n, 2 + n + q)
+    between : a state within a segment, shape (n,)
     behind : state behind a reset, in the last row, and the derivatives of the reset, shape
         (n + 1, 1 + n + q)
     grad, level_grad : gradients of an observable and of a level, shapes (1 + n + q,) and (q,)
@@ -96,6 +101,7 @@ class EquationWorkspace(NamedTuple):
 
     state: FloatArray
     jac: FloatArray
+    between: FloatArray
     behind: FloatArray
     grad: FloatArray
     level_grad: FloatArray
@@ -115,6 +121,7 @@ def equation_workspace(count, m, free):  # type: ignore[no-untyped-def]
     return EquationWorkspace(
         np.empty(n),
         np.empty((n, 2 + n + free)),
+        np.empty(n),
         np.empty((n + 1, 1 + n + free)),
         np.empty(1 + n + free),
         np.empty(free),
@@ -272,9 +279,31 @@ def mean_rate_row(functions, layout, i, at, start, duration, p, which, workspace
 
 
 @helper
-def is_divided(layout, i, duration):  # type: ignore[no-untyped-def]
+def is_divided(functions, layout, i, start, duration, p, which, workspace):  # type: ignore[no-untyped-def]
     """Tell whether the exit row of segment i is divided by its duration."""
-    return abs(duration) < _SHORT and layout.returns[i] == 1
+    if not (abs(duration) < _SHORT and layout.returns[i] == 1):
+        return False
+    state, none, empty, nothing = (
+        workspace.between,
+        workspace.none,
+        workspace.empty,
+        workspace.nothing,
+    )
+    n, mode, c = state.shape[0], layout.modes[i], layout.observables[layout.exits[i]]
+    begin, change = start[1:], 0.0
+    if layout.resets[i] >= 0:
+        apply_reset(functions, layout, i, start, p, which, workspace)
+        begin = workspace.behind[n, :n]
+    for k in range(_NODES.shape[0]):
+        time = _NODES[k] * duration
+        functions.flow(mode, start[0], begin, time, p, none, state, nothing)
+        change += _WEIGHTS[k] * functions.rate(mode, c, start[0] + time, state, p, none, empty)
+    change *= duration
+    functions.flow(mode, start[0], begin, duration, p, none, state, nothing)
+    value = functions.observe(c, start[0] + duration, state, p, none, empty)
+    difference = value - functions.observe(c, start[0], begin, p, none, empty)
+    exact = max(_EXACT, _ROUNDINGS * layout.rounding) * (1.0 + abs(value))
+    return abs(difference - change) <= exact
 
 
 @helper
@@ -330,7 +359,7 @@ def segment_rows(functions, layout, i, at, start, after, p, which, workspace, ro
     for k in range(3 * m + free + 1, width):
         rows[row, k] = 0.0
     duration = after[0] - start[0]
-    if is_divided(layout, i, duration):
+    if is_divided(functions, layout, i, start, duration, p, which, workspace):
         worst += mean_rate_row(functions, layout, i, at, start, duration, p, which, workspace, rows)
         return worst if math.isfinite(worst) else np.inf
     for k in range(m):

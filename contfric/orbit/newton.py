@@ -76,6 +76,10 @@ _CIRCLES = 2
 _ROUNDING = 1e-14
 #: A residual that no longer falls is rounding below this many times that of the flow.
 _NOISE = 10.0
+#: Rounding of a segment's end against that of the numbers it is computed from, each of which counts with
+#: its derivative: what flows in closed form are held to (50 units in the last place). That of a stiff mode is
+#: far above that of the states.
+_UNITS = 50.0 * 2.2e-16
 #: A residual of rounding varies by more than this from step to step; one on its way down falls faster.
 _STILL_FALLS = 0.5
 #: Error that the last correction may leave: below one unit in the last place.
@@ -103,8 +107,21 @@ def add_rate(functions, layout, i, after, p, which, grad, rows):  # type: ignore
 
 
 @helper
+def rounding_of_rows(rows, at, start, after):  # type: ignore[no-untyped-def]
+    """Return what rounding of a segment's joint and of its end in time makes of its residual."""
+    m, total = start.shape[0], 0.0
+    for j in range(m - 1):
+        row = m + j
+        moved = abs(rows[row, 2 * m] * after[0])
+        for k in range(m):
+            moved += abs(rows[row, at + k] * start[k])
+        total += moved / (1.0 + abs(after[1 + j]))
+    return _UNITS * total
+
+
+@helper
 def newton_step(functions, layout, z, p, which, tangential, probe, workspace):  # type: ignore[no-untyped-def]
-    """Solve the linearised equations at (z, p); return (solved, largest residual).
+    """Solve the linearised equations at (z, p); return (solved, largest residual, largest rounding of one).
 
     The closure of the chain and the border rows are in the workspace. The solution is left in
     ``workspace.elimination``, the pencil of one turn in ``workspace.pencil``. With a ``probe`` above zero the
@@ -115,7 +132,7 @@ def newton_step(functions, layout, z, p, which, tangential, probe, workspace):  
     work, equations = workspace.elimination, workspace.equations
     rows, second = work.rows, 3 * m + which.shape[0] + 1
     start_border(work.border, workspace.d, workspace.e, workspace.s, m)
-    worst = 0.0
+    worst = noise = 0.0
     for i in range(count):
         if i > 0:
             next_rows(rows, work.border, workspace.d, i, m)
@@ -123,19 +140,21 @@ def newton_step(functions, layout, z, p, which, tangential, probe, workspace):  
         at = 0 if i == 0 else m
         here = segment_rows(functions, layout, i, at, z[i], after, p, which, equations, rows)
         if here == np.inf:
-            return False, here
+            return False, here, noise
         if i == tangential:
             add_rate(functions, layout, i, after, p, which, equations.grad, rows)
         worst = max(worst, here)
+        noise = max(noise, rounding_of_rows(rows, at, z[i], after))
         if probe > 0.0:
             for j in range(m):  # signs and sizes without a pattern: no null vector is normal to it
                 rows[m + j, second] = (
                     probe * math.cos(1.0 + 7.0 * i + 3.0 * j) * (1.0 + abs(after[j]))
                 )
         if i > 0 and not take_out(work, i, m):
-            return False, worst
+            return False, worst, noise
     pencil = workspace.pencil
-    return finish(work, equations.close, equations.close_w, pencil[0], pencil[1]), worst
+    regular = finish(work, equations.close, equations.close_w, pencil[0], pencil[1])
+    return regular, worst, noise
 
 
 @helper
@@ -283,7 +302,7 @@ def correcting(border: Any) -> Any:
             residual, tangential = border(functions, layout, z, p, which, workspace, extra)
             if not math.isfinite(residual):
                 return NOT_FINITE, step, first, residual
-            solved, worst = newton_step(
+            solved, worst, noise = newton_step(
                 functions, layout, z, p, which, tangential, probe, workspace
             )
             if not solved:
@@ -292,16 +311,17 @@ def correcting(border: Any) -> Any:
             size = correction_size(work.z, work.w, z, p, which, 0)
             if size == np.inf:
                 return NOT_FINITE, step, first, worst
+            noise = max(noise, rounding)
             share = trust / size if size > trust else 1.0
             move(z, p, which, work.z, work.w, share)
             if step == 0:
                 first = size
-            found = verdict(step, size, before, worst, residual_before, floor, rounding)
+            found = verdict(step, size, before, worst, residual_before, floor, noise)
             if found == CONVERGED or (found == NOT_CONVERGED and not damped):
                 return found, step + 1, first, worst
             if size > 0.5 * before:
                 circles += 1
-            if floor > ALONG and circles >= _CIRCLES and not is_noise(size, worst, rounding):
+            if floor > ALONG and circles >= _CIRCLES and not is_noise(size, worst, noise):
                 return NOT_CONVERGED, step + 1, first, worst
             residual_before = worst
             before = (

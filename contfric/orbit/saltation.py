@@ -37,8 +37,8 @@ _MOVED = 1.07
 #: Projections onto surfaces, and the distance that counts as on them.
 _STEPS, _ON = 50, 1e-11
 #: A rate at an exit below this share of an ordinary one counts as small: rows of the exit that divide by it
-#: lose as many digits, twice.
-_SMALL = 1e-4
+#: lose as many digits, twice: twelve are left.
+_SMALL = 1e-2
 
 
 class Passage(Enum):
