@@ -24,12 +24,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from contfric.errors import ContfricError, ResultFileError
 from contfric.files import unwritable
 from contfric.stored import Reader, UnstorableError, Writer
+from contfric.tally import add, tally
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -203,13 +201,6 @@ def _lock(file: int, path: Path) -> None:
 # ----------------------------------------------------------------------------- remembered calls
 
 _KEPT: ContextVar[Journal | None] = ContextVar("contfric_journal", default=None)
-#: Counts that a call adds to: one that is looked up adds the same.
-_TALLIES: list[NDArray[np.int64]] = []
-
-
-def counts_in(tally: NDArray[np.int64]) -> None:
-    """Have what a remembered call adds to some counts added again where it is looked up."""
-    _TALLIES.append(tally)
 
 
 @contextmanager
@@ -276,8 +267,7 @@ def _looked_up(journal: Journal, key: bytes, inputs: Writer) -> tuple[Any] | Non
         result, added = Reader(content, inputs.objects).value()
     except UnstorableError:
         return None
-    for tally, more in zip(_TALLIES, added, strict=True):
-        np.add(tally, more, out=tally)
+    add(added)  # one that is looked up counts as much
     return (result,)
 
 
@@ -290,7 +280,7 @@ def _computed(
     finished: Callable[[Any], bool] | None,
 ) -> tuple[Any]:
     """Compute a result, or the error that it ends in, and keep it."""
-    before, start = [tally.copy() for tally in _TALLIES], time.perf_counter()
+    before, start = tally().copy(), time.perf_counter()
     result: Any
     try:
         result = compute()
@@ -299,9 +289,8 @@ def _computed(
     took = time.perf_counter() - start
     whole = finished is None or isinstance(result, Exception) or finished(result)
     if whole and took >= slow:
-        added = [tally - old for tally, old in zip(_TALLIES, before, strict=True)]
         with suppress(UnstorableError):
-            content = Writer(inputs.objects).bytes_of((result, added))
+            content = Writer(inputs.objects).bytes_of((result, tally() - before))
             if took >= _WORTH * len(content):
                 journal.put(key, content)
     return (result,)

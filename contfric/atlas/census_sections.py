@@ -24,10 +24,10 @@ from contfric.atlas.census_conditions import Arcs
 from contfric.atlas.census_words import letters_of, modes_after
 from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.counts import TALLY
 from contfric.orbit.system import IntArray, exit_domains, mirror_mode
 from contfric.orbit.tables import tables
 from contfric.signature.reduced import ReducedPair
+from contfric.tally import tally
 
 #: Phases at which it is asked whether an exit can be met: an arc narrower than this part of a period
 #: may be missed.
@@ -183,7 +183,7 @@ def sweep_from(
     clocks, states = np.zeros((count, events)), np.zeros((count, events, n))
     outcome = np.empty((count, 3), dtype=np.int64)
     mode, exit_, after = section.indices
-    TALLY[3] += sweep(
+    tally()[3] += sweep(
         model.flow.functions(),
         tables(model),
         mode,

@@ -52,6 +52,7 @@ class Event:
     proposals : what was proposed to follow it
     final : why nothing is continued from it, if that is known: the mass stays at rest, or a continuum
     kinds : what the words of its motion call it
+    begun : whether what leaves it has been begun in advance
     """
 
     bifurcation: Bifurcation
@@ -60,6 +61,7 @@ class Event:
     proposals: list[Proposal] = field(default_factory=list)
     final: EndReason | None = None
     kinds: set[Kind] = field(default_factory=set)
+    begun: bool = False
 
 
 def collect(

@@ -11,7 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from contfric.advance import in_advance
 from contfric.atlas.collect import collect
+from contfric.atlas.departures import foresee_departures
 from contfric.atlas.diagram import Asked, Diagram
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.follow import follow
@@ -111,7 +113,8 @@ def explore(
         )
     stops = settings.stop_at
     asked = Asked(max_step, stability, bridges, most, again, max_branches, max_points, stops)
-    _follow_from(state, orbit, seeds)
+    with in_advance():
+        _follow_from(state, orbit, seeds)
     return collect(
         orbit.model,
         settings,
@@ -193,4 +196,6 @@ def _follow_all(state: Exploration) -> None:
             state.notes.append(f"stopped at max_branches = {state.max_branches}")
             state.complete = False
             return
-        follow(state, state.waiting.popleft())
+        event = state.waiting.popleft()
+        foresee_departures(state)
+        follow(state, event)

@@ -10,28 +10,25 @@ A candidate is accepted when it is solved, and admissible beyond the event in on
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 
 from contfric.atlas.collect import Event
 from contfric.atlas.crossings import follow_crossing, whole_branch
+from contfric.atlas.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.faults import fault_of, never_lasts
 from contfric.atlas.folds import follow_fold
 from contfric.atlas.leaving_event import (
-    first_end,
     leave_event,
     leave_singular,
     settings_for,
-    went_somewhere,
 )
-from contfric.atlas.matching import SAME_MOTION, part_distance, same_kind, same_place
-from contfric.continuation.assembly import assemble
+from contfric.atlas.matching import SAME_MOTION, part_distance, same_kind
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, sequences_of
 from contfric.continuation.continuum import in_continuum
-from contfric.continuation.crossing import LOCATED, Direction, crossing_near
+from contfric.continuation.crossing import LOCATED, crossing_near
 from contfric.continuation.events import (
     ACCURACY,
     TERMINAL,
@@ -42,16 +39,10 @@ from contfric.continuation.events import (
 )
 from contfric.continuation.from_simulation import walked
 from contfric.continuation.incident import incident_forms
-from contfric.continuation.points import FIRST_STEP, Settings
-from contfric.continuation.side import Side
+from contfric.continuation.points import Settings
 from contfric.continuation.switching import (
-    NEARER,
-    leave_along,
-    null_vector,
-    overshoots,
     settings_value,
 )
-from contfric.continuation.trace import trace_side
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish
@@ -63,8 +54,6 @@ from contfric.signature.edits import show
 _SHARES = (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6)
 #: The same for an event that is located to the root of rounding only.
 _NOWHERE_ROUGHLY = 1e-3
-#: A branch shorter than this (arclength) that comes back to its event has been nowhere.
-_NO_WIDTH = 1e-3
 #: A bridge shorter than this violates a condition by its square from the start on, which is rounding up to
 #: there (1e-10 at a slack of 1e-9 over a rate that is small).
 _ROUNDED = 1e-5
@@ -219,29 +208,12 @@ def _begins_continuum(state: Exploration, orbit: Orbit | None, event: Event) -> 
 
 def _has_no_width(branch: Branch, event: Event, settings: Settings) -> bool:
     """Tell whether a branch begins and ends at one event and is nowhere else: admissible to rounding only."""
-    if branch.arc[-1] <= _NO_WIDTH and _ends_at(branch.ends[1], event, settings):
+    if branch.arc[-1] <= NO_WIDTH and ends_at(branch.ends[1], event, settings):
         return True
     last, b = branch.ends[1].bifurcation, event.bifurcation
     if last is None or not branch.bridge or branch.arc[-1] >= _ROUNDED:
         return False
     return same_kind(last, b) and last.outline.apart(b.outline) < SAME_MOTION
-
-
-def _comes_back(side: Side, event: Event, settings: Settings) -> bool:
-    """Tell whether what was traced away from an event has come back to it at once."""
-    return side.length <= _NO_WIDTH and _ends_at(side.end, event, settings)
-
-
-def _ends_at(end: End, event: Event, settings: Settings) -> bool:
-    """Tell whether a branch that leaves an event ends at it again.
-
-    One that ends at another kind of event has been somewhere, however near that is: where a margin is small
-    at a branch point, the branch between is as short, and its parameter changes by the square of that.
-    """
-    last, b = end.bifurcation, event.bifurcation
-    if last is None or not same_kind(last, b):
-        return False
-    return same_place(last, b, settings.parameter, settings.width)
 
 
 # --------------------------------------------------------------------------- branch points
@@ -251,7 +223,7 @@ def _follow_branch_point(state: Exploration, event: Event) -> None:
     orbit = event.bifurcation.orbit
     crossing = crossing_near(orbit, state.settings, LOCATED)
     if crossing is not None:
-        follow_crossing(state, crossing, event, _follow_departure)
+        follow_crossing(state, crossing, event, follow_departure)
         return
     if not orbit.system.half:
         _follow_both_ways(state, orbit, event)
@@ -260,7 +232,7 @@ def _follow_branch_point(state: Exploration, event: Event) -> None:
         _follow_both_ways(state, orbit, event)
     if any(not state.branches[i].system.half for i in event.branches):
         return
-    _follow_departure(state, orbit.as_whole(), event, EndReason.BP)
+    follow_departure(state, orbit.as_whole(), event, EndReason.BP)
 
 
 def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
@@ -273,52 +245,6 @@ def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
         state.judge(event, reason, Verdict.KNOWN, known)
     else:
         state.accept(event, reason, branch)
-
-
-def _follow_departure(
-    state: Exploration,
-    orbit: Orbit,
-    event: Event,
-    reason: EndReason,
-    direction: Direction | None = None,
-) -> None:
-    """Trace the branch that leaves a branch point or a period doubling; by default along the null vector."""
-    settings = settings_for(orbit, state.settings)
-    text = "the branch that leaves along the null vector"
-    active = orbit.model.index_of(settings.parameter)
-    along = direction or Direction(null_vector(orbit), 0.0)
-    overshot: list[float] = []
-    for distance in chain(NEARER, overshot):  # those that overshoot something come last
-        departure = leave_along(orbit, settings, along, reason.value, distance)
-        if departure is None:
-            continue
-        there = departure.point.orbit(orbit.system, orbit.vector, active)
-        if shortest(there) is not there:
-            continue  # Newton has fallen back on the orbit that it is to leave
-        known = state.known(there)
-        if known is not None:
-            state.judge(event, text, Verdict.KNOWN, known)
-            return
-        again = distance in overshot
-        if (
-            not again
-            and distance != NEARER[-1]
-            and overshoots(orbit, settings, departure, distance, along)
-        ):
-            overshot.append(distance)
-            continue
-        side = trace_side(
-            orbit,
-            departure.point,
-            settings,
-            first_step=min(FIRST_STEP, distance / settings.largest),  # no longer than what is known
-            progress=state.progress,
-        )
-        if went_somewhere(side, event) and not _comes_back(side, event, settings):
-            first = first_end(reason, event, side, settings)
-            state.accept(event, text, assemble(orbit, settings, side, first, departure.origin))
-            return
-    state.judge(event, text, Verdict.REFUSED, why="it is not admissible")
 
 
 def _through(state: Exploration, orbit: Orbit) -> Branch | None:
@@ -352,4 +278,4 @@ def _follow_doubling(state: Exploration, event: Event) -> None:
         reason = f"the branch of {2 * orbit.periods} periods"
         state.judge(event, reason, Verdict.REFUSED, why=why)
         return
-    _follow_departure(state, orbit.doubled(), event, EndReason.PD)
+    follow_departure(state, orbit.doubled(), event, EndReason.PD)

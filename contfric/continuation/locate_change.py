@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.points import Point, Rows, Settings
-from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
+from contfric.tally import tally
 
 
 def locate_change(
@@ -39,7 +39,7 @@ def locate_change(
         target,
         bool(orbit.model.kinks),
         rows.arrays(),
-        TALLY,
+        tally(),
     )
     # behind -2 Newton fails: the last good point, marked as such
     if at == -1.0 or (at < 0.0 and kind != BY_TEST):

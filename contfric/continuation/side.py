@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.advance import heed
 from contfric.continuation.events import Bifurcation, End
 from contfric.continuation.points import SMALLEST_STEP, Point, Rows, Settings
 from contfric.models.definition import FloatArray
-from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.pace import Pace
 from contfric.orbit.system import IntArray, System
+from contfric.tally import tally
 
 #: Points that the rows hold at a time: enough to cost nothing.
 CHUNK = 512
@@ -194,7 +195,8 @@ class Side:
         options = march_options(settings, step, self.largest)
         why, most = MORE, _MOST_SOLVES * settings.most_points
         while why == MORE and self.solves < most:  # between the calls Ctrl-C is heard
-            options[BUDGET], before, began = self._pace.budget, int(TALLY[0]), perf_counter()
+            heed()
+            options[BUDGET], before, began = self._pace.budget, int(tally()[0]), perf_counter()
             why, last, options[0] = march(
                 orbit.system.functions(),
                 orbit.system.layout,
@@ -207,11 +209,11 @@ class Side:
                 *self.first.as_start(),
                 self.count - 1,
                 self.rows.arrays(stop),
-                TALLY,
+                tally(),
             )
             self.count += last - self.last
             self.last = last
-            done = int(TALLY[0]) - before
+            done = int(tally()[0]) - before
             self.solves += done
             self._pace.took(done, perf_counter() - began)
         return why, float(options[0])
@@ -271,6 +273,6 @@ def first_point(
         *rows.point(0).as_start(),
         0,
         rows.arrays(1),
-        TALLY,
+        tally(),
     )
     return None if why == BROKEN else rows.point(0)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from contfric.advance import foresee, foreseeable
 from contfric.continuation.accuracy import not_critical
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
@@ -124,6 +125,7 @@ def follow_orbit(
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
     orbit, start = start_of(orbit, settings)
+    foresee(trace_side, orbit, start.reversed(), settings, keep=keep)
     ahead = trace_side(orbit, start, settings, progress=progress, keep=keep)
     if ahead.end.reason in (EndReason.CLOSED, EndReason.INTERRUPTED):
         return assemble(orbit, settings, ahead, End(ahead.end.reason))
@@ -136,6 +138,7 @@ def _went_to_its_end(side: Side) -> bool:
 
 
 @remembered(finished=_went_to_its_end)
+@foreseeable(without=("progress", "keep"))
 def trace_side(
     orbit: Orbit,
     start: Point,

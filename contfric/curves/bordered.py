@@ -44,7 +44,8 @@ from contfric.orbit.cyclic import (
     start_border,
     take_out,
 )
-from contfric.orbit.equations import is_divided, segment_rows
+from contfric.orbit.equations import segment_rows
+from contfric.orbit.short_exits import is_divided
 
 #: Step of the third derivatives along a null vector of size 1: with Richardson's extrapolation its error
 #: and its rounding are both about 1e-11.

@@ -31,10 +31,10 @@ from contfric.curves.bordered import (
     spread_end,
 )
 from contfric.models.definition import FloatArray
+from contfric.orbit.after_reset import apply_reset
 from contfric.orbit.cyclic import Elimination, elimination_workspace
 from contfric.orbit.equations import (
     EquationWorkspace,
-    apply_reset,
     equation_workspace,
     segment_jacobian,
 )

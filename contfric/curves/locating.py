@@ -15,7 +15,7 @@ from contfric.continuation.points import Point, Rows
 from contfric.curves.points import solve_point
 from contfric.curves.problem import Problem
 from contfric.models.definition import FloatArray
-from contfric.orbit.counts import TALLY
+from contfric.tally import tally
 
 #: Share of a step to which a place is bracketed: the resolution of the arithmetic.
 _RESOLUTION = 4e-16
@@ -123,7 +123,7 @@ def locate(
         np.ascontiguousarray(sought.planes, dtype=np.float64),
         border.copy(),
         rows.arrays(),
-        TALLY,
+        tally(),
     )
     return (a, False) if status < 0 else (rows.point(3), status == 1)
 

@@ -32,7 +32,7 @@ from contfric.curves.bordered import (
     segment_direction,
     set_border,
 )
-from contfric.orbit.equations import is_divided
+from contfric.orbit.short_exits import is_divided
 
 
 @helper

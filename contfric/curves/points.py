@@ -9,10 +9,10 @@ import numpy as np
 from contfric.continuation.points import SMALLEST_STEP, Point, Rows
 from contfric.curves.problem import Problem, border_of
 from contfric.models.definition import FloatArray
-from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import assembled
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.pace import Pace
+from contfric.tally import tally
 
 #: Points that are marched at a time: limits of the parameters are looked at after each.
 CHUNK = 128
@@ -41,7 +41,7 @@ def march_rows(
     # a step that is refused for its angle is halved, down to the least
     options = np.array([min(step, largest), largest, SMALLEST_STEP, 0.0, 1.0, 0.0])
     while why == MORE:  # between the calls Ctrl-C is heard
-        options[BUDGET], before, began = _PACE.budget, int(TALLY[0]), perf_counter()
+        options[BUDGET], before, began = _PACE.budget, int(tally()[0]), perf_counter()
         taken, k = taken + last - k, last
         why, last, options[0] = march_curve(
             problem.system.functions(),
@@ -58,9 +58,9 @@ def march_rows(
             taken,
             border,
             rows.arrays(),
-            TALLY,
+            tally(),
         )
-        _PACE.took(int(TALLY[0]) - before, perf_counter() - began)
+        _PACE.took(int(tally()[0]) - before, perf_counter() - began)
     return int(why), int(last), float(options[0])
 
 

@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from contfric.journal import counts_in
-
-#: Added to by the kernels, in the order of the fields of :class:`Counts`.
-TALLY = np.zeros(4, dtype=np.int64)
-counts_in(TALLY)
+from contfric.tally import tally
 
 
 @dataclass(frozen=True)
@@ -33,4 +27,4 @@ class Counts:
 
 def counts() -> Counts:
     """Return the counts of this process so far; subtract two of them to get those of a run."""
-    return Counts(*(int(value) for value in TALLY))
+    return Counts(*(int(value) for value in tally()))

@@ -17,9 +17,7 @@ minus its duration, is found with the rest. (The last exit surface is the sectio
 The last row of a hold is its pin, a condition on ``z_i``: the observable of a surface less its level, or
 the rate of the exit before it.
 
-A segment that begins on its exit surface (a slide does) may shrink to nothing, where its exit row is
-singular: a duration of zero solves it whatever the rates. It is divided by the duration there: with v on
-the level at ``z_i``, ``v(d) / d`` is the mean of v' over the slide, a quadrature without cancellation.
+The exit row of a short segment is that of :mod:`contfric.orbit.short_exits`.
 """
 
 from __future__ import annotations
@@ -41,20 +39,10 @@ from contfric.compiled import (
     vector,
 )
 from contfric.models.definition import FloatArray
+from contfric.orbit.after_reset import apply_reset, behind_reset
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN
+from contfric.orbit.short_exits import is_divided, mean_rate_row
 from contfric.orbit.system import Layout
-
-#: Where a segment that begins on its exit surface is shorter than this (nondimensional), its exit row is
-#: divided by the duration if five points of Gauss are exact there; the row as it stands is well conditioned
-#: beyond.
-_SHORT = 0.1
-#: Exact is a mean that gives the change of the observable to this (nondimensional, against scale): hundreds
-#: of roundings of a closed form over so short a time, and far below what an orbit is asked for. An
-#: integrated flow is allowed ten of its own.
-_EXACT, _ROUNDINGS = 1e-13, 10.0
-#: Abscissas and weights of Gauss and Legendre on (0, 1), five points.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
-_NODES, _WEIGHTS = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
 
 #: Type of a layout, as kernels take it.
 LayoutType = types.NamedTuple(
@@ -165,31 +153,6 @@ def close_chain(functions, layout, z, p, which, workspace):  # type: ignore[no-u
 
 
 @helper
-def apply_reset(functions, layout, i, start, p, which, workspace):  # type: ignore[no-untyped-def]
-    """Write the state in which segment i begins, behind its reset, with the derivatives if any are wanted.
-
-    Only for a segment that has one: elsewhere its joint is where it begins.
-    """
-    n, behind = start.shape[0] - 1, workspace.behind
-    functions.reset(layout.resets[i], start[0], start[1:], p, which, behind[n, :n], behind[:n])
-
-
-@helper
-def behind_reset(jac, reset, row, n):  # type: ignore[no-untyped-def]
-    """Make the derivatives of a flow behind a reset those with respect to the joint before it."""
-    for j in range(n):
-        for k in range(n):
-            row[k] = jac[j, 1 + k]
-            jac[j, 1 + k] = 0.0
-        for k in range(n):
-            jac[j, 0] += row[k] * reset[k, 0]
-            for a in range(n):
-                jac[j, 1 + a] += row[k] * reset[k, 1 + a]
-            for a in range(n + 1, reset.shape[1]):
-                jac[j, 1 + a] += row[k] * reset[k, a]
-
-
-@helper
 def segment_jacobian(functions, layout, i, start, duration, p, which, out, workspace):  # type: ignore[no-untyped-def]
     """Write the end of segment i, from its joint, with the derivatives: behind a reset by the chain rule."""
     mode, state = layout.modes[i], workspace.state
@@ -237,73 +200,6 @@ def pin_row(functions, layout, i, at, start, after, p, which, workspace, rows): 
             rows[row, 3 * m + k] -= level_grad[k]
     rows[row, 3 * m + free] = -residual
     return abs(residual)
-
-
-@helper
-def mean_rate_row(functions, layout, i, at, start, duration, p, which, workspace, rows):  # type: ignore[no-untyped-def]
-    """Write the exit row of a short segment, divided by its duration; return the residual."""
-    state, jac, grad = workspace.state, workspace.jac, workspace.grad
-    n, free = state.shape[0], which.shape[0]
-    m = n + 1
-    row, mode, c = 2 * m - 1, layout.modes[i], layout.observables[layout.exits[i]]
-    for k in range(rows.shape[1]):
-        rows[row, k] = 0.0
-    mean = 0.0
-    for k in range(_NODES.shape[0]):
-        share, weight = _NODES[k], _WEIGHTS[k]
-        time = share * duration
-        if layout.resets[i] >= 0:
-            functions.flow(mode, start[0], workspace.behind[n, :n], time, p, which, state, jac)
-            behind_reset(jac, workspace.behind, grad, n)
-        else:
-            functions.flow(mode, start[0], start[1:], time, p, which, state, jac)
-        mean += weight * functions.rate(mode, c, start[0] + time, state, p, which, grad)
-        for j in range(2 + n + free):  # t_0, y_0, duration, parameters
-            slope = 0.0
-            for a in range(n):
-                slope += grad[1 + a] * jac[a, j]
-            if j == 0 or j == 1 + n:
-                slope += grad[0]
-            elif j >= 2 + n:
-                slope += grad[m + j - 2 - n]
-            slope *= weight
-            if j == 1 + n:
-                rows[row, at] -= share * slope
-                rows[row, 2 * m] += share * slope
-            elif j < 1 + n:
-                rows[row, at + j] += slope
-            else:
-                rows[row, 3 * m + j - 2 - n] += slope
-    rows[row, 3 * m + free] = -mean
-    return abs(mean)
-
-
-@helper
-def is_divided(functions, layout, i, start, duration, p, which, workspace):  # type: ignore[no-untyped-def]
-    """Tell whether the exit row of segment i is divided by its duration."""
-    if not (abs(duration) < _SHORT and layout.returns[i] == 1):
-        return False
-    state, none, empty, nothing = (
-        workspace.between,
-        workspace.none,
-        workspace.empty,
-        workspace.nothing,
-    )
-    n, mode, c = state.shape[0], layout.modes[i], layout.observables[layout.exits[i]]
-    begin, change = start[1:], 0.0
-    if layout.resets[i] >= 0:
-        apply_reset(functions, layout, i, start, p, which, workspace)
-        begin = workspace.behind[n, :n]
-    for k in range(_NODES.shape[0]):
-        time = _NODES[k] * duration
-        functions.flow(mode, start[0], begin, time, p, none, state, nothing)
-        change += _WEIGHTS[k] * functions.rate(mode, c, start[0] + time, state, p, none, empty)
-    change *= duration
-    functions.flow(mode, start[0], begin, duration, p, none, state, nothing)
-    value = functions.observe(c, start[0] + duration, state, p, none, empty)
-    difference = value - functions.observe(c, start[0], begin, p, none, empty)
-    exact = max(_EXACT, _ROUNDINGS * layout.rounding) * (1.0 + abs(value))
-    return abs(difference - change) <= exact
 
 
 @helper

@@ -16,9 +16,9 @@ from numba import types
 from contfric.compiled import allocating_helper, helper, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
+from contfric.orbit.after_reset import apply_reset
 from contfric.orbit.equations import (
     LayoutType,
-    apply_reset,
     close_chain,
     equation_workspace,
     segment_rows,

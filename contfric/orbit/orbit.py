@@ -14,7 +14,6 @@ from contfric.errors import ParameterError
 from contfric.extras import need_flint, need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
-from contfric.orbit.counts import TALLY
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.measured import MeasuredOrbit
 from contfric.orbit.reading import read_signature
@@ -24,6 +23,7 @@ from contfric.orbit.stops import displacements, reach_of, stationary_points, sto
 from contfric.orbit.system import System, Word, build_system
 from contfric.orbit.words import half_of, mirror_pairs, whole_of
 from contfric.signature import Signature
+from contfric.tally import tally
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -237,7 +237,7 @@ class Orbit(MeasuredOrbit):
         watched = np.empty(count + len(layout.labels))
         labels = np.zeros(len(layout.labels), dtype=np.int64)
         functions = self.system.functions()
-        fine = examine(functions, layout, self.joints, self.vector, watched, labels, TALLY)
+        fine = examine(functions, layout, self.joints, self.vector, watched, labels, tally())
         return watched[:count], labels, bool(fine)
 
     @cached_property
@@ -252,7 +252,7 @@ class Orbit(MeasuredOrbit):
         if self.system.holds:  # the least disturbance ends a hold: it is no flow
             return mu[: self.model.directions]
         pencil = pencil_of_turn(self.system, self.joints, self.vector)
-        stability(self.system.layout, pencil, mu, TALLY)
+        stability(self.system.layout, pencil, mu, tally())
         return mu[: self.model.directions]
 
     @property

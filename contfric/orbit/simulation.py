@@ -14,12 +14,12 @@ from contfric.errors import real_number, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
-from contfric.orbit.counts import TALLY
 from contfric.orbit.pace import Pace
 from contfric.orbit.starts import checked_state, start_of
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import surfaces_under, tables
 from contfric.shown import Shown
+from contfric.tally import tally
 
 
 class SimulationEnd(str, Enum):
@@ -203,7 +203,7 @@ def run(
             carry,
             pace.budget,
         )
-        TALLY[3] += count
+        tally()[3] += count
         pieces.append(written.first(count))
         done += count
         if end != ALL_EVENTS or done >= events:

@@ -13,13 +13,13 @@ from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray
 from contfric.models.tied import tied
 from contfric.orbit.clock import clocked
-from contfric.orbit.counts import TALLY
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.simulation import Trajectory, run
 from contfric.orbit.starts import start_of
 from contfric.orbit.system import System, build_system
 from contfric.orbit.words import half_of
 from contfric.signature import Signature, reduced_word
+from contfric.tally import tally
 
 #: Starts drawn for one signature: enough for every bundled signature to be found from scratch in
 #: the tests (the rarest needs about 150), at about a tenth of a millisecond each.
@@ -53,7 +53,7 @@ def polish(orbit: Orbit, damped: bool = True) -> Orbit:
         vector,
         TRUST if damped else np.inf,
         np.empty((2, m, m)),
-        TALLY,
+        tally(),
     )
     return Orbit(orbit.system, joints, vector, float(residual), list(Status)[int(status)])
 

@@ -21,9 +21,9 @@ from contfric.continuation.switching import LEAVE, leave_branch_point, overshoot
 from contfric.continuation.trace import trace_side
 from contfric.continuation.vertex_between import left_at
 from contfric.continuation.vertices import moved, opening, passed_vertex, refined_opening
-from contfric.orbit.counts import TALLY
 from contfric.orbit.simulation import tables
 from contfric.orbit.system import Margin
+from contfric.tally import tally
 
 FIG05 = {"Omega": 0.5, "S": 0.32, "S0": 0.4, "h": 0.0}
 #: The branch point of 2s (docs/numerics.md, 40 digits).
@@ -192,9 +192,9 @@ def test_an_event_of_an_integrated_flow_is_bracketed_to_its_rounding_and_no_furt
     locate = smooth.locate_change
 
     def counted(*given: Any) -> Point | None:
-        before = int(TALLY[0])
+        before = int(tally()[0])
         found = locate(*given)
-        solves.append(int(TALLY[0]) - before)
+        solves.append(int(tally()[0]) - before)
         return found
 
     monkeypatch.setattr(smooth, "locate_change", counted)

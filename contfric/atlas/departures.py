@@ -1,0 +1,136 @@
+"""What leaves a branch point or a period doubling along its null vector; the next one on another core."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import chain
+
+from contfric.advance import foresee
+from contfric.atlas.collect import Event
+from contfric.atlas.exploration import Exploration
+from contfric.atlas.leaving_event import first_end, settings_for, went_somewhere
+from contfric.atlas.matching import same_kind, same_place
+from contfric.continuation.assembly import assemble
+from contfric.continuation.crossing import Direction
+from contfric.continuation.events import End, EndReason, Kind, Verdict
+from contfric.continuation.points import FIRST_STEP, Settings
+from contfric.continuation.side import Side
+from contfric.continuation.switching import (
+    NEARER,
+    Departure,
+    leave_along,
+    null_vector,
+    overshoots,
+)
+from contfric.continuation.trace import trace_side
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.repetition import shortest
+
+#: A branch shorter than this (arclength) that comes back to its event has been nowhere.
+NO_WIDTH = 1e-3
+
+
+def follow_departure(
+    state: Exploration,
+    orbit: Orbit,
+    event: Event,
+    reason: EndReason,
+    direction: Direction | None = None,
+) -> None:
+    """Trace the branch that leaves a branch point or a period doubling; by default along the null vector."""
+    settings = settings_for(orbit, state.settings)
+    text = "the branch that leaves along the null vector"
+    for departure, distance, known in _departures(orbit, settings, reason, direction, state.known):
+        if known is not None:
+            state.judge(event, text, Verdict.KNOWN, known)
+            return
+        side = trace_side(
+            orbit,
+            departure.point,
+            settings,
+            first_step=_first_step(distance, settings),
+            progress=state.progress,
+        )
+        if went_somewhere(side, event) and not _comes_back(side, event, settings):
+            first = first_end(reason, event, side, settings)
+            state.accept(event, text, assemble(orbit, settings, side, first, departure.origin))
+            return
+    state.judge(event, text, Verdict.REFUSED, why="it is not admissible")
+
+
+def _departures(
+    orbit: Orbit,
+    settings: Settings,
+    reason: EndReason,
+    direction: Direction | None,
+    known: Callable[[Orbit], int | None],
+) -> Iterator[tuple[Departure, float, int | None]]:
+    """Yield departures with their distances, and the branch that is there if it is known."""
+    active = orbit.model.index_of(settings.parameter)
+    along = direction or Direction(null_vector(orbit), 0.0)
+    overshot: list[float] = []
+    for distance in chain(NEARER, overshot):  # those that overshoot something come last
+        departure = leave_along(orbit, settings, along, reason.value, distance)
+        if departure is None:
+            continue
+        there = departure.point.orbit(orbit.system, orbit.vector, active)
+        if shortest(there) is not there:
+            continue  # Newton has fallen back on the orbit that it is to leave
+        found, again = known(there), distance in overshot
+        if (
+            found is None
+            and not again
+            and distance != NEARER[-1]
+            and overshoots(orbit, settings, departure, distance, along)
+        ):
+            overshot.append(distance)
+            continue
+        yield departure, distance, found
+
+
+def _first_step(distance: float, settings: Settings) -> float:
+    """Return a first step no longer than what is known."""
+    return min(FIRST_STEP, distance / settings.largest)
+
+
+def _comes_back(side: Side, event: Event, settings: Settings) -> bool:
+    """Tell whether what was traced away from an event has come back to it at once."""
+    return side.length <= NO_WIDTH and ends_at(side.end, event, settings)
+
+
+def ends_at(end: End, event: Event, settings: Settings) -> bool:
+    """Tell whether a branch that leaves an event ends at it again.
+
+    One that ends at another kind of event has been somewhere, however near that is: where a margin is small
+    at a branch point, the branch between is as short, and its parameter changes by the square of that.
+    """
+    last, b = end.bifurcation, event.bifurcation
+    if last is None or not same_kind(last, b):
+        return False
+    return same_place(last, b, settings.parameter, settings.width)
+
+
+def foresee_departures(state: Exploration) -> None:
+    """Begin on another core what the next events that wait will ask for."""
+    for event in state.waiting:
+        if not event.begun:
+            event.begun = foresee(_begin, state, event)
+            return
+
+
+def _begin(state: Exploration, event: Event) -> None:
+    """Trace what leaves an event that still waits, as :func:`follow_departure` will."""
+    if event not in state.waiting:
+        return
+    kind, orbit = event.bifurcation.kind, event.bifurcation.orbit
+    if kind is Kind.PD and 2 * orbit.periods <= state.max_periods:
+        orbit, reason = orbit.doubled(), EndReason.PD
+    elif kind is Kind.BP and orbit.system.half:
+        orbit, reason = orbit.as_whole(), EndReason.BP
+    else:
+        return
+    settings = settings_for(orbit, state.settings)
+    for departure, distance, known in _departures(orbit, settings, reason, None, state.known):
+        if known is None:
+            trace_side(orbit, departure.point, settings, first_step=_first_step(distance, settings))
+        return
