@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from contfric.certify.diagram_certificate import DiagramCertificate
     from contfric.plot.live.frame import Frame
     from contfric.plot.live.serve import Live
+    from contfric.plot.look import LineStyle
     from contfric.quantities.registry import QuantityLike
     from contfric.response.sweep import Sweep
 
@@ -290,12 +291,14 @@ class Diagram(Shown):
         legend: bool = True,
         names: Mapping[str, str] | None = None,
         colours: Mapping[str, str] | None = None,
+        linestyles: Mapping[str, LineStyle] | None = None,
         inset: bool | tuple[float, float] = False,
     ) -> Axes:
         """Draw one quantity of all branches with the bifurcations; behind them the points of a sweep.
 
         ``names`` and ``colours`` say what branches are called in the legend, and their colours, by their
-        signature's name. ``inset`` draws a part once more, larger: where events crowd, or (low, high).
+        signature's name; ``linestyles`` how ``"stable"``, ``"unstable"``, ``"unknown"`` parts and a
+        ``"bridge"`` are drawn. ``inset`` draws a part once more, larger: where events crowd, or (low, high).
         """
         from contfric.plot.diagram import plot_diagram_row
 
@@ -307,6 +310,7 @@ class Diagram(Shown):
             legend=legend,
             names=names,
             colours=colours,
+            linestyles=linestyles,
             inset=inset,
         )
 

@@ -12,23 +12,19 @@ from contfric.plot.events import Mark, draw_marks, label_marks, marks_of
 from contfric.plot.inset import Inset, add_inset
 from contfric.plot.labels import settle
 from contfric.plot.legend import handles_of
-from contfric.plot.look import Look
+from contfric.plot.look import LineStyle, Look
 from contfric.plot.response import draw_overlay
 from contfric.plot.runs import stability_runs
 from contfric.plot.save import axes_or_new, figure_or_new, for_journal, legend_of
 from contfric.plot.style import (
     BESIDE,
-    BRIDGE,
     BRIDGE_COLOUR,
     BRIDGE_WIDTH,
     LINE_WIDTH,
     MIRROR_WIDTH,
     SMALL,
-    STABLE,
     TEXT,
-    UNKNOWN,
     UNKNOWN_WIDTH,
-    UNSTABLE,
     full_title,
     greyish,
     lighter,
@@ -58,6 +54,7 @@ def plot_branches(
     legend: bool = True,
     names: Mapping[str, str] | None = None,
     colours: Mapping[str, str] | None = None,
+    linestyles: Mapping[str, LineStyle] | None = None,
 ) -> Axes:
     r"""Draw one quantity of some branches against their parameter.
 
@@ -78,6 +75,9 @@ def plot_branches(
         the markers.
     names, colours : mapping, optional
         What branches are called in the legend, and colours of theirs, by their names.
+    linestyles : mapping, optional
+        Line styles of matplotlib for ``"stable"``, ``"unstable"``, ``"unknown"`` (no multipliers) and
+        ``"bridge"``.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def plot_branches(
     """
     row_of(row, _model_of(branches))  # before a figure is opened for it
     found = [b for branch in branches for b in branch.bifurcations] if events else []
-    look = Look.of(branches, names, colours, legend=legend)
+    look = Look.of(branches, names, colours, linestyles, legend=legend)
     return _plot_row(axes_or_new(ax), branches, found, row, look, outside=ax is None)
 
 
@@ -102,6 +102,7 @@ def plot_diagram_row(
     overlay: Sweep | None = None,
     names: Mapping[str, str] | None = None,
     colours: Mapping[str, str] | None = None,
+    linestyles: Mapping[str, LineStyle] | None = None,
     inset: Inset = False,
 ) -> Axes:
     """Draw one quantity of all branches of a diagram, with its bifurcations.
@@ -121,6 +122,9 @@ def plot_diagram_row(
         Simulated points of the same parameter, drawn behind the branches.
     names, colours : mapping, optional
         What branches are called in the legend, and colours of theirs, by their names.
+    linestyles : mapping, optional
+        Line styles of matplotlib for ``"stable"``, ``"unstable"``, ``"unknown"`` (no multipliers) and
+        ``"bridge"``.
     inset : bool or (float, float)
         Whether to draw the part in which events crowd once more, larger; or which part.
 
@@ -132,7 +136,7 @@ def plot_diagram_row(
     """
     row_of(row, _model_of(diagram.branches))  # before a figure is opened for it
     found = diagram.bifurcations if events else ()
-    look = Look.of(diagram.branches, names, colours, legend=legend, inset=inset)
+    look = Look.of(diagram.branches, names, colours, linestyles, legend=legend, inset=inset)
     new = axes_or_new(ax)
     new.set_xlim(*diagram.range)
     draw_overlay([new], [row], diagram.parameter, overlay)
@@ -149,6 +153,7 @@ def plot_diagram(
     legend: bool = True,
     names: Mapping[str, str] | None = None,
     colours: Mapping[str, str] | None = None,
+    linestyles: Mapping[str, LineStyle] | None = None,
     inset: Inset = False,
 ) -> list[Axes]:
     """Draw a diagram in several rows over one parameter axis, as Figs. 4-7 of the reference.
@@ -164,7 +169,7 @@ def plot_diagram(
         Simulated points of the same parameter, drawn behind the branches.
     title : str, optional
         What stands above; names of parameters become symbols. The fixed parameters by default.
-    legend, names, colours, inset : optional
+    legend, names, colours, linestyles, inset : optional
         As for :func:`plot_diagram_row`.
 
     Returns
@@ -179,7 +184,7 @@ def plot_diagram(
     >>> axes = plot_diagram(cf.explore(orbit, "Omega", (0.4, 0.6)), rows=("x_max", "psi"))
     """
     looks = [row_of(row, _model_of(diagram.branches)) for row in rows]
-    look = Look.of(diagram.branches, names, colours, legend=legend, inset=inset)
+    look = Look.of(diagram.branches, names, colours, linestyles, legend=legend, inset=inset)
     fig = figure_or_new(fig, 8.4, 1.2 + 2.4 * len(rows))
     axes = list(fig.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0])
     axes[0].set_xlim(*diagram.range)
@@ -272,9 +277,9 @@ def _draw_row(
         if branch.mirrored and branch.name in twins:
             continue  # it lies on its original
         if branch.bridge:
-            _draw_bridge(ax, branch, row)
+            _draw_bridge(ax, branch, row, look)
         else:
-            _draw_branch(ax, branch, row, look.colours[branch.name])
+            _draw_branch(ax, branch, row, look)
     draw_marks(ax, marks)
     ax.margins(y=0.12)
     displacement = branches[0].model.states[0] if branches else "x"
@@ -286,8 +291,9 @@ def _draw_row(
     ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
 
 
-def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, colour: str) -> None:
+def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> None:
     width = MIRROR_WIDTH if branch.mirrored else LINE_WIDTH
+    colour = look.colours[branch.name]
     colour = lighter(colour) if branch.mirrored else colour
     for run in stability_runs(branch, row):
         known = run.stable is not None
@@ -295,7 +301,9 @@ def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, colour: str) -> No
             run.x,
             run.y,
             color=colour if known else greyish(colour),
-            linestyle=UNKNOWN if not known else STABLE if run.stable else UNSTABLE,
+            linestyle=look.styles[
+                "unknown" if not known else "stable" if run.stable else "unstable"
+            ],
             linewidth=sized(width if known else UNKNOWN_WIDTH),
             solid_capstyle="butt",
             zorder=2.0 + 0.5 * bool(run.stable) - 0.3 * branch.mirrored,
@@ -304,13 +312,13 @@ def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, colour: str) -> No
             line.set_gid(branch.name)
 
 
-def _draw_bridge(ax: Axes, branch: Branch, row: QuantityLike) -> None:
+def _draw_bridge(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> None:
     for run in stability_runs(branch, row):
         lines = ax.plot(
             run.x,
             run.y,
             color=lighter(BRIDGE_COLOUR, 0.3) if branch.mirrored else BRIDGE_COLOUR,
-            linestyle=BRIDGE,
+            linestyle=look.styles["bridge"],
             linewidth=sized(BRIDGE_WIDTH),
             zorder=1.6 - 0.1 * branch.mirrored,
         )

@@ -21,10 +21,10 @@ Inset: TypeAlias = bool | tuple[float, float]
 _CROWD, _WINDOW = 4, 0.08
 #: Space on both sides of the first and last of them, as a share of their distance.
 _BESIDE = 0.3
-#: Size of an inset, its distance from the frame, and what is too near to it, as shares of the axes.
+#: Size of an inset, its distance from the frame and what is too near to it, as shares of the axes; space on
+#: its left and beneath it for its numbers.
 _WIDTH, _HEIGHT, _EDGE, _NEAR = 0.3, 0.4, 0.06, 0.03
-#: An inset rather hides lines than markers: by this factor.
-_MARKERS = 10
+_LEFT, _BENEATH = 0.03, 0.06
 
 
 def checked_inset(inset: object) -> Inset:
@@ -74,7 +74,7 @@ def add_inset(
     part = crowd(marks, high - low) if inset is True else inset
     if not part:
         return None, list(marks)
-    inner = ax.inset_axes(_emptiest_corner(ax), zorder=5.5)
+    inner = ax.inset_axes(_place(ax), zorder=5.5)
     draw(inner)
     inner.set_xlim(*part)
     inner.set_ylim(*_extent(inner, marks, *part))
@@ -99,15 +99,28 @@ def _extent(ax: Axes, marks: Sequence[Mark], low: float, high: float) -> tuple[f
     return float(found.min()) - margin, float(found.max()) + margin
 
 
-def _emptiest_corner(ax: Axes) -> tuple[float, float, float, float]:
-    """Return the corner in which least is drawn, as a share of the axes."""
-    points = np.vstack([line_pixels(ax), *[marker_pixels(ax)] * _MARKERS])
+def _place(ax: Axes) -> tuple[float, float, float, float]:
+    """Return a place in which nothing is drawn, as a share of the axes, which grow upwards if need be."""
+    found = _empty_place(ax)
+    if found is None:
+        low, high = ax.get_ylim()
+        drawn = (
+            1.0 - _HEIGHT - _EDGE - _BENEATH - 2.0 * _NEAR
+        )  # the share that is left to the lines
+        ax.set_ylim(low, low + (high - low) / drawn)
+        found = _empty_place(ax)
+    return found or (_EDGE + _LEFT, 1.0 - _EDGE - _HEIGHT, _WIDTH, _HEIGHT)
+
+
+def _empty_place(ax: Axes) -> tuple[float, float, float, float] | None:
+    """Return a corner, or the middle of a side, in which nothing is drawn."""
+    points = np.vstack([line_pixels(ax), marker_pixels(ax)])
     shares = ax.transAxes.inverted().transform(points) if len(points) else points
-    best, corner = np.inf, (0.0, 0.0)
-    for left in (_EDGE + 0.03, 0.5 * (1.0 - _WIDTH), 1.0 - _EDGE - _WIDTH):
-        for bottom in (1.0 - _EDGE - _HEIGHT, _EDGE + 0.12):
-            box = Bbox.from_bounds(left, bottom, _WIDTH, _HEIGHT).padded(_NEAR)
-            inside = np.all((shares > box.min) & (shares < box.max), axis=1)
-            if (count := int(np.count_nonzero(inside))) < best:
-                best, corner = count, (left, bottom)
-    return (*corner, _WIDTH, _HEIGHT)
+    for left in (_EDGE + _LEFT, 0.5 * (1.0 - _WIDTH), 1.0 - _EDGE - _WIDTH):
+        for bottom in (1.0 - _EDGE - _HEIGHT, _EDGE + _BENEATH):
+            box = Bbox.from_bounds(
+                left - _LEFT, bottom - _BENEATH, _WIDTH + _LEFT, _HEIGHT + _BENEATH
+            ).padded(_NEAR)
+            if not np.any(np.all((shares > box.min) & (shares < box.max), axis=1)):
+                return left, bottom, _WIDTH, _HEIGHT
+    return None

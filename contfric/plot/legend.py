@@ -12,7 +12,6 @@ from contfric.errors import either
 from contfric.plot.events import Mark
 from contfric.plot.look import Look
 from contfric.plot.style import (
-    BRIDGE,
     BRIDGE_COLOUR,
     BRIDGE_NAME,
     BRIDGE_WIDTH,
@@ -21,9 +20,7 @@ from contfric.plot.style import (
     MARKERS,
     MIRROR_WIDTH,
     OTHER_MARKER,
-    STABLE,
     UNKNOWN_WIDTH,
-    UNSTABLE,
     lighter,
     sized,
 )
@@ -43,23 +40,29 @@ def handles_of(
 
     Where all rows are even, ``mirrors`` is false: images lie on their originals.
     """
-    handles = [_line(look.names[name], colour) for name, colour in look.colours.items()]
+    styles = look.styles
+    handles = [
+        _line(look.names[name], colour, style=styles["stable"])
+        for name, colour in look.colours.items()
+    ]
     if mirrors and any(b.mirrored for b in branches):
-        handles.append(_line("mirror image: lighter", lighter(GREY), width=MIRROR_WIDTH))
+        handles.append(
+            _line("mirror image: lighter", lighter(GREY), styles["stable"], MIRROR_WIDTH)
+        )
     regular = [b for b in branches if not b.bridge]
     known = {bool(s) for b in regular if b.stable is not None for s in b.stable}
     if True in known:
-        handles.append(_line("stable", GREY))
+        handles.append(_line("stable", GREY, styles["stable"]))
     if False in known:
-        handles.append(_line("unstable", GREY, style=UNSTABLE))
+        handles.append(_line("unstable", GREY, styles["unstable"]))
     if any(b.stable is None for b in regular):
-        handles.append(_line("stability not computed", GREY, width=UNKNOWN_WIDTH))
+        handles.append(_line("stability not computed", GREY, styles["unknown"], UNKNOWN_WIDTH))
     width = max((float(b.values.max()) for b in branches), default=0.0)
     width -= min((float(b.values.min()) for b in branches), default=0.0)
     zoomed = bool(look.inset)
     bridges = [b for b in branches if b.bridge]
     if any(zoomed or float(np.ptp(b.values)) > _SMALLEST * width for b in bridges):
-        handles.append(_line(BRIDGE_NAME, BRIDGE_COLOUR, style=BRIDGE, width=BRIDGE_WIDTH))
+        handles.append(_line(BRIDGE_NAME, BRIDGE_COLOUR, styles["bridge"], BRIDGE_WIDTH))
     kinds: dict[str, str] = {}
     for m in marks if zoomed else _seen(marks, width):
         kinds[m.kind.value] = either(kinds.get(m.kind.value, ""), m.meaning)
@@ -67,7 +70,7 @@ def handles_of(
     return handles + [_marker(k, kinds[k]) for k in order if k in kinds]
 
 
-def _line(label: str, colour: str, style: Any = STABLE, width: float = LINE_WIDTH) -> Line2D:
+def _line(label: str, colour: str, style: Any, width: float = LINE_WIDTH) -> Line2D:
     return Line2D([], [], color=colour, linestyle=style, linewidth=sized(width), label=label)
 
 

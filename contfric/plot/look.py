@@ -4,25 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from matplotlib.colors import is_color_like
+from matplotlib.lines import Line2D
 
 from contfric.errors import ParameterError, did_you_mean
 from contfric.plot.inset import Inset, checked_inset
-from contfric.plot.style import branch_colours
+from contfric.plot.style import BRIDGE, STABLE, UNKNOWN, UNSTABLE, branch_colours
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
 
+#: A line style of matplotlib: ``"--"``, ``"dashdot"`` or ``(0, (4, 2))``.
+LineStyle: TypeAlias = str | tuple[float, Sequence[float]]
+
+#: What a line style tells, and which it is where the user wants no other.
+_STYLES: dict[str, LineStyle] = {
+    "stable": STABLE,
+    "unstable": UNSTABLE,
+    "unknown": UNKNOWN,
+    "bridge": BRIDGE,
+}
+
 
 @dataclass(frozen=True)
 class Look:
-    """How a diagram is drawn: with a legend, with insets, and names and colours by signature."""
+    """How a diagram is drawn: legend, insets, names and colours by signature, line styles by stability."""
 
     legend: bool
     names: Mapping[str, str]
     colours: Mapping[str, str]
+    styles: Mapping[str, LineStyle]
     inset: Inset = False
 
     @classmethod
@@ -31,6 +44,7 @@ class Look:
         branches: Sequence[Branch],
         names: Mapping[str, str] | None,
         colours: Mapping[str, str] | None,
+        linestyles: Mapping[str, LineStyle] | None = None,
         *,
         legend: bool,
         inset: Inset = False,
@@ -40,7 +54,8 @@ class Look:
         Raises
         ------
         ParameterError
-            If a name or a colour is given for a branch that there is not, or something is no colour.
+            If a name or a colour is given for a branch that there is not, something is no colour or no
+            line style, or a line style is given for what has none.
         """
         regular = dict.fromkeys(b.name for b in branches if not b.bridge)
         for given in (names, colours):
@@ -53,4 +68,21 @@ class Look:
         own = branch_colours(regular)
         shown = {name: (colours or {}).get(name, own[name]) for name in regular}
         called = {name: (names or {}).get(name, name) for name in regular}
-        return cls(legend, called, shown, checked_inset(inset))
+        return cls(legend, called, shown, _styles(linestyles or {}), checked_inset(inset))
+
+
+def _styles(given: Mapping[str, Any]) -> Mapping[str, LineStyle]:
+    """Return all line styles, from those that are given."""
+    for name, style in given.items():
+        if name not in _STYLES:
+            raise ParameterError(
+                f"linestyles are of {', '.join(_STYLES)}; there is no '{name}'"
+                f"{did_you_mean(name, [*_STYLES])}"
+            )
+        try:
+            Line2D([], [], linestyle=style)
+        except (ValueError, TypeError):
+            raise ParameterError(
+                f"linestyles['{name}']: {style!r} is no line style of matplotlib"
+            ) from None
+    return {**_STYLES, **given}

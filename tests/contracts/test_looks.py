@@ -13,8 +13,8 @@ from matplotlib.text import Annotation, Text
 
 import contfric as cf
 from contfric.plot import new_figure, plot_diagram
-from contfric.plot.inset import crowd
-from contfric.plot.labels import Anchor, place_labels
+from contfric.plot.inset import add_inset, crowd
+from contfric.plot.labels import Anchor, line_pixels, marker_pixels, place_labels
 from contfric.plot.style import _OTHERS, _TYPICAL, MARKERS, STABLE, UNSTABLE
 
 #: Severe colour blindness, in linear RGB (Machado, Oliveira and Fernandes, 2009).
@@ -84,6 +84,39 @@ def test_what_matters_is_told_by_more_than_colour() -> None:
     assert len({look.shape for look in MARKERS.values()}) == len(MARKERS)
 
 
+# ------------------------------------------------------------------------------- line styles
+
+
+def test_line_styles_are_those_that_are_given(diagram: cf.Diagram) -> None:
+    given = {"unstable": ":", "bridge": "-."}
+    for draw in (diagram.plot, lambda **look: plot_diagram(diagram, ("psi",), **look)[0]):
+        ax = draw(linestyles=given)
+        seen = {line.get_linestyle() for line in ax.lines if line.get_gid()}
+        assert seen - {"None"} == {"-", ":", "-."}
+        legend = ax.get_legend() or ax.figure.legends[0]
+        shown = {
+            t.get_text(): h for t, h in zip(legend.get_texts(), legend.legend_handles, strict=True)
+        }
+        assert shown["unstable"].get_linestyle() == ":"
+        assert shown["stable"].get_linestyle() == "-"
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (
+            {"unstabel": ":"},
+            "linestyles are of stable, unstable, unknown, bridge.*'unstabel'.*did you mean",
+        ),
+        ({"unstable": "wavy"}, r"linestyles\['unstable'\]: 'wavy' is no line style"),
+        ({"bridge": 3}, r"linestyles\['bridge'\]: 3 is no line style"),
+    ],
+)
+def test_line_styles_that_are_none(diagram: cf.Diagram, given: Any, message: str) -> None:
+    with pytest.raises(cf.ParameterError, match=message):
+        diagram.plot(linestyles=given)
+
+
 # ------------------------------------------------------------------------------------ insets
 
 
@@ -117,6 +150,23 @@ def test_an_inset_has_the_labels_of_its_part_and_hides_little(
         if line.get_gid() == "2a" and line.get_marker() == "None":
             low, high = inner.get_ylim()
             assert low < np.nanmin(line.get_ydata()) and np.nanmax(line.get_ydata()) < high
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_an_inset_stands_where_nothing_is_drawn(seed: int) -> None:
+    """Whatever is drawn: lines through all of the axes leave no corner, and the axes grow."""
+    draw = np.random.default_rng(seed)
+    ax = new_figure(6.0, 4.0).add_subplot()
+    x = np.linspace(0.0, 1.0, 400)
+    for _ in range(int(draw.integers(1, 7))):
+        ax.plot(x, np.cumsum(draw.normal(size=400)), marker="o" if seed % 2 else "")
+    inner, _ = add_inset(ax, [], (0.4, 0.5), lambda inner: inner.plot(x, x))
+    ax.figure.canvas.draw()
+    assert inner is not None
+    frame = inner.get_tightbbox()
+    points = np.vstack([line_pixels(ax), marker_pixels(ax)])
+    assert len(points) > 400
+    assert not any(frame.contains(*point) for point in points)
 
 
 def test_where_events_crowd_is_found(diagram: cf.Diagram) -> None:
