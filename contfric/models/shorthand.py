@@ -1,4 +1,4 @@
-"""What a model says in short, written out: structures, ties, clocks, angles, units, sliding that is derived.
+"""What a model says in short, written out: structures, ties, clocks, angles, units, sliding, observables.
 
 Each is put into the data of a model, before it is read, as if it had been typed: nothing behind knows of it.
 """
@@ -32,7 +32,8 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
     data = with_contacts(data)
     if not _is_regular(data):
         return read(data)  # which says what is wrong, and where
-    surfaces, plain = _derived_sliding(with_angles(with_clock(with_ties_put_in(data))))
+    data = _with_observables(with_ties_put_in(data))
+    surfaces, plain = _derived_sliding(with_angles(with_clock(data)))
     plain = in_units(plain, read)
     found = read(plain)
     if surfaces:
@@ -66,6 +67,22 @@ def _is_regular(data: Mapping[str, Any]) -> bool:
     own = [e["field"] for e in entries if isinstance(e, Mapping) and "field" in e]
     lists = isinstance(data.get("states"), (list, tuple))
     return lists and all(isinstance(part, Mapping) for part in (*parts, *entries, *own))
+
+
+def _with_observables(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a model in which an expression that a surface is the zero of has a name: that of the surface."""
+    surfaces, observables = data.get("surfaces") or {}, dict(data.get("observables") or {})
+    named: dict[Any, Any] = {}
+    for name, entry in surfaces.items():
+        named[name] = entry
+        text = entry.get("observable")
+        if not isinstance(text, str) or text.strip().isidentifier() or name in observables:
+            continue
+        if str(name) in {*map(str, data.get("states") or ()), *(data.get("parameters") or ())}:
+            continue
+        observables[name] = text
+        named[name] = {**entry, "observable": name}
+    return {**data, "surfaces": named, "observables": observables} if observables else data
 
 
 def _derived_sliding(data: dict[str, Any]) -> tuple[tuple[str, ...], dict[str, Any]]:

@@ -40,6 +40,10 @@ def beginnings(
         returns[i] = _returns(model, *row)
         if row[3] in model.reset_by_surface:
             resets[i] = model.surface_index[row[3]]
+    if np.all(
+        returns
+    ):  # each exit only said to be as high as the one before: one has to say how high
+        returns[-1] = 0
     return {"departs": departs, "resets": resets, "returns": returns}
 
 

@@ -80,6 +80,9 @@ _NOISE = 10.0
 #: its derivative: what flows in closed form are held to (50 units in the last place). That of a stiff mode is
 #: far above that of the states.
 _UNITS = 50.0 * 2.2e-16
+#: Corrections that are rounding of its own numbers are no longer than this: a few thousand times the floor.
+#: (In a motion that departs from its neighbours rounding of the end is far more, and moves the orbit less.)
+_SMALL = 2e-10
 #: A residual of rounding varies by more than this from step to step; one on its way down falls faster.
 _STILL_FALLS = 0.5
 #: Error that the last correction may leave: below one unit in the last place.
@@ -225,8 +228,11 @@ def has_converged(size, before, worst, floor):  # type: ignore[no-untyped-def]
 
 @helper
 def is_noise(size, worst, rounding):  # type: ignore[no-untyped-def]
-    """Tell whether a residual may be rounding, and the correction what it asks for."""
-    return worst < _NOISE * rounding and size < 1e-6
+    """Tell whether a residual may be rounding, of flow or numbers, and the correction what it asks for."""
+    flow, numbers = rounding
+    if worst < _NOISE * flow and size < 1e-6:
+        return True
+    return worst < _NOISE * numbers and size < _SMALL
 
 
 @helper
@@ -245,7 +251,7 @@ def verdict(step, size, before, worst, worst_before, floor, rounding):  # type: 
     size, before : this correction and the last one; infinite if that was cut or there was none
     worst, worst_before : largest residual before this correction, and before the last one
     floor : size of a correction after which no other is asked for
-    rounding : relative rounding of the flow
+    rounding : relative rounding of the flow, and that of the numbers of a segment
     """
     if has_converged(size, before, worst, floor):
         return CONVERGED
@@ -311,17 +317,20 @@ def correcting(border: Any) -> Any:
             size = correction_size(work.z, work.w, z, p, which, 0)
             if size == np.inf:
                 return NOT_FINITE, step, first, worst
-            noise = max(noise, rounding)
             share = trust / size if size > trust else 1.0
             move(z, p, which, work.z, work.w, share)
             if step == 0:
                 first = size
-            found = verdict(step, size, before, worst, residual_before, floor, noise)
+            found = verdict(step, size, before, worst, residual_before, floor, (rounding, noise))
             if found == CONVERGED or (found == NOT_CONVERGED and not damped):
                 return found, step + 1, first, worst
             if size > 0.5 * before:
                 circles += 1
-            if floor > ALONG and circles >= _CIRCLES and not is_noise(size, worst, noise):
+            if (
+                floor > ALONG
+                and circles >= _CIRCLES
+                and not is_noise(size, worst, (rounding, noise))
+            ):
                 return NOT_CONVERGED, step + 1, first, worst
             residual_before = worst
             before = (
