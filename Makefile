@@ -105,6 +105,7 @@ bench: $(BENCH_STAMP)
 	@$(BIN)/python benchmarks/scenes.py
 	@$(BIN)/python benchmarks/integrated.py
 	@$(BIN)/python benchmarks/states.py
+	@$(BIN)/python benchmarks/contacts.py
 
 # An hour or more; sequences and restarts go on where they were interrupted.
 stress: $(STAMP)

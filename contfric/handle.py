@@ -115,16 +115,29 @@ class Block:
 
     def __init__(self, layout: Layout, values: Mapping[str, Any]) -> None:
         self._layout = layout
-        kinds = {TABLE: np.int64, WEIGHTS: np.float64}
-        self._values: dict[str, Any] = {
-            name: np.array(value, dtype=kinds[layout[name]]) if layout[name] in kinds else value
+        self._values = self._arrays(values)
+        self._memory = np.zeros(len(layout), dtype=np.int64)
+
+    def renew(self, values: Mapping[str, Any]) -> None:
+        """Put other tables and numbers in the place of some; the address stays. No kernel may be running."""
+        self._values |= self._arrays(values)
+        if "address" in self.__dict__:
+            self._write()
+
+    def _arrays(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        kinds, layout = {TABLE: np.int64, WEIGHTS: np.float64}, self._layout
+        return {
+            name: np.asarray(value, dtype=kinds[layout[name]]) if layout[name] in kinds else value
             for name, value in values.items()
         }
-        self._memory = np.zeros(len(layout), dtype=np.int64)
 
     @cached_property
     def address(self) -> int:
         """Where it lies; its functions are compiled, or loaded, when that is first asked for."""
+        self._write()
+        return int(self._memory.ctypes.data)
+
+    def _write(self) -> None:
         for k, (name, kind) in enumerate(self._layout.items()):
             value = self._values.get(name)
             if value is None:
@@ -135,7 +148,6 @@ class Block:
                 self._memory[k] = value
             else:
                 self._memory[k] = value.ctypes.data if kind in _ARRAYS else value.address
-        return int(self._memory.ctypes.data)
 
 
 class Bound:

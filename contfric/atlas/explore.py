@@ -7,6 +7,7 @@ those already known, and a new one puts what leaves it into the queue (:mod:`con
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -113,7 +114,8 @@ def explore(
         )
     stops = settings.stop_at
     asked = Asked(max_step, stability, bridges, most, again, max_branches, max_points, stops)
-    with in_advance():
+    # tables that grow as modes are visited belong to one thread
+    with nullcontext() if orbit.model.composed else in_advance():
         _follow_from(state, orbit, seeds)
     return collect(
         orbit.model,

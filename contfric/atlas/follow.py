@@ -9,11 +9,13 @@ A candidate is accepted when it is solved, and admissible beyond the event in on
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from contfric.atlas.collect import Event
+from contfric.atlas.composed import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.crossings import follow_crossing, whole_branch
 from contfric.atlas.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.exploration import Exploration
@@ -93,9 +95,13 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
         words: set[Word] = set()
         state.raise_copies(shortest(orbit).periods // incident.unit.periods)
         most = min(state.max_periods, state.copies * incident.unit.periods)
-        for candidate in sequences_of(incident, active, most, state.bridges):
+        proposed: Iterable[Candidate] = sequences_of(incident, active, most, state.bridges)
+        for candidate in in_order(proposed) if composes(orbit) else proposed:
             jumps = jumps or candidate.has_hold
             accepted = _judge(state, event, candidate) or accepted
+            if composes(orbit) and goes_on(state, event):
+                state.judge(event, "other orders of the changes", Verdict.REFUSED, why=GOES_ON)
+                break
             if event.proposals and event.proposals[-1].verdict is not Verdict.REFUSED:
                 words |= candidate.words
         event.kinds |= {n.kind for n in incident.names if n.before & words and n.after & words}

@@ -111,8 +111,9 @@ def _relations(
     incident: Incident, forms: tuple[Form, ...], active: int | None
 ) -> list[Relation] | None:
     """Return the linear relations of the forms; None if one is not clear."""
-    if active is None or incident.wide or incident.unit.model.autonomous:
-        return None
+    model = incident.unit.model
+    if active is None or incident.wide or model.autonomous or model.composed:
+        return None  # composed: the first sequence is right, and its relation the dearest part
     found = []
     for form in forms:
         relation = relation_of(incident.unit, form, active, incident.least)

@@ -306,7 +306,7 @@ def meaning_of(kind: Kind, model: Model, surfaces: Set[str]) -> str:
 
 def _is_rested_on(model: Model, surface: str) -> bool:
     """Tell whether motion can stay on a surface."""
-    return any(d.signs[surface] == 0 and model.mode_by_name[d.mode].sliding for d in model.domains)
+    return model.rests_on(surface)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.sections import is_smooth, without_sections
 from contfric.orbit.simulation import Trajectory, run
+from contfric.orbit.slides import resting_modes
 from contfric.orbit.starts import signs_at
 from contfric.orbit.structure import mode_domains
 from contfric.orbit.system import Word, build_system
@@ -53,7 +54,8 @@ def walked(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator
 def _middle(orbit: Orbit) -> tuple[int, float]:
     """Return the longest segment that does not rest, and the time of its middle: far from any surface."""
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
-    rests = [orbit.model.mode_by_name[mode].sliding for mode, _ in orbit.word]
+    resting = resting_modes(orbit)
+    rests = [mode in resting for mode, _ in orbit.word]
     i = int(np.argmax(np.where(rests, -1.0, lasts)))
     return i, float(orbit.cycle[i, 0] + 0.5 * lasts[i])
 

@@ -27,16 +27,15 @@ from contfric.continuation.outcomes import (
     NO_LENGTH_AT_TOUCH,
     Outcome,
     RestsForEver,
-    normal_place,
     outcome_at,
-    places_of,
 )
+from contfric.continuation.places import normal_place, places_of
 from contfric.continuation.unit import Form, Unit, pieces, unit_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.slides import SHORT
+from contfric.orbit.slides import SHORT, resting_modes
 from contfric.orbit.system import Margin, Test, Word, build_system
 from contfric.signature.edits import apply_edit, edited_pieces
 
@@ -113,7 +112,7 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
 
 def _moves(orbit: Orbit) -> bool:
     """Tell whether a motion has a slide of some length: in less the mass moves by the cube of it."""
-    sliding = {mode.name for mode in orbit.model.modes if mode.sliding}
+    sliding = resting_modes(orbit)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
     return any(
         mode not in sliding and last > SHORT

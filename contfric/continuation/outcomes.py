@@ -36,7 +36,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from contfric.continuation.events import Bifurcation, Kind, hold_of_test
+from contfric.continuation.composed_outcomes import continuous_edit
+from contfric.continuation.events import Bifurcation, Kind
+from contfric.continuation.places import places_of
 from contfric.continuation.zero_acceleration import (
     first_zero_acceleration,
     leaving_rate,
@@ -100,17 +102,6 @@ class Outcome:
     away: Mapping[Origin, float] = field(default_factory=dict)
 
 
-def places_of(bifurcation: Bifurcation) -> list[Test]:
-    """Return the places of the whole orbit at which a sliding event happens."""
-    orbit = bifurcation.orbit
-    places = [normal_place(test, orbit) for test in bifurcation.tests]
-    places = list(dict.fromkeys(places))
-    if orbit.system.half and orbit.model.symmetry is not None:
-        n, image = len(orbit.system.word), orbit.model.symmetry.surfaces
-        places += [Test(t.margin, t.segment + n, image[t.surface]) for t in places]
-    return places
-
-
 def end_message(bifurcation: Bifurcation) -> str:
     """Return why a branch ends at an event where its kind alone would say something else; else nothing."""
     orbit, kind = bifurcation.orbit, bifurcation.kind
@@ -123,6 +114,12 @@ def end_message(bifurcation: Bifurcation) -> str:
         if orbit.model.reset_by_surface[struck].stays:
             return "grazing impact: the wall is just touched"
         return f"grazing: the surface of the reset at '{struck}' is just touched"
+    if orbit.model.composed and orbit.model.filippov:
+        return (
+            ""
+            if kind is Kind.SS
+            else f"{kind.meaning}: the signature changes, the motion is continuous"
+        )
     for place in places_of(bifurcation)[:1]:
         try:
             outcome_at(orbit.as_whole(), place, kind)
@@ -131,14 +128,6 @@ def end_message(bifurcation: Bifurcation) -> str:
         except NotationError:
             return ""
     return ""
-
-
-def normal_place(test: Test, orbit: Orbit) -> Test:
-    """Return a test of what belongs to a hold as one of the hold itself."""
-    hold = hold_of_test(test, orbit)
-    if hold is None or hold.segment == test.segment:
-        return test
-    return Test(Margin.EXIT, hold.segment, hold.leaves)
 
 
 def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
@@ -157,6 +146,9 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
     if place.margin is Margin.JOINT and place.surface in orbit.model.reset_by_surface:
         where = f"where segment {place.segment + 1} ends"
         raise NotationError(f"the wall {place.surface} is met {where}")
+    if orbit.model.composed and orbit.model.filippov:
+        edit, joints, away, reason = continuous_edit(orbit, place)
+        return Outcome(edit, joints, reason, away)
     if kind is Kind.CS:
         i, surface = place.segment, place.surface
         edit, joints = swap_edit(orbit.word, {i: surface}, orbit.model), {(i, 0): orbit.ends[i]}
@@ -373,7 +365,7 @@ def _check_inside(orbit: Orbit, rest: str, joint: FloatArray) -> None:
     """Check that a state lies inside the region of a rest, not on its boundary."""
     model = orbit.model
     place = signs_at(model, float(joint[0]), joint[1:].copy(), orbit.vector, within=NO_JUMP)
-    for domain in (d for d in model.domains if d.mode == rest):
+    for domain in model.domains_of(rest):
         if all(place[s] == sign for s, sign in domain.signs.items() if sign != 0):
             return
     raise NoJump(f"'{rest}' begins on the boundary of its region: nothing can be held there")
@@ -382,12 +374,11 @@ def _check_inside(orbit: Orbit, rest: str, joint: FloatArray) -> None:
 def _rest_mode(orbit: Orbit, i: int, surface: str) -> str:
     """Return the mode of rest on a surface that a slide comes to at its end, or at a touch of it."""
     model = orbit.model
-    for domain in model.domains:
-        target = model.transitions.get((domain.name, surface))
-        if domain.mode != model.whole_mode(orbit.word[i][0]) or target is None:
-            continue
-        if model.mode_by_name[model.domain_by_name[target].mode].sliding:
-            return model.domain_by_name[target].mode
+    for domain in model.domains_of(model.whole_mode(orbit.word[i][0])):
+        for through, target in model.exits_of(domain.name):
+            rest = model.domain_by_name[target].mode
+            if through == surface and model.mode_by_name[rest].sliding:
+                return rest
     raise NoJump(
         f"mode '{orbit.word[i][0]}' of model '{model.name}' never comes to rest on {surface}"
     )
@@ -395,5 +386,5 @@ def _rest_mode(orbit: Orbit, i: int, surface: str) -> str:
 
 def _leaves(orbit: Orbit, mode: str) -> str:
     """Return the surface that a mode of rest lies on."""
-    rest = next(domain for domain in orbit.model.domains if domain.mode == mode)
+    rest = orbit.model.domains_of(mode)[0]
     return next(name for name, sign in rest.signs.items() if sign == 0)

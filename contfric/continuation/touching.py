@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cache
 
 import numpy as np
@@ -47,14 +48,16 @@ def begins_to_slide(model: Model, mode: str, surface: str) -> bool:
 
     Where another contact sticks meanwhile, a touch of such a surface is a grazing: no rest comes to an end.
     """
-    own = [d for d in model.domains if d.mode == model.whole_mode(mode)]
+    own = list(model.domains_of(model.whole_mode(mode)))
     after = [
         model.domain_by_name[target].signs
         for d in own
         for target in model.targets.get((d.name, surface), ())
     ]
-    slides_on = {s for s, sign in own[0].signs.items() if all(d.signs[s] == 0 for d in own)}
-    return bool(after) and all(all(signs[s] == 0 for s in (*slides_on, surface)) for signs in after)
+    slides_on = {s for s, sign in own[0].signs.items() if all(d.signs.get(s) == 0 for d in own)}
+    return bool(after) and all(
+        all(signs.get(s) == 0 for s in (*slides_on, surface)) for signs in after
+    )
 
 
 def resting_domain(system: System, test: Test) -> Domain | None:
@@ -66,14 +69,21 @@ def resting_domain(system: System, test: Test) -> Domain | None:
     mode, exit_ = system.word[test.segment]
     resting = [
         d
-        for d in model.domains
-        if model.mode_by_name[d.mode].sliding and d.signs[test.surface] != 0
+        for d in _near(model, mode, exit_)
+        if model.mode_by_name[d.mode].sliding and d.signs.get(test.surface, 0) != 0
     ]
     own = [d for d in resting if d.mode == mode and _ends_rest(model, d, test.surface)]
     others = [
         d for d in resting if d.signs.get(exit_) == 0 and _ends_rest(model, d, test.surface, exit_)
     ]
     return next(iter([*own, *others]), None)
+
+
+def _near(model: Model, mode: str, exit_: str) -> Iterable[Domain]:
+    """Return the domains that a joint may be next to: all, or those on both sides of it."""
+    if not model.composed:
+        return model.domains
+    return [model.domain_by_name[name] for name in (mode, *model.targets.get((mode, exit_), ()))]
 
 
 def _ends_rest(model: Model, domain: Domain, surface: str, on: str = "") -> bool:
@@ -83,7 +93,7 @@ def _ends_rest(model: Model, domain: Domain, surface: str, on: str = "") -> bool
         model.domain_by_name[target].signs
         for target in model.targets.get((domain.name, surface), ())
     ]
-    return any(signs[name] != 0 for signs in after for name in held)
+    return any(signs.get(name, 1) != 0 for signs in after for name in held)
 
 
 @cache

@@ -85,7 +85,7 @@ def _departure_rate(orbit: Orbit, i: int, departs: str) -> Callable[[float], flo
 def leaving_rate(orbit: Orbit, mode: str, departs: str, joint: FloatArray) -> float:
     """Return the acceleration with which a mode of rest is left into a departing mode at a joint."""
     model = orbit.model
-    rest = next(d for d in model.domains if d.mode == mode)
+    rest = model.domains_of(mode)[0]
     leaves = next(name for name, sign in rest.signs.items() if sign == 0)
     sign = model.domain_by_name[mode_domains(model, departs)[0]].signs[leaves]
     observable = model.surface_by_name[leaves].observable

@@ -150,11 +150,25 @@ class Functions:
         if self.affine is not None:
             values |= self.affine.functions
         if self.timed:
-            pieces = self.modes << len(self.kinks)
-            none: dict[str, Any] = {"sides": {}, "kinks": (), "slides": (), "idle": (), "timed": ()}
-            clock = dataclasses.replace(self, field=still, modes=pieces, affine=None, **none)
-            values["clock"] = clock.block
+            values["clock"] = self._clock.block
         return Block(MODEL, {**values, **self._tables(), **self._numbers()})
+
+    @cached_property
+    def _clock(self) -> Functions:
+        pieces = self.modes << len(self.kinks)
+        none: dict[str, Any] = {"sides": {}, "kinks": (), "slides": (), "idle": (), "timed": ()}
+        return dataclasses.replace(self, field=still, modes=pieces, affine=None, **none)
+
+    def grow(self, tables: Mapping[str, Any], none: Mapping[str, Any]) -> None:
+        """Put tables of more modes in the place of those of the block, which kernels are bound to.
+
+        Parameters
+        ----------
+        none : tables as long, of zeros, for the clock
+        """
+        self.block.renew(tables)
+        if self.timed:
+            self._clock.block.renew(none)
 
     def _tables(self) -> dict[str, list[int]]:
         pieces = range(self.modes << len(self.kinks))

@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING, Any
 
 from contfric.checked import read_sealed, write_sealed
 from contfric.errors import ResultFileError
-from contfric.models.coded import coded_functions, forms_of
+from contfric.models.coded import forms_of
+from contfric.models.coded_flow import coded_flow
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
@@ -37,7 +38,7 @@ class GeneratedFlow:
 
     def __call__(self) -> CompiledFlow:
         """Return the compiled functions; a module is generated if one is needed and was never written."""
-        found = coded_functions(self.definition)
+        found = coded_flow(self.definition)
         if found is not None:
             return found.flow
         return load_module(self.definition).compiled_flow()  # type: ignore[no-any-return]
@@ -45,7 +46,7 @@ class GeneratedFlow:
 
 def field_of(definition: str) -> Any:
     """Return the compiled field of the modes of a definition, without the flow, which takes longer."""
-    found = coded_functions(definition)
+    found = coded_flow(definition)
     return load_module(definition).field_of if found is None else found.field
 
 

@@ -10,9 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any
 
 from contfric.models.coefficients import (
     AFFINE,
@@ -27,14 +25,11 @@ from contfric.models.coefficients import (
     symbols,
     within,
 )
+from contfric.models.columns import Column
 from contfric.models.description import Description, ModeText
 from contfric.models.grammar import parse
 from contfric.models.not_affine import NotAffineError
 from contfric.models.regions import engine_order, known_sides
-
-if TYPE_CHECKING:
-    from contfric.flow.interface import CompiledFlow
-    from contfric.handle import Bound
 
 Form = list[Affine]
 #: Rates of states, over all modes, up to which code is generated: it takes half of the time that tables take,
@@ -63,7 +58,10 @@ class Forms:
         self.surfaces = surfaces
         self.observables = [self.form(o.formula) for o in description.observables]
         self.levels = [self._constant(s.level) for s in surfaces]
-        self.fields = [self._field(mode) for mode in description.modes]
+        self.modes: list[ModeText] = []
+        self.fields: list[Form] = []
+        for mode in description.modes:
+            self.add(mode)
         self.period = self._constant(description.period or "0")
         self.scales = [self._constant(text) for text in description.spread]
         self.resets = {
@@ -71,6 +69,11 @@ class Forms:
             for s in surfaces
             if s.name in description.resets
         }
+
+    def add(self, mode: ModeText) -> None:
+        """Read the rates in a mode, which comes behind those that are known."""
+        self.modes.append(mode)
+        self.fields.append(self._field(mode))
 
     def form(self, text: str) -> Affine:
         """Return an expression as an affine form; the same text is read once."""
@@ -109,15 +112,11 @@ class Forms:
                 found = found + self.fields[mode][key[1]].scaled(slope)
         return found
 
-    @property
-    def idle(self) -> list[tuple[int, int]]:
-        """Pairs (mode, observable) for which the observable never changes along the mode."""
+    def idle(self, mode: int) -> list[tuple[int, int]]:
+        """Return pairs (mode, observable) for which the observable never changes along a mode."""
         still = [{key[0] for key in o.parts} <= {"y", "1"} for o in self.observables]
         return [
-            (m, c)
-            for m in range(len(self.fields))
-            for c in range(len(self.observables))
-            if still[c] and not self.rate(m, c).parts
+            (mode, c) for c, quiet in enumerate(still) if quiet and not self.rate(mode, c).parts
         ]
 
 
@@ -134,17 +133,18 @@ class Tables:
 
     names: Sequence[str]
     states: int
-    operations: list[int] = field(default_factory=list)
-    numbers: list[float] = field(default_factory=list)
-    data: dict[str, list[Any]] = field(default_factory=dict)
+    operations: Column = field(default_factory=Column)
+    numbers: Column = field(default_factory=lambda: Column(whole=False))
+    data: dict[str, Column] = field(default_factory=dict)
     _known: dict[Any, int] = field(default_factory=dict)
     _waves: dict[Coefficient, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("columns", "harmonics", "operands", "weights", "frequency_at"):
-            self.data[name] = []
+        for name in ("columns", "harmonics", "operands", "frequency_at"):
+            self.data[name] = Column()
+        self.data["weights"] = Column(whole=False)
         for name in ("row_of", "slope_at", "wave_at", "term_at", "places"):
-            self.data[name] = [0]
+            self.data[name] = Column([0])
         self.wave(Coefficient())  # the constant is the first harmonic
 
     @cached_property
@@ -254,120 +254,15 @@ class Tables:
         return max((places[g + 1] - places[g] for g in groups), default=0)
 
 
-def _returns(forms: Forms, mode: int, held: Sequence[int]) -> list[float]:
-    """Return how a state goes back onto the surfaces of a mode: ``G^T (G G^T)^-1``, column by column."""
-    if not held:
-        return []
-    gradients = np.zeros((len(held), len(forms.description.states)))
-    names = [o.name for o in forms.description.observables]
-    for row, k in enumerate(held):
-        for key, slope in forms.observables[
-            names.index(forms.surfaces[k].observable)
-        ].parts.items():
-            if key[0] == "y":
-                if slope.number is None:
-                    raise NotAffineError("a surface of rest depends on a parameter")
-                gradients[row, key[1]] = slope.number
-    return [float(x) for x in np.linalg.pinv(gradients).T.ravel()]
-
-
-@dataclass(frozen=True)
-class CodedFunctions:
-    """The flow of a model whose formulas are tables, and the field of its modes."""
-
-    flow: CompiledFlow
-    field: Bound
-
-
 @lru_cache(maxsize=64)
 def forms_of(definition: str) -> Forms | None:
     """Return the affine forms of a definition, if its formulas are to be tables; else None."""
     from contfric.models.describe import from_text
 
     description = from_text(definition)
-    if len(description.modes) * len(description.states) <= _FEW:
+    if not description.structure and len(description.modes) * len(description.states) <= _FEW:
         return None
     try:
         return Forms(description)
     except (NotAffineError, ArithmeticError):
         return None
-
-
-@lru_cache(maxsize=64)
-def coded_functions(definition: str) -> CodedFunctions | None:
-    """Return the compiled functions of a definition whose formulas are to be tables; else None."""
-    forms = forms_of(definition)
-    return None if forms is None else functions_from(forms)
-
-
-def functions_from(forms: Forms) -> CodedFunctions:
-    """Return the compiled functions of affine forms."""
-    from contfric.flow.coded.kernels import KERNELS
-    from contfric.flow.coded.tables import LAYOUT
-    from contfric.flow.integrated import AffineModes, Functions
-    from contfric.flow.layouts import AFFINE as HELPERS
-    from contfric.handle import Block, Bound
-
-    description = forms.description
-    tables = Tables([p.name for p in description.parameters], len(description.states))
-    pieces = [tables.group(rows) for rows in forms.fields]
-    data = tables.data
-    data["observable_of"] = [tables.group([form]) for form in forms.observables]
-    data["reset_at"] = [
-        tables.group(forms.resets[s.name]) if s.name in forms.resets else 0 for s in forms.surfaces
-    ]
-    data["level_at"] = [tables.value(level) for level in forms.levels]
-    data["scale_at"] = [tables.value(scale) for scale in forms.scales]
-    period = tables.value(forms.period)
-    slides = _slides(forms, data)
-    values = {
-        **data,
-        "operations": tables.operations,
-        "numbers": tables.numbers,
-        "values": len(tables.numbers),
-        "states": tables.states,
-        "waves": len(data["frequency_at"]),
-        "parameters": len(tables.names),
-        "coefficients": tables.most(range(len(data["places"]) - 1)),
-        "period_at": period,
-    }
-    block = Block(LAYOUT, values)
-    bound = {name: Bound(kernel, block) for name, kernel in KERNELS.items()}
-    count = len(forms.observables)
-    functions = Functions(
-        field=bound["field"],
-        observe=bound["observe"],
-        rate=bound["rate"],
-        period=bound["period"],
-        scale=bound["scale"],
-        onto=bound["onto"],
-        modes=len(pieces),
-        observables=count,
-        slides=slides,
-        idle=forms.idle,
-        timed=[c for c, o in enumerate(forms.observables) if "y" not in {k[0] for k in o.parts}],
-        affine=AffineModes(
-            {name: bound[name] for name in HELPERS},
-            entries=tables.most([*pieces, *data["observable_of"]]),
-            waves=len(data["frequency_at"]),
-            closed=pieces,
-            seen=range(count),
-        ),
-    )
-    flow = functions.flow(bound["level"], reset=bound["reset"] if forms.resets else None)
-    return CodedFunctions(flow, bound["field"])
-
-
-def _slides(forms: Forms, data: dict[str, list[Any]]) -> list[int]:
-    """Write the surfaces that each mode slides on, and the way back; return the modes that do."""
-    order = {o.name: c for c, o in enumerate(forms.description.observables)}
-    data["seen_at"] = [order[s.observable] for s in forms.surfaces]
-    data["surface_at"], data["surfaces"], data["returns"] = [0], [], []
-    slides = []
-    for m, mode in enumerate(forms.description.modes):
-        held = [k for k, s in enumerate(forms.surfaces) if mode.sides.get(s.name) == 0]
-        data["surfaces"] += held
-        data["returns"] += _returns(forms, m, held)
-        data["surface_at"].append(len(data["surfaces"]))
-        slides += [m] if held else []
-    return slides

@@ -76,7 +76,7 @@ def _written(
     laws: dict[tuple[str, str], str] = {}
     in_mode = {}
     for mode, states in modes.items():
-        law = _law(structure, contact, states)
+        law = law_of(structure, contact, states)
         in_mode[mode] = laws.setdefault(law, str(len(laws)))
     texts: dict[str, str] = {}
     for (force, power), number in laws.items():
@@ -88,7 +88,7 @@ def _written(
     return {"modes": in_mode, "texts": texts}
 
 
-def _law(structure: Structure, contact: Contact, states: Mapping[str, str]) -> tuple[str, str]:
+def law_of(structure: Structure, contact: Contact, states: Mapping[str, str]) -> tuple[str, str]:
     """Return force and dissipated power of a contact in a mode."""
     state = states.get(contact.name, "")
     if contact.kind is ContactKind.FRICTION and state == "s":

@@ -19,6 +19,7 @@ from contfric.models.coefficients import AFFINE, symbols
 from contfric.models.contact_laws import laws_of
 from contfric.models.contact_ranges import constraints_of
 from contfric.models.contacts import Contact, ContactKind, drift, factor_of
+from contfric.models.description import STRUCTURE
 from contfric.models.entries import EntryError, Part, mapping_in
 from contfric.models.grammar import Scope, names_in, number_of, parse
 from contfric.models.matrices import summed, times
@@ -28,6 +29,8 @@ from contfric.models.units import read_units
 
 #: What a model of a structure has of its own; everything else is as in any model.
 KEYS = (COORDINATES, "mass", "damping", "stiffness", "force", "contacts")
+#: What a structure is not made from: it stands in the model itself.
+_APART = ("title", "references", "symmetry", "spread", "quantities", "max_step", "integration")
 _OTHERS = (
     *("name", "title", "references", "parameters", "constraints", "period", "autonomous", "define"),
     *("observables", "symmetry", "spread", "units", "integration", "max_step", "quantities"),
@@ -54,10 +57,19 @@ def with_contacts(data: dict[str, Any]) -> dict[str, Any]:
         return data
     top = Part(data)
     top.only((*KEYS, *_OTHERS))
-    return _Modes(Structure.read(top)).data()
+    structure = Structure.read(top)
+    composes = structure.composes
+    if not composes:
+        structure.check_count()
+    found = Combinations(structure).data(only_quiet=composes)
+    return (
+        {**found, STRUCTURE: {k: v for k, v in data.items() if k not in _APART}}
+        if composes
+        else found
+    )
 
 
-class _Modes:
+class Combinations:
     """The parts of a model that a structure with contacts is."""
 
     def __init__(self, structure: Structure) -> None:
@@ -66,8 +78,13 @@ class _Modes:
         self.contacts, self.mass = structure.contacts, structure.mass
         self.states: dict[str, Mapping[str, str]] = {}
 
-    def data(self) -> dict[str, Any]:
-        """Return the model in the schema of all models."""
+    def data(self, only_quiet: bool = False) -> dict[str, Any]:
+        """Return the model in the schema of all models.
+
+        Parameters
+        ----------
+        only_quiet : only the mode in which no contact acts: others come when they are visited
+        """
         kept = {key: value for key, value in self.top.data.items() if key not in KEYS}
         stretches = [c.name for c in self.contacts if c.kind is ContactKind.JENKINS]
         states = [*self.coordinates, *self.velocities, *stretches]
@@ -77,7 +94,7 @@ class _Modes:
             for q, force in zip(self.coordinates, self.structure.forces, strict=True)
         }
         observables, surfaces = self._surfaces()
-        modes = self._modes()
+        modes = self._quiet() if only_quiet else self._modes()
         found = {
             **kept,
             "states": states,
@@ -86,7 +103,9 @@ class _Modes:
             "surfaces": surfaces,
             "modes": modes,
             "forces": laws_of(self.structure, self.states),
-            "departures": [d for c in self.contacts for d in self._departures(c)],
+            "departures": []
+            if only_quiet
+            else [d for c in self.contacts for d in self._departures(c)],
             "spread": mapping_in(kept, "spread"),
         }
         found |= {"units": self._units(stretches)} if "units" in kept else {}
@@ -147,7 +166,7 @@ class _Modes:
                 self._limits(c, add)
             elif c.kind is ContactKind.JENKINS:
                 level = f"({c.texts['limit']})/({c.texts['stiffness']})"
-                if self._stop(c)[0] == c.name:
+                if self.stop_of(c)[0] == c.name:
                     add(c.name, f"w_{c.name}", self.structure.speed(c), "0")
                 add(f"{c.name}+", c.name, c.name, level)
                 add(f"{c.name}-", c.name, c.name, f"-{level}")
@@ -166,14 +185,14 @@ class _Modes:
                 self.structure.load(c, closed),
             )
             for sign, other in ("+", "-"), ("-", "+"):
-                surface = _limit(c, closed, sign)
+                surface = limit_of(c, closed, sign)
                 if fixed:
                     add(surface, name, load, f"{sign}({static})")
                 else:  # a limit that moves
                     side = "high" if sign == "+" else "low"
                     add(surface, f"{name}_{side}", f"{load} {other} ({static})", "0")
 
-    def _stop(self, c: Contact) -> tuple[str, Mapping[str, str]]:
+    def stop_of(self, c: Contact) -> tuple[str, Mapping[str, str]]:
         """Return the surface on which the velocity of an element vanishes, and its sides where it slides.
 
         Jenkins elements that are stretched along one direction share that of the first.
@@ -189,9 +208,15 @@ class _Modes:
         sides: dict[str, set[str]] = {}
         for c in self.contacts:
             if c.kind is ContactKind.JENKINS and states[c.name] != "s":
-                stop, ways = self._stop(c)
+                stop, ways = self.stop_of(c)
                 sides.setdefault(stop, set()).add(ways[states[c.name]])
         return any(len(found) > 1 for found in sides.values())
+
+    def _quiet(self) -> dict[str, Any]:
+        states = {c.name: c.states[0] for c in self.contacts if c.states}
+        name = "".join(states.values())
+        self.states[name] = states
+        return {name: {"in": self.sides(states), "field": self.field(states)}}
 
     def _modes(self) -> dict[str, Any]:
         found = {}
@@ -201,7 +226,7 @@ class _Modes:
             if self._contradicts(states):
                 continue
             name = "".join(letters) or "free"
-            found[name] = {"in": self._sides(states), "field": self._field(states)}
+            found[name] = {"in": self.sides(states), "field": self.field(states)}
             self.states[name] = states
         self._divide(found)
         return found
@@ -225,7 +250,8 @@ class _Modes:
         gaps = [c for c in self.contacts if c.kind is ContactKind.SPRING]
         return elastic[0].name if elastic else f"w_{gaps[0].name}" if gaps else ""
 
-    def _sides(self, states: Mapping[str, str]) -> dict[str, str]:
+    def sides(self, states: Mapping[str, str]) -> dict[str, str]:
+        """Return the sides of surfaces that contacts in some states lie on, and no others."""
         sides: dict[str, str] = {}
         for c in self.contacts:
             state = states.get(c.name, "")
@@ -237,16 +263,17 @@ class _Modes:
                 limits = {"s": {"+": "-", "-": "+"}, "p": {"+": "0"}, "n": {"-": "0"}}[state]
                 sides |= {f"{c.name}{sign}": side for sign, side in limits.items()}
                 if state != "s":
-                    stop, ways = self._stop(c)
+                    stop, ways = self.stop_of(c)
                     sides[stop] = ways[state]
             elif state == "s":
                 closed = self.structure.closed(c, states)
-                sides |= {c.name: "0", _limit(c, closed, "+"): "-", _limit(c, closed, "-"): "+"}
+                sides |= {c.name: "0", limit_of(c, closed, "+"): "-", limit_of(c, closed, "-"): "+"}
             else:
                 sides[c.name] = "+" if state == "p" else "-"
         return sides
 
-    def _field(self, states: Mapping[str, str]) -> dict[str, str]:
+    def field(self, states: Mapping[str, str]) -> dict[str, str]:
+        """Return the rates of all states of the model while the contacts are in some states."""
         pulls: dict[int, list[str]] = {i: [f"f_{q}"] for i, q in enumerate(self.coordinates)}
         for c in self.contacts:
             stuck = c.kind is ContactKind.FRICTION and states[c.name] == "s"
@@ -285,14 +312,14 @@ class _Modes:
     def _departures(self, c: Contact) -> list[dict[str, Any]]:
         """Return where motion on the surfaces of a contact leaves to."""
         if c.kind is ContactKind.JENKINS:
-            return self._stops(c) if self._stop(c)[0] == c.name else []
+            return self._stops(c) if self.stop_of(c)[0] == c.name else []
         if c.kind is not ContactKind.FRICTION:
             return []
         found = []
         for closed in _subsets(self.structure.springs[c.name]):
             gaps = {s.name: "-" if s in closed else "+" for s in self.structure.springs[c.name]}
             for sign in "+-":  # friction that has reached its limit slides
-                where = {c.name: "0", _limit(c, closed, sign): sign, **gaps}
+                where = {c.name: "0", limit_of(c, closed, sign): sign, **gaps}
                 found.append({"where": where, "leaves": {c.name: sign}})
         return found
 
@@ -302,7 +329,7 @@ class _Modes:
             (c, ways)
             for c in self.contacts
             if c.kind is ContactKind.JENKINS
-            for stop, ways in [self._stop(c)]
+            for stop, ways in [self.stop_of(c)]
             if stop == first.name
         ]
         found = []
@@ -346,6 +373,6 @@ def _subsets(items: Sequence[_T]) -> list[tuple[_T, ...]]:
     return [s for k in range(len(items) + 1) for s in itertools.combinations(items, k)]
 
 
-def _limit(contact: Contact, closed: tuple[Contact, ...], sign: str) -> str:
+def limit_of(contact: Contact, closed: tuple[Contact, ...], sign: str) -> str:
     """Return the name of a surface: a load's limit, with the springs that are closed."""
     return "".join([contact.name, sign, *(s.name for s in closed)])

@@ -67,10 +67,14 @@ def model_from(description: Description) -> Model:
     EntryError
         If the description contradicts itself; with the address of the entry.
     """
+    if description.structure:
+        from contfric.models.composing import composed_from
+
+        return composed_from(description)
     params = defaults(description)
     evaluator = floats(description)
     sampler = Sampler(evaluator, params)
-    levels = {s.name: _level(evaluator, s, params) for s in description.surfaces}
+    levels = {s.name: level_of(evaluator, s, params) for s in description.surfaces}
     surfaces = ordered_surfaces(description, levels)
     declared = domains_of(description, surfaces)
     departures = description.departures or _departures(sampler, surfaces, declared)
@@ -82,7 +86,7 @@ def model_from(description: Description) -> Model:
         states=description.states,
         parameters=description.parameters,
         constraints=tuple(
-            _constraint(("constraints", i), text, why, params)
+            constraint_of(("constraints", i), text, why, params)
             for i, (text, why) in enumerate(description.constraints)
         ),
         observables=description.observables,
@@ -90,8 +94,8 @@ def model_from(description: Description) -> Model:
         modes=tuple(_mode(description, m.name) for m in description.modes),
         domains=domains,
         departures=departures,
-        symmetry=_symmetry(sampler, surfaces),
-        stop_surface=description.stop_surface or _stop_surface(sampler),
+        symmetry=symmetry_of(sampler, surfaces),
+        stop_surface=description.stop_surface or stop_surface_of(sampler),
         displacement="" if extrema_at_joints(sampler, surfaces) else displacement_of(description),
         flow_factory=GeneratedFlow(description.motion),
         spread=Spread(description.spread, description.text),
@@ -116,7 +120,8 @@ def model_from(description: Description) -> Model:
     return model
 
 
-def _level(evaluator: Evaluator[float], surface: Surface, params: dict[str, float]) -> float:
+def level_of(evaluator: Evaluator[float], surface: Surface, params: dict[str, float]) -> float:
+    """Return the level of a surface at the defaults."""
     address = ("surfaces", surface.name, "level")
     level = evaluator.value(surface.level, params)
     if not math.isfinite(level):
@@ -135,7 +140,7 @@ def _mode(description: Description, name: str) -> Mode:
 # ------------------------------------------------------------------------------ constraints
 
 
-def _constraint(address: Address, text: str, why: str, params: Mapping[str, float]) -> Constraint:
+def constraint_of(address: Address, text: str, why: str, params: Mapping[str, float]) -> Constraint:
     """Read ``S0 >= S``: the difference of both sides, linear in the parameters."""
     tree = _comparison(address, text)
     sign = 1.0 if isinstance(tree.ops[0], (ast.Gt, ast.GtE)) else -1.0
@@ -227,7 +232,7 @@ def _departure(
 # --------------------------------------------------------------------------- stops, symmetry
 
 
-def _stop_surface(sampler: Sampler) -> str:
+def stop_surface_of(sampler: Sampler) -> str:
     """Find the surface on which the first state is stationary in every mode that moves it; or none."""
     evaluator, description = sampler.evaluator, sampler.evaluator.description
     moving = [m for m in description.modes if 0 not in m.sides.values()] or description.modes
@@ -249,14 +254,21 @@ def _ratio(a: float, b: float) -> int:
     return 1 if abs(a - b) <= scale else -1 if abs(a + b) <= scale else 0
 
 
-def _symmetry(sampler: Sampler, surfaces: list[Surface]) -> Symmetry | None:
+def symmetry_of(sampler: Sampler, surfaces: list[Surface]) -> Symmetry | None:
     """Read the linear map and find the image of every surface."""
     description = sampler.evaluator.description
     if description.symmetry is None:
         return None
     try:
         matrix, fraction = _linear_map(description)
-        images = {s.name: _image(sampler, s, surfaces) for s in surfaces}
+        evaluator, params = sampler.evaluator, sampler.params
+        points, period = list(sampler.states(_POINTS)), evaluator.period(params) or 0.0
+        moved = [evaluator.image(params, t, y, period) for t, y in points]
+        heights, beyond = (
+            {s.name: [evaluator.height(s.name, params, t, y) for t, y in at] for s in surfaces}
+            for at in (points, moved)
+        )
+        images = {s.name: _image(s, heights, beyond) for s in surfaces}
     except ModelError as error:
         raise EntryError(("symmetry",), str(error)) from None
     if not description.period:
@@ -286,19 +298,14 @@ def _linear_map(description: Description) -> tuple[tuple[tuple[float, ...], ...]
     return tuple(rows), fraction
 
 
-def _image(sampler: Sampler, surface: Surface, surfaces: list[Surface]) -> str:
-    evaluator, params = sampler.evaluator, sampler.params
-    period = evaluator.period(params) or 0.0
-    points = list(sampler.states(_POINTS))
-    for other in surfaces:
-        same = True
-        for t, y in points:
-            moved_t, moved = evaluator.image(params, t, y, period)
-            a = evaluator.height(surface.name, params, moved_t, moved)
-            b = evaluator.height(other.name, params, t, y)
-            same = same and abs(a + b) <= _SAME * (1.0 + abs(a) + abs(b))
-        if same:
-            return other.name
+def _image(
+    surface: Surface, heights: Mapping[str, list[float]], images: Mapping[str, list[float]]
+) -> str:
+    """Return the surface whose sides at some states are the other ones of a surface at their images."""
+    for other, values in heights.items():
+        pairs = zip(images[surface.name], values, strict=True)
+        if all(abs(a + b) <= _SAME * (1.0 + abs(a) + abs(b)) for a, b in pairs):
+            return other
     raise ModelError(
         f"the image of surface '{surface.name}' ({surface.observable} = {surface.level}) is none of "
         "the surfaces with its sides exchanged: there is no such symmetry, or a surface is missing"

@@ -11,8 +11,8 @@ from contfric.errors import ModelError
 from contfric.models.contact_laws import KEY as LAWS
 from contfric.models.contact_laws import check_laws, read_laws
 from contfric.models.definition import Departure, Observable, Parameter, Surface
-from contfric.models.description import Description, DomainText, ModeText
-from contfric.models.entries import Part
+from contfric.models.description import STRUCTURE, Description, DomainText, ModeText
+from contfric.models.entries import Part, mapping_in
 from contfric.models.measuring import measured
 from contfric.models.names import Names
 from contfric.models.quantity_entries import check_quantities, read_quantities
@@ -23,21 +23,14 @@ from contfric.yaml_lines import comma_hint
 KEYS = (
     *("name", "title", "references", "states", "parameters", "constraints", "period"),
     *("autonomous", "define", "observables", "surfaces", "field", "modes", "domains"),
-    *(
-        "angles",
-        "departures",
-        "resets",
-        "symmetry",
-        "stop_surface",
-        "kinks",
-        "spread",
-        "integration",
-    ),
+    *("angles", "departures", "resets", "symmetry", "stop_surface", "kinks", "spread"),
+    "integration",
     "max_step",
     "quantities",
     KEY,
     APPLIED,
     LAWS,
+    STRUCTURE,
 )
 _PARAMETER = ("default", "meaning")
 _SURFACE = ("observable", "level", "switching")
@@ -122,6 +115,7 @@ def _described(data: dict[str, Any]) -> Description:
         quantities=read_quantities(top),
         laws=read_laws(top),
         units=tuple(read_units(top, APPLIED, states).items()),
+        structure=mapping_in(data, STRUCTURE),
     )
     _check_expressions(found, names)
     return measured(found)

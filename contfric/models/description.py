@@ -18,6 +18,9 @@ from contfric.models.contact_laws import ContactLaws, written
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.names import Names
 
+#: The key of the structure that modes are made from.
+STRUCTURE = "structure"
+
 
 @dataclass(frozen=True)
 class ModeText:
@@ -62,6 +65,7 @@ class Description:
     quantities : (name, expression) of each quantity that the file declares
     laws : what the contacts of a structure carry and dissipate
     units : (state or t, its unit): all formulas are in these (:mod:`contfric.models.units`)
+    structure : what modes are made from when they are visited; empty where all are listed
     """
 
     name: str
@@ -91,6 +95,7 @@ class Description:
     quantities: tuple[tuple[str, str], ...] = ()
     laws: tuple[ContactLaws, ...] = ()
     units: tuple[tuple[str, float], ...] = ()
+    structure: Mapping[str, Any] = field(default_factory=dict)
 
     def data(self) -> dict[str, Any]:
         """Return the description in the schema of the YAML files, with nothing left out."""
@@ -145,6 +150,8 @@ class Description:
             found[LAWS] = written(self.laws)
         if self.units:
             found["in_units"] = dict(self.units)
+        if self.structure:
+            found[STRUCTURE] = dict(self.structure)
         return found
 
     def _mode(self, mode: ModeText) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,8 +18,11 @@ from contfric.models.grammar import names_in, parse
 from contfric.models.matrices import Mass, Texts, is_zero, mass_of, matrix_of, summed, times
 
 COORDINATES = "coordinates"
-#: Most combinations of states of contacts: each is a mode with regions of its own.
+#: Most combinations of states of contacts that are listed, each a mode with regions of its own.
 _MOST_MODES = 243
+#: Friction contacts from which on modes are made when they are visited: each has seven regions, four of them
+#: 2401 that are read in a second, and five would take nine seconds. What needs all modes is for fewer.
+_MANY_FRICTION = 5
 
 
 @dataclass(frozen=True)
@@ -75,17 +79,35 @@ class Structure:
 
     # ------------------------------------------------------------------------------- checks
 
-    def check(self) -> None:
-        """Refuse what cannot be written out."""
-        count = 1
-        for contact in self.contacts:
-            count *= max(1, len(contact.states))
-        if count > _MOST_MODES:
+    @property
+    def composes(self) -> bool:
+        """Whether modes are made when a solution visits them, and not listed (:mod:`..composition`)."""
+        rubbing = sum(c.kind is ContactKind.FRICTION for c in self.contacts)
+        if rubbing < _MANY_FRICTION and self._combinations <= _MOST_MODES:
+            return False
+        numbers = set(defaults_of(self.top)) == set(mapping_in(self.top.data, "parameters"))
+        return numbers and "units" not in self.top.data and not self._has_impacts
+
+    @property
+    def _has_impacts(self) -> bool:
+        return any(c.kind is ContactKind.IMPACT for c in self.contacts)
+
+    @property
+    def _combinations(self) -> int:
+        return math.prod(max(1, len(c.states)) for c in self.contacts)
+
+    def check_count(self) -> None:
+        """Refuse more modes than can be listed."""
+        if self._combinations > _MOST_MODES:
+            why = "impacts" if self._has_impacts else "units, or parameters that follow others"
             raise EntryError(
                 ("contacts",),
-                f"these contacts have {count} combinations of states, and each is a mode: at most "
-                f"{_MOST_MODES} can be listed (five contacts of three states)",
+                f"these contacts have {self._combinations} combinations of states, and with {why} each is "
+                f"listed as a mode: at most {_MOST_MODES} (five contacts of three states)",
             )
+
+    def check(self) -> None:
+        """Refuse what cannot be written out."""
         rubbing = [c for c in self.contacts if c.kind is ContactKind.FRICTION]
         self._check_locks(rubbing)
         for one, other in itertools.combinations(rubbing, 2):

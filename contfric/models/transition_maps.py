@@ -6,7 +6,7 @@ motion stays in the mode that it is in while that holds.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -22,10 +22,68 @@ class TransitionMaps(SectionMaps):
 
     if TYPE_CHECKING:
         name: str
+        states: tuple[str, ...]
         departures: tuple[Departure, ...]
         symmetry: Symmetry | None
         kinks: tuple[str, ...]
         turned: frozenset[tuple[str, str]]
+
+    @property
+    def composed(self) -> bool:
+        """Whether modes are made when they are visited (:mod:`contfric.models.composed`)."""
+        return False
+
+    def mode_order(self, name: str) -> int:
+        """Return the place of a mode in words that are compared."""
+        return self._mode_places[name]
+
+    @cached_property
+    def _mode_places(self) -> dict[str, int]:
+        return {name: k for k, name in enumerate(self.mode_by_name)}
+
+    def domain_order(self, name: str) -> int:
+        """Return the place of a domain in signatures that are compared."""
+        return self._domain_places[name]
+
+    @cached_property
+    def _domain_places(self) -> dict[str, int]:
+        return {name: k for k, name in enumerate(self.domain_by_name)}
+
+    def domains_of(self, mode: str) -> tuple[Domain, ...]:
+        """Return the domains of a mode."""
+        return self._domains_by_mode.get(mode, ())
+
+    @cached_property
+    def _domains_by_mode(self) -> dict[str, tuple[Domain, ...]]:
+        found: dict[str, list[Domain]] = {}
+        for domain in self.domains:
+            found.setdefault(domain.mode, []).append(domain)
+        return {mode: tuple(own) for mode, own in found.items()}
+
+    def exits_of(self, domain: str) -> Iterable[tuple[str, str]]:
+        """Return (surface, domain that follows), for all ways out of a domain but resets."""
+        return self._exits_by_domain.get(domain, ())
+
+    @cached_property
+    def _exits_by_domain(self) -> dict[str, list[tuple[str, str]]]:
+        found: dict[str, list[tuple[str, str]]] = {}
+        for (source, surface), target in self.transitions.items():
+            found.setdefault(source, []).append((surface, target))
+        return found
+
+    def is_at_rest(self, mode: str) -> bool:
+        """Return whether nothing moves in a mode but time: as many states are held as are free."""
+        found = self.mode_by_name[mode]
+        return found.sliding and 2 * found.rank <= len(self.states)
+
+    def lies_on(self, mode: str, surface: str) -> bool:
+        """Return whether a mode moves on a surface."""
+        own = self.domains_of(self.whole_mode(mode))
+        return all(domain.signs.get(surface) == 0 for domain in own)
+
+    def rests_on(self, surface: str) -> bool:
+        """Return whether some mode moves on a surface."""
+        return any(domain.signs[surface] == 0 for domain in self.domains)
 
     def cuts(self, surface: str) -> bool:
         """Return whether motion is cut at a surface: it is switching, or has a reset."""

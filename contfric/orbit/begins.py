@@ -53,7 +53,7 @@ def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> 
         return 0
     if is_hold(entered):
         return 1
-    rest = any(domain.signs[exit_] == 0 for domain in model.domains)
+    rest = model.rests_on(exit_)
     reset = model.reset_by_surface.get(entered)
     if rest and not model.filippov:  # rest is left, and a stop reversed, with an acceleration
         return 0
@@ -61,7 +61,7 @@ def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> 
         return 1
     if reset is not None and (exit_ == entered or model.changed_by(reset, exit_)):
         return 0  # thrown off the surface that it rested on
-    rested = model.domain_by_name[mode_domains(model, before)[0]].signs[exit_] == 0
+    rested = model.domain_by_name[mode_domains(model, before)[0]].signs.get(exit_) == 0
     return int(exit_ == entered or rested)
 
 

@@ -16,6 +16,7 @@ from functools import cache
 
 import numpy as np
 
+from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
 from contfric.models.evaluate import Sampler, defaults, floats
 
@@ -40,14 +41,16 @@ def conserved(model: Model, word: Word) -> FloatArray:
     for mode in dict.fromkeys(mode for mode, _ in word):
         rates, apart = _along(model, mode)
         changes, places = np.hstack([changes, rates]), np.hstack([places, apart])
-        if _rank(changes) == n:
+        if not model.composed and _rank(changes) == n:  # else each mode has few columns
             return np.empty((0, n))
     for surface in dict.fromkeys(exit_ for _, exit_ in word if exit_ in model.reset_by_surface):
         changes = np.hstack([changes, _jumps(model, surface)])
-    left, sizes, _ = np.linalg.svd(changes)
+    left, sizes, _ = np.linalg.svd(changes, full_matrices=not model.composed)
     rank = int(np.sum(sizes > _ZERO))
     still = left[:, rank:].T
-    own, sizes, _ = np.linalg.svd(still @ places)  # not what is the same at all places
+    if not len(still):
+        return np.empty((0, n))
+    own, sizes, _ = np.linalg.svd(still @ places, full_matrices=not model.composed)
     return np.ascontiguousarray(own[:, : int(np.sum(sizes > _ZERO))].T @ still)
 
 
@@ -82,6 +85,36 @@ def _along(model: Model, mode: str) -> tuple[FloatArray, FloatArray]:
 
     Columns of size 1, shapes (n, states).
     """
+    if isinstance(model, ComposedModel):
+        rates, states = _at_random(model, mode)
+    else:
+        rates, states = _at_samples(model, mode)
+    first = states[0] if states else []
+    apart = [[b - a for a, b in zip(first, state, strict=True)] for state in states[1:]]
+    changes = _columns(rates, len(model.states))
+    if model.composed:  # many words have this mode: directions that say the same
+        left, sizes, _ = np.linalg.svd(changes, full_matrices=False)
+        changes = left[:, : int(np.sum(sizes > _ZERO))]
+    return changes, _columns(apart, len(model.states))
+
+
+def _at_random(model: ComposedModel, mode: str) -> tuple[list[list[float]], list[list[float]]]:
+    """Return rates along a mode at random states that it has, by its compiled field."""
+    k, n, draw = model.mode_index[mode], len(model.states), np.random.default_rng(1)
+    rates, states = [], []
+    for factor in (1.0, _MOVED):
+        vector = model.vector({}) * factor
+        wide, period = 2.0 * np.abs(model.spread(model.mapping(vector))), model.view(vector).period
+        for _ in range(n + _MORE):
+            t, y = float(draw.uniform(0.0, period or 10.0)), wide * draw.uniform(-1.0, 1.0, n)
+            state, rate = model.state_and_rate(k, t, y, vector)
+            states.append(state.tolist())
+            rates.append(rate.tolist())
+    return rates, states
+
+
+def _at_samples(model: Model, mode: str) -> tuple[list[list[float]], list[list[float]]]:
+    """Return rates along a mode at sampled states that it has, by its formulas."""
     rates, states = [], []
     description = _samplers(model)[0].evaluator.description
     parts = [
@@ -97,9 +130,7 @@ def _along(model: Model, mode: str) -> tuple[FloatArray, FloatArray]:
             if place is not None:
                 states.append(place[1])
                 rates.append(sampler.evaluator.field(text.name, sampler.params, *place))
-    first = states[0] if states else []
-    apart = [[b - a for a, b in zip(first, state, strict=True)] for state in states[1:]]
-    return _columns(rates, len(model.states)), _columns(apart, len(model.states))
+    return rates, states
 
 
 @cache

@@ -63,7 +63,7 @@ def holds_of(model: Model, word: Word) -> tuple[Hold, ...]:
         before = word[index - 1]
         if index == 0 or is_hold(before[1]) or not known_hold(exit_, model):
             raise ValueError(f"'{exit_}' cannot stand at place {index + 1} of {word}")
-        rest = next(d for d in model.domains if d.mode == mode)
+        rest = model.domains_of(mode)[0]
         found.append(
             Hold(
                 index,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -73,7 +74,7 @@ def _domains(orbit: Orbit, labels: IntArray) -> list[str]:
             domains.append(impact_at(model, exit_))
     if system.half:
         assert model.symmetry is not None
-        image = {**model.symmetry.surfaces, **model.mirror_domain}
+        image = ChainMap(model.mirror_domain, dict(model.symmetry.surfaces))
         domains += [mirror_name(d, image) for d in domains]
     return domains
 
@@ -82,6 +83,8 @@ def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
     """Domain in which a segment of the whole orbit begins."""
     model, word = orbit.model, orbit.word
     mode, entry = word[i - 1]  # of the whole word: its last exit leads into the first
+    if model.composed:
+        return word[i][0]
     if entry not in model.reset_by_surface and not is_hold(entry):
         return model.transitions[ends[i - 1], entry]
     begin = orbit.begins[i]
@@ -112,7 +115,7 @@ def _end_domains(orbit: Orbit) -> list[str]:
         signs = signs_at(model, float(end[0]), end[1:].copy(), orbit.vector)
         after, following = word[(i + 1) % len(word)]
         if is_hold(exit_):
-            found.append(next(d.name for d in model.domains if d.mode == mode))
+            found.append(mode_domains(model, mode)[0])
             continue
         if is_hold(following) and (mode == after or following != TOUCH):  # it leads beyond the hold
             after = word[(i + 2) % len(word)][0]

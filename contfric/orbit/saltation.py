@@ -135,7 +135,7 @@ def passage_at(model: Model, mode: str, surface: str, following: str) -> Passage
 def _lies_on(model: Model, mode: str) -> set[str]:
     """Return the surfaces that a mode slides on."""
     whole = model.whole_mode(mode)
-    own = [d.signs for d in model.domains if d.mode == whole]
+    own = [d.signs for d in model.domains_of(whole)]
     return {name for name in own[0] if all(signs[name] == 0 for signs in own)}
 
 

@@ -12,8 +12,10 @@ from numpy.typing import ArrayLike
 
 from contfric.errors import real_number, whole_number
 from contfric.models import ModelSource, Parameters
+from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
+from contfric.orbit.growing_tables import UNVISITED, growing_tables
 from contfric.orbit.pace import Pace
 from contfric.orbit.starts import checked_state, start_of
 from contfric.orbit.system import IntArray
@@ -178,7 +180,8 @@ def run(
     from contfric.orbit.trajectory import ALL_EVENTS, CARRIED
     from contfric.orbit.trajectory import simulate as kernel
 
-    model_tables = tables(model)
+    composed = isinstance(model, ComposedModel)
+    model_tables = growing_tables(model).tables() if composed else tables(model)
     y = y.copy()
     pieces: list[EventRows] = []
     done, carry, pace = 0, np.zeros(CARRIED), Pace(_FIRST_EVENTS)
@@ -206,10 +209,15 @@ def run(
         tally()[3] += count
         pieces.append(written.first(count))
         done += count
+        grown = mode <= UNVISITED
+        if grown and isinstance(model, ComposedModel):
+            growing = growing_tables(model)
+            mode = growing.visit(mode)
+            model_tables = growing.tables()
         if end != ALL_EVENTS or done >= events:
             break
         time = phase
-        pace.took(pace.budget, perf_counter() - began)
+        pace.took(count if grown else pace.budget, perf_counter() - began)
     found = joined(pieces)
     last_mode = model.modes[mode].name if mode >= 0 else ""
     return Trajectory(

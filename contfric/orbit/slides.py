@@ -20,13 +20,25 @@ SAME_MOTION = 1e-5
 SHORT = 1e-3
 
 
+def resting_modes(orbit: Orbit) -> set[str]:
+    """Return the modes of an orbit in which a contact rests; where one always does, those in which all do.
+
+    Of many contacts one or the other nearly always rests.
+    """
+    model, modes = orbit.model, {mode for mode, _ in orbit.word}
+    if model.composed:
+        return {mode for mode in modes if model.is_at_rest(mode)}
+    sliding = {mode for mode in modes if model.mode_by_name[mode].sliding}
+    return sliding if sliding < modes else {mode for mode in modes if model.is_at_rest(mode)}
+
+
 def slides_of(orbit: Orbit) -> list[int]:
     """Return the segments with which slides of some length begin, joined over a touch of rest.
 
     Segments of rest are left out, and those of no length; a segment that goes on in the mode and from
     the state in which the one before it ended is a part of that.
     """
-    sliding = {mode.name for mode in orbit.model.modes if mode.sliding}
+    sliding = resting_modes(orbit)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
     some = [i for i in range(len(orbit.word)) if lasts[i] > SHORT]
     found = []

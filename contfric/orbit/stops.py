@@ -38,7 +38,7 @@ def displacements(orbit: Orbit, surface: str) -> FloatArray:
     found: list[tuple[float, float]] = []
     for i, (mode, exit_) in enumerate(orbit.word):
         if model.mode_by_name[mode].sliding and exit_ in model.surface_by_name:
-            lies = {d.signs.get(surface) for d in model.domains if d.mode == mode}
+            lies = {d.signs.get(surface) for d in model.domains_of(mode)}
             if lies == {0}:
                 continue  # it rests there
         start, end = float(orbit.begins[i, 0]), float(orbit.ends[i, 0])

@@ -6,21 +6,28 @@ stands in words only where a segment ends on the section between two parts: it s
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 
+from contfric.models.composed import ComposedModel
 from contfric.models.definition import Model
+from contfric.models.made import Made
 
 
 @cache
-def mode_bounds(model: Model) -> dict[str, tuple[str, ...]]:
+def mode_bounds(model: Model) -> Mapping[str, tuple[str, ...]]:
     """Surfaces that bound each mode: resets, and those through which a transition changes the mode."""
+    if isinstance(model, ComposedModel):
+        return Made(model.bounds_of, model.composition.is_mode)
     found = _bounds(model, {d.name: d.mode for d in model.domains})
     return found | {part: found[whole] for part, whole in model.joined.items()}
 
 
 @cache
-def cut_bounds(model: Model) -> dict[str, tuple[str, ...]]:
+def cut_bounds(model: Model) -> Mapping[str, tuple[str, ...]]:
     """Surfaces that bound each mode as it was declared, sections among them: a simulation stops there."""
+    if isinstance(model, ComposedModel):
+        return mode_bounds(model)
     return _bounds(model, {d.name: d.own_mode for d in model.domains})
 
 
@@ -38,14 +45,32 @@ def _bounds(model: Model, modes: dict[str, str]) -> dict[str, tuple[str, ...]]:
 
 def mode_domains(model: Model, mode: str) -> list[str]:
     """Return the domains of one mode."""
-    whole = model.whole_mode(mode)
-    return [d.name for d in model.domains if d.mode == whole]
+    return [d.name for d in model.domains_of(model.whole_mode(mode))]
 
 
 def inside_sign(model: Model, mode: str, surface: str) -> int:
     """Return the sign of (observable - level) inside a mode, 0 if the mode lies on both sides."""
-    signs = {model.domain_by_name[d].signs[surface] for d in mode_domains(model, mode)}
+    signs = {d.signs.get(surface, 0) for d in model.domains_of(model.whole_mode(mode))}
     return signs.pop() if len(signs) == 1 else 0
+
+
+def ending_sides(
+    model: Model, mode: str, surface: str, following: str, inside: list[str]
+) -> dict[str, int]:
+    """Return the sides of surfaces where a mode is left through one into the following mode, as far as known.
+
+    Parameters
+    ----------
+    inside : the domains in which the segment may end
+    """
+    if isinstance(model, ComposedModel):
+        return model.exit_sides(mode, surface, following)
+    found = {}
+    for name in model.surface_by_name:
+        signs = {model.domain_by_name[d].signs[name] for d in inside}
+        if len(signs) == 1:
+            found[name] = signs.pop()
+    return found
 
 
 def is_section(model: Model, mode: str, surface: str) -> bool:
@@ -69,7 +94,9 @@ def exit_domains(model: Model, mode: str, surface: str, following: str) -> list[
 
 
 @cache
-def mirror_mode(model: Model) -> dict[str, str]:
+def mirror_mode(model: Model) -> Mapping[str, str]:
     """Image of each mode under the symmetry; that of a part of a mode is the whole image."""
+    if isinstance(model, ComposedModel):
+        return model.mirror_domain
     found = {d.mode: model.domain_by_name[model.mirror_domain[d.name]].mode for d in model.domains}
     return found | {part: found[whole] for part, whole in model.joined.items()}

@@ -35,6 +35,7 @@ from contfric.orbit.conserved import conserved, kept_by
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN, Hold, holds_of
 from contfric.orbit.margins import Margin, Test, double_zeros, lasting_segments
 from contfric.orbit.structure import (
+    ending_sides,
     exit_domains,
     inside_sign,
     mirror_mode,
@@ -169,7 +170,11 @@ def build_system(
     ]
     entered = [first_entry(model, word, half), *(exit_ for _, exit_ in word[:-1])]
     entries = entry_rows(model, word, entered, domains)
-    interior, joint, tests = _margins(model, word, inside, bool(domains), holds, entries)
+    ending = [
+        ending_sides(model, mode, exit_, _leads_to(i, after, holds), inside[i])
+        for i, ((mode, exit_), after) in enumerate(zip(word, following, strict=True))
+    ]
+    interior, joint, tests = _margins(model, word, inside, ending, bool(domains), holds, entries)
     exits = [_exit_surface(i, exit_, holds) for i, (_, exit_) in enumerate(word)]
     held = {hold.segment: hold for hold in holds}
     symmetry = model.symmetry
@@ -278,6 +283,7 @@ def _margins(
     model: Model,
     word: Word,
     inside: list[list[str]],
+    ending: list[dict[str, int]],
     full: bool,
     holds: tuple[Hold, ...],
     entries: list[tuple[int, ...]],
@@ -295,12 +301,11 @@ def _margins(
             if sign != 0 and surface not in model.wraps:
                 interior.append((i, model.surface_index[surface], sign))
         for surface in names:
-            signs = {model.domain_by_name[d].signs[surface] for d in inside[i]}
+            sign = ending[i].get(surface, 0)
             pinned = any(h.segment == i + 1 and h.pin == surface for h in holds)
-            if surface == exit_ or pinned or len(signs) != 1 or surface in model.wraps:
+            if surface == exit_ or pinned or sign == 0 or surface in model.wraps:
                 continue
-            if (sign := signs.pop()) != 0:
-                joint.append((i, model.surface_index[surface], sign, 0))
+            joint.append((i, model.surface_index[surface], sign, 0))
     tests = (
         *(Test(Margin.INTERIOR, i, names[k]) for i, k, _ in interior),
         *(
@@ -323,7 +328,7 @@ def _label_rows(
     model: Model, word: Word, half: bool, full: bool, holds: tuple[Hold, ...]
 ) -> IntArray:
     """Segments and observables whose surfaces are transparent there, and where they start and end."""
-    if full:
+    if full or model.composed:  # what bounds no mode has no side there
         return _rows([], 4)
     surfaces = [s.name for s in model.surfaces]
     first = first_entry(model, word, half)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contfric.errors import ModelError
+from contfric.errors import ModelError, ParameterError
 from contfric.models.definition import Mode, Model
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.system import IntArray
@@ -51,9 +51,8 @@ class Tables(NamedTuple):
     walls: int
 
 
-@cache
-def tables(model: Model) -> Tables:
-    """Return the transition tables of a model, in modes as they were declared: sections are events, too.
+def check_surfaces(model: Model) -> None:
+    """Refuse a model that a simulation cannot take.
 
     Raises
     ------
@@ -65,12 +64,29 @@ def tables(model: Model) -> Tables:
             f"model '{model.name}' has {len(model.surfaces)} surfaces, a simulation takes {_MOST_SURFACES}: "
             "leave out those at which nothing changes"
         )
+
+
+@cache
+def tables(model: Model) -> Tables:
+    """Return the transition tables of a model, in modes as they were declared: sections are events, too.
+
+    Those of a model whose modes are made when they are visited grow (:mod:`contfric.orbit.growing_tables`).
+
+    Raises
+    ------
+    ModelError
+        If it has more surfaces than can be told apart.
+    """
+    if model.composed:
+        raise ParameterError(
+            f"this is not offered for '{model.name}', whose modes are made when solutions visit them: all of "
+            "them would be needed before. Simulations, orbits, branches and diagrams are"
+        )
+    check_surfaces(model)
     bounds = np.zeros((len(model.modes), len(model.surfaces)), dtype=np.int64)
-    for mode, names in cut_bounds(model).items():
-        for name in names:
-            bounds[model.mode_index[mode], model.surface_index[name]] = 1 + (
-                name in model.reset_by_surface
-            )
+    for k, mode in enumerate(model.modes):
+        for name in cut_bounds(model)[mode.name]:
+            bounds[k, model.surface_index[name]] = 1 + (name in model.reset_by_surface)
     first, rules = _rules(model)
     return Tables(
         np.array([model.observable_index[s.observable] for s in model.surfaces], dtype=np.int64),
@@ -78,12 +94,12 @@ def tables(model: Model) -> Tables:
         first,
         rules,
         np.array(
-            [int(m.sliding) * (1 + int(_moves_on(model, m))) for m in model.modes], dtype=np.int64
+            [int(m.sliding) * (1 + int(moves_on(model, m))) for m in model.modes], dtype=np.int64
         ),
         np.array([surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
         np.array([_surfaces_kept(model, s.name) for s in model.surfaces], dtype=np.int64),
-        np.array([_bits(model, _landed(model, s.name)) for s in model.surfaces], dtype=np.int64),
-        _bits(model, (r.surface for r in model.resets if r.lands.get(r.surface, 0) > 0)),
+        np.array([bits_of(model, _landed(model, s.name)) for s in model.surfaces], dtype=np.int64),
+        bits_of(model, (r.surface for r in model.resets if r.lands.get(r.surface, 0) > 0)),
     )
 
 
@@ -96,7 +112,7 @@ def _rules(model: Model) -> tuple[IntArray, IntArray]:
     ) -> None:
         pair = model.mode_index[model.domain_by_name[source].own_mode], model.surface_index[surface]
         where = found.setdefault(pair, {})
-        where[_sides(model, signs, skipped)] = model.mode_index[model.domain_by_name[to].own_mode]
+        where[sides_of(model, signs, skipped)] = model.mode_index[model.domain_by_name[to].own_mode]
 
     for (name, surface), target in model.transitions.items():
         add(name, surface, model.domain_by_name[name].signs, {surface}, target)
@@ -132,15 +148,18 @@ def _merged(cases: Mapping[tuple[int, int], int]) -> list[Rule]:
     return [(mask, value, to) for (mask, value), to in rules.items()]
 
 
-def _sides(model: Model, signs: Mapping[str, int], skipped: Collection[str]) -> tuple[int, int]:
+def sides_of(model: Model, signs: Mapping[str, int], skipped: Collection[str]) -> tuple[int, int]:
     """Return the sides of a domain as (mask, value); those that a motion lies on are not asked for."""
     asked = [s for s, sign in signs.items() if sign != 0 and s not in skipped]
-    return _bits(model, asked), _bits(model, (s for s in asked if signs[s] > 0))
+    return bits_of(model, asked), bits_of(model, (s for s in asked if signs[s] > 0))
 
 
 def surfaces_under(model: Model, mode: str) -> int:
     """Return the surfaces that a mode moves on, as bits."""
-    return _bits(model, _lies_on(model).get(mode, ()))
+    if model.composed:
+        sides = model.domain_by_name[mode].signs
+        return bits_of(model, (s for s, side in sides.items() if side == 0))
+    return bits_of(model, _lies_on(model).get(mode, ()))
 
 
 @cache
@@ -158,7 +177,7 @@ def _surfaces_kept(model: Model, met: str) -> int:
     """Return the surfaces that the state stays on where one is met, as bits."""
     reset = model.reset_by_surface.get(met)
     kept = [s.name for s in model.surfaces if reset is None or not model.changed_by(reset, s.name)]
-    return _bits(model, kept)
+    return bits_of(model, kept)
 
 
 def _landed(model: Model, met: str) -> Collection[str]:
@@ -167,11 +186,12 @@ def _landed(model: Model, met: str) -> Collection[str]:
     return {met} if reset is None else reset.lands
 
 
-def _bits(model: Model, surfaces: Iterable[str]) -> int:
+def bits_of(model: Model, surfaces: Iterable[str]) -> int:
+    """Return surfaces as bits of a number."""
     return sum(1 << model.surface_index[name] for name in surfaces)
 
 
-def _moves_on(model: Model, mode: Mode) -> bool:
+def moves_on(model: Model, mode: Mode) -> bool:
     """Tell whether a load may grow for more than a period: without excitation, or as other masses move.
 
     Where as many states are free as are held, these are the places of what rests.

@@ -89,7 +89,10 @@ def sign_code(functions, observables, landed, t, y, p, none, empty):  # type: ig
 
 @helper
 def mode_after(tables, mode, surface, code):  # type: ignore[no-untyped-def]
-    """Return the mode that follows where motion meets a surface, by the sides of all; -1 if none does."""
+    """Return the mode that follows where motion meets a surface, by the sides of all; -1 if none does.
+
+    A number below that stands for a mode that was not visited yet (:mod:`contfric.orbit.growing_tables`).
+    """
     place = mode * tables.observables.shape[0] + surface
     for k in range(tables.first[place], tables.first[place + 1]):
         if code & tables.rules[k, 0] == tables.rules[k, 1]:
@@ -268,7 +271,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         struck = reset or (struck and at_once > 0)
         if at_once > MOST_AT_ONCE:
             return (CHATTER if struck else IMPOSSIBLE), event, mode, cycle, t
-        if reset and target < 0:
+        if reset and target == -1:
             return IMPOSSIBLE, event, mode, cycle, t
         if reset and is_pressed(
             functions,
@@ -284,7 +287,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
             workspace,
         ):
             return CHATTER, event, mode, cycle, t
-        if target < 0:
+        if target == -1:
             continue  # nothing leads there: the surface is touched and left to the same side
         write_event(rows, event, mode, surface, cycle, t)
         if not reset:
@@ -292,6 +295,8 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         on = behind_event(tables, mode, surface)
         mode = target
         event += 1
+        if mode < 0:  # not visited yet: the tables are to be extended
+            break
     carry[CYCLE], carry[AT_ONCE], carry[ON] = float(cycle), float(at_once), float(on)
     carry[STRUCK] = 1.0 if struck else 0.0
     return ALL_EVENTS, event, mode, cycle, t
@@ -317,7 +322,7 @@ def simulate(functions, tables, mode, on, t, y, p, periods, rows, carry, budget)
     Returns
     -------
     tuple
-        (how it ended, events written, mode, periods completed, phase).
+        (how it ended, events written, mode, periods completed, phase). A mode below 0 was not visited yet.
     """
     count = y.shape[0]
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))

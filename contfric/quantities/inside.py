@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from contfric.errors import ParameterError, did_you_mean
+from contfric.models.composed import ComposedModel
 from contfric.models.contact_laws import ContactLaws
 from contfric.models.definition import FloatArray, Model
 from contfric.models.grammar import PI, TIME, Scope, names_in, parse
@@ -147,6 +148,8 @@ def laws_of(model: Model) -> tuple[ContactLaws, ...]:
     """Return the laws of the contacts of a structure; none of another model."""
     if not model.definition:
         return ()
+    if isinstance(model, ComposedModel):
+        return model.composition.laws
     from contfric.models.describe import from_text
 
     return from_text(model.definition).laws

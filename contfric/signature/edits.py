@@ -188,7 +188,7 @@ def swap_edit(segments: Sequence[ReducedPair], events: Mapping[int, str], model:
     edit = Edit()
     for joint, surface in events.items():
         following = _stop(word, joint, surface, model)
-        if model.mode_by_name[word[following][0]].sliding:
+        if model.lies_on(word[following][0], word[joint][1]):
             edit |= drop(_removable(word, following, surface))
         else:
             edit |= insert(joint, _new_stick(word, joint, surface, model))
@@ -228,12 +228,12 @@ def is_closed_walk(word: Sequence[ReducedPair], model: Model) -> bool:
     if len(word) == 1 and word[0][1] == NEVER:
         return _has_cycle(modes[0], model)
     surfaces = {surface for _, surface in word}
-    if not word or not (model.mode_by_name.keys() >= set(modes)):
+    if not word or not all(mode in model.mode_by_name for mode in modes):
         return False
     if not (model.surface_by_name.keys() >= surfaces):
         return False
     first = model.whole_mode(modes[0])
-    for entry in (domain.name for domain in model.domains if domain.mode == first):
+    for entry in (domain.name for domain in model.domains_of(first)):
         reached = {entry}
         for index, (mode, surface) in enumerate(word):
             reached = entered(reached, surface, model, mode, modes[(index + 1) % len(word)])
@@ -253,7 +253,7 @@ def entered(
     """Return the domains of the next mode that a segment can lead to from its entries."""
     inside = _within(entries, model, mode)
     side = model.section_sides.get((mode, surface), 0)
-    inside = {d for d in inside if side in (0, model.domain_by_name[d].signs[surface])}
+    inside = {d for d in inside if side in (0, model.domain_by_name[d].signs.get(surface, 0))}
     targets = {t for d in inside for t in model.targets.get((d, surface), ())}
     return {t for t in targets if model.domain_by_name[t].mode == model.whole_mode(next_mode)}
 
@@ -274,19 +274,20 @@ def _within(entries: Iterable[str], model: Model, mode: str) -> set[str]:
 def _steps_within(model: Model, mode: str) -> dict[str, list[str]]:
     """Return where each domain leads to without leaving a mode."""
     steps: dict[str, list[str]] = {}
-    for (start, surface), target in model.transitions.items():
-        if fuses(model, mode, surface, model.domain_by_name[target].mode):
-            steps.setdefault(start, []).append(target)
+    for start in (domain.name for domain in model.domains_of(model.whole_mode(mode))):
+        for surface, target in model.exits_of(start):
+            if fuses(model, mode, surface, model.domain_by_name[target].mode):
+                steps.setdefault(start, []).append(target)
     return steps
 
 
 def _has_cycle(mode: str, model: Model) -> bool:
     """Return whether a walk can go round within a mode without leaving it."""
-    for (start, surface), target in model.transitions.items():
-        modes = {model.domain_by_name[name].mode for name in (start, target)}
-        inside = modes == {mode} and fuses(model, mode, surface, mode)
-        if inside and start in _within({target}, model, mode):
-            return True
+    for start in (domain.name for domain in model.domains_of(mode)):
+        for surface, target in model.exits_of(start):
+            inside = model.domain_by_name[target].mode == mode and fuses(model, mode, surface, mode)
+            if inside and start in _within({target}, model, mode):
+                return True
     return False
 
 
@@ -307,7 +308,8 @@ def _stop(word: ReducedWord, joint: int, surface: str, model: Model) -> int:
         hint = did_you_mean(surface, model.surface_by_name)
         raise NotationError(f"model '{model.name}' has no surface '{surface}'{hint}")
     mode, exit_surface = word[joint]
-    if model.mode_by_name[mode].sliding or not model.surface_by_name[exit_surface].switching:
+    slides = model.lies_on(mode, exit_surface) or not model.rests_on(exit_surface)
+    if slides or not model.surface_by_name[exit_surface].switching:
         raise NotationError(
             f"segment {joint} of '{show(word)}' does not end at a stop: only a slide that ends "
             "on a switching surface does"
@@ -328,8 +330,11 @@ def _new_stick(word: ReducedWord, joint: int, surface: str, model: Model) -> Red
     """Return the sliding segment that can be inserted after a joint."""
     mode, stop = word[joint]
     next_mode = word[(joint + 1) % len(word)][0]
-    slides = [domain.name for domain in model.domains if domain.mode == mode]
-    for stick in (m.name for m in model.modes if m.sliding):
+    slides = [domain.name for domain in model.domains_of(mode)]
+    behind = {
+        model.domain_by_name[t].mode for d in slides for t in model.targets.get((d, stop), ())
+    }
+    for stick in sorted((m for m in behind if model.lies_on(m, stop)), key=model.mode_order):
         held = entered(slides, stop, model, mode, stick)
         if entered(held, surface, model, stick, next_mode):
             return stick, surface

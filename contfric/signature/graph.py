@@ -56,11 +56,7 @@ def successors(model: Model, domain: str) -> dict[str, str]:
     """
     if domain not in model.domain_by_name:
         raise NotationError(unknown_domain(model, domain))
-    return {
-        surface: target
-        for (source, surface), target in model.transitions.items()
-        if source == domain
-    }
+    return dict(model.exits_of(domain))
 
 
 def crossing(model: Model, source: str, target: str) -> str | None:
@@ -74,7 +70,7 @@ def crossing(model: Model, source: str, target: str) -> str | None:
     >>> crossing(load_model("coulomb"), "x0v+", "stick")
     'v'
     """
-    return next((s for s, after in successors(model, source).items() if after == target), None)
+    return next((s for s, after in model.exits_of(source) if after == target), None)
 
 
 def unknown_domain(model: Model, domain: str) -> str:

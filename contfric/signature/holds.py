@@ -61,6 +61,8 @@ def mirror_exit(name: str, surfaces: Mapping[str, str]) -> str:
 def known_hold(name: str, model: Model) -> bool:
     """Return whether a hold is one of a model: pinned to a surface that bounds its rest, or a touch."""
     surface = pinned_surface(name)
+    if model.composed:
+        return surface is None or (surface in model.surface_by_name and not model.rests_on(surface))
     return surface is None or any(
         (domain.name, surface) in model.transitions
         for domain in model.domains
@@ -70,9 +72,9 @@ def known_hold(name: str, model: Model) -> bool:
 
 def release_mode(model: Model, mode: str, surface: str) -> str | None:
     """Return the mode that a regular release through a surface leads to; None if there is none."""
-    for domain in model.domains:
+    for domain in model.domains_of(mode):
         target = model.transitions.get((domain.name, surface))
-        if domain.mode == mode and target is not None:
+        if target is not None:
             return model.domain_by_name[target].mode
     return None
 
@@ -116,12 +118,16 @@ def mode_of(model: Model, segments: Sequence[str], index: int) -> str:
         return before
     rests = [
         mode
-        for (source, _), target in model.transitions.items()
+        # of several contacts that may come to rest first the one that can from this very domain
+        for domain in (segments[index - 1], *(d.name for d in model.domains_of(before)))
+        for _, target in model.exits_of(domain)
         if model.mode_by_name[mode := model.domain_by_name[target].mode].sliding
-        and model.domain_by_name[source].mode == before
     ]
     surface = pinned_surface(segments[index])
     bounded = [m for m in rests if surface is not None and release_mode(model, m, surface)]
+    after = model.domain_by_name.get(segments[(index + 1) % len(segments)])
+    if after is not None:  # first the one that is left into what follows
+        bounded.sort(key=lambda m: release_mode(model, m, str(surface)) != after.mode)
     return next(iter([*bounded, *rests]), before)
 
 
@@ -136,8 +142,8 @@ def surface_into(model: Model, segments: Sequence[str], index: int) -> str | Non
     beyond = model.domain_by_name[segments[(index + 2) % len(segments)]].mode
     touches = segments[hold] == TOUCH and not rests
     wanted = mode_of(model, segments, hold) if touches else beyond
-    for (start, surface), target in model.transitions.items():
-        if start == source and model.domain_by_name[target].mode == wanted:
+    for surface, target in model.exits_of(source):
+        if model.domain_by_name[target].mode == wanted:
             return surface
     return None
 
@@ -147,12 +153,13 @@ def domains_after(model: Model, mode: str, departs: str) -> tuple[str, ...]:
 
     Where other contacts have regions of their own there are several.
     """
-    rests = [domain for domain in model.domains if domain.mode == mode]
+    rests = model.domains_of(mode)
+    if model.composed:
+        return (departs,)
     return tuple(
         domain.name
-        for domain in model.domains
-        if domain.mode == departs
-        and any(
+        for domain in model.domains_of(departs)
+        if any(
             all(domain.signs[name] == sign for name, sign in rest.signs.items() if sign)
             for rest in rests
         )

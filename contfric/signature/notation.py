@@ -7,6 +7,7 @@ constructed. Two signatures are equal if they differ by a rotation only.
 from __future__ import annotations
 
 import re
+from collections import ChainMap
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -119,11 +120,11 @@ class Signature(Shown):
     @cached_property
     def canonical(self) -> tuple[str, ...]:
         """The least rotation of the segments, by the order of the domains in the model."""
-        names = [domain.name for domain in self.model.domains]
         holds = [TOUCH, *(hold_at(surface.name) for surface in self.model.surfaces)]
         impacts = (impact_at(self.model, s) for s in self.model.reset_by_surface)
-        order = {name: i for i, name in enumerate([*names, *holds, *impacts])}
-        return rotated(self.segments, least_rotation([order[s] for s in self.segments]))
+        events = {name: (1, i) for i, name in enumerate([*holds, *impacts])}
+        order = [events.get(s) or (0, self.model.domain_order(s)) for s in self.segments]
+        return rotated(self.segments, least_rotation(order))
 
     @cached_property
     def surfaces(self) -> tuple[str, ...]:
@@ -357,7 +358,7 @@ def _mirrored(model: Model, segments: Iterable[str]) -> tuple[str, ...]:
     if model.symmetry is None:
         raise NotationError(f"model '{model.name}' has no symmetry: there is no mirror image")
     surfaces = model.symmetry.surfaces
-    images = {**surfaces, **model.mirror_domain}
+    images = ChainMap(model.mirror_domain, dict(surfaces))
     return tuple(mirror_name(s, images) if is_event(s) else images[s] for s in segments)
 
 

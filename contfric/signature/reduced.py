@@ -61,8 +61,8 @@ def reduce_signature(signature: Signature) -> tuple[ReducedSegment, ...]:
     model = signature.model
     pieces = rotated(pieces, least_rotation([_key(piece.pair, model) for piece in pieces]))
     block = primitive_length([piece.pair for piece in pieces])
-    order = {domain.name: i for i, domain in enumerate(model.domains)}
-    path = [tuple(order.get(name, -1) for name in piece.domains) for piece in pieces]
+    known, order = model.domain_by_name, model.domain_order
+    path = [tuple(order(n) if n in known else -1 for n in piece.domains) for piece in pieces]
     blocks = [tuple(path[i : i + block]) for i in range(0, len(path), block)]
     return rotated(pieces, block * least_rotation(blocks))
 
@@ -101,7 +101,7 @@ def mirror_pair(pair: ReducedPair, model: Model) -> ReducedPair:
     surfaces = {NEVER: NEVER, **model.symmetry.surfaces}
     section = pair in model.sections
     known = surface in surfaces or (is_hold(surface) and known_hold(surface, model))
-    for domain in model.domains:
+    for domain in model.domains if section else model.domains_of(model.whole_mode(mode)):
         own = domain.own_mode if section else domain.mode
         if known and own == (mode if section else model.whole_mode(mode)):
             image = model.domain_by_name[model.mirror_domain[domain.name]]
@@ -151,8 +151,8 @@ def _key(pair: ReducedPair, model: Model) -> tuple[int, int]:
     mode, surface = pair
     exits = (NEVER, *model.surface_by_name, TOUCH, *map(hold_at, model.surface_by_name))
     try:
-        return tuple(model.mode_by_name).index(mode), exits.index(surface)
-    except ValueError:
+        return model.mode_order(mode), exits.index(surface)
+    except (KeyError, ValueError):
         raise NotationError(f"model '{model.name}' has no segment {pair}") from None
 
 

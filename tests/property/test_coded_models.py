@@ -12,7 +12,8 @@ import pytest
 import contfric as cf
 from contfric.errors import ModelError
 from contfric.models.build import load_module
-from contfric.models.coded import Forms, forms_of, functions_from
+from contfric.models.coded import Forms, forms_of
+from contfric.models.coded_flow import CodedFlow
 from contfric.models.coefficients import AFFINE, Affine, symbols
 from contfric.models.describe import describe, from_text
 from contfric.models.grammar import FLOATS, Scope, parse
@@ -30,7 +31,7 @@ POINTS = 12
 
 def flows(name: str) -> tuple[cf.Model, Any, Any]:
     model = cf.load_model(name)
-    coded = functions_from(Forms(from_text(model.definition))).flow
+    coded = CodedFlow(Forms(from_text(model.definition))).flow
     return model, coded, load_module(model.definition).compiled_flow()
 
 

@@ -340,7 +340,10 @@ def test_contacts_that_share_their_load_and_too_many_are_refused() -> None:
     with pytest.raises(ModelError, match="the loads of 'a' and 'b' depend on each other"):
         cf.Mechanism(eye, eye, eye, contacts={"a": rubs("v1"), "b": rubs("v1 - v2")})
     many = {f"c{i}": rubs(f"v{i}") for i in range(1, 7)}
-    with pytest.raises(ModelError, match="729 combinations of states"):
+    many["wall"] = {"kind": "impact", "gap": "1 - q7", "restitution": "0.5"}
+    with pytest.raises(
+        ModelError, match="729 combinations of states, and with impacts each is listed"
+    ):
         cf.Mechanism(eye, eye, eye, contacts=many)
 
 

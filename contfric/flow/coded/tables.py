@@ -10,6 +10,7 @@ affine form lists its coefficients of states and of harmonics. Forms come in *gr
     columns[s], harmonics[s]   state of a slope, frequency of a wave
     term_at[k]                 first term of a coefficient;  operands[j], weights[j] of a term
     places[g]                  first coefficient of a group: its slopes, then cosine and sine of each wave
+    first_mode                 the group of the first mode; those of the others follow, and nothing else
 """
 
 from __future__ import annotations
@@ -24,7 +25,10 @@ _TABLES = (
     *("places", "frequency_at", "level_at", "scale_at", "reset_at", "surface_at", "surfaces"),
     *("observable_of", "seen_at"),
 )
-_NUMBERS = ("values", "states", "waves", "parameters", "coefficients", "period_at")
+_NUMBERS = (
+    *("values", "states", "waves", "parameters", "coefficients", "period_at"),
+    "first_mode",
+)
 #: What is behind a handle of a model whose formulas are data.
 LAYOUT = {
     **dict.fromkeys(_TABLES, TABLE),

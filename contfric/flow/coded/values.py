@@ -89,7 +89,7 @@ def map_of(model, group, t, y, p, which, out, jac):  # type: ignore[no-untyped-d
 
 def field(model, piece, t, y, p, which, out, jac):  # type: ignore[no-untyped-def]
     """Write the rates of a piece (``field_signature``)."""
-    map_of(model, piece, t, y, p, which, out, jac)
+    map_of(model, model.first_mode + piece, t, y, p, which, out, jac)
 
 
 def reset(model, k, t, y, p, which, y1, jac):  # type: ignore[no-untyped-def]
@@ -123,7 +123,8 @@ def rate(model, mode, c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
     n, free, group = y.shape[0], which.shape[0] if grad.shape[0] > 0 else 0, model.observable_of[c]
     values, by, w, dw = numbers_at(model, p, which[:free])
     co, slopes = group_at(model, group, values, by)
-    own, owns = group_at(model, mode, values, by)
+    moved = model.first_mode + mode
+    own, owns = group_at(model, moved, values, by)
     weights, row = np.empty(n), np.empty(n)
     _, total, second = row_at(model, group, 0, co, t, y, w, weights)
     for m in range(grad.shape[0]):
@@ -131,7 +132,7 @@ def rate(model, mode, c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
     first = model.slope_at[model.row_of[group]]
     for k in range(first, model.slope_at[model.row_of[group] + 1]):
         i = model.columns[k]
-        f, f_t, _ = row_at(model, mode, i, own, t, y, w, row)
+        f, f_t, _ = row_at(model, moved, i, own, t, y, w, row)
         total += weights[i] * f
         if grad.shape[0] == 0:
             continue
@@ -139,7 +140,7 @@ def rate(model, mode, c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
         for j in range(n):
             grad[1 + j] += weights[i] * row[j]
         for q in range(free):
-            by_q, _ = varied_row(model, mode, i, own, owns[q], t, y, w, dw[q])
+            by_q, _ = varied_row(model, moved, i, own, owns[q], t, y, w, dw[q])
             grad[1 + n + q] += weights[i] * by_q + slopes[q, k - first] * f
     if grad.shape[0] > 0:
         grad[0] += second

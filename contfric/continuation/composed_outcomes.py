@@ -1,0 +1,116 @@
+"""What follows an event of a structure with many contacts, where nothing jumps.
+
+The states of the contacts compose, so that the word behind an event follows from that before it. Where rest
+is left without acceleration (:attr:`contfric.models.definition.Model.filippov`) the solution is continuous,
+and there are four cases:
+
+=====================================  =================================================================
+event, at the place                    edit of the word
+=====================================  =================================================================
+two contacts change at once            they change in the other order
+a surface is touched inside            split it there: the contact changes its state, for no time
+such a state has no length any more    drop it: the contact does not change
+a stop meets the limit of its load     swap stick and reversal (:func:`contfric.signature.edits.swap_edit`)
+=====================================  =================================================================
+
+In the second case the new segment grows with the root of the distance from the event. Let ``e`` be by how
+much the surface would be passed, ``w`` the root of ``2 e`` over the curvature there. A load that passes its
+limit begins a slide at ``-w``, with an acceleration that is zero at ``w``: its velocity is zero again at
+``2 w``. A velocity that falls through zero begins a stick at ``-w``, whose load reaches the limit again at
+``0``. A gap is closed from ``-w`` to ``w``.
+"""
+
+from __future__ import annotations
+
+from contfric.continuation.zero_acceleration import touch_of
+from contfric.errors import NotationError
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Margin, Test
+from contfric.signature.edits import Edit, split, swap_edit
+from contfric.signature.holds import is_hold
+
+#: A segment shorter than this (nondimensional) has no length: it is as long as the root, or the third root,
+#: of the rounding of what is located. One that is longer, taken for none, is refused by Newton's method.
+_NO_LENGTH = 1e-3
+
+
+#: Start joints of the segments that come in or move, and how fast these move away, by their origin.
+Joints = dict[tuple[int, int], FloatArray]
+Speeds = dict[tuple[int, int], float]
+
+
+def continuous_edit(orbit: Orbit, place: Test) -> tuple[Edit, Joints, Speeds, str]:
+    """Return the edit at a place where nothing jumps, its joints, how they move away, and why.
+
+    Raises
+    ------
+    NotationError
+        If nothing follows from this place: the reason says why.
+    """
+    word, i = orbit.word, place.segment
+    if is_hold(word[i][1]):
+        raise NotationError(f"segment {i + 1} is a hold: where nothing jumps there is none")
+    if place.margin is Margin.JOINT:
+        return _two_at_once(orbit, i, place.surface)
+    if place.margin is Margin.INTERIOR:
+        return _touched(orbit, i, place.surface)
+    return _vanished(orbit, i)
+
+
+def _two_at_once(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, str]:
+    """Return the edit where two surfaces are met at once: of one contact, or of two."""
+    model, word = orbit.model, orbit.word
+    (mode, first), (_, second) = word[i], word[(i + 1) % len(word)]
+    joints: Joints = {(i, 0): orbit.ends[i]}
+    if not any(through == surface for through, _ in model.exits_of(mode)):
+        edit = swap_edit(word, {i: surface}, model)
+        return edit, joints, {}, f"swap stick and reversal at stop {i + 1}, at {surface}"
+    after = word[(i + 2) % len(word)][0]
+    others = [m for through, m in model.exits_of(mode) if through == surface]
+    ways = [m for m in others if after in model.targets.get((m, first), ())]
+    if second != surface or not ways or _lasts(orbit, (i + 1) % len(word)):
+        raise NotationError(
+            f"{surface} and {first} are met at once, and do not change places there"
+        )
+    edit = Edit(frozenset({(i + 1) % len(word)}), {i: surface}, {i: ((ways[0], first),)})
+    return edit, joints, {}, f"{surface} is met before {first} at the end of segment {i + 1}"
+
+
+def _touched(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, str]:
+    """Return the edit where a surface is touched inside: the contact changes its state, for no time."""
+    model, (mode, exit_) = orbit.model, orbit.word[i]
+    touch = touch_of(orbit, i, surface)
+    other, back = _there_and_back(model, mode, surface)
+    edit = split(i, surface, (other, back), (mode, exit_))
+    joints: Joints = {(i, 0): touch, (i, 1): touch}
+    if back == surface:
+        lasts = (-1.0, 1.0)  # a gap
+    else:
+        lasts = (-1.0, 2.0) if model.rests_on(back) else (-1.0, 0.0)
+    speeds = {(i, 0): lasts[0], (i, 1): lasts[1]}
+    return edit, joints, speeds, f"{surface} is touched in segment {i + 1}: passed, and met again"
+
+
+def _there_and_back(model: Model, mode: str, surface: str) -> tuple[str, str]:
+    """Return the mode behind a surface, and the surface that leads back from there."""
+    for other in model.targets.get((mode, surface), ()):
+        for back, target in model.exits_of(other):
+            if target == mode:
+                return other, back
+    raise NotationError(f"{surface} does not bound '{mode}', or nothing leads back")
+
+
+def _vanished(orbit: Orbit, i: int) -> tuple[Edit, Joints, Speeds, str]:
+    """Return the edit where a state of a contact has no length any more: the contact does not change."""
+    word, n = orbit.word, len(orbit.word)
+    for k in (i, (i + 1) % n):
+        before, behind = (k - 1) % n, (k + 1) % n
+        if n > 2 and word[before][0] == word[behind][0] and not _lasts(orbit, k):
+            edit = Edit(frozenset({k, behind}), {before: word[behind][1]})
+            return edit, {}, {}, f"segment {k + 1} vanishes"
+    raise NotationError(f"segment {i + 1} ends tangentially, and what follows has some length")
+
+
+def _lasts(orbit: Orbit, i: int) -> bool:
+    return bool(orbit.ends[i, 0] - orbit.cycle[i, 0] > _NO_LENGTH)

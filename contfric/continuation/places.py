@@ -1,0 +1,26 @@
+"""The places of an orbit at which a sliding event happens."""
+
+from __future__ import annotations
+
+from contfric.continuation.events import Bifurcation, hold_of_test
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Margin, Test
+
+
+def places_of(bifurcation: Bifurcation) -> list[Test]:
+    """Return the places of the whole orbit at which a sliding event happens."""
+    orbit = bifurcation.orbit
+    places = [normal_place(test, orbit) for test in bifurcation.tests]
+    places = list(dict.fromkeys(places))
+    if orbit.system.half and orbit.model.symmetry is not None:
+        n, image = len(orbit.system.word), orbit.model.symmetry.surfaces
+        places += [Test(t.margin, t.segment + n, image[t.surface]) for t in places]
+    return places
+
+
+def normal_place(test: Test, orbit: Orbit) -> Test:
+    """Return a test of what belongs to a hold as one of the hold itself."""
+    hold = hold_of_test(test, orbit)
+    if hold is None or hold.segment == test.segment:
+        return test
+    return Test(Margin.EXIT, hold.segment, hold.leaves)

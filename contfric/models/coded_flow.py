@@ -1,0 +1,175 @@
+"""The flow of a model whose formulas are tables (:mod:`contfric.models.coded`); modes may come later."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contfric.models.coded import Forms, Tables, forms_of
+from contfric.models.columns import Column
+from contfric.models.description import ModeText
+from contfric.models.not_affine import NotAffineError
+
+if TYPE_CHECKING:
+    from contfric.flow.integrated import Functions
+    from contfric.flow.interface import CompiledFlow
+    from contfric.handle import Block, Bound
+
+
+class CodedFlow:
+    """The compiled functions of affine forms.
+
+    Observables and resets are the first groups of the tables, the modes follow: one that is added is the
+    last, and what is there stays where it is.
+    """
+
+    def __init__(self, forms: Forms) -> None:
+        self._forms = forms
+        description = forms.description
+        self._tables = Tables([p.name for p in description.parameters], len(description.states))
+        tables, data = self._tables, self._tables.data
+        order = {o.name: c for c, o in enumerate(description.observables)}
+        data["observable_of"] = Column([tables.group([form]) for form in forms.observables])
+        data["reset_at"] = Column(
+            tables.group(forms.resets[s.name]) if s.name in forms.resets else 0
+            for s in forms.surfaces
+        )
+        data["level_at"] = Column([tables.value(level) for level in forms.levels])
+        data["scale_at"] = Column([tables.value(scale) for scale in forms.scales])
+        data["seen_at"] = Column([order[s.observable] for s in forms.surfaces])
+        data["surface_at"], data["surfaces"] = Column([0]), Column()
+        data["returns"] = Column(whole=False)
+        self._period = tables.value(forms.period)
+        self._first = len(data["places"]) - 1
+        self._most = tables.most(range(self._first))
+        self._of_modes = {name: Column() for name in ("closed", "slides", "idle", "sides")}
+        self._none = Column()
+        for mode in range(len(forms.fields)):
+            self._write(mode)
+
+    def _write(self, m: int) -> None:
+        """Write the rates in a mode, the surfaces that it slides on, and the way back to these."""
+        self._tables.group(self._forms.fields[m])
+        sides, data = self._forms.modes[m].sides, self._tables.data
+        held = [k for k, s in enumerate(self._forms.surfaces) if sides.get(s.name) == 0]
+        data["surfaces"] += held
+        data["returns"] += _returns(self._forms, held)
+        data["surface_at"].append(len(data["surfaces"]))
+        self._most = max(self._most, self._tables.most([self._first + m]))
+        idle, count = {c for _, c in self._forms.idle(m)}, len(self._forms.observables)
+        self._of_modes["closed"].append(1)
+        self._of_modes["slides"].append(int(bool(held)))
+        self._of_modes["idle"] += [int(c in idle) for c in range(count)]
+        self._of_modes["sides"] += [0] * count
+        self._none += [0] * count
+
+    def add(self, mode: ModeText) -> None:
+        """Add a mode. The functions and their addresses stay the same."""
+        self._forms.add(mode)
+        self._write(len(self._forms.fields) - 1)
+        if "_functions" in self.__dict__:
+            self._block.renew(self._values())
+            own = {name: column.array for name, column in self._of_modes.items()}
+            none = dict.fromkeys(own, self._none.array)
+            self._functions.grow({**own, "entries_count": self._most}, none)
+
+    def _values(self) -> dict[str, Any]:
+        tables, data = self._tables, self._tables.data
+        return {
+            **{name: column.array for name, column in data.items()},
+            "operations": tables.operations.array,
+            "numbers": tables.numbers.array,
+            "values": len(tables.numbers),
+            "states": tables.states,
+            "waves": len(data["frequency_at"]),
+            "parameters": len(tables.names),
+            "coefficients": self._most,
+            "period_at": self._period,
+            "first_mode": self._first,
+        }
+
+    @cached_property
+    def _block(self) -> Block:
+        from contfric.flow.coded.tables import LAYOUT
+        from contfric.handle import Block
+
+        return Block(LAYOUT, self._values())
+
+    @cached_property
+    def _bound(self) -> dict[str, Bound]:
+        from contfric.flow.coded.kernels import KERNELS
+        from contfric.handle import Bound
+
+        return {name: Bound(kernel, self._block) for name, kernel in KERNELS.items()}
+
+    @cached_property
+    def _functions(self) -> Functions:
+        from contfric.flow.integrated import AffineModes, Functions
+        from contfric.flow.layouts import AFFINE as HELPERS
+
+        forms, bound = self._forms, self._bound
+        count, modes = len(forms.observables), len(forms.fields)
+        states_in = [{key[0] for key in o.parts} for o in forms.observables]
+        return Functions(
+            field=bound["field"],
+            observe=bound["observe"],
+            rate=bound["rate"],
+            period=bound["period"],
+            scale=bound["scale"],
+            onto=bound["onto"],
+            modes=modes,
+            observables=count,
+            slides=[m for m in range(modes) if self._of_modes["slides"][m]],
+            idle={pair for m in range(modes) for pair in forms.idle(m)},
+            timed=[c for c, kinds in enumerate(states_in) if "y" not in kinds],
+            affine=AffineModes(
+                {name: bound[name] for name in HELPERS},
+                entries=self._most,
+                waves=len(self._tables.data["frequency_at"]),
+                closed=range(modes),
+                seen=range(count),
+            ),
+        )
+
+    @property
+    def field(self) -> Bound:
+        """The field of the modes."""
+        return self._bound["field"]
+
+    @property
+    def onto(self) -> Bound:
+        """The way back onto the surfaces that a mode slides on."""
+        return self._bound["onto"]
+
+    @cached_property
+    def flow(self) -> CompiledFlow:
+        """The flow."""
+        reset = self._bound["reset"] if self._forms.resets else None
+        return self._functions.flow(self._bound["level"], reset=reset)
+
+
+def _returns(forms: Forms, held: Sequence[int]) -> list[float]:
+    """Return how a state goes back onto the surfaces of a mode: ``G^T (G G^T)^-1``, column by column."""
+    if not held:
+        return []
+    gradients = np.zeros((len(held), len(forms.description.states)))
+    names = [o.name for o in forms.description.observables]
+    for row, k in enumerate(held):
+        for key, slope in forms.observables[
+            names.index(forms.surfaces[k].observable)
+        ].parts.items():
+            if key[0] == "y":
+                if slope.number is None:
+                    raise NotAffineError("a surface of rest depends on a parameter")
+                gradients[row, key[1]] = slope.number
+    return [float(x) for x in np.linalg.pinv(gradients).T.ravel()]
+
+
+@lru_cache(maxsize=64)
+def coded_flow(definition: str) -> CodedFlow | None:
+    """Return the compiled functions of a definition whose formulas are to be tables; else None."""
+    forms = forms_of(definition)
+    return None if forms is None else CodedFlow(forms)

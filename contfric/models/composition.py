@@ -1,0 +1,255 @@
+"""Structures with many contacts: modes that come into being when a solution visits them.
+
+The mode of a structure is the tuple of the states of its contacts, and its name has a letter for each
+(``sspn``: two stick, one slides up, one down). k contacts of three states have 3^k modes. None of them is
+listed: what an engine asks of a mode follows from its letters, and is worked out when it is first asked for.
+
+========================  =================================================================================
+sides, rates              those of the contacts (:mod:`contfric.models.contact_modes`)
+bounds                    the surfaces through which a contact changes its state; no others matter to a mode,
+                          so that a sliding contact is not divided by the limits of its load
+ways through a surface    (what else holds where it is met, mode that follows): friction that stops sticks
+                          where its load is within the limits, and reverses where it is beyond; all Jenkins
+                          elements along one direction stop at once. One way only for everything else
+========================  =================================================================================
+
+The engine's numbers of modes (:class:`contfric.models.composed.ComposedModel`) are given in the order of the
+first visit; words and signatures have the names.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
+
+from contfric.models.coded import Forms
+from contfric.models.contact_laws import ContactLaws, law_of
+from contfric.models.contact_modes import Combinations, limit_of
+from contfric.models.contacts import Contact, ContactKind
+from contfric.models.description import ModeText
+from contfric.models.entries import SIDES, Part
+from contfric.models.made import Made
+from contfric.models.parts import Domain, Mode
+from contfric.models.structure import Structure
+
+if TYPE_CHECKING:
+    from contfric.models.description import Description
+
+
+@dataclass(frozen=True)
+class Way:
+    """What follows where a surface is met: the mode, and the sides of other surfaces for which it does."""
+
+    mode: str
+    where: Mapping[str, int]
+
+
+class Composition:
+    """The modes of a structure, each made when it is asked for.
+
+    Parameters
+    ----------
+    description : of the structure, with the mode in which no contact acts
+    """
+
+    def __init__(self, description: Description) -> None:
+        structure = Structure.read(Part(description.structure))
+        self.structure, self.states = structure, description.states
+        self._description = description
+        self._parts = Combinations(structure)
+        self.acting = [c for c in structure.contacts if c.states]
+        self._sides: dict[str, dict[str, int]] = {}
+        self._places: dict[str, int] = {}
+        self._ways: dict[str, dict[str, tuple[Way, ...]]] = {}
+
+    def is_mode(self, name: object) -> bool:
+        """Tell whether a name is that of a mode."""
+        if name in self._places:
+            return True
+        fits = isinstance(name, str) and len(name) == len(self.acting)
+        return fits and all(a in c.states for a, c in zip(str(name), self.acting, strict=True))
+
+    def order(self, name: str) -> int:
+        """Return the place of a mode among all, if they were listed."""
+        if name not in self._places:
+            place = 0
+            for letter, contact in zip(name, self.acting, strict=True):
+                place = place * len(contact.states) + contact.states.index(letter)
+            self._places[name] = place
+        return self._places[name]
+
+    def states_in(self, name: str) -> dict[str, str]:
+        """Return the state of each contact."""
+        return {c.name: letter for c, letter in zip(self.acting, name, strict=True)}
+
+    def sides(self, name: str) -> dict[str, int]:
+        """Return the sides of the surfaces that matter to a mode."""
+        if name not in self._sides:
+            found = self._parts.sides(self.states_in(name))
+            self._sides[name] = {surface: SIDES[side] for surface, side in found.items()}
+        return self._sides[name]
+
+    def mode(self, name: str) -> Mode:
+        """Return a mode; it forgets a direction for each surface that it moves on."""
+        held = sum(side == 0 for side in self.sides(name).values())
+        return Mode(name, len(self.states) - held, held > 0)
+
+    def domain(self, name: str) -> Domain:
+        """Return the only domain of a mode, with the sides of the surfaces that matter to it."""
+        return Domain(name, name, self.sides(name), name)
+
+    def text(self, name: str) -> ModeText:
+        """Return the rates in a mode, and its sides."""
+        field = self._parts.field(self.states_in(name))
+        return ModeText(name, tuple(field[state] for state in self.states), self.sides(name))
+
+    @cached_property
+    def laws(self) -> tuple[ContactLaws, ...]:
+        """What the contacts carry and dissipate: a law for each state, and for the springs that load it."""
+        return tuple(map(self._laws_of, self.structure.contacts))
+
+    def _laws_of(self, contact: Contact) -> ContactLaws:
+        springs = [s.name for s in self.structure.springs.get(contact.name, ())]
+        texts: dict[str, str] = {}
+        for letters in itertools.product(contact.states, *["oc"] * len(springs)):
+            states = dict(zip((contact.name, *springs), letters, strict=True))
+            force, power = law_of(self.structure, contact, states)
+            key = "".join(letters)
+            texts |= {f"force {key}": force, f"power {key}": power}
+
+        def key_of(name: str) -> str:
+            states = self.states_in(name)
+            return "".join(states[own] for own in (contact.name, *springs))
+
+        return ContactLaws(contact.name, Made(key_of, self.is_mode), texts)
+
+    def check(self) -> None:
+        """Read the rates of all contacts in each of their states; what cannot be read is reported.
+
+        Raises
+        ------
+        NotAffineError
+            With the reason, where a force is not affine.
+        """
+        forms = Forms(self._description)
+        for letter in range(max(len(c.states) for c in self.acting)):
+            forms.add(
+                self.text("".join(c.states[min(letter, len(c.states) - 1)] for c in self.acting))
+            )
+
+    # --------------------------------------------------------------------------- what follows
+
+    def ways(self, name: str) -> dict[str, tuple[Way, ...]]:
+        """Return what follows a mode at each surface that bounds it."""
+        if name not in self._ways:
+            states = self.states_in(name)
+            found: dict[str, tuple[Way, ...]] = {}
+            for contact in self.acting:
+                found |= self._ways_of(contact, states)
+            self._ways[name] = found
+        return self._ways[name]
+
+    def _ways_of(self, contact: Contact, states: Mapping[str, str]) -> dict[str, tuple[Way, ...]]:
+        state, name = states[contact.name], contact.name
+
+        def way(letter: str, where: Mapping[str, int] | None = None) -> Way:
+            return Way("".join({**states, name: letter}.values()), where or {})
+
+        if contact.kind is ContactKind.SPRING:
+            return {name: (way("c" if state == "o" else "o"),)}
+        if contact.kind is ContactKind.JENKINS:
+            if state == "s":
+                return {f"{name}+": (way("p"),), f"{name}-": (way("n"),)}
+            return self._stop(contact, states)
+        closed = self.structure.closed(contact, states)
+        upper, lower = (limit_of(contact, closed, sign) for sign in "+-")
+        if state == "s":
+            return {upper: (way("p"),), lower: (way("n"),)}
+        beyond = way("n", {lower: -1}) if state == "p" else way("p", {upper: 1})
+        return {name: (way("s", {upper: -1, lower: 1}), beyond)}
+
+    def _stop(self, contact: Contact, states: Mapping[str, str]) -> dict[str, tuple[Way, ...]]:
+        """Return what follows where a sliding element stops: all that slide along its direction do."""
+        stop, _ = self._parts.stop_of(contact)
+        along = {
+            c.name
+            for c in self.acting
+            if c.kind is ContactKind.JENKINS and self._parts.stop_of(c)[0] == stop
+        }
+        after = {c: "s" if c in along else letter for c, letter in states.items()}
+        return {stop: (Way("".join(after.values()), {}),)}
+
+    # ------------------------------------------------------------------------------- surfaces
+
+    @property
+    def rested_on(self) -> frozenset[str]:
+        """The surfaces that some mode moves on."""
+        found: set[str] = set()
+        for c in self.acting:
+            if c.kind is ContactKind.FRICTION:
+                found.add(c.name)
+            elif c.kind is ContactKind.JENKINS:
+                found |= {f"{c.name}+", f"{c.name}-"}
+        return frozenset(found)
+
+    @property
+    def switching(self) -> frozenset[str]:
+        """The surfaces at which motion is cut: those that are rested on, and the ends of gaps."""
+        gaps = {c.name for c in self.acting if c.kind is ContactKind.SPRING}
+        return self.rested_on | gaps
+
+    @property
+    def leaves_at_rest(self) -> bool:
+        """Whether all that stops is left without acceleration: static and kinetic friction agree."""
+        slides = [c for c in self.acting if c.kind is not ContactKind.SPRING]
+        texts = [c.texts for c in slides if c.kind is ContactKind.FRICTION]
+        return bool(slides) and all(t.get("static", t["kinetic"]) == t["kinetic"] for t in texts)
+
+    def mode_at(self, signs: Mapping[str, int]) -> str:
+        """Return the mode of a state from the sides of all surfaces; on one, where it leaves to."""
+        states: dict[str, str] = {}
+        for c in self.acting:
+            if c.kind is ContactKind.SPRING:
+                states[c.name] = "c" if signs[c.name] < 0 else "o"
+        for c in self.acting:
+            if c.kind is ContactKind.JENKINS:
+                stop, ways = self._parts.stop_of(c)
+                out = {"p": signs[f"{c.name}+"] >= 0, "n": signs[f"{c.name}-"] <= 0}
+                going = [a for a in "pn" if out[a] and signs[stop] == SIDES[ways[a]]]
+                states[c.name] = going[0] if going else "s"
+            elif c.kind is ContactKind.FRICTION:
+                closed = self.structure.closed(c, states)
+                upper, lower = (signs[limit_of(c, closed, sign)] for sign in "+-")
+                pushed = 1 if upper > 0 else -1 if lower < 0 else 0
+                states[c.name] = {1: "p", -1: "n", 0: "s"}[signs[c.name] or pushed]
+        return "".join(states[c.name] for c in self.acting)
+
+    def image(self, name: str, images: Mapping[str, str]) -> str:
+        """Return the image of a mode under a symmetry.
+
+        Parameters
+        ----------
+        images : of the surfaces; the signs of (observable - level) are reversed
+        """
+        sides = {images[surface]: -side for surface, side in self.sides(name).items()}
+        letters = []
+        for c in self.acting:
+            if c.kind is ContactKind.FRICTION:
+                letters.append({0: "s", 1: "p", -1: "n"}[sides[c.name]])
+            elif c.kind is ContactKind.JENKINS:
+                at = [a for a, s in (("p", "+"), ("n", "-")) if sides.get(f"{c.name}{s}") == 0]
+                letters.append(at[0] if at else "s")
+            else:
+                letters.append("o" if sides[c.name] > 0 else "c")
+        return "".join(letters)
+
+
+@lru_cache(maxsize=16)
+def composition_of(definition: str) -> Composition:
+    """Return the composition of a definition that has a structure."""
+    from contfric.models.describe import from_text
+
+    return Composition(from_text(definition))

@@ -1,0 +1,179 @@
+"""Modes that are made when they are visited are those that would be listed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.errors import ModelError, ParameterError
+from contfric.models import structure as reading
+
+PARAMETERS = {"Omega": 0.9, "S": 0.25, "S0": 0.3, "F": 1.1, "kd": 1.7}
+
+
+def friction(velocity: str, static: str = "S0") -> dict[str, str]:
+    return {"kind": "friction", "velocity": velocity, "kinetic": "S", "static": static}
+
+
+def structure(seed: int, name: str) -> cf.Model:
+    """Return four masses with two friction contacts, two Jenkins elements along one line, and a spring."""
+    rng = np.random.default_rng(seed)
+    mass = np.diag(rng.uniform(0.5, 2.0, 4))
+    damping, stiffness = (m @ m.T for m in rng.normal(size=(2, 4, 4)))
+    contacts = {
+        "brake": friction("v1 - 0.2*cos(Omega*t)"),
+        "pad": friction("2*v2 - v3"),
+        "weak": {"kind": "jenkins", "displacement": "q4", "stiffness": "kd", "limit": "S"},
+        "strong": {"kind": "jenkins", "displacement": "-2*q4", "stiffness": "kd", "limit": "2.7*S"},
+        "stop": {"kind": "spring", "gap": "0.3 - q3 + q1", "stiffness": "3*kd"},
+    }
+    return cf.Mechanism(
+        mass,
+        damping,
+        stiffness,
+        contacts=contacts,
+        force={"q1": "F*cos(Omega*t)", "q3": "0.2*F*sin(Omega*t)"},
+        parameters=PARAMETERS,
+        period="2*pi/Omega",
+        name=name,
+    )
+
+
+def chain(contacts: int, masses: int, name: str, force: float = 1.0) -> cf.Model:
+    """Return masses in a row on springs of their own and between them, some of which rub on the ground."""
+    ones = np.eye(masses, k=1) + np.eye(masses, k=-1)
+    between = np.diag(np.sum(ones, axis=1)) - ones
+    stiffness = np.eye(masses) + 0.5 * between
+    step = masses // contacts
+    return cf.Mechanism(
+        np.eye(masses),
+        0.05 * stiffness,
+        stiffness,
+        contacts={f"b{i}": friction(f"v{i * step}", "S") for i in range(1, contacts + 1)},
+        force={"q1": "F*cos(Omega*t)"},
+        parameters={"Omega": 1.0, "F": force, "S": 0.05},
+        period="2*pi/Omega",
+        name=name,
+    )
+
+
+@pytest.fixture
+def composing(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Return a function that builds a model whose modes are made when they are visited, however few."""
+
+    def built(make: Any, *arguments: Any) -> cf.Model:
+        with monkeypatch.context() as patch:
+            patch.setattr(reading, "_MANY_FRICTION", 1)
+            return make(*arguments)  # type: ignore[no-any-return]
+
+    return built
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_solutions_are_those_of_listed_modes(composing: Any, seed: int) -> None:
+    listed = structure(seed, "listed")
+    composed = composing(structure, seed, "composed")
+    assert composed.composed and not listed.composed and len(composed.modes) == 1
+    assert composed.states == listed.states
+    assert {s.name: s.observable for s in listed.surfaces}.items() >= {
+        s.name: s.observable for s in composed.surfaces
+    }.items()
+    state = np.random.default_rng(seed).normal(size=10) * np.array([*[1.0] * 8, 0.05, 0.05])
+    one, other = (cf.simulate(m, state=state, periods=12) for m in (listed, composed))
+    # where no contact acts a listed model is cut where a velocity vanishes, too, with a name for each part
+    apart = ("sssso", "weak"), ("sssso-", "weak")
+    cuts = [k for k, pair in enumerate(one.word) if pair not in apart]
+    word = [(one.word[k][0].rstrip("-"), one.word[k][1]) for k in cuts]
+    assert len(word) > 20 and tuple(word) == other.word
+    np.testing.assert_allclose(one.states[cuts], other.states, atol=1e-9)
+    assert len(composed.modes) <= len({mode for mode, _ in other.word}) + 1
+
+
+def test_a_branch_ends_where_that_of_listed_modes_does(composing: Any) -> None:
+    found = []
+    for model in (chain(3, 6, "listed"), composing(chain, 3, 6, "composed")):
+        orbit = cf.find_orbit(model)
+        branch = cf.continue_orbit(orbit, "Omega", (0.9, 1.2))
+        events = [(b.kind, b.params["Omega"]) for b in branch.bifurcations if b.kind != "T"]
+        found.append((orbit, sorted(events, key=lambda event: event[1])))
+    (one, events), (other, same) = found
+    assert one.word == other.word and one.symmetric == other.symmetric
+    np.testing.assert_allclose(
+        np.sort(np.abs(one.multipliers)), np.sort(np.abs(other.multipliers)), atol=1e-9
+    )
+    assert [kind for kind, _ in events] == [kind for kind, _ in same] and events
+    np.testing.assert_allclose([w for _, w in events], [w for _, w in same], rtol=1e-9)
+
+
+def test_a_diagram_goes_on_where_contacts_change_in_another_order() -> None:
+    model = chain(5, 10, "composed")
+    diagram = cf.explore(cf.find_orbit(model), "Omega", (1.0, 1.2), max_periods=1)
+    assert not diagram.loose_ends
+    events = [b for b in diagram.bifurcations if b.kind != "T"]
+    assert len(events) >= 3
+    for branch in diagram.branches:  # a simulation that starts on an orbit stays on it
+        orbit = branch[len(branch) // 2]
+        if not orbit.stable:
+            continue
+        joint = orbit.ends[-1]
+        again = cf.find_orbit(model, orbit.params, state=joint[1:], time=float(joint[0]))
+        assert abs(again.x_max - orbit.x_max) < 1e-8
+        assert sorted(again.word) in (sorted(orbit.word), sorted(orbit.mirror().word))
+
+
+def test_nothing_is_listed() -> None:
+    model = chain(20, 20, "long")
+    assert len(model.modes) == len(model.domains) == 1
+    trajectory = cf.simulate(model, periods=3)
+    assert len(trajectory) > 20
+    assert len(model.modes) <= len(trajectory) + 2
+    assert [m.name for m in model.modes] == list(model.mode_index)
+    name = "p" * 20
+    assert name in model.domain_by_name and "x" * 20 not in model.domain_by_name
+    assert model.mirror_domain[name] == "n" * 20
+    assert model.mode_by_name[name].rank == 40 and model.mode_by_name["s" * 20].rank == 20
+
+
+def test_a_saved_orbit_comes_back_in_a_model_that_has_visited_nothing(tmp_path: Any) -> None:
+    from contfric.models.files import model_of
+
+    orbit = cf.find_orbit(chain(5, 10, "saved"))
+    cf.save(orbit, tmp_path / "orbit.npz")
+    model_of.cache_clear()
+    again = cf.load(tmp_path / "orbit.npz")
+    assert again.model is not orbit.model and again.word == orbit.word
+    np.testing.assert_allclose(again.joints, orbit.joints, atol=1e-12)
+    assert again.signature.segments == orbit.signature.segments
+
+
+def test_forces_and_work_of_contacts(composing: Any) -> None:
+    values = []
+    for model in (chain(3, 6, "listed"), composing(chain, 3, 6, "composed")):
+        orbit = cf.find_orbit(model)
+        names = ("work(b1)", "work(b3)", "max(force(b2))")
+        values.append([orbit.quantity(name) for name in names])
+    np.testing.assert_allclose(values[0], values[1], rtol=1e-9)
+
+
+def test_what_needs_all_modes_says_so() -> None:
+    model = chain(5, 10, "many")
+    with pytest.raises(ParameterError, match="modes are made when solutions visit them"):
+        cf.lyapunov_exponent(model, state=np.ones(20), periods=10)
+
+
+def test_forces_that_are_not_affine_are_refused() -> None:
+    contacts = {f"b{i}": friction(f"v{i}", "S") for i in range(1, 6)}
+    contacts["b1"] = {**contacts["b1"], "kinetic": "S/(1 + v1**2)"}
+    with pytest.raises(ModelError, match="need affine forces"):
+        cf.Mechanism(
+            np.eye(5),
+            0.1 * np.eye(5),
+            np.eye(5),
+            contacts=contacts,
+            force={"q1": "cos(Omega*t)"},
+            parameters={"Omega": 1.0, "S": 0.1},
+            period="2*pi/Omega",
+        )
