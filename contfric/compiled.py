@@ -17,6 +17,8 @@ changes, not when a helper in another file does; so the folder's name carries a 
 compiled sources. Each kernel has a folder of its own below that, with the digests of its files: damaged
 ones are thrown away, and the kernel is compiled again. Where no folder is writable the kernels are compiled
 in every process: slower, never broken.
+
+What is compiled is said at level INFO of the logger ``contfric.compiled``, before and after.
 """
 
 from __future__ import annotations
@@ -24,12 +26,15 @@ from __future__ import annotations
 import atexit
 import gc
 import hashlib
+import logging
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache, cached_property
 from pathlib import Path
+from time import perf_counter
 from typing import Any, TypeVar
 
 import numba
@@ -42,6 +47,8 @@ from contfric.errors import ResultFileError
 from contfric.inlined import part_options
 from contfric.interrupts import held_back
 from contfric.resources import user_cache
+
+_log = logging.getLogger(__name__)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -124,6 +131,8 @@ class Kernel:
         function = self.__wrapped__
         aside = _ASIDE.get(f"{function.__module__}:{function.__name__}")
         if aside is not None:
+            if aside.poll() is None:
+                _log.info("compiling %s, once, in another process", self.name)
             aside.wait()  # another process is compiling it into the cache
         folder = self._folder()
         before = config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE
@@ -135,7 +144,8 @@ class Kernel:
             folder.mkdir(parents=True, exist_ok=True)
             return self._from_cache(folder)
         except (OSError, RuntimeError, ResultFileError):  # no folder is writable
-            return numba.njit(self.signature, **_OPTIONS)(function)
+            with _announced(f"{self.name}, in every process"):
+                return numba.njit(self.signature, **_OPTIONS)(function)
         finally:
             config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = before
             if collects:
@@ -145,10 +155,7 @@ class Kernel:
         """Load the function from its folder, or compile it into that."""
         sound = discard_damaged(folder, _CACHED)
         cached = numba.njit(self.signature, cache=True, **_OPTIONS)
-        with (
-            held_back() as raise_now,
-            install_listener("numba:run_pass", _BetweenPasses(raise_now)),
-        ):
+        with _announced(f"{self.name}, once"):
             try:
                 found = cached(self.__wrapped__)
             except Exception:  # what unpickling ends in, where the files are of another numba
@@ -176,15 +183,41 @@ class Kernel:
         return self._entry(*arguments)
 
 
-class _BetweenPasses(Listener):  # type: ignore[misc]
-    """Lets Ctrl-C through between the passes of numba's compiler, where nothing is half done."""
+@contextmanager
+def _announced(what: str) -> Iterator[None]:
+    """Log what the block compiles, and its time; nothing where it is loaded from the cache."""
+    with held_back() as raise_now:
+        passes = _BetweenPasses(raise_now, what)
+        with install_listener("numba:run_pass", passes):
+            try:
+                yield
+            finally:
+                passes.log_end()
 
-    def __init__(self, raise_now: Callable[[], None]) -> None:
+
+class _BetweenPasses(Listener):  # type: ignore[misc]
+    """Lets Ctrl-C through between the passes of numba's compiler, where nothing is half done.
+
+    The first pass is the sign that something is compiled and not loaded.
+    """
+
+    def __init__(self, raise_now: Callable[[], None], what: str) -> None:
         self._raise_now = raise_now
+        self._what = what
+        self._began: float | None = None
 
     def on_start(self, event: Any) -> None:
-        """Raise what has come."""
+        """Raise what has come; say what is compiled."""
         self._raise_now()
+        if self._began is None:
+            self._began = perf_counter()
+            _log.info("compiling %s", self._what)
+
+    def log_end(self) -> None:
+        """Say how long it took."""
+        if self._began is not None:
+            took = perf_counter() - self._began
+            _log.info("compiled %s: %.1f s", self._what, took, extra={"seconds": took})
 
     def on_end(self, event: Any) -> None:
         """Let the pass end."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import subprocess
@@ -11,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from contfric.checked import discard
+from contfric.cli.progress import compiling_shown
 from contfric.compiled import allocating_helper, f8, helper, kernel
 from contfric.inlined import part_options
 
@@ -52,6 +55,30 @@ def test_a_kernel_contains_its_helpers(fresh_cache):
     assert any(fresh_cache.rglob("*.nbc"))
     assert second(1.5) == first(1.5)  # this one is loaded
     assert sum(second.dispatcher.stats.cache_hits.values()) == 1
+
+
+def test_what_is_compiled_is_logged_and_what_is_loaded_is_not(fresh_cache, caplog):
+    caplog.set_level(logging.INFO, logger="contfric")
+    assert kernel(f8(f8))(twice)(1.0) == kernel(f8(f8))(twice)(1.0)  # compiled, loaded
+    begin, end = caplog.records
+    assert begin.getMessage() == f"compiling {twice.__module__}.twice, once"
+    assert end.getMessage().startswith(f"compiled {twice.__module__}.twice, once: ")
+    assert end.seconds > 0.0
+
+
+def test_a_terminal_shows_what_is_compiled(fresh_cache, monkeypatch, capsys):
+    name = f"{twice.__module__}.twice"
+    kernel(f8(f8))(twice)(1.0)
+    assert capsys.readouterr().err == ""  # a library is silent by itself
+    for quiet, lines in ((True, 0), (False, 1)):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+        discard(next(fresh_cache.rglob("*.nbc")).parent, (".nbi", ".nbc"))
+        with compiling_shown(quiet=quiet):
+            kernel(f8(f8))(twice)(1.0)
+        shown = capsys.readouterr().err
+        assert shown.count(f"compiling {name}, once") == lines
+        assert shown.endswith("\r\x1b[K" if lines else "")
+    assert logging.getLogger("contfric").handlers == []
 
 
 def test_helpers_are_not_compiled_by_themselves(fresh_cache):
