@@ -14,9 +14,9 @@ compiled anew in every process.
 The cache lives in ``$CONTFRIC_CACHE_DIR``, else in ``$NUMBA_CACHE_DIR``, else in the user's cache
 folder (``~/.cache/contfric``). Numba renews a cached kernel only when the file of the kernel itself
 changes, not when a helper in another file does; so the folder's name carries a digest of all
-compiled sources. Each kernel has a folder of its own below that, with the digests of its files: damaged
-ones are thrown away, and the kernel is compiled again. Where no folder is writable the kernels are compiled
-in every process: slower, never broken.
+compiled sources. Each kernel has a folder of its own below that, one for each Python, numba, llvmlite and
+processor, with the digests of its files: damaged ones are thrown away, and the kernel is compiled again.
+Where no folder is writable the kernels are compiled in every process: slower, never broken.
 
 What is compiled is said at level INFO of the logger ``contfric.compiled``, before and after.
 """
@@ -37,9 +37,12 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeVar
 
+import llvmlite
 import numba
+from llvmlite import binding
 from numba import types
 from numba.core import config
+from numba.core.codegen import get_host_cpu_features
 from numba.core.event import Listener, install_listener
 
 from contfric.checked import discard, discard_damaged, list_files
@@ -123,7 +126,8 @@ class Kernel:
             return False
 
     def _folder(self) -> Path:
-        return cache_folder(Path(self.__wrapped__.__code__.co_filename)) / self.name
+        target = _target(config.CPU_NAME, config.CPU_FEATURES, config.ENABLE_AVX)
+        return cache_folder(Path(self.__wrapped__.__code__.co_filename)) / self.name / target
 
     @cached_property
     def dispatcher(self) -> Any:
@@ -288,6 +292,25 @@ def _digest(folder: Path) -> str:
         if b"contfric.compiled" in text:
             content.update(text)
     return content.hexdigest()[:16]
+
+
+def processor() -> str:
+    """Return the name of the processor that code is compiled for: this one's, or what numba was told."""
+    return str(config.CPU_NAME or binding.get_host_cpu_name())
+
+
+@cache
+def _target(*_told: object) -> str:
+    """Digest of what machine code depends on beside its sources; ``_told`` is what numba was told of it."""
+    facts = (
+        sys.implementation.cache_tag,
+        numba.__version__,
+        llvmlite.__version__,
+        binding.get_process_triple(),
+        processor(),
+        config.CPU_FEATURES or get_host_cpu_features(),
+    )
+    return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
 
 
 def cache_folder(source: Path) -> Path:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core import config
 
 from contfric.checked import discard
 from contfric.cli.progress import compiling_shown
@@ -55,6 +56,23 @@ def test_a_kernel_contains_its_helpers(fresh_cache):
     assert any(fresh_cache.rglob("*.nbc"))
     assert second(1.5) == first(1.5)  # this one is loaded
     assert sum(second.dispatcher.stats.cache_hits.values()) == 1
+
+
+@pytest.mark.parametrize("told", [{"CPU_NAME": "generic"}, {"CPU_FEATURES": "-avx2"}], ids=str)
+def test_what_is_compiled_for_another_processor_does_not_count(fresh_cache, monkeypatch, told):
+    here = kernel(f8(f8))(twice)
+    value = here(1.5)
+    files = sorted(fresh_cache.rglob("*.nbc"))
+    assert here.cached()
+    for name, text in told.items():
+        monkeypatch.setattr(config, name, text)
+    assert not kernel(f8(f8))(twice).cached()
+    monkeypatch.undo()
+    monkeypatch.setenv("CONTFRIC_CACHE_DIR", str(fresh_cache))
+    assert sorted(fresh_cache.rglob("*.nbc")) == files  # and nothing was thrown away
+    again = kernel(f8(f8))(twice)
+    assert again.cached() and again(1.5) == value
+    assert sum(again.dispatcher.stats.cache_hits.values()) == 1
 
 
 def test_what_is_compiled_is_logged_and_what_is_loaded_is_not(fresh_cache, caplog):
