@@ -11,12 +11,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from numba.core import config
 
 from contfric.checked import discard
 from contfric.cli.progress import compiling_shown
 from contfric.compiled import allocating_helper, f8, helper, kernel
 from contfric.inlined import part_options
+from contfric.models import build
+from contfric.models.describe import describe
 
 MODELS = Path(__file__).parents[1] / "models"
 
@@ -155,7 +158,6 @@ def test_a_damaged_file_that_cannot_be_deleted_is_not_used(fresh_cache, monkeypa
 
 @pytest.mark.parametrize("damage", DAMAGE)
 def test_a_damaged_module_of_a_model_is_generated_again(fresh_cache, damage, monkeypatch):
-    from contfric.models import build
     from contfric.models.files import read_model
 
     definition = read_model(MODELS / "bilinear.yaml").definition
@@ -172,6 +174,15 @@ def test_a_damaged_module_of_a_model_is_generated_again(fresh_cache, damage, mon
     assert build.module_path.__wrapped__(definition) == path
     assert len(asked) == 2
     assert callable(build.load_module.__wrapped__(definition).compiled_flow)
+
+
+def test_a_model_by_another_name_is_not_compiled_again():
+    data = yaml.safe_load((MODELS / "bilinear.yaml").read_text(encoding="utf-8"))
+    other = {**data, "name": "mine", "title": "My own", "references": ["a thesis"]}
+    assert describe(other).text != describe(data).text
+    assert build.module_path(describe(other).motion) == build.module_path(describe(data).motion)
+    faster = {**data, "field": {**data["field"], "v": f"2*({data['field']['v']})"}}
+    assert describe(faster).motion != describe(data).motion
 
 
 def test_a_damaged_cache_is_mended_in_a_run_from_the_shell(tmp_path):
