@@ -14,9 +14,11 @@ compiled anew in every process.
 The cache lives in ``$CONTFRIC_CACHE_DIR``, else in ``$NUMBA_CACHE_DIR``, else in the user's cache
 folder (``~/.cache/contfric``). Numba renews a cached kernel only when the file of the kernel itself
 changes, not when a helper in another file does; so the folder's name carries a digest of all
-compiled sources. Each kernel has a folder of its own below that, with the digests of its files: damaged
-ones are thrown away, and the kernel is compiled again. Where no folder is writable the kernels are compiled
-in every process: slower, never broken.
+compiled sources. Each kernel has a folder of its own below that, one for each Python, numba, llvmlite and
+processor, with the digests of its files: damaged ones are thrown away, and the kernel is compiled again.
+Where no folder is writable the kernels are compiled in every process: slower, never broken.
+
+What is compiled is said at level INFO of the logger ``contfric.compiled``, before and after.
 """
 
 from __future__ import annotations
@@ -24,17 +26,23 @@ from __future__ import annotations
 import atexit
 import gc
 import hashlib
+import logging
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache, cached_property
 from pathlib import Path
+from time import perf_counter
 from typing import Any, TypeVar
 
+import llvmlite
 import numba
+from llvmlite import binding
 from numba import types
 from numba.core import config
+from numba.core.codegen import get_host_cpu_features
 from numba.core.event import Listener, install_listener
 
 from contfric.checked import discard, discard_damaged, list_files
@@ -42,6 +50,8 @@ from contfric.errors import ResultFileError
 from contfric.inlined import part_options
 from contfric.interrupts import held_back
 from contfric.resources import user_cache
+
+_log = logging.getLogger(__name__)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -116,7 +126,8 @@ class Kernel:
             return False
 
     def _folder(self) -> Path:
-        return cache_folder(Path(self.__wrapped__.__code__.co_filename)) / self.name
+        target = _target(config.CPU_NAME, config.CPU_FEATURES, config.ENABLE_AVX)
+        return cache_folder(Path(self.__wrapped__.__code__.co_filename)) / self.name / target
 
     @cached_property
     def dispatcher(self) -> Any:
@@ -124,6 +135,8 @@ class Kernel:
         function = self.__wrapped__
         aside = _ASIDE.get(f"{function.__module__}:{function.__name__}")
         if aside is not None:
+            if aside.poll() is None:
+                _log.info("compiling %s, once, in another process", self.name)
             aside.wait()  # another process is compiling it into the cache
         folder = self._folder()
         before = config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE
@@ -135,7 +148,8 @@ class Kernel:
             folder.mkdir(parents=True, exist_ok=True)
             return self._from_cache(folder)
         except (OSError, RuntimeError, ResultFileError):  # no folder is writable
-            return numba.njit(self.signature, **_OPTIONS)(function)
+            with _announced(f"{self.name}, in every process"):
+                return numba.njit(self.signature, **_OPTIONS)(function)
         finally:
             config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = before
             if collects:
@@ -145,10 +159,7 @@ class Kernel:
         """Load the function from its folder, or compile it into that."""
         sound = discard_damaged(folder, _CACHED)
         cached = numba.njit(self.signature, cache=True, **_OPTIONS)
-        with (
-            held_back() as raise_now,
-            install_listener("numba:run_pass", _BetweenPasses(raise_now)),
-        ):
+        with _announced(f"{self.name}, once"):
             try:
                 found = cached(self.__wrapped__)
             except Exception:  # what unpickling ends in, where the files are of another numba
@@ -176,15 +187,41 @@ class Kernel:
         return self._entry(*arguments)
 
 
-class _BetweenPasses(Listener):  # type: ignore[misc]
-    """Lets Ctrl-C through between the passes of numba's compiler, where nothing is half done."""
+@contextmanager
+def _announced(what: str) -> Iterator[None]:
+    """Log what the block compiles, and its time; nothing where it is loaded from the cache."""
+    with held_back() as raise_now:
+        passes = _BetweenPasses(raise_now, what)
+        with install_listener("numba:run_pass", passes):
+            try:
+                yield
+            finally:
+                passes.log_end()
 
-    def __init__(self, raise_now: Callable[[], None]) -> None:
+
+class _BetweenPasses(Listener):  # type: ignore[misc]
+    """Lets Ctrl-C through between the passes of numba's compiler, where nothing is half done.
+
+    The first pass is the sign that something is compiled and not loaded.
+    """
+
+    def __init__(self, raise_now: Callable[[], None], what: str) -> None:
         self._raise_now = raise_now
+        self._what = what
+        self._began: float | None = None
 
     def on_start(self, event: Any) -> None:
-        """Raise what has come."""
+        """Raise what has come; say what is compiled."""
         self._raise_now()
+        if self._began is None:
+            self._began = perf_counter()
+            _log.info("compiling %s", self._what)
+
+    def log_end(self) -> None:
+        """Say how long it took."""
+        if self._began is not None:
+            took = perf_counter() - self._began
+            _log.info("compiled %s: %.1f s", self._what, took, extra={"seconds": took})
 
     def on_end(self, event: Any) -> None:
         """Let the pass end."""
@@ -255,6 +292,25 @@ def _digest(folder: Path) -> str:
         if b"contfric.compiled" in text:
             content.update(text)
     return content.hexdigest()[:16]
+
+
+def processor() -> str:
+    """Return the name of the processor that code is compiled for: this one's, or what numba was told."""
+    return str(config.CPU_NAME or binding.get_host_cpu_name())
+
+
+@cache
+def _target(*_told: object) -> str:
+    """Digest of what machine code depends on beside its sources; ``_told`` is what numba was told of it."""
+    facts = (
+        sys.implementation.cache_tag,
+        numba.__version__,
+        llvmlite.__version__,
+        binding.get_process_triple(),
+        processor(),
+        config.CPU_FEATURES or get_host_cpu_features(),
+    )
+    return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
 
 
 def cache_folder(source: Path) -> Path:

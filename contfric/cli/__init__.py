@@ -33,9 +33,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
         from contfric.cli.parser import parse
+        from contfric.cli.progress import compiling_shown
 
         options = parse(arguments)
-        code: int = options.command(options)
+        with compiling_shown(quiet=getattr(options, "quiet", False)):
+            code: int = options.command(options)
         sys.stdout.flush()
     except BrokenPipeError:
         # whoever read our output has gone, and must not hear of it when Python flushes at its end

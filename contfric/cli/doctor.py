@@ -18,7 +18,7 @@ def doctor(options: argparse.Namespace) -> int:
     from contfric import __file__ as package
     from contfric import __version__
     from contfric.ahead import compile_missing, every_kernel, missing, writable
-    from contfric.compiled import cache_folder
+    from contfric.compiled import cache_folder, processor
 
     absent = missing()
     count = len(every_kernel())
@@ -30,7 +30,7 @@ def doctor(options: argparse.Namespace) -> int:
     lines = {
         "contfric": f"{__version__}, Python {platform.python_version()}, numba {numba.__version__}, "
         f"llvmlite {llvmlite.__version__}",
-        "processor": f"{_processor()} ({platform.machine()})",
+        "processor": f"{processor()} ({platform.machine()})",
         "cache": str(cache_folder(Path(package))),
         "kernels": f"{count - len(absent)} of {count} compiled",
     }
@@ -44,10 +44,3 @@ def doctor(options: argparse.Namespace) -> int:
         )
         print(f"{'':10} {hint}")
     return Exit.FAILED if options.compile and absent and writable() else Exit.DONE
-
-
-def _processor() -> str:
-    """Return the processor that code is compiled for."""
-    from llvmlite.binding import get_host_cpu_name
-
-    return str(get_host_cpu_name())

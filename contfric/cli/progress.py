@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 
 #: Seconds between two updates: faster is not read.
@@ -38,18 +40,56 @@ class ProgressLine:
         traceback: TracebackType | None,
     ) -> None:
         if self._shown:
-            self._write("")
+            _write("")
 
     def show(self, text: str) -> None:
         """Show a text unless the last one is too recent."""
         now = time.monotonic() - self._start
         if self._shown and now - self._last >= _INTERVAL:
             self._last = now
-            width = shutil.get_terminal_size().columns - 1
-            self._write(f"{now:6.1f} s  {text}"[:width])
+            _write(f"{now:6.1f} s  {text}")
 
-    @staticmethod
-    def _write(text: str) -> None:
-        # \r and ESC[K: from the start of the line, erase to its end
-        sys.stderr.write(f"\r\x1b[K{text}")
-        sys.stderr.flush()
+
+class _Compiling(logging.Handler):
+    """Shows what is compiled while it is, after the seconds that compiling took before."""
+
+    _before = 0.0
+
+    def emit(self, record: logging.LogRecord) -> None:
+        seconds = getattr(record, "seconds", None)  # what has been compiled says how long it took
+        if seconds is None:
+            _write(f"{self._before:6.1f} s  {record.getMessage()}")
+        else:
+            self._before += seconds
+            _write("")
+
+
+@contextmanager
+def compiling_shown(quiet: bool = False) -> Iterator[None]:
+    """Show what is compiled while the block runs, if stderr is a terminal.
+
+    Parameters
+    ----------
+    quiet : bool
+        Whether to show nothing.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield
+        return
+    logger, handler = logging.getLogger("contfric"), _Compiling(logging.INFO)
+    level = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(min(level or logging.INFO, logging.INFO))
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+        logger.removeHandler(handler)
+
+
+def _write(text: str) -> None:
+    """Write over the line of the terminal, and no further than its width."""
+    width = shutil.get_terminal_size().columns - 1
+    # \r and ESC[K: from the start of the line, erase to its end
+    sys.stderr.write(f"\r\x1b[K{text[:width]}")
+    sys.stderr.flush()

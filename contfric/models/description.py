@@ -168,10 +168,10 @@ class Description:
 
     @cached_property
     def motion(self) -> str:
-        """The same of what motion depends on: without steps of a continuation, and what is measured."""
-        if self.max_step is None and not self.quantities and not self.laws and not self.units:
-            return self.text
-        return replace(self, max_step=None, quantities=(), laws=(), units=()).text
+        """The same of what motion depends on: what only names, explains or measures is left out."""
+        parameters = tuple(replace(p, meaning="") for p in self.parameters)
+        kept = replace(self, name="model", title="", references=(), parameters=parameters)
+        return replace(kept, max_step=None, quantities=(), laws=(), units=()).text
 
     @cached_property
     def names(self) -> Names:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import subprocess
@@ -10,9 +11,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+from numba.core import config
 
+from contfric.checked import discard
+from contfric.cli.progress import compiling_shown
 from contfric.compiled import allocating_helper, f8, helper, kernel
 from contfric.inlined import part_options
+from contfric.models import build
+from contfric.models.describe import describe
 
 MODELS = Path(__file__).parents[1] / "models"
 
@@ -52,6 +59,47 @@ def test_a_kernel_contains_its_helpers(fresh_cache):
     assert any(fresh_cache.rglob("*.nbc"))
     assert second(1.5) == first(1.5)  # this one is loaded
     assert sum(second.dispatcher.stats.cache_hits.values()) == 1
+
+
+@pytest.mark.parametrize("told", [{"CPU_NAME": "generic"}, {"CPU_FEATURES": "-avx2"}], ids=str)
+def test_what_is_compiled_for_another_processor_does_not_count(fresh_cache, monkeypatch, told):
+    here = kernel(f8(f8))(twice)
+    value = here(1.5)
+    files = sorted(fresh_cache.rglob("*.nbc"))
+    assert here.cached()
+    for name, text in told.items():
+        monkeypatch.setattr(config, name, text)
+    assert not kernel(f8(f8))(twice).cached()
+    monkeypatch.undo()
+    monkeypatch.setenv("CONTFRIC_CACHE_DIR", str(fresh_cache))
+    assert sorted(fresh_cache.rglob("*.nbc")) == files  # and nothing was thrown away
+    again = kernel(f8(f8))(twice)
+    assert again.cached() and again(1.5) == value
+    assert sum(again.dispatcher.stats.cache_hits.values()) == 1
+
+
+def test_what_is_compiled_is_logged_and_what_is_loaded_is_not(fresh_cache, caplog):
+    caplog.set_level(logging.INFO, logger="contfric")
+    assert kernel(f8(f8))(twice)(1.0) == kernel(f8(f8))(twice)(1.0)  # compiled, loaded
+    begin, end = caplog.records
+    assert begin.getMessage() == f"compiling {twice.__module__}.twice, once"
+    assert end.getMessage().startswith(f"compiled {twice.__module__}.twice, once: ")
+    assert end.seconds > 0.0
+
+
+def test_a_terminal_shows_what_is_compiled(fresh_cache, monkeypatch, capsys):
+    name = f"{twice.__module__}.twice"
+    kernel(f8(f8))(twice)(1.0)
+    assert capsys.readouterr().err == ""  # a library is silent by itself
+    for quiet, lines in ((True, 0), (False, 1)):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+        discard(next(fresh_cache.rglob("*.nbc")).parent, (".nbi", ".nbc"))
+        with compiling_shown(quiet=quiet):
+            kernel(f8(f8))(twice)(1.0)
+        shown = capsys.readouterr().err
+        assert shown.count(f"compiling {name}, once") == lines
+        assert shown.endswith("\r\x1b[K" if lines else "")
+    assert logging.getLogger("contfric").handlers == []
 
 
 def test_helpers_are_not_compiled_by_themselves(fresh_cache):
@@ -110,7 +158,6 @@ def test_a_damaged_file_that_cannot_be_deleted_is_not_used(fresh_cache, monkeypa
 
 @pytest.mark.parametrize("damage", DAMAGE)
 def test_a_damaged_module_of_a_model_is_generated_again(fresh_cache, damage, monkeypatch):
-    from contfric.models import build
     from contfric.models.files import read_model
 
     definition = read_model(MODELS / "bilinear.yaml").definition
@@ -127,6 +174,15 @@ def test_a_damaged_module_of_a_model_is_generated_again(fresh_cache, damage, mon
     assert build.module_path.__wrapped__(definition) == path
     assert len(asked) == 2
     assert callable(build.load_module.__wrapped__(definition).compiled_flow)
+
+
+def test_a_model_by_another_name_is_not_compiled_again():
+    data = yaml.safe_load((MODELS / "bilinear.yaml").read_text(encoding="utf-8"))
+    other = {**data, "name": "mine", "title": "My own", "references": ["a thesis"]}
+    assert describe(other).text != describe(data).text
+    assert build.module_path(describe(other).motion) == build.module_path(describe(data).motion)
+    faster = {**data, "field": {**data["field"], "v": f"2*({data['field']['v']})"}}
+    assert describe(faster).motion != describe(data).motion
 
 
 def test_a_damaged_cache_is_mended_in_a_run_from_the_shell(tmp_path):
