@@ -62,6 +62,11 @@ _ROUNDED = 1e-5
 #: Where rounding moves an event by this share of the range its orbits hold for every value of the parameter.
 _UNKNOWN = 0.1
 
+#: Why nothing is followed where the impacts of a chatter just come to rest before the wall lets go.
+_INCOMPLETE = (
+    "the chatter is not complete beyond: branches with any number of impacts come together here"
+)
+
 
 def follow(state: Exploration, event: Event) -> None:
     """Trace everything that leaves an event and is not known yet."""
@@ -82,6 +87,9 @@ def follow(state: Exploration, event: Event) -> None:
 def _follow_sliding(state: Exploration, event: Event) -> None:
     accepted = jumps = False
     orbit = event.bifurcation.orbit
+    if any(test.surface in orbit.model.settled_sides for test in event.bifurcation.tests):
+        state.judge(event, "go on behind the event", Verdict.REFUSED, why=_INCOMPLETE)
+        return
     if event.bifurcation.accuracy > _UNKNOWN and _begins_continuum(state, orbit, event):
         reason, why = "go on behind the event", EndReason.CONTINUUM.value
         state.judge(event, reason, Verdict.REFUSED, why=why)

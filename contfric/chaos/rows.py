@@ -81,7 +81,7 @@ def starting(model: Model) -> Starting:
     for signs in product((-1, 0, 1), repeat=len(surfaces)):
         code = sum((sign + 1) * 3**k for k, sign in enumerate(signs))
         named = dict(zip(surfaces, signs, strict=True))
-        domain = model.domain_at(named)
+        domain = model.domain_at({**named, **model.settled_sides})
         if domain is None:
             continue
         name = model.domain_by_name[domain].own_mode

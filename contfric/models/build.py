@@ -38,10 +38,32 @@ class GeneratedFlow:
 
     def __call__(self) -> CompiledFlow:
         """Return the compiled functions; a module is generated if one is needed and was never written."""
-        found = coded_flow(self.definition)
-        if found is not None:
-            return found.flow
-        return load_module(self.definition).compiled_flow()  # type: ignore[no-any-return]
+        coded = coded_flow(self.definition)
+        found = load_module(self.definition).compiled_flow() if coded is None else coded.flow
+        if '"chatters":' not in self.definition:
+            return found
+        return _with_chatter(found, self.definition)
+
+
+def _with_chatter(flow: CompiledFlow, definition: str) -> CompiledFlow:
+    """Return the flow of a model whose modes of chatter are contact alone, with their impacts."""
+    from contfric.flow.chattering import ChatterMode, with_chatter
+    from contfric.models.describe import from_text
+    from contfric.models.regions import engine_order
+
+    description = from_text(definition)
+    modes = [mode.name for mode in description.modes]
+    observables = [o.name for o in description.observables]
+    surfaces = engine_order(description)
+    walls = {s.name: (k, observables.index(s.observable)) for k, s in enumerate(surfaces)}
+    chatters = []
+    for own in description.chatters:
+        wall, gap = walls[own.surface]
+        flight = modes.index(own.flight)
+        side = description.modes[flight].sides[own.surface]
+        lift = observables.index(own.lift)
+        chatters.append(ChatterMode(modes.index(own.mode), flight, gap, wall, side, lift))
+    return with_chatter(flow, len(modes), chatters)
 
 
 def field_of(definition: str) -> Any:

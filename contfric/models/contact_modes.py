@@ -348,8 +348,8 @@ class Combinations:
                 )
         return found
 
-    def _resets(self) -> dict[str, dict[str, str]]:
-        found = {}
+    def _resets(self) -> dict[str, dict[str, Any]]:
+        found: dict[str, dict[str, Any]] = {}
         for c in self.contacts:
             if c.kind is ContactKind.IMPACT:
                 over = self.structure.mobility(c, c)
@@ -359,6 +359,8 @@ class Combinations:
                     self.velocities[i]: f"{self.velocities[i]} + {times(w, kick)}"
                     for i, w in moved.items()
                 }
+                if c.chatter:
+                    found[c.name]["chatter"] = True
         return found
 
 

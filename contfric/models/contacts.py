@@ -51,6 +51,8 @@ KEYS = {
     ContactKind.IMPACT: ("gap", "restitution"),
 }
 _OPTIONAL = ("static",)
+#: What an impact may say: that it comes to rest after infinitely many impacts.
+_CHATTER = "chatter"
 #: What the direction of each kind is the gradient of.
 _DIRECTION = {
     ContactKind.FRICTION: "velocity",
@@ -69,6 +71,7 @@ class Contact:
     texts : its expressions by their keys
     direction : (coordinate, weight), the entries of W that are not zero
     form : what W is the gradient of, an affine form of states and time
+    chatter : whether impacts may come to rest, a mode of its own
     """
 
     name: str
@@ -76,6 +79,7 @@ class Contact:
     texts: Mapping[str, str]
     direction: Mapping[int, float]
     form: Affine = field(repr=False)
+    chatter: bool = False
 
     @property
     def states(self) -> str:
@@ -126,7 +130,8 @@ def read_contacts(
                 f"'{name}' is a coordinate, velocity or parameter: give the contact another name",
             )
         kind = ContactKind(entry.one_of("kind", [k.value for k in ContactKind], "kind of contact"))
-        entry.only(("kind", *KEYS[kind]))
+        own_keys = (_CHATTER,) if kind is ContactKind.IMPACT else ()
+        entry.only(("kind", *KEYS[kind], *own_keys))
         texts = {
             key: _expression(entry, key)
             for key in KEYS[kind]
@@ -136,7 +141,8 @@ def read_contacts(
         count = len(coordinates)
         shift = count if kind is ContactKind.FRICTION else 0
         direction = _direction(entry, _DIRECTION[kind], form, shift, count)
-        found.append(Contact(name, kind, texts, direction, form))
+        rests = bool(entry.flag(_CHATTER)) if own_keys else False
+        found.append(Contact(name, kind, texts, direction, form, rests))
     return found
 
 

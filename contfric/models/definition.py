@@ -35,6 +35,7 @@ import numpy as np
 
 from contfric.errors import ParameterError, did_you_mean, mapping_of, shown
 from contfric.models.parts import (
+    Chatter,
     Constraint,
     Departure,
     Domain,
@@ -89,6 +90,8 @@ class Model(Shown, TransitionMaps):
         shape (n,), nondimensional.
     resets : tuple of Reset
         Surfaces at which the state is mapped.
+    chatters : tuple of Chatter
+        Modes that begin with infinitely many impacts (:mod:`contfric.models.chatter`).
     autonomous : bool
         Whether there is no excitation: the flow's ``period`` returns 0, the period of an orbit is found
         with it, and ``periods`` of a simulation are units of time.
@@ -137,6 +140,7 @@ class Model(Shown, TransitionMaps):
     spread: Callable[[Mapping[str, float]], FloatArray] = field(repr=False)
     references: tuple[str, ...] = ()
     resets: tuple[Reset, ...] = ()
+    chatters: tuple[Chatter, ...] = ()
     autonomous: bool = False
     kinks: tuple[str, ...] = ()
     filippov: bool = False

@@ -78,6 +78,10 @@ def model_from(description: Description) -> Model:
     surfaces = ordered_surfaces(description, levels)
     declared = domains_of(description, surfaces)
     departures = description.departures or _departures(sampler, surfaces, declared)
+    resting = {own.mode for own in description.chatters}
+    flights = tuple(d for d in declared if d.mode not in resting)
+    ends = {own.lift for own in description.chatters}
+    asked = [s for s in surfaces if s.name not in ends]
     domains = join_domains(declared, joined_modes(description))
     surfaces = clear_surfaces(surfaces, domains)
     model = Model(
@@ -100,10 +104,11 @@ def model_from(description: Description) -> Model:
         flow_factory=GeneratedFlow(description.motion),
         spread=Spread(description.spread, description.text),
         references=description.references,
-        resets=tuple(reset_of(sampler, name, surfaces, declared) for name in description.resets),
+        resets=tuple(reset_of(sampler, name, asked, flights) for name in description.resets),
+        chatters=description.chatters,
         autonomous=not description.period,
         kinks=description.kinks,
-        filippov=leaves_at_rest(sampler, description, declared),
+        filippov=leaves_at_rest(sampler, description, flights),
         turned=turned_modes(sampler, surfaces, declared),
         max_step=description.max_step,
         quantities=description.quantities,

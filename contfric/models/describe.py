@@ -15,6 +15,7 @@ from contfric.models.description import STRUCTURE, Description, DomainText, Mode
 from contfric.models.entries import Part, mapping_in
 from contfric.models.measuring import measured
 from contfric.models.names import Names
+from contfric.models.parts import Chatter
 from contfric.models.quantity_entries import check_quantities, read_quantities
 from contfric.models.shorthand import expanded
 from contfric.models.units import APPLIED, KEY, read_units
@@ -31,6 +32,7 @@ KEYS = (
     APPLIED,
     LAWS,
     STRUCTURE,
+    "chatters",
 )
 _PARAMETER = ("default", "meaning")
 _SURFACE = ("observable", "level", "switching")
@@ -104,6 +106,9 @@ def _described(data: dict[str, Any]) -> Description:
         domains=_domains(top, modes, surfaces),
         departures=_departures(top, surfaces),
         **_resets(top, states, surfaces, modes),
+        chatters=tuple(
+            Chatter(surface, **own) for surface, own in mapping_in(data, "chatters").items()
+        ),
         symmetry=_symmetry(top, states),
         stop_surface=_stop_surface(top, surfaces),
         kinks=top.texts("kinks"),

@@ -17,6 +17,7 @@ from contfric.models.contact_laws import KEY as LAWS
 from contfric.models.contact_laws import ContactLaws, written
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.names import Names
+from contfric.models.parts import Chatter
 
 #: The key of the structure that modes are made from.
 STRUCTURE = "structure"
@@ -55,6 +56,7 @@ class Description:
     resets : surface -> state -> expression
     leads : surface -> mode behind the reset, where it is said
     acts : surface -> modes in which the reset acts, where they are said
+    chatters : modes that begin with infinitely many impacts
     symmetry : name (a state or t) -> expression of its image; None if there is none
     stop_surface : empty if it is to be found
     kinks : observables at whose zeros the fields have kinks, and are continuous
@@ -84,6 +86,7 @@ class Description:
     resets: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     leads: Mapping[str, str] = field(default_factory=dict)
     acts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    chatters: tuple[Chatter, ...] = ()
     symmetry: Mapping[str, str] | None = None
     stop_surface: str = ""
     kinks: tuple[str, ...] = ()
@@ -134,6 +137,11 @@ class Description:
             "integration": {"method": self.method, "tolerance": self.tolerance},
         }
         found.update({"period": self.period} if self.period else {"autonomous": True})
+        if self.chatters:
+            found["chatters"] = {
+                c.surface: {"mode": c.mode, "flight": c.flight, "lift": c.lift}
+                for c in self.chatters
+            }
         if self.symmetry is not None:
             found["symmetry"] = dict(self.symmetry)
         if self.kinks:

@@ -56,9 +56,10 @@ class Landing:
         found, acting = [], acting_modes(self.sampler, self.domains, self.surface)
         for t, y in self.sampler.on(self.surface, {}, _PLACES):
             sides = self.sampler.sides(t, y, self.surfaces)
+            others = [s for s in self.surfaces if s != self.surface]
             for domain in self.domains:
                 side = domain.signs[self.surface]
-                beside = all(sides[s] == v for s, v in domain.signs.items() if s != self.surface)
+                beside = all(sides[s] == domain.signs[s] for s in others)
                 if not (domain.mode in acting and beside):
                     continue
                 if side * self.sampler.rate(domain.mode, self.surface, side, t, y) < 0.0:

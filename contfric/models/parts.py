@@ -134,6 +134,23 @@ class Reset:
 
 
 @dataclass(frozen=True)
+class Chatter:
+    """Infinitely many impacts in finite time, and the contact behind them, as one mode of its own.
+
+    Attributes
+    ----------
+    surface : the wall, which has a reset
+    mode, flight : the mode, and that in which the impacts are
+    lift : surface (and observable) of the gap's acceleration in flight, which vanishes where the wall lets go
+    """
+
+    surface: str
+    mode: str
+    flight: str
+    lift: str
+
+
+@dataclass(frozen=True)
 class Symmetry:
     """The map ``(t, y) -> (t + fraction * T, matrix @ y)`` that takes solutions to solutions.
 

@@ -92,8 +92,10 @@ def domains_of(description: Description, surfaces: list[Surface]) -> tuple[Domai
     places: dict[str, set[tuple[int, ...]]] = {}
     found: list[Domain] = []
     order, led = [s.name for s in surfaces], {*description.leads.values()}
+    by_mode = {mode.name: mode.sides for mode in description.modes}
+    settled = {own.lift: by_mode[own.mode][own.lift] for own in description.chatters}
     for mode in description.modes:
-        regions = combinations(surfaces, mode.sides)
+        regions = combinations(surfaces, {**mode.sides, **settled})
         if not regions:
             raise EntryError(("modes", mode.name, "in"), _impossible(mode, surfaces))
         places[mode.name] = {tuple(sides[name] for name in order) for sides in regions}

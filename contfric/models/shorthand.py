@@ -33,13 +33,19 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
     if not _is_regular(data):
         return read(data)  # which says what is wrong, and where
     data = _with_observables(with_ties_put_in(data))
+    walls, data = _chattering(data)
     surfaces, plain = _derived_sliding(with_angles(with_clock(data)))
     plain = in_units(plain, read)
     found = read(plain)
     if surfaces:
         from contfric.models.filippov import sliding_parts
 
-        found = read(plain | sliding_parts(found, surfaces, _with_fields(plain)))
+        plain = plain | sliding_parts(found, surfaces, _with_fields(plain))
+        found = read(plain)
+    if walls:
+        from contfric.models.chatter import chatter_parts
+
+        found = read(plain | chatter_parts(found, walls, _with_fields(plain)))
     return found
 
 
@@ -98,6 +104,16 @@ def _derived_sliding(data: dict[str, Any]) -> tuple[tuple[str, ...], dict[str, A
             asked.append(str(name))
             plain[str(name)] = {k: v for k, v in entry.items() if k != "sliding"}
     return tuple(asked), {**data, "surfaces": plain}
+
+
+def _chattering(data: dict[str, Any]) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """Return the walls at which chatter is to be derived, and the model without saying so."""
+    asked, plain = [], {}
+    for name, entry in (data.get("resets") or {}).items():
+        plain[name] = {key: value for key, value in entry.items() if key != "chatter"}
+        if Part(entry, ("resets", str(name))).flag("chatter"):
+            asked.append(str(name))
+    return tuple(asked), {**data, "resets": plain} if asked else data
 
 
 def _with_fields(data: Mapping[str, Any]) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from contfric.errors import ParameterError
 from contfric.models.section_maps import SectionMaps
 
 if TYPE_CHECKING:
-    from contfric.models.parts import Departure, Domain, Reset, Surface, Symmetry
+    from contfric.models.parts import Chatter, Departure, Domain, Reset, Surface, Symmetry
 
 
 class TransitionMaps(SectionMaps):
@@ -27,6 +27,7 @@ class TransitionMaps(SectionMaps):
         symmetry: Symmetry | None
         kinks: tuple[str, ...]
         turned: frozenset[tuple[str, str]]
+        chatters: tuple[Chatter, ...]
 
     @property
     def composed(self) -> bool:
@@ -69,6 +70,10 @@ class TransitionMaps(SectionMaps):
         found: dict[str, list[tuple[str, str]]] = {}
         for (source, surface), target in self.transitions.items():
             found.setdefault(source, []).append((surface, target))
+        for own in self.chatters:
+            for domain in self.domains_of(own.mode):
+                behind = self.targets[domain.name, own.lift]
+                found[domain.name] = [(own.lift, target) for target in behind]
         return found
 
     def is_at_rest(self, mode: str) -> bool:
@@ -82,8 +87,12 @@ class TransitionMaps(SectionMaps):
         return all(domain.signs.get(surface) == 0 for domain in own)
 
     def rests_on(self, surface: str) -> bool:
-        """Return whether some mode moves on a surface."""
-        return any(domain.signs[surface] == 0 for domain in self.domains)
+        """Return whether some mode moves on a surface; at rest on a wall a mass is there behind chatter."""
+        return any(
+            domain.signs[surface] == 0
+            for domain in self.domains
+            if domain.own_mode not in self.chatter_by_mode
+        )
 
     def cuts(self, surface: str) -> bool:
         """Return whether motion is cut at a surface: it is switching, or has a reset."""
@@ -121,6 +130,10 @@ class TransitionMaps(SectionMaps):
                 behind = self._domains_behind(domain, reset)
                 if behind and self.maps_at(domain, reset.surface):
                     found[domain.name, reset.surface] = behind
+        for own in self.chatters:  # what is one mode may be left to on either side of its section
+            for domain in self.domains_of(own.mode):
+                free = tuple(d.name for d in self.domains_of(own.flight))
+                found[domain.name, own.lift] = free
         return found
 
     def undecided(self) -> tuple[str, str, tuple[str, ...]] | None:
@@ -182,7 +195,24 @@ class TransitionMaps(SectionMaps):
         for mode in (reset.leads, domain.own_mode):
             kept = [d.signs for d in behind if d.own_mode == mode]
             behind = [d for d in behind if d.own_mode == mode or d.signs not in kept]
-        return tuple(d.name for d in behind)
+        chatter = self.chatter_at.get((domain.mode, reset.surface))
+        resting = self.domains_of(chatter.mode) if chatter else ()
+        return tuple(d.name for d in (*behind, *resting))
+
+    @cached_property
+    def chatter_at(self) -> dict[tuple[str, str], Chatter]:
+        """Chatter that impacts in a mode, at a surface, may lead to."""
+        return {(own.flight, own.surface): own for own in self.chatters}
+
+    @cached_property
+    def settled_sides(self) -> dict[str, int]:
+        """The side of each surface that only ends chatter: all domains have that, on whichever they are."""
+        return {own.lift: self.domains_of(own.mode)[0].signs[own.lift] for own in self.chatters}
+
+    @cached_property
+    def chatter_by_mode(self) -> dict[str, Chatter]:
+        """Chatter by its modes."""
+        return {own.mode: own for own in self.chatters}
 
     def _domains_landed(self, reset: Reset) -> dict[tuple[int, ...], list[Domain]]:
         """Return the domains that lie on no surface of what a reset changes, by the sides of all others."""
@@ -208,6 +238,10 @@ class TransitionMaps(SectionMaps):
             return None
         mode = domain.own_mode
         through = {**domain.signs, surface.name: -sign}
+        resting_at = self.chatter_by_mode.get(mode)
+        if resting_at is not None and resting_at.lift == surface.name:  # the wall lets go
+            side = self._side_of[resting_at.flight, resting_at.surface]
+            return self._domain_with({**domain.signs, resting_at.surface: side}, resting_at.flight)
         if not surface.switching:
             target = self.domain_at(through, mode)
             entered = "" if target is None else self.domain_by_name[target].own_mode

@@ -44,6 +44,9 @@ def beginnings(
         returns
     ):  # each exit only said to be as high as the one before: one has to say how high
         returns[-1] = 0
+    for i, mode in enumerate(before):
+        if mode in model.chatter_by_mode and i not in held:
+            returns[i] |= 2
     return {"departs": departs, "resets": resets, "returns": returns}
 
 
@@ -72,8 +75,8 @@ def entry_rows(
     rows: list[tuple[int, ...]] = []
     for i, surface in enumerate(entered):
         reset = model.reset_by_surface.get(surface)
-        if reset is None:
-            continue
+        if reset is None or word[i][0] in model.chatter_by_mode:
+            continue  # what holds at rest on a wall need not hold before the impacts have come to rest
         for k, other in enumerate(model.surfaces):
             signs = {
                 model.domain_by_name[d].signs[other.name]
@@ -81,6 +84,7 @@ def entry_rows(
             }
             free = model.changed_by(reset, other.name) and other.name not in reset.lands
             free = free and other.name not in model.wraps
+            free = free and other.name not in model.settled_sides
             if free and len(signs) == 1:
                 rows.append((i, k, signs.pop(), 1))
     return rows

@@ -89,6 +89,12 @@ def _settled(
     """Return the orbit that a motion converges to."""
     span, done = _FIRST, 0
     trajectory = simulate(model, params, state=state, time=time, periods=span, events=10_000_000)
+    if trajectory.end is SimulationEnd.CHATTER and not model.chatters:
+        from contfric.models.chatter import with_chatter  # which takes sympy
+
+        resting = with_chatter(model)
+        if resting is not None:
+            return _settled(resting, params, state, time, longest)
     while True:
         _check_motion(trajectory)
         done += span

@@ -11,7 +11,9 @@ from contfric.models.composed import ComposedModel
 from contfric.orbit.tables import (
     Tables,
     bits_of,
+    chatter_table,
     check_surfaces,
+    flight_table,
     moves_on,
     sides_of,
     surfaces_under,
@@ -62,6 +64,8 @@ class GrowingTables:
             np.full(surfaces, every, dtype=np.int64),
             np.array([bits_of(model, {s}) for s in model.surface_by_name], dtype=np.int64),
             0,
+            chatter_table(model, self._done),
+            flight_table(model, self._done),
         )
 
     def _write(self, name: str) -> None:

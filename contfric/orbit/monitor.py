@@ -128,6 +128,8 @@ def interior_margin(functions, layout, k, found, z, p, workspace, stationary):  
     first, last = -np.inf, np.inf
     if layout.pins[i] != NO_PIN or layout.pins[i - 1] != NO_PIN:
         first = _AT_PIN * (1.0 + duration)
+    if layout.returns[i] & 2 == 2:  # it leaves the wall without speed or acceleration
+        first = _AT_PIN * (1.0 + duration)
     if layout.pins[i] != NO_PIN or layout.pins[(i + 1) % count] != NO_PIN:
         last = duration - _AT_PIN * (1.0 + duration)
     target = functions.level(layout.interior[k, 1], p, workspace.none, workspace.empty)

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.system import IntArray
 
+#: Share of a segment that is looked ahead.
+_AHEAD = 1e-3
+
 
 def read_signature(orbit: Orbit, labels: IntArray) -> Signature:
     """Return the signature of an orbit.
@@ -85,6 +88,15 @@ def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
     mode, entry = word[i - 1]  # of the whole word: its last exit leads into the first
     if model.composed:
         return word[i][0]
+    if (
+        mode in model.chatter_by_mode
+    ):  # at rest on a wall no side of a section is told: look a little ahead
+        begin, lasts = orbit.begins[i], orbit.ends[i][0] - orbit.begins[i][0]
+        state = model.view(orbit.vector).state(
+            word[i][0], float(begin[0]), begin[1:].copy(), _AHEAD * lasts
+        )
+        signs = signs_at(model, float(begin[0] + _AHEAD * lasts), state, orbit.vector)
+        return _nearest([model.domain_by_name[d] for d in mode_domains(model, word[i][0])], signs)
     if entry not in model.reset_by_surface and not is_hold(entry):
         return model.transitions[ends[i - 1], entry]
     begin = orbit.begins[i]

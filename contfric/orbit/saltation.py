@@ -114,6 +114,8 @@ def passage_at(model: Model, mode: str, surface: str, following: str) -> Passage
         return Passage.JUMP
     if model.whole_mode(mode) == model.whole_mode(following):
         return Passage.CONTINUOUS
+    if mode in model.chatter_by_mode:  # left where the force of the wall vanishes
+        return Passage.CONTINUOUS
     slides = surface in _lies_on(model, following)
     vector, worst = model.vector({}), Passage.CONTINUOUS
     for k in range(_SETS):

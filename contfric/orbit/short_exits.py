@@ -70,7 +70,7 @@ def mean_rate_row(functions, layout, i, at, start, duration, p, which, workspace
 @helper
 def is_divided(functions, layout, i, start, duration, p, which, workspace):  # type: ignore[no-untyped-def]
     """Tell whether the exit row of segment i is divided by its duration."""
-    if not (abs(duration) < _SHORT and layout.returns[i] == 1):
+    if not (abs(duration) < _SHORT and layout.returns[i] & 1 == 1):
         return False
     state, none, empty, nothing = (
         workspace.between,

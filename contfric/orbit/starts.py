@@ -24,7 +24,7 @@ def signs_at(
     for surface in model.surfaces:
         apart = flow.height(surface.name, t, y)
         signs[surface.name] = 0 if abs(apart) <= within else int(np.sign(apart))
-    return signs
+    return {**signs, **model.settled_sides}
 
 
 def start_of(

@@ -65,8 +65,10 @@ def ending_sides(
     """
     if isinstance(model, ComposedModel):
         return model.exit_sides(mode, surface, following)
+    if mode in model.chatter_by_mode:  # at rest on a wall, on whichever side of a section
+        return {}
     found = {}
-    for name in model.surface_by_name:
+    for name in model.surface_by_name.keys() - model.settled_sides.keys():
         signs = {model.domain_by_name[d].signs[name] for d in inside}
         if len(signs) == 1:
             found[name] = signs.pop()

@@ -292,6 +292,9 @@ def _margins(
     interior: list[tuple[int, ...]] = []
     joint: list[tuple[int, ...]] = []
     for i, (mode, exit_) in enumerate(word):
+        if own := model.chatter_by_mode.get(mode):  # its flights stay on their side of the wall
+            side = inside_sign(model, own.flight, own.surface)
+            interior.append((i, model.surface_index[own.surface], side))
         for surface in names if full else mode_bounds(model)[mode]:
             sign = (
                 model.domain_by_name[inside[i][0]].signs[surface]

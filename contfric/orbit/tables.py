@@ -36,6 +36,9 @@ class Tables(NamedTuple):
     sliding : whether a mode slides on a surface; 2 if it may do so for more than a period
     lies_on : surfaces that a mode moves on, as bits
     kept : surfaces that the state stays on where a surface is met, as bits: a reset takes it off others
+    chatters : mode that infinitely many impacts lead to, by (mode behind an impact, surface); -1 if none,
+        shape (modes, surfaces)
+    flights : mode that a mode of chatter is left for, -1 of others
     landed : surfaces that the state is on where motion goes on, as bits: the one met, but for a reset
     walls : surfaces at which a reset sends motion back, as bits
     """
@@ -49,6 +52,8 @@ class Tables(NamedTuple):
     kept: IntArray
     landed: IntArray
     walls: int
+    chatters: IntArray
+    flights: IntArray
 
 
 def check_surfaces(model: Model) -> None:
@@ -100,7 +105,27 @@ def tables(model: Model) -> Tables:
         np.array([_surfaces_kept(model, s.name) for s in model.surfaces], dtype=np.int64),
         np.array([bits_of(model, _landed(model, s.name)) for s in model.surfaces], dtype=np.int64),
         bits_of(model, (r.surface for r in model.resets if r.lands.get(r.surface, 0) > 0)),
+        chatter_table(model, len(model.modes)),
+        flight_table(model, len(model.modes)),
     )
+
+
+def chatter_table(model: Model, modes: int) -> IntArray:
+    """Return the mode of chatter that impacts in a mode at a surface may lead to, -1 if there is none."""
+    found = np.full((modes, len(model.surfaces)), -1, dtype=np.int64)
+    for own in model.chatters:
+        for k, mode in enumerate(model.modes[:modes]):
+            if model.whole_mode(mode.name) == own.flight:
+                found[k, model.surface_index[own.surface]] = model.mode_index[own.mode]
+    return found
+
+
+def flight_table(model: Model, modes: int) -> IntArray:
+    """Return the mode that each mode of chatter is left for, -1 of others."""
+    found = np.full(modes, -1, dtype=np.int64)
+    for own in model.chatters:
+        found[model.mode_index[own.mode]] = model.mode_index[own.flight]
+    return found
 
 
 def _rules(model: Model) -> tuple[IntArray, IntArray]:
@@ -119,8 +144,16 @@ def _rules(model: Model) -> tuple[IntArray, IntArray]:
     for (name, surface), targets in model.targets.items():
         if surface in model.reset_by_surface:
             for after in targets:  # behind a reset the signs of the mapped state tell the domain
+                if model.domain_by_name[after].own_mode in model.chatter_by_mode:
+                    continue  # found by following the impacts
                 signs = model.domain_by_name[after].signs
                 add(name, surface, signs, _landed(model, surface), after)
+    for own in model.chatters:
+        for domain in model.domains_of(own.mode):
+            found.pop((model.mode_index[own.mode], model.surface_index[own.lift]), None)
+            for after in model.targets[domain.name, own.lift]:
+                signs = model.domain_by_name[after].signs
+                add(domain.name, own.lift, signs, {own.surface}, after)
     first, rules = [0], []
     for mode in range(len(model.modes)):
         for k in range(len(model.surfaces)):
@@ -150,7 +183,11 @@ def _merged(cases: Mapping[tuple[int, int], int]) -> list[Rule]:
 
 def sides_of(model: Model, signs: Mapping[str, int], skipped: Collection[str]) -> tuple[int, int]:
     """Return the sides of a domain as (mask, value); those that a motion lies on are not asked for."""
-    asked = [s for s, sign in signs.items() if sign != 0 and s not in skipped]
+    asked = [
+        s
+        for s, sign in signs.items()
+        if sign != 0 and s not in skipped and s not in model.settled_sides
+    ]
     return bits_of(model, asked), bits_of(model, (s for s in asked if signs[s] > 0))
 
 
@@ -194,6 +231,8 @@ def bits_of(model: Model, surfaces: Iterable[str]) -> int:
 def moves_on(model: Model, mode: Mode) -> bool:
     """Tell whether a load may grow for more than a period: without excitation, or as other masses move.
 
-    Where as many states are free as are held, these are the places of what rests.
+    Where as many states are free as are held, these are the places of what rests. Impacts before rest may
+    take any time.
     """
-    return model.autonomous or 2 * mode.rank > len(model.states)
+    free = model.autonomous or 2 * mode.rank > len(model.states)
+    return free or mode.name in model.chatter_by_mode

@@ -23,7 +23,7 @@ from contfric.orbit.tables import Tables
 
 #: Types of the model's tables and of the rows of events, as kernels take them.
 TablesType = types.NamedTuple(
-    [indices, table, indices, table, indices, indices, indices, indices, i8], Tables
+    [indices, table, indices, table, indices, indices, indices, indices, i8, table, indices], Tables
 )
 RowsType = types.NamedTuple([table, indices, vector, matrix], EventRows)
 
@@ -55,10 +55,14 @@ NO_TIME, MOST_AT_ONCE = 1e-12, 16
 #: The same where impacts chatter: a mass that bounces to less than rounding of its displacement (1e-16)
 #: is in flight for the root of that, and never for less.
 NO_FLIGHT = 1e-7
+#: A mass that a wall lets go moves off it with the third power of time: at this share of a period by far more
+#: than rounding, and less than anything else does.
+_AHEAD = 1e-3
 #: Numbers that a simulation hands over to the call that goes on with it: whether there are any, the period
-#: and phase it began in, the period it is in, events at once, whether one was an impact, surfaces it is on.
-CARRIED = 7
-STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON = range(CARRIED)
+#: and phase it began in, the period it is in, events at once, whether one was an impact, surfaces it is on,
+#: 1 + the wall that was met last if no other event came since.
+CARRIED = 8
+STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON, BOUNCED = range(CARRIED)
 
 #: A state this large grows for ever (negative damping, or resonance without any): its square is still
 #: far from overflow, and its events are still exact.
@@ -170,7 +174,7 @@ def begin(carry, on, t, period):  # type: ignore[no-untyped-def]
     cycle = int(math.floor(t / period)) if period > 0.0 else 0
     t -= cycle * period
     carry[STARTED], carry[FIRST_CYCLE], carry[FIRST_TIME] = 1.0, float(cycle), t
-    carry[AT_ONCE] = carry[STRUCK] = 0.0
+    carry[AT_ONCE] = carry[STRUCK] = carry[BOUNCED] = 0.0
     return cycle, t, on
 
 
@@ -211,6 +215,40 @@ def is_pressed(functions, tables, mode, surface, following, t, before, y, p, uni
 
 
 @helper
+def code_ahead(functions, tables, mode, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
+    """Return the sides of all surfaces a little after a wall has let go: at once rounding decides."""
+    none, ahead = workspace.none, _AHEAD * unit
+    functions.flow(tables.flights[mode], t, y, ahead, p, none, workspace.trial, workspace.nothing)
+    return sign_code(
+        functions, tables.observables, 0, t + ahead, workspace.trial, p, none, workspace.empty
+    )
+
+
+@helper
+def lying_on(functions, tables, t, y, p, workspace):  # type: ignore[no-untyped-def]
+    """Return the surfaces that a state is on to rounding, as bits."""
+    found = 0
+    for k in range(tables.observables.shape[0]):
+        value = functions.observe(tables.observables[k], t, y, p, workspace.none, workspace.empty)
+        level = functions.level(k, p, workspace.none, workspace.empty)
+        if abs(value - level) <= NO_TIME * (1.0 + abs(level)):
+            found |= 1 << k
+    return found
+
+
+@helper
+def leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
+    """Tell whether infinitely many impacts follow, with nothing else between, until the wall lets go.
+
+    ``workspace.after`` is written over.
+    """
+    on = tables.landed[surface]
+    longest = SLIDE_PERIODS * unit
+    _, met = first_hit(functions, tables, chatter, on, t, y, p, longest, unit, workspace)
+    return met >= 0 and tables.bounds[chatter, met] == 1
+
+
+@helper
 def too_large(y):  # type: ignore[no-untyped-def]
     """Tell whether a state has grown beyond all bounds, or is no number."""
     for j in range(y.shape[0]):
@@ -236,7 +274,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
     unit = period if period > 0.0 else 1.0
     cycle, t, on = begin(carry, on, t, period)
     event, waited, at_most = 0, 0.0, shortest_flight(tables, mode)
-    at_once, struck = int(carry[AT_ONCE]), carry[STRUCK] != 0.0
+    at_once, struck, bounced = int(carry[AT_ONCE]), carry[STRUCK] != 0.0, int(carry[BOUNCED])
     for _ in range(budget):
         if event == rows.joints.shape[0]:
             break
@@ -266,14 +304,15 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
             functions.reset(surface, t, rows.states[event], p, none, y, workspace.nothing)
         on = tables.landed[surface]
         code = sign_code(functions, tables.observables, on, t, y, p, none, workspace.empty)
+        if tables.flights[mode] >= 0:
+            code = code_ahead(functions, tables, mode, t, y, p, unit, workspace)
         target = mode_after(tables, mode, surface, code)
         at_once = at_once + 1 if tau <= at_most * unit else 0
         struck = reset or (struck and at_once > 0)
-        if at_once > MOST_AT_ONCE:
-            return (CHATTER if struck else IMPOSSIBLE), event, mode, cycle, t
         if reset and target == -1:
             return IMPOSSIBLE, event, mode, cycle, t
-        if reset and is_pressed(
+        chatter = tables.chatters[target, surface] if reset and target >= 0 else -1
+        pressed = reset and is_pressed(
             functions,
             tables,
             mode,
@@ -285,19 +324,34 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
             p,
             unit,
             workspace,
+        )
+        if chatter >= 0 and (
+            pressed
+            or at_once > MOST_AT_ONCE
+            or (
+                bounced
+                != 1 + surface  # all impacts since another event are one chatter, or none is
+                and leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace)
+            )
         ):
-            return CHATTER, event, mode, cycle, t
+            target, at_once = chatter, 0
+        elif pressed or at_once > MOST_AT_ONCE:
+            return (CHATTER if struck else IMPOSSIBLE), event, mode, cycle, t
         if target == -1:
             continue  # nothing leads there: the surface is touched and left to the same side
+        bounced = 1 + surface if reset else 0
         write_event(rows, event, mode, surface, cycle, t)
         if not reset:
             copy_state(y, rows.states[event])
         on = behind_event(tables, mode, surface)
+        if tables.flights[mode] >= 0:  # at rest on a wall it may be at rest on a section, too
+            on |= lying_on(functions, tables, t, y, p, workspace)
         mode = target
         event += 1
         if mode < 0:  # not visited yet: the tables are to be extended
             break
     carry[CYCLE], carry[AT_ONCE], carry[ON] = float(cycle), float(at_once), float(on)
+    carry[BOUNCED] = float(bounced)
     carry[STRUCK] = 1.0 if struck else 0.0
     return ALL_EVENTS, event, mode, cycle, t
 

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.models.definition import FloatArray, Model
+from contfric.quantities.chatter import pieces
 from contfric.quantities.duals import Dual
 
 if TYPE_CHECKING:
@@ -239,7 +240,22 @@ class Motion:
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
-        """The segments of the whole orbit."""
+        """The smooth pieces of the whole orbit: its segments, and of chatter its flights."""
+        chatters = self.orbit.model.chatter_by_mode
+        if not chatters:
+            return self._whole_segments
+        return tuple(
+            piece
+            for s in self._whole_segments
+            for piece in (pieces(s, chatters[s.mode]) if s.mode in chatters else (s,))
+        )
+
+    def last_of(self, index: int) -> Segment:
+        """Return the piece that ends with a segment of the orbit."""
+        return next(s for s in reversed(self.segments) if s.index == index)
+
+    @cached_property
+    def _whole_segments(self) -> tuple[Segment, ...]:
         orbit, moved = self.orbit, self.d_cycle
         ends = np.roll(moved[:, 0], -1, axis=0)
         ends[-1] += self.d_period

@@ -68,7 +68,7 @@ def _rate_at_end(orbit: Orbit, i: int) -> tuple[float, FloatArray]:
 
 def _speed_slopes(measuring: Measuring, i: int, grad: FloatArray) -> FloatArray:
     """Return how a speed moves at the end of a segment, by its gradient on (t, y, p)."""
-    time, states = measuring.motion.segments[i].at(np.ones(1))
+    time, states = measuring.motion.last_of(i).at(np.ones(1))
     moved = np.vstack([time.slopes, *(s.slopes for s in states)])[:, :-1]
     return np.asarray(grad[: len(moved)] @ moved + grad[len(moved) :] @ measuring.motion.d_vector)
 

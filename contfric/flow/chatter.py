@@ -1,0 +1,235 @@
+r"""Chatter: infinitely many impacts in finite time, and the contact that they lead to, compiled.
+
+A mass that is pressed to a wall bounces lower and lower. Its impacts come ever faster and end at a time
+``t*``, in a state ``y*`` that rests on the wall; there it stays until the force of the wall vanishes. All of
+that is one segment: its mode moves by the field of contact, and begins at the state behind an impact. From
+``(t_0, y_0)`` the map of one flight and one impact is iterated, ``(t_n, y_n) -> (t_{n+1}, y_{n+1})``; then
+
+    phi(t_0, y_0, d) = contact(t*, y*, d - (t* - t_0)),
+
+also for durations d that end before ``t*``, so that Newton's method has a smooth function.
+
+*The limit.* The map has a line of fixed points, at the speeds v = 0, with multiplier e (the restitution)
+across it; so all impacts of one chatter lie on one smooth curve ``(t, y) = z(v)`` that ends in
+``z(0) = (t*, y*)`` [1]_. It is found by extrapolation of the polynomial through the impacts with speeds v_i
+(each at most half of the one before) to v = 0. The last two extrapolations differ by about their error. No
+impact is needed at which rounding counts, whose share in the time of a flight is eps / v.
+
+*Derivatives* are those of the polynomial's value where its nodes move: ``sum_i w_i (dz_i - z'(v_i) dv_i)``
+with Lagrange's weights w_i at 0. Those of the nodes are products of the derivatives of flights and resets.
+
+.. [1] A. B. Nordmark, P. T. Piiroinen, Simulation and stability analysis of impacting systems with complete
+   chattering, Nonlinear Dynamics 58 (2009) 85-106, who take a first-order map near the limit in its place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.compiled import allocating_helper, helper
+from contfric.flow.layouts import FLOW, SECOND
+from contfric.handle import TABLE, HandleType
+
+#: By modes: the flight between the impacts (-1: no mode of chatter), observable of the gap, surface of the
+#: wall, side of it on which flights are, observable of the acceleration that is positive where it is left.
+TABLES = ("flights", "gaps", "walls", "sides", "lifts")
+LAYOUT = {**FLOW, **SECOND, **dict.fromkeys(TABLES, TABLE)}
+CHATTERING = HandleType("chattering", LAYOUT)
+
+#: Impacts that the polynomial goes through: with speeds halved from one to the next its error falls by more
+#: than a hundred for each.
+_NODES = 8
+#: A node has at most this share of the speed of the one before: nearer ones would cancel each other.
+_SHARE = 0.5
+#: Extrapolations that differ by less than this (relative to 1 + the time) have rounding left.
+_EXACT = 4e-16
+#: Where they differ by more than this share of a period the impacts converge to nothing.
+_CLOSE = 1e-8
+#: Impacts after which there is no limit: with a restitution of 0.99 speeds fall by a thousand in 700.
+MOST_IMPACTS = 10_000
+#: Impacts of which one is faster than this times the one before are not one chatter: the wall, or a force,
+#: has thrown the mass off.
+_FASTER = 2.0
+#: A speed below this share of that of the first impact, and of 1, is rest.
+_REST = 1e-14
+#: A flight longer than this many periods (or units of time) is none between impacts of chatter.
+_LONGEST = 64.0
+
+
+@helper
+def weights_at_rest(speeds, first, count, weights):  # type: ignore[no-untyped-def]
+    """Write Lagrange's weights at 0 of the nodes from ``first`` on."""
+    for i in range(first, count):
+        weights[i] = 1.0
+        for j in range(first, count):
+            if j != i:
+                weights[i] *= speeds[j] / (speeds[j] - speeds[i])
+
+
+@helper
+def extrapolated(speeds, nodes, first, count, weights, k):  # type: ignore[no-untyped-def]
+    """Return component k of the polynomial through the nodes from ``first`` on at 0."""
+    weights_at_rest(speeds, first, count, weights)
+    total = 0.0
+    for i in range(first, count):
+        total += weights[i] * (nodes[i, k] - nodes[count - 1, k])
+    return nodes[count - 1, k] + total
+
+
+@helper
+def slope_at_node(speeds, nodes, count, i, k):  # type: ignore[no-untyped-def]
+    """Return the derivative of component k of the polynomial at node i (barycentric formula)."""
+    total = 0.0
+    for j in range(count):
+        if j == i:
+            continue
+        ratio = 1.0  # of the barycentric weights of j and i
+        for m in range(count):
+            if m != i:
+                ratio *= speeds[i] - speeds[m]
+            if m != j:
+                ratio /= speeds[j] - speeds[m]
+        total += ratio * (nodes[j, k] - nodes[i, k]) / (speeds[j] - speeds[i])
+    return -total
+
+
+@allocating_helper
+def fly(motion, mode, t, y, p, which, slopes):  # type: ignore[no-untyped-def]
+    """Advance (t, y) from behind an impact to behind the next; return the time between, -1 if there is none.
+
+    ``slopes`` (1 + n, 1 + n + k), the derivatives of (t, y), are advanced as well, if there are any.
+    """
+    n, k, flight = y.shape[0], which.shape[0], motion.flights[mode]
+    c, wall = motion.gaps[mode], motion.walls[mode]
+    none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
+    level, before = motion.level(wall, p, none, empty), np.empty(n)
+    unit = motion.period(p, none, empty)
+    within = _LONGEST * (unit if unit > 0.0 else 1.0)
+    tau = motion.hit(flight, c, level, True, t, y, within, p, before)
+    if not tau > 0.0:
+        return -1.0
+    if slopes.shape[0] == 0:
+        motion.reset(wall, t + tau, before, p, none, y, nothing)
+        return tau
+    jac, grad, by = np.empty((n, 2 + n + k)), np.empty(1 + n + k), np.empty(k)
+    motion.flow(flight, t, y, tau, p, which, before, jac)
+    motion.observe(c, t + tau, before, p, which, grad)
+    motion.level(wall, p, which, by)
+    rate = grad[0]
+    for i in range(n):
+        rate += grad[1 + i] * jac[i, 1 + n]
+    ends = np.empty((1 + n, slopes.shape[1]))
+    for j in range(slopes.shape[1]):
+        moved = grad[0] * slopes[0, j]
+        if j > n:
+            moved += grad[j] - by[j - 1 - n]
+        for i in range(n):
+            ends[1 + i, j] = jac[i, 0] * slopes[0, j] + (jac[i, j + 1] if j > n else 0.0)
+            for a in range(n):
+                ends[1 + i, j] += jac[i, 1 + a] * slopes[1 + a, j]
+            moved += grad[1 + i] * ends[1 + i, j]
+        later = -moved / rate
+        ends[0, j] = slopes[0, j] + later
+        for i in range(n):
+            ends[1 + i, j] += jac[i, 1 + n] * later
+    bounced = np.empty((n, 1 + n + k))
+    motion.reset(wall, t + tau, before, p, which, y, bounced)
+    for j in range(slopes.shape[1]):
+        slopes[0, j] = ends[0, j]
+        for i in range(n):
+            slopes[1 + i, j] = bounced[i, 0] * ends[0, j] + (bounced[i, j] if j > n else 0.0)
+            for a in range(n):
+                slopes[1 + i, j] += bounced[i, 1 + a] * ends[1 + a, j]
+    return tau
+
+
+@allocating_helper
+def settle(motion, mode, limit, p):  # type: ignore[no-untyped-def]
+    """Take what is left of the gap's rate out of a limit, along the change that an impact makes."""
+    flight, c, y = motion.flights[mode], motion.gaps[mode], limit[1:]
+    none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
+    image = np.empty(y.shape[0])
+    motion.reset(motion.walls[mode], limit[0], y, p, none, image, nothing)
+    here = motion.rate(flight, c, limit[0], y, p, none, empty)
+    change = here - motion.rate(flight, c, limit[0], image, p, none, empty)
+    if change != 0.0:
+        for i in range(y.shape[0]):
+            y[i] += here / change * (image[i] - y[i])
+
+
+@allocating_helper
+def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-untyped-def]
+    """Write the limit (t*, y*) of the impacts from behind one of them; return its error, -1 if there is none.
+
+    ``jac`` (1 + n, 1 + n + k), if it has space: its derivatives by t0, y0 and the parameters.
+    """
+    n, k = y0.shape[0], which.shape[0]
+    width = 1 + n + k if jac.shape[0] > 0 else 0
+    t, y, grad = t0, y0.copy(), np.empty(width)
+    slopes = np.zeros((1 + n if width > 0 else 0, width))
+    for i in range(slopes.shape[0]):
+        slopes[i, i] = 1.0
+    speeds, weights, nodes = np.empty(_NODES), np.empty(_NODES), np.empty((_NODES, 1 + n))
+    speeds_by = np.zeros((_NODES, width))
+    nodes_by = np.zeros((_NODES, 1 + n if width > 0 else 0, width))
+    flight, c, side = motion.flights[mode], motion.gaps[mode], motion.sides[mode]
+    unit = motion.period(p, which[:0], grad[:0])
+    unit = unit if unit > 0.0 else 1.0
+    count, first_speed, last, found, before = 0, 0.0, np.inf, False, np.inf
+    for _ in range(MOST_IMPACTS):
+        v = side * motion.rate(flight, c, t, y, p, which, grad)
+        first_speed = max(first_speed, abs(v))
+        if not v > _REST * max(1.0, first_speed):  # without restitution at once
+            limit[0], limit[1:] = t, y
+            for i in range(slopes.shape[0]):
+                jac[i, :] = slopes[i, :]
+            return 0.0 if v > -1e-6 * max(1.0, first_speed) else -1.0
+        if v > _FASTER * before:
+            break
+        before = v
+        if count > 0 and v > speeds[count - 1]:
+            count, last = 0, np.inf  # the polynomial begins anew
+        if count == 0 or v <= _SHARE * speeds[count - 1]:
+            if count == _NODES:
+                for i in range(_NODES - 1):
+                    speeds[i], nodes[i], speeds_by[i] = (
+                        speeds[i + 1],
+                        nodes[i + 1],
+                        speeds_by[i + 1],
+                    )
+                    nodes_by[i] = nodes_by[i + 1]
+                count -= 1
+            speeds[count], nodes[count, 0], nodes[count, 1:] = v, t, y
+            for j in range(width):
+                speeds_by[count, j] = side * grad[0] * slopes[0, j]
+                if j > n:
+                    speeds_by[count, j] += side * grad[j]
+                for i in range(n):
+                    speeds_by[count, j] += side * grad[1 + i] * slopes[1 + i, j]
+            if width > 0:
+                nodes_by[count] = slopes
+            count += 1
+            if count > 2:
+                shorter = extrapolated(speeds, nodes, 1, count, weights, 0)
+                error = abs(extrapolated(speeds, nodes, 0, count, weights, 0) - shorter)
+                rounding = error >= last and last <= _CLOSE * unit
+                last = error
+                if error <= _EXACT * (1.0 + abs(t)) or rounding:
+                    found = True
+                    break
+        tau = fly(motion, mode, t, y, p, which, slopes)
+        if not tau > 0.0:
+            break
+        t += tau
+    if not found:
+        return -1.0
+    for q in range(1 + n):
+        limit[q] = extrapolated(speeds, nodes, 0, count, weights, q)
+    for q in range(jac.shape[0]):
+        jac[q, :] = 0.0
+        for i in range(count):
+            slope = slope_at_node(speeds, nodes, count, i, q)
+            for j in range(width):
+                jac[q, j] += weights[i] * (nodes_by[i, q, j] - slope * speeds_by[i, j])
+    settle(motion, mode, limit, p)
+    return last

@@ -1,0 +1,194 @@
+r"""Chatter that is derived: ``chatter: true`` in a reset that is an impact.
+
+Motion meets the wall h = 0 and is sent back with ``h' -> -e h'``. Where it is pressed to the wall
+(``h'' < 0`` along its flight) infinitely many impacts follow each other in finite time, and then it rests on
+the wall, by a force that acts in the direction in which the impacts do, and keeps ``h = h' = 0``::
+
+    y' = f(t, y) - h''(t, y) d(y),    h'' = (d/dt + f . d/dy)^2 h,    (dh'/dy) . d = 1,
+
+with d the direction of the change ``R(t, y) - y`` that the reset makes. The force vanishes where ``h''``
+does: there the mass leaves the wall. The mode, its field and the surface that ends it are put into the model
+as if they had been typed; its flow begins with the impacts (:mod:`contfric.flow.chatter`).
+
+This module imports sympy, and is loaded where a model asks for it.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
+
+import sympy
+
+from contfric.models.definition import Model
+from contfric.models.description import Description, ModeText
+from contfric.models.entries import EntryError
+from contfric.models.evaluate import defaults
+from contfric.models.functions import as_text
+from contfric.models.sections import joined_modes
+from contfric.models.symbols import Formulas
+
+#: The key of a reset.
+CHATTER = "chatter"
+#: Rounding in an identity of formulas, relative to 1 + the values; and states at which it must hold.
+_SAME, _PLACES = 1e-9, 8
+
+
+def chatter_parts(
+    description: Description, surfaces: tuple[str, ...], data: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return modes, observables and surfaces of a model with the modes of chatter at some walls.
+
+    Parameters
+    ----------
+    description : the model without them
+    surfaces : the walls
+
+    Raises
+    ------
+    EntryError
+        If a reset is no impact of one mode.
+    """
+    formulas = Formulas(description)
+    found: dict[str, Any] = {
+        key: dict(data.get(key) or {}) for key in ("observables", "surfaces", "modes")
+    }
+    chatters = {}
+    for surface in surfaces:
+        name = CHATTER if len(surfaces) == 1 else f"{CHATTER}_{surface}"
+        own = _Wall(formulas, surface, _flight(description, surface))
+        lift = f"{surface}_lift"
+        for kind, taken in (("modes", name), ("surfaces", lift), ("observables", lift)):
+            if taken in found[kind]:
+                raise EntryError(
+                    (kind, taken), f"'{taken}' is a name of the chatter at '{surface}'"
+                )
+        found["observables"][lift] = own.text(own.lift)
+        found["surfaces"][lift] = {"observable": lift, "level": "0"}
+        pressed = "-" if own.side > 0 else "+"
+        found["modes"][name] = {
+            "in": {**own.flight.sides, surface: 0, lift: pressed},
+            "field": dict(zip(description.states, map(own.text, own.field), strict=True)),
+            "rank": len(description.states) - 2,
+        }
+        chatters[surface] = {"mode": name, "flight": own.flight.name, "lift": lift}
+    return {**found, "chatters": chatters}
+
+
+def with_chatter(model: Model) -> Model | None:
+    """Return a model with chatter at all of its walls for which that is derived; None if there is none."""
+    from contfric.models.derive import model_from
+    from contfric.models.describe import describe, from_text
+
+    if not model.definition or model.composed or model.chatters:
+        return None
+    data = from_text(model.definition).data()
+    walls = [r.surface for r in model.resets if r.lands.get(r.surface, 0) > 0]
+    for surface in walls:
+        asked = {**data["resets"], surface: {**data["resets"][surface], CHATTER: True}}
+        with suppress(EntryError):
+            describe({**data, "resets": asked})
+            data["resets"] = asked
+    found = describe(data)
+    return model_from(found) if found.chatters else None
+
+
+def _flight(description: Description, surface: str) -> ModeText:
+    """Return the one mode that the impacts at a wall are in; of those that are one, the first."""
+    named = description.acts.get(surface, ())
+    found = [
+        mode
+        for mode in description.modes
+        if mode.sides.get(surface, 0) != 0 and (not named or mode.name in named)
+    ]
+    first = joined_modes(description)
+    if len({first[mode.name] for mode in found}) == 1 and 0 not in found[0].sides.values():
+        return next(mode for mode in found if mode.name == first[mode.name])
+    raise EntryError(
+        ("resets", surface, CHATTER),
+        f"chatter at '{surface}' is derived where its impacts are all in one mode that does not slide, and "
+        f"they are in {', '.join(mode.name for mode in found) or 'none'}",
+    )
+
+
+class _Wall:
+    """A wall: the field of contact, and the acceleration that leaves it, as formulas and as texts."""
+
+    def __init__(self, formulas: Formulas, surface: str, flight: ModeText) -> None:
+        description = formulas.description
+        self._formulas, self.surface, self.flight = formulas, surface, flight
+        self.side = flight.sides[surface]
+        [own] = [s for s in description.surfaces if s.name == surface]
+        c = [o.name for o in description.observables].index(own.observable)
+        field = formulas.fields()[[m.name for m in description.modes].index(flight.name)]
+        gap = formulas.observables()[c]
+        self._rate = self._along(gap, field)
+        self.lift = sympy.simplify(self._along(self._rate, field))
+        self._image = formulas.resets()[description.surfaces.index(own)]
+        slopes = [self._rate.diff(s) for s in formulas.y]
+        changes = [
+            [image.diff(s) - int(i == j) for j, s in enumerate(formulas.y)]
+            for i, image in enumerate(self._image)
+        ]
+        column = next((j for j, slope in enumerate(slopes) if slope != 0), None)
+        if column is None or description.kinks:
+            raise self._refused("the rate of the gap does not depend on the states")
+        along = [row[column] for row in changes]
+        size = sum(slope * a for slope, a in zip(slopes, along, strict=True))
+        if sympy.simplify(size) == 0:
+            raise self._refused("the reset does not change the rate of the gap")
+        direction = [sympy.simplify(a / size) for a in along]
+        self.field = [
+            sympy.simplify(f - self.lift * d) for f, d in zip(field, direction, strict=True)
+        ]
+        self._check(gap - formulas.levels()[description.surfaces.index(own)], column)
+        known = dict(zip(formulas.y, description.states, strict=True))
+        known |= dict(zip(formulas.p, (p.name for p in description.parameters), strict=True))
+        self._named = {symbol: sympy.Symbol(name) for symbol, name in known.items()}
+
+    def _along(self, formula: Any, field: list[Any]) -> Any:
+        states = zip(self._formulas.y, field, strict=True)
+        return sympy.expand_mul(formula.diff(self._formulas.t)) + sum(
+            formula.diff(s) * f for s, f in states
+        )
+
+    def _check(self, above: Any, column: int) -> None:
+        """Refuse a reset that is no impact: it moves states at rest on the wall, or takes others off it."""
+        f, draw = self._formulas, random.Random(1)
+        values = defaults(f.description)
+        symbols = (f.t, *f.y, *f.p)
+        fixed = [values[p.name] for p in f.description.parameters]
+        rates, heights, images = (
+            sympy.lambdify(symbols, formula, "math") for formula in (self._rate, above, self._image)
+        )
+        for _ in range(_PLACES):
+            t, y = draw.uniform(0.0, 3.0), [draw.uniform(-1.0, 1.0) for _ in f.y]
+            for _ in range(50):  # secants: affine in the state, most often
+                at, moved = rates(t, *y, *fixed), list(y)
+                moved[column] += 1e-4
+                slope = (rates(t, *moved, *fixed) - at) / 1e-4
+                if slope == 0.0 or abs(at) < 1e-12:
+                    break
+                y[column] -= at / slope
+            size = 1.0 + max(map(abs, y))
+            if abs(rates(t, *y, *fixed)) > _SAME * size:
+                continue
+            image = images(t, *y, *fixed)
+            if max(abs(a - b) for a, b in zip(image, y, strict=True)) > _SAME * size:
+                raise self._refused("it moves a state that rests on the wall")
+            y[column] += 1.0
+            image = images(t, *y, *fixed)
+            if abs(heights(t, *image, *fixed) - heights(t, *y, *fixed)) > _SAME * size:
+                raise self._refused("it takes states off the wall")
+
+    def _refused(self, why: str) -> EntryError:
+        return EntryError(
+            ("resets", self.surface, CHATTER),
+            f"the reset at '{self.surface}' is no impact that can chatter: {why}",
+        )
+
+    def text(self, formula: Any) -> str:
+        """Return a formula as an expression of the model."""
+        return as_text(formula.xreplace(self._named))
