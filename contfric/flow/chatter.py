@@ -49,7 +49,7 @@ _CLOSE = 1e-8
 MOST_IMPACTS = 10_000
 #: Impacts of which one is faster than this times the one before are not one chatter: the wall, or a force,
 #: has thrown the mass off.
-_FASTER = 2.0
+FASTER = 2.0
 #: A speed below this share of that of the first impact, and of 1, is rest.
 _REST = 1e-14
 #: A flight longer than this many periods (or units of time) is none between impacts of chatter.
@@ -184,7 +184,7 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
             for i in range(slopes.shape[0]):
                 jac[i, :] = slopes[i, :]
             return 0.0 if v > -1e-6 * max(1.0, first_speed) else -1.0
-        if v > _FASTER * before:
+        if v > FASTER * before:
             break
         before = v
         if count > 0 and v > speeds[count - 1]:

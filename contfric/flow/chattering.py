@@ -120,7 +120,11 @@ def hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-
     if limit_of(motion, mode, t0, y0, p, none, limit, nothing) < 0.0:
         return -1.0
     rests = limit[0] - t0
-    if c != motion.lifts[mode]:
+    if c == motion.lifts[mode]:
+        pulled = motion.observe(c, limit[0], limit[1:], p, none, np.empty(0))
+        if motion.sides[mode] * (pulled - target) > 0.0:
+            return -1.0  # it does not stay
+    else:
         at = hit_in_flights(motion, mode, c, target, t0, y0, min(rests, dt_max), p, y1)
         if at >= 0.0:
             return at

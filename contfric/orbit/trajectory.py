@@ -15,6 +15,7 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, vector
+from contfric.flow.chatter import FASTER
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
 from contfric.orbit.simulation import EventRows
@@ -60,9 +61,9 @@ NO_FLIGHT = 1e-7
 _AHEAD = 1e-3
 #: Numbers that a simulation hands over to the call that goes on with it: whether there are any, the period
 #: and phase it began in, the period it is in, events at once, whether one was an impact, surfaces it is on,
-#: 1 + the wall that was met last if no other event came since.
-CARRIED = 8
-STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON, BOUNCED = range(CARRIED)
+#: 1 + the wall that was met last if no other event came since, and the speed behind that impact.
+CARRIED = 9
+STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON, BOUNCED, SPEED = range(CARRIED)
 
 #: A state this large grows for ever (negative damping, or resonance without any): its square is still
 #: far from overflow, and its events are still exact.
@@ -274,7 +275,8 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
     unit = period if period > 0.0 else 1.0
     cycle, t, on = begin(carry, on, t, period)
     event, waited, at_most = 0, 0.0, shortest_flight(tables, mode)
-    at_once, struck, bounced = int(carry[AT_ONCE]), carry[STRUCK] != 0.0, int(carry[BOUNCED])
+    at_once, struck = int(carry[AT_ONCE]), carry[STRUCK] != 0.0
+    bounced, speed = int(carry[BOUNCED]), carry[SPEED]
     for _ in range(budget):
         if event == rows.joints.shape[0]:
             break
@@ -325,12 +327,16 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
             unit,
             workspace,
         )
+        anew, before = bounced != 1 + surface, speed
+        if chatter >= 0:
+            c = tables.observables[surface]
+            speed = abs(functions.rate(target, c, t, y, p, none, workspace.empty))
+            # all impacts behind another event, or behind a throw, are one chatter, or none is
+            anew = anew or speed > FASTER * before or at_once > MOST_AT_ONCE
         if chatter >= 0 and (
             pressed
-            or at_once > MOST_AT_ONCE
             or (
-                bounced
-                != 1 + surface  # all impacts since another event are one chatter, or none is
+                anew
                 and leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace)
             )
         ):
@@ -351,7 +357,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         if mode < 0:  # not visited yet: the tables are to be extended
             break
     carry[CYCLE], carry[AT_ONCE], carry[ON] = float(cycle), float(at_once), float(on)
-    carry[BOUNCED] = float(bounced)
+    carry[BOUNCED], carry[SPEED] = float(bounced), speed
     carry[STRUCK] = 1.0 if struck else 0.0
     return ALL_EVENTS, event, mode, cycle, t
 
