@@ -295,7 +295,7 @@ made_of(Bifurcation, _parts, Bifurcation)
 def meaning_of(kind: Kind, model: Model, surfaces: Set[str]) -> str:
     """Return what happens at an event on surfaces of a model: a sliding only where something slides."""
     if surfaces & model.settled_sides.keys():
-        return "incomplete chatter: the wall lets go before the impacts have come to rest"
+        return "incomplete chatter"
     if kind is Kind.CS and not any(mode.sliding for mode in model.modes):
         return "corner: two surfaces are met at once"
     if kind is not Kind.GS:

@@ -274,6 +274,9 @@ def symmetry_of(sampler: Sampler, surfaces: list[Surface]) -> Symmetry | None:
             for at in (points, moved)
         )
         images = {s.name: _image(s, heights, beyond) for s in surfaces}
+        lifts = {own.surface: own.lift for own in description.chatters}
+        for wall, lift in lifts.items():  # of two walls they may be levels of one observable
+            images[lift] = lifts.get(images[wall], images[lift])
     except ModelError as error:
         raise EntryError(("symmetry",), str(error)) from None
     if not description.period:

@@ -19,7 +19,7 @@ IMAGES = HERE.parent / "images" / "gallery"
 STUDIES = (
     *("dead-band", "impact", "impact-friction", "belt", "popp", "bang-bang"),
     *("buck", "relay", "relay-sliding", "thermostat", "rocking-block", "rimless-wheel"),
-    *("bouncing-ball", "gear-pair", "pendulum", "normal-force", "jenkins"),
+    *("bouncing-ball", "chattering-ball", "gear-pair", "pendulum", "normal-force", "jenkins"),
     "compass-gait",
     *("blade-damper", "pounding", "two-blocks", "braced-chain"),
     *("drill-string", "iwan", "beam-stop", "storeys"),

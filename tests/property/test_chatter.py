@@ -303,3 +303,31 @@ def test_what_is_no_impact_is_refused_in_one_line(reset: str, why: str, tmp_path
     with pytest.raises(ModelError, match=why) as error:
         ball(tmp_path, reset)
     assert "\n" not in str(error.value).strip()
+
+
+GEAR = """
+name: gear
+states: [x, v]
+parameters: {w: 0.5, A: 1.0, beta: 0.1, d: 0.5, e: 0.3}
+constraints: [w > 0, e >= 0, e < 1]
+period: 2*pi/w
+surfaces: {right: {observable: x, level: d}, left: {observable: x, level: -d}}
+modes: {free: {in: {right: -, left: +}, field: {x: v, v: A*cos(w*t) - beta*v}}}
+resets: {right: {v: -e*v}, left: {v: -e*v}}
+symmetry: x -> -x, v -> -v, t -> t + T/2
+spread: {x: 0.5, v: 1}
+"""
+
+
+def test_a_pair_of_gears_rests_on_both_flanks(tmp_path: Path) -> None:
+    path = tmp_path / "gear.yaml"
+    path.write_text(GEAR, encoding="utf-8")
+    orbit = cf.find_orbit(path, {})
+    assert orbit.symmetric and orbit.admissible
+    kinds = [mode for mode, _ in orbit.word]
+    assert sorted(kinds) == ["chatter_left", "chatter_right", "free", "free"]
+    for (mode, _), end in zip(orbit.word, orbit.ends, strict=True):
+        if mode.startswith("chatter"):  # let go where the force changes its sign: cos(w t) = 0
+            assert abs(np.cos(0.5 * end[0])) < 1e-12 and abs(end[2]) < 1e-13
+    diagram = cf.explore(orbit, "w", (0.4, 0.6))
+    assert [str(b.name) for b in diagram.branches] == [orbit.name]
