@@ -49,9 +49,12 @@ from contfric.orbit.trajectory import (
     SLIDE_PERIODS,
     TOO_LARGE,
     StateWorkspace,
+    code_ahead,
     copy_state,
     first_hit,
     is_pressed,
+    leads_to_rest,
+    lying_on,
     mode_after,
     sign_code,
     whole_turns,
@@ -124,6 +127,10 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
     duration, turns = 0.0, 0
     at_most = NO_FLIGHT if walk.at_once[1] & 2 != 0 else NO_TIME
     longest = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * period
+    for k in range(tables.flights.shape[0]):
+        if tables.flights[k] >= 0:  # behind a wall it may begin at rest on a section
+            on |= lying_on(functions, tables, t, y, p, workspace)
+            break
     while True:
         tau, surface = first_hit(functions, tables, mode, on, t, y, p, longest, period, workspace)
         if surface < 0:
@@ -149,6 +156,8 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
             functions.reset(surface, t, workspace.after, p, workspace.none, y, workspace.nothing)
         landed = tables.landed[surface]
         code = sign_code(functions, observables, landed, t, y, p, workspace.none, workspace.empty)
+        if tables.flights[mode] >= 0:
+            code = code_ahead(functions, tables, mode, t, y, p, period, workspace)
         following = mode_after(tables, mode, surface, code)
         if following >= 0:
             pressed = reset and is_pressed(
@@ -164,6 +173,14 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
                 period,
                 workspace,
             )
+            chatter = tables.chatters[following, surface] if reset else -1
+            if chatter >= 0:
+                copy_state(workspace.after, walk.end)
+                if pressed or leads_to_rest(
+                    functions, tables, chatter, surface, t, y, p, period, workspace
+                ):
+                    following, pressed = chatter, False
+                copy_state(walk.end, workspace.after)
             why = CHATTER if pressed else ARRIVED
             return why, surface, following, duration, turns, t
         if reset:

@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 import contfric as cf
 from contfric.continuation.events import EndReason
-from contfric.errors import ModelError
+from contfric.errors import ModelError, ParameterError
 from contfric.models.chatter import with_chatter
 from contfric.models.check import check_model
 from contfric.orbit.simulation import SimulationEnd
@@ -331,3 +331,24 @@ def test_a_pair_of_gears_rests_on_both_flanks(tmp_path: Path) -> None:
             assert abs(np.cos(0.5 * end[0])) < 1e-12 and abs(end[2]) < 1e-13
     diagram = cf.explore(orbit, "w", (0.4, 0.6))
     assert [str(b.name) for b in diagram.branches] == [orbit.name]
+
+
+def test_exponents_and_basins_of_chatter() -> None:
+    model = with_chatter(cf.load_model("pounding"))
+    assert model is not None
+    params = {"w": 0.3, "e": 0.2, "d": 0.0, "F": 0.5}
+    orbit = cf.find_orbit(model, params)
+    found = cf.lyapunov_exponent(model, params, periods=300)
+    moduli = np.sort(np.abs(orbit.multipliers))[::-1]
+    assert found.exponents[:2] == pytest.approx(np.log(moduli[:2]) / orbit.period, abs=1e-9)
+    assert np.all(np.isneginf(found.exponents[2:]))
+    ball_ = with_chatter(cf.load_model("bouncing-ball"))
+    assert ball_ is not None
+    basins = cf.basins(ball_, {"a": 1.2, "e": 0.5}, {"x": [1.5, 2.0, 3.0], "v": [-1.0, 0.0, 1.0]})
+    assert "1a, 2seg, 1imp 100.0%" in repr(basins)
+
+
+def test_proofs_are_not_offered_for_chatter() -> None:
+    orbit = cf.find_orbit("bouncing-ball", {"a": 1.2, "e": 0.5})
+    with pytest.raises(ParameterError, match="infinitely many impacts"):
+        orbit.certify()

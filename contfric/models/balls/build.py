@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from flint import arb
 
+from contfric.errors import ParameterError
 from contfric.models.balls.model import BallModel
 from contfric.models.definition import Model
 
@@ -22,7 +23,7 @@ def ball_model(
     Raises
     ------
     ParameterError
-        If the model moves in no closed form: the message names the modes.
+        If the model moves in no closed form: the message names the modes; or has modes of chatter.
 
     Examples
     --------
@@ -31,6 +32,10 @@ def ball_model(
     >>> ball_model(model, model.defaults).states
     2
     """
+    if model.chatters:
+        raise ParameterError(
+            f"proofs are not offered for '{model.name}': infinitely many impacts have no enclosure here"
+        )
     balls = {name: arb(float(number)) for name, number in params.items()}
     if free is not None and value is not None:
         balls[free] = value
