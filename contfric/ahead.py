@@ -39,10 +39,12 @@ _GROUPS = (
 @cache
 def every_kernel() -> dict[str, Kernel]:
     """Return the kernels of the package by the names of their folders in the cache."""
-    from contfric.flow.coded.kernels import KERNELS
+    from contfric.flow.chattering import KERNELS as CHATTERING
+    from contfric.flow.coded.kernels import KERNELS as CODED
     from contfric.flow.general import Kind, kernels_of
 
-    found = [*(kernel for kind in Kind for kernel in kernels_of(kind)), *KERNELS.values()]
+    found = [kernel for kind in Kind for kernel in kernels_of(kind)]
+    found += [*CODED.values(), *CHATTERING.values()]
     root = Path(__file__).parent
     for file in package_files():
         if _MARK not in file.read_text(encoding="utf-8"):
@@ -124,8 +126,12 @@ def compile_missing(
 
 def waiting(left: Sequence[str], count: int, workers: int | None = None) -> str:
     """Return what is said while kernels are compiled: how many are left, and for how long."""
-    seconds = expected(left) / (workers or os.cpu_count() or 1)
-    return f"compiling the engine, once: {len(left)} of {count} kernels left, {about(seconds)}"
+    return f"compiling the engine, once: {len(left)} of {count} kernels left, {duration(left, workers)}"
+
+
+def duration(names: Sequence[str], workers: int | None = None) -> str:
+    """Return how long some kernels will take to compile."""
+    return about(expected(names) / (workers or os.cpu_count() or 1))
 
 
 def _group(name: str) -> int:

@@ -6,6 +6,7 @@ This module does not import numba, which takes longer than reading all sources.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
@@ -14,20 +15,25 @@ from contfric.resources import user_cache
 #: Text of a file whose code may be part of a kernel.
 _MARK = b"contfric.compiled"
 _ROOT = Path(__file__).parent
-
-
-def _digest(contents: list[bytes]) -> str:
-    return hashlib.sha256(b"".join(contents)).hexdigest()[:16]
+#: What came with a wheel beside the package: generated modules in it are none of its own.
+_DATA = _ROOT / "_data"
 
 
 def package_files() -> list[Path]:
-    """Return the modules of the package; generated ones that came with the wheel are data."""
-    return sorted(file for file in _ROOT.rglob("*.py") if _ROOT / "_data" not in file.parents)
+    """Return the modules of the package."""
+    return sorted(file for file in _ROOT.rglob("*.py") if _DATA not in file.parents)
 
 
 @cache
-def _package() -> list[bytes]:
-    return [file.read_bytes() for file in package_files()]
+def _package() -> dict[str, bytes]:
+    return {file.relative_to(_ROOT).as_posix(): file.read_bytes() for file in package_files()}
+
+
+def _digest(contents: Mapping[str, bytes]) -> str:
+    found = hashlib.sha256()
+    for name, content in contents.items():
+        found.update(f"{name} {len(content)} ".encode() + content)
+    return found.hexdigest()[:16]
 
 
 @cache
@@ -42,9 +48,10 @@ def kernels_digest(folder: Path = _ROOT) -> str:
 
     A kernel may use any helper of the package, and those of its own folder.
     """
-    own = [] if folder == _ROOT or _ROOT in folder.parents else sorted(folder.glob("*.py"))
-    every = _package() + [file.read_bytes() for file in own]
-    return _digest([text for text in every if _MARK in text])
+    every = dict(_package())
+    if folder != _ROOT and (_ROOT not in folder.parents or _DATA in folder.parents):
+        every |= {f"./{file.name}": file.read_bytes() for file in sorted(folder.glob("*.py"))}
+    return _digest({name: text for name, text in every.items() if _MARK in text})
 
 
 def kernels_folder() -> Path:

@@ -15,7 +15,8 @@ def doctor(options: argparse.Namespace) -> int:
     import numba
 
     from contfric import __version__
-    from contfric.ahead import can_keep, compile_missing, every_kernel, missing, waiting
+    from contfric.ahead import can_keep, compile_missing, duration, every_kernel, missing, waiting
+    from contfric.resources import SHIPPED_KERNELS
     from contfric.shipped import describe
     from contfric.sources import kernels_folder
     from contfric.targets import target
@@ -27,19 +28,22 @@ def doctor(options: argparse.Namespace) -> int:
             show(waiting(absent, len(absent), options.workers))
             compile_missing(options.workers, show)
         absent = missing()
+    kept = [kernel.kept() for kernel in every_kernel().values()]
+    shipped = sum(file is not None and SHIPPED_KERNELS in file.parents for file in kept)
     lines = {
         "contfric": f"{__version__}, Python {platform.python_version()}, numba {numba.__version__}, "
         f"llvmlite {llvmlite.__version__}",
         "processor": f"{target().processor} ({platform.machine()})",
         "wheel": describe(),
         "cache": str(kernels_folder()),
-        "kernels": f"{count - len(absent)} of {count} compiled",
+        "kernels": f"{count - len(absent)} of {count} compiled, {shipped} of them with the wheel",
     }
     for name, text in lines.items():
         print(f"{name:10} {text}")
     if absent:
         hint = (
-            "contfric doctor --compile compiles them now, else who needs one waits for it"
+            f"contfric doctor --compile compiles them now ({duration(absent, options.workers)}), "
+            "else who needs one waits for it"
             if can_keep()
             else "the cache cannot be written: kernels are compiled in every process, slower"
         )

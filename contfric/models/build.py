@@ -45,7 +45,7 @@ class GeneratedFlow:
         coded = coded_flow(self.definition)
         if coded is None:
             tolerance = json.loads(self.definition)["integration"]["tolerance"]
-            found = load_module(self.definition).compiled_flow(tolerance)
+            found: CompiledFlow = load_module(self.definition).compiled_flow(tolerance)
         else:
             found = coded.flow
         if '"chatters":' not in self.definition:
