@@ -52,7 +52,7 @@ def announced(name: str, folder: Path, log: Logger) -> Iterator[None]:
 
 def _say(name: str, folder: Path, log: Logger) -> None:
     how_often = "once" if writable(folder) else "in every process"
-    log.info("compiling %s, %s: %s", name, how_often, about(expected([name])))
+    log.info("compiling %s, %s: %s", name, how_often, time_of(name))
 
 
 class _BetweenPasses(Listener):  # type: ignore[misc]
@@ -90,6 +90,11 @@ def about(seconds: float) -> str:
     """
     step = 1 if seconds < 10.0 else (5 if seconds < 60.0 else 10)
     return f"about {max(step, step * round(seconds / step))} s"
+
+
+def time_of(name: str) -> str:
+    """Return how long a kernel will take to compile."""
+    return about(expected([name]))
 
 
 def expected(names: Sequence[str]) -> float:

@@ -31,6 +31,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -38,7 +39,7 @@ import numba
 from numba import types
 from numba.core import config
 
-from contfric.announced import announced
+from contfric.announced import announced, time_of
 from contfric.inlined import part_options
 from contfric.kept import KernelFiles, file_name, writable
 from contfric.resources import SHIPPED_KERNELS, user_cache
@@ -132,7 +133,9 @@ class Kernel:
         aside = _ASIDE.get(f"{function.__module__}:{function.__name__}")
         if aside is not None:
             if aside.poll() is None:
-                _log.info("compiling %s, once, in another process", self.name)
+                _log.info(
+                    "compiling %s, once, in another process: %s", self.name, time_of(self.name)
+                )
             aside.wait()  # another process is compiling it into the cache
         found = numba.njit(**_OPTIONS)(function)
         found._cache = self._files()
@@ -172,22 +175,21 @@ _ASIDE: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def compile_aside(kernels: Sequence[str]) -> None:
-    """Compile kernels in a second process, if nothing is cached yet; who needs one waits for it.
+    """Compile kernels in a second process, those that have to be; who needs one waits for it.
 
     Parameters
     ----------
     kernels : names "module:kernel"
     """
-    folder = kernels_folder()
-    cold = not _ASIDE and not folder.exists() and not (SHIPPED_KERNELS / folder.name).exists()
-    if not cold or (os.cpu_count() or 1) < 2 or not sys.executable:
+    if _ASIDE or (os.cpu_count() or 1) < 2 or not sys.executable:
         return
-    if not writable(folder.parent):  # what another process compiles would be lost
+    named = [kernel.split(":") for kernel in kernels]
+    absent = [[m, name] for m, name in named if getattr(import_module(m), name).kept() is None]
+    if not absent or not writable(kernels_folder()):  # what another process compiles would be lost
         return
     # the same path as here: what lies in the working folder is not imported by accident
     code = f"import sys; sys.path[:] = {sys.path!r}\n" + "".join(
-        f"from {module} import {name}; {name}.dispatcher\n"
-        for module, name in (kernel.split(":") for kernel in kernels)
+        f"from {module} import {name}; {name}.dispatcher\n" for module, name in absent
     )
     silent = {
         "stdin": subprocess.DEVNULL,
@@ -198,7 +200,7 @@ def compile_aside(kernels: Sequence[str]) -> None:
         process = subprocess.Popen([sys.executable, "-c", code], **silent)  # type: ignore[call-overload]
     except OSError:  # no process to be had: they are compiled here, one after the other
         return
-    _ASIDE.update(dict.fromkeys(kernels, process))
+    _ASIDE.update(dict.fromkeys(map(":".join, absent), process))
     atexit.register(_end, process)
 
 
