@@ -33,6 +33,11 @@ def make(patterns: Sequence[str] = ("*",)) -> int:
     """
     every = {**every_kernel(), **models_kernels()}
     names = [name for name in every if any(fnmatch(name, pattern) for pattern in patterns)]
+    if not names:
+        raise SystemExit(
+            f"no kernel is called {' or '.join(patterns)}: names are such as {min(every)}, "
+            "with * for any part"
+        )
     compile_missing(names=names)
     absent = [name for name in names if every[name].kept() is None]
     if absent:

@@ -113,6 +113,14 @@ def test_the_doctor_says_what_came_with_the_wheel(wheel, capsys):
     assert f"not used: numba is {facts['numba']}, not 0.1\n" in said()
 
 
+def test_a_pattern_that_no_kernel_has_is_refused(monkeypatch, wheel):
+    monkeypatch.setattr(shipped, "models_kernels", dict)
+    with pytest.raises(
+        SystemExit, match=r"no kernel is called contfric\.orbits\.\*: names are such"
+    ):
+        shipped.make(["contfric.orbits.*"])
+
+
 class Heard:
     """Stands for hatchling's application."""
 
