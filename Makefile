@@ -1,4 +1,4 @@
-# make setup | demo | test | test-all | gate | bench | stress | studies | gallery | docs | notebooks | clean
+# make setup | wheel | demo | test | test-all | gate | bench | stress | studies | gallery | docs | notebooks | clean
 PYTHON ?= python3
 WORKERS ?= 2
 
@@ -12,7 +12,7 @@ DEMO := demo
 STRESS := .stress
 
 .DEFAULT_GOAL := help
-.PHONY: help setup kernels demo test lint types contracts unit test-all gate bench stress studies gallery docs notebooks clean
+.PHONY: help setup kernels wheel demo test lint types contracts unit test-all gate bench stress studies gallery docs notebooks clean
 MAKEFLAGS += --no-print-directory
 
 help:
@@ -27,6 +27,7 @@ help:
 	@echo "make docs     the documentation as a site, in $(SITE)/; a warning or a broken link fails it"
 	@echo "make notebooks  the notebooks of docs/tutorial, executed anew in place"
 	@echo "make setup    a virtual environment in $(VENV)/, and all kernels compiled"
+	@echo "make wheel    a wheel in dist/ with compiled kernels, for this Python, numba and platform"
 	@echo "make clean    removes what make and the tests wrote, and keeps $(VENV)/"
 
 setup: $(STAMP) kernels
@@ -35,6 +36,11 @@ setup: $(STAMP) kernels
 kernels: $(STAMP)
 	@echo "== kernels"
 	@$(BIN)/contfric doctor --compile --workers $(WORKERS)
+
+# Without isolation: the kernels in it are for the numba and llvmlite that they are compiled with.
+wheel: $(STAMP)
+	@echo "== wheel"
+	@$(BIN)/python -m build --wheel --no-isolation --outdir dist
 
 $(STAMP): pyproject.toml
 	@echo "== setup: $(VENV)"

@@ -41,14 +41,6 @@ def timed(seconds: dict[str, float], name: str, call: Callable[[], Any]) -> Any:
         seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - start
 
 
-def registries() -> None:
-    """Load what numba knows of Python and numpy: the first kernel that is loaded does this."""
-    from numba.core.registry import cpu_target
-
-    cpu_target.target_context.refresh()
-    cpu_target.typing_context.refresh()
-
-
 def watch_kernels(seconds: dict[str, float]) -> None:
     """Time each kernel that is compiled or loaded; its helpers count for the first that calls them."""
     from contfric.compiled import Kernel
@@ -95,7 +87,6 @@ def imported(study: str) -> dict[str, float]:
     if timed(seconds, "reading the study", lambda: read_study(study)).drawings:
         load("matplotlib", "matplotlib.figure")
     load("numba", "numba")
-    timed(seconds, "numba's registries", registries)
     return seconds
 
 

@@ -150,8 +150,7 @@ first called; the process leaves without taking Python and the compiler apart, w
 ## Where the time goes
 
 One run of each scene with the clock on each part (`benchmarks/scene_probe.py`): imports in the order in
-which a run has them, kernels loaded from the cache. Numba's registries are what it knows of Python and numpy;
-it loads them before its first kernel, cached or not. The last column is the very first run.
+which a run has them, kernels loaded from the cache. The last column is the very first run.
 
 {parts}
 

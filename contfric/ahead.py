@@ -7,7 +7,7 @@ calls. What belongs to one model is compiled with that model.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from fnmatch import fnmatch
 from functools import cache
@@ -15,7 +15,10 @@ from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 
-from contfric.compiled import Kernel, cache_folder
+from contfric.announced import about, expected
+from contfric.compiled import Kernel
+from contfric.kept import writable
+from contfric.sources import kernels_folder, package_files
 
 Progress = Callable[[str], None]
 
@@ -29,18 +32,21 @@ _GROUPS = (
     ("flow.general.*-stiff",),
     ("chaos",),
     ("flow.coded",),
+    ("contfric_model_",),
 )
 
 
 @cache
 def every_kernel() -> dict[str, Kernel]:
     """Return the kernels of the package by the names of their folders in the cache."""
-    from contfric.flow.coded.kernels import KERNELS
+    from contfric.flow.chattering import KERNELS as CHATTERING
+    from contfric.flow.coded.kernels import KERNELS as CODED
     from contfric.flow.general import Kind, kernels_of
 
-    found = [*(kernel for kind in Kind for kernel in kernels_of(kind)), *KERNELS.values()]
+    found = [kernel for kind in Kind for kernel in kernels_of(kind)]
+    found += [*CODED.values(), *CHATTERING.values()]
     root = Path(__file__).parent
-    for file in sorted(root.rglob("*.py")):
+    for file in package_files():
         if _MARK not in file.read_text(encoding="utf-8"):
             continue
         name = ".".join((root.name, *file.relative_to(root).with_suffix("").parts))
@@ -49,23 +55,44 @@ def every_kernel() -> dict[str, Kernel]:
     return {kernel.name: kernel for kernel in found}
 
 
-def missing() -> list[str]:
-    """Return the names of the kernels that are not in the cache; damaged ones are thrown away."""
-    return [name for name, kernel in every_kernel().items() if not kernel.cached()]
+@cache
+def models_kernels() -> dict[str, Kernel]:
+    """Return the kernels of the bundled models by their names; models whose formulas are tables have none."""
+    from contfric.models import load_model
+    from contfric.models.build import GeneratedFlow, kernels_of
+    from contfric.models.library import bundled
+
+    flows = [load_model(name).flow_factory for name in bundled()]
+    found = [k for flow in flows if isinstance(flow, GeneratedFlow) for k in kernels_of(flow)]
+    return {kernel.name: kernel for kernel in found}
 
 
-def writable() -> bool:
+def _kernels(names: Sequence[str] | None) -> dict[str, Kernel]:
+    """Return kernels of the package, and of models, by their names; those of the package if None."""
+    if names is None:
+        return every_kernel()
+    every = dict(every_kernel())
+    if not every.keys() >= set(names):
+        every |= models_kernels()
+    return {name: every[name] for name in names}
+
+
+def missing(names: Sequence[str] | None = None) -> list[str]:
+    """Return the names of the kernels that have to be compiled; damaged ones have to be."""
+    return [name for name, kernel in _kernels(names).items() if kernel.kept() is None]
+
+
+def can_keep() -> bool:
     """Tell whether what is compiled can be kept."""
-    folder = cache_folder(Path(__file__))
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return False
-    return os.access(folder, os.W_OK)
+    return writable(kernels_folder())
 
 
-def compile_missing(workers: int | None = None, progress: Progress | None = None) -> list[str]:
-    """Compile what is not in the cache, in several processes; return the names.
+def compile_missing(
+    workers: int | None = None,
+    progress: Progress | None = None,
+    names: Sequence[str] | None = None,
+) -> list[str]:
+    """Compile what is neither in the wheel nor in the cache, in several processes; return the names.
 
     Nothing where the cache cannot be written: what other processes compile would be lost.
 
@@ -73,25 +100,38 @@ def compile_missing(workers: int | None = None, progress: Progress | None = None
     ----------
     workers : number of processes; that of the processor's cores if None
     progress : called with what was done
+    names : of the kernels that are wanted; those of the package if None
     """
-    if not writable():
+    if not can_keep():
         return []
-    names = missing()
+    absent = missing(names)
     groups: dict[int, list[str]] = {}
-    for name in names:
+    for name in absent:
         groups.setdefault(_group(name), []).append(name)
     if not groups:
         return []
     # fresh processes: a fork would take over the compiler in whatever state it is
-    pool = ProcessPoolExecutor(workers or os.cpu_count(), mp_context=get_context("spawn"))
+    workers = workers or os.cpu_count() or 1
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
     with pool:
-        jobs = [pool.submit(_compile, groups[k]) for k in sorted(groups)]
-        done = 0
+        jobs = {pool.submit(_compile, groups[k]): groups[k] for k in sorted(groups)}
+        left = list(absent)
         for job in as_completed(jobs):
-            done += job.result()
-            if progress is not None:
-                progress(f"compiling the engine, once: {done} of {len(names)} kernels")
-    return names
+            job.result()
+            left = [name for name in left if name not in jobs[job]]
+            if progress is not None and left:
+                progress(waiting(left, len(absent), workers))
+    return absent
+
+
+def waiting(left: Sequence[str], count: int, workers: int | None = None) -> str:
+    """Return what is said while kernels are compiled: how many are left, and for how long."""
+    return f"compiling the engine, once: {len(left)} of {count} kernels left, {duration(left, workers)}"
+
+
+def duration(names: Sequence[str], workers: int | None = None) -> str:
+    """Return how long some kernels will take to compile."""
+    return about(expected(names) / (workers or os.cpu_count() or 1))
 
 
 def _group(name: str) -> int:
@@ -102,7 +142,7 @@ def _group(name: str) -> int:
     return len(_GROUPS)
 
 
-def _compile(names: list[str]) -> int:
+def _compile(names: list[str]) -> None:
+    kernels = _kernels(names)
     for name in names:
-        every_kernel()[name].dispatcher  # noqa: B018
-    return len(names)
+        kernels[name].dispatcher  # noqa: B018

@@ -11,11 +11,11 @@ A flow reaches the engine as addresses of functions of the fixed types below (:m
 what lets numba cache the engine: a kernel that takes a jitted function as an ordinary argument would be
 compiled anew in every process.
 
-The cache lives in ``$CONTFRIC_CACHE_DIR``, else in ``$NUMBA_CACHE_DIR``, else in the user's cache
-folder (``~/.cache/contfric``). Numba renews a cached kernel only when the file of the kernel itself
-changes, not when a helper in another file does; so the folder's name carries a digest of all
-compiled sources. Each kernel has a folder of its own below that, one for each Python, numba, llvmlite and
-processor, with the digests of its files: damaged ones are thrown away, and the kernel is compiled again.
+Code comes with the wheel (``_data/kernels``), where the wheel was built with it and it fits; else it is
+compiled into the cache: ``$CONTFRIC_CACHE_DIR``, else ``$NUMBA_CACHE_DIR``, else the user's cache folder
+(``~/.cache/contfric``). Both have the same folders: one for a digest of all compiled sources, as a kernel
+changes with its helpers in other files; below it one for each kernel, with a file for each Python, numba,
+llvmlite and processor (:mod:`contfric.kept`). A damaged file is not used: the kernel is compiled again.
 Where no folder is writable the kernels are compiled in every process: slower, never broken.
 
 What is compiled is said at level INFO of the logger ``contfric.compiled``, before and after.
@@ -25,31 +25,26 @@ from __future__ import annotations
 
 import atexit
 import gc
-import hashlib
 import logging
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from functools import cache, cached_property
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from importlib import import_module
 from pathlib import Path
-from time import perf_counter
 from typing import Any, TypeVar
 
-import llvmlite
 import numba
-from llvmlite import binding
 from numba import types
 from numba.core import config
-from numba.core.codegen import get_host_cpu_features
-from numba.core.event import Listener, install_listener
 
-from contfric.checked import discard, discard_damaged, list_files
-from contfric.errors import ResultFileError
+from contfric.announced import announced, time_of
 from contfric.inlined import part_options
-from contfric.interrupts import held_back
-from contfric.resources import user_cache
+from contfric.kept import KernelFiles, file_name, writable
+from contfric.resources import SHIPPED_KERNELS, user_cache
+from contfric.sources import kernels_digest, kernels_folder
+from contfric.targets import shipped_target, target
 
 _log = logging.getLogger(__name__)
 
@@ -93,9 +88,8 @@ scale_signature = f8(i8, vector)
 #: the first row of ``jac``. ``workspace`` holds 8 + n numbers. 0 where a flow has none.
 second_signature = i8(i8, i8, f8, vector, f8, vector, indices, vector, matrix, vector)
 
-#: How an entry point is compiled, and the files that numba caches it in.
+#: How an entry point is compiled.
 _OPTIONS = {"nogil": True, "error_model": "numpy"}
-_CACHED = (".nbi", ".nbc")
 
 
 class Kernel:
@@ -118,16 +112,19 @@ class Kernel:
         """The name of its folder in the cache."""
         return f"{self.__wrapped__.__module__}.{self.__wrapped__.__name__}{self.label}"
 
-    def cached(self) -> bool:
-        """Tell whether it lies in the cache; damaged files are thrown away."""
-        try:
-            return discard_damaged(self._folder(), _CACHED)
-        except OSError:
-            return False
+    def kept(self) -> Path | None:
+        """Return the file that its code is loaded from, None if it has to be compiled."""
+        return self._files().found()
 
-    def _folder(self) -> Path:
-        target = _target(config.CPU_NAME, config.CPU_FEATURES, config.ENABLE_AVX)
-        return cache_folder(Path(self.__wrapped__.__code__.co_filename)) / self.name / target
+    def _files(self) -> KernelFiles:
+        """Where its code is looked for: with the package, then in the cache."""
+        function, shipped = self.__wrapped__, shipped_target()
+        digest = kernels_digest(Path(function.__code__.co_filename).parent)
+        own = user_cache() / digest / self.name / file_name(function, self.signature, target())
+        if shipped is None:
+            return KernelFiles([own])
+        name = file_name(function, self.signature, shipped)
+        return KernelFiles([SHIPPED_KERNELS / digest / self.name / name, own])
 
     @cached_property
     def dispatcher(self) -> Any:
@@ -136,39 +133,25 @@ class Kernel:
         aside = _ASIDE.get(f"{function.__module__}:{function.__name__}")
         if aside is not None:
             if aside.poll() is None:
-                _log.info("compiling %s, once, in another process", self.name)
+                _log.info(
+                    "compiling %s, once, in another process: %s", self.name, time_of(self.name)
+                )
             aside.wait()  # another process is compiling it into the cache
-        folder = self._folder()
-        before = config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE
-        config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = str(folder), _OPTIMISATION, _VECTORISE
+        found = numba.njit(**_OPTIONS)(function)
+        found._cache = self._files()
+        before = config.OPT, config.LOOP_VECTORIZE
+        config.OPT, config.LOOP_VECTORIZE = _OPTIMISATION, _VECTORISE
         # what the compiler makes lives as long as it does: looking for garbage takes a tenth of its time
         collects = gc.isenabled()
         gc.disable()
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            return self._from_cache(folder)
-        except (OSError, RuntimeError, ResultFileError):  # no folder is writable
-            with _announced(f"{self.name}, in every process"):
-                return numba.njit(self.signature, **_OPTIONS)(function)
+            with announced(self.name, Path(found._cache.cache_path), _log):
+                found.compile(self.signature)
+            found.disable_compile()
         finally:
-            config.CACHE_DIR, config.OPT, config.LOOP_VECTORIZE = before
+            config.OPT, config.LOOP_VECTORIZE = before
             if collects:
                 gc.enable()
-
-    def _from_cache(self, folder: Path) -> Any:
-        """Load the function from its folder, or compile it into that."""
-        sound = discard_damaged(folder, _CACHED)
-        cached = numba.njit(self.signature, cache=True, **_OPTIONS)
-        with _announced(f"{self.name}, once"):
-            try:
-                found = cached(self.__wrapped__)
-            except Exception:  # what unpickling ends in, where the files are of another numba
-                if not sound:
-                    raise
-                discard(folder, _CACHED)
-                found = cached(self.__wrapped__)
-        if not found.stats.cache_hits:
-            list_files(folder, _CACHED)
         return found
 
     @cached_property
@@ -187,71 +170,26 @@ class Kernel:
         return self._entry(*arguments)
 
 
-@contextmanager
-def _announced(what: str) -> Iterator[None]:
-    """Log what the block compiles, and its time; nothing where it is loaded from the cache."""
-    with held_back() as raise_now:
-        passes = _BetweenPasses(raise_now, what)
-        with install_listener("numba:run_pass", passes):
-            try:
-                yield
-            finally:
-                passes.log_end()
-
-
-class _BetweenPasses(Listener):  # type: ignore[misc]
-    """Lets Ctrl-C through between the passes of numba's compiler, where nothing is half done.
-
-    The first pass is the sign that something is compiled and not loaded.
-    """
-
-    def __init__(self, raise_now: Callable[[], None], what: str) -> None:
-        self._raise_now = raise_now
-        self._what = what
-        self._began: float | None = None
-
-    def on_start(self, event: Any) -> None:
-        """Raise what has come; say what is compiled."""
-        self._raise_now()
-        if self._began is None:
-            self._began = perf_counter()
-            _log.info("compiling %s", self._what)
-
-    def log_end(self) -> None:
-        """Say how long it took."""
-        if self._began is not None:
-            took = perf_counter() - self._began
-            _log.info("compiled %s: %.1f s", self._what, took, extra={"seconds": took})
-
-    def on_end(self, event: Any) -> None:
-        """Let the pass end."""
-
-
 #: Processes that compile a kernel into the cache, by its name "module:kernel".
 _ASIDE: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def compile_aside(kernels: Sequence[str]) -> None:
-    """Compile kernels in a second process, if nothing is cached yet; who needs one waits for it.
+    """Compile kernels in a second process, those that have to be; who needs one waits for it.
 
     Parameters
     ----------
     kernels : names "module:kernel"
     """
-    folder = cache_folder(Path(__file__))
-    cold = not _ASIDE and not folder.exists()
-    if not cold or (os.cpu_count() or 1) < 2 or not sys.executable:
+    if _ASIDE or (os.cpu_count() or 1) < 2 or not sys.executable:
         return
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-    except OSError:  # nothing can be cached: what another process compiles would be lost
-        return
-    if not os.access(folder.parent, os.W_OK):
+    named = [kernel.split(":") for kernel in kernels]
+    absent = [[m, name] for m, name in named if getattr(import_module(m), name).kept() is None]
+    if not absent or not writable(kernels_folder()):  # what another process compiles would be lost
         return
     # the same path as here: what lies in the working folder is not imported by accident
     code = f"import sys; sys.path[:] = {sys.path!r}\n" + "".join(
-        f"from {module} import {name}; {name}.dispatcher\n"
-        for module, name in (kernel.split(":") for kernel in kernels)
+        f"from {module} import {name}; {name}.dispatcher\n" for module, name in absent
     )
     silent = {
         "stdin": subprocess.DEVNULL,
@@ -262,7 +200,7 @@ def compile_aside(kernels: Sequence[str]) -> None:
         process = subprocess.Popen([sys.executable, "-c", code], **silent)  # type: ignore[call-overload]
     except OSError:  # no process to be had: they are compiled here, one after the other
         return
-    _ASIDE.update(dict.fromkeys(kernels, process))
+    _ASIDE.update(dict.fromkeys(map(":".join, absent), process))
     atexit.register(_end, process)
 
 
@@ -276,46 +214,6 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 #: LLVM's level, and vectorised loops or not: loops are over 3 to 10 numbers here, so that more of
 #: either does not run faster (measured: within 2 percent) and takes up to a quarter longer to compile.
 _OPTIMISATION, _VECTORISE = type(config.OPT)(1), 0
-
-
-@cache
-def _digest(folder: Path) -> str:
-    """Digest of the compiled sources that a kernel in ``folder`` may have been built from."""
-    root = Path(__file__).parent
-    # a kernel may use any helper of the package, and those of its own folder
-    files = sorted(root.rglob("*.py"))
-    if folder != root and root not in folder.parents:
-        files += sorted(folder.glob("*.py"))
-    content = hashlib.sha256()
-    for file in files:
-        text = file.read_bytes()
-        if b"contfric.compiled" in text:
-            content.update(text)
-    return content.hexdigest()[:16]
-
-
-def processor() -> str:
-    """Return the name of the processor that code is compiled for: this one's, or what numba was told."""
-    return str(config.CPU_NAME or binding.get_host_cpu_name())
-
-
-@cache
-def _target(*_told: object) -> str:
-    """Digest of what machine code depends on beside its sources; ``_told`` is what numba was told of it."""
-    facts = (
-        sys.implementation.cache_tag,
-        numba.__version__,
-        llvmlite.__version__,
-        binding.get_process_triple(),
-        processor(),
-        config.CPU_FEATURES or get_host_cpu_features(),
-    )
-    return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
-
-
-def cache_folder(source: Path) -> Path:
-    """Return the folder that the kernels of a source file are cached in."""
-    return user_cache() / _digest(source.parent)
 
 
 def kernel(signature: Any) -> Callable[[Callable[..., Any]], Kernel]:

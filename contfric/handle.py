@@ -38,6 +38,10 @@ _ARRAYS = (TABLE, WEIGHTS)
 Layout = Mapping[str, Any]
 
 
+#: All types of handles by their names.
+_KNOWN: dict[str, HandleType] = {}
+
+
 class HandleType(types.Type):  # type: ignore[misc]
     """Numba's type of a handle.
 
@@ -52,6 +56,11 @@ class HandleType(types.Type):  # type: ignore[misc]
         self.layout, self.members = layout, members or {}
         self.places = {member: k for k, member in enumerate(layout)}
         super().__init__(f"Handle({name})")
+        _KNOWN[self.name] = self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Refer to the name: cached code must not carry the helpers, of which it is made."""
+        return _known, (self.name,)
 
     def type_of(self, name: str) -> Any:
         """Return the type of a member, None if there is none of that name."""
@@ -62,6 +71,10 @@ class HandleType(types.Type):  # type: ignore[misc]
         if isinstance(kind, Signature):
             return types.ExternalFunctionPointer(kind, get_pointer=None)
         return self if kind is ITSELF else kind
+
+
+def _known(name: str) -> HandleType:
+    return _KNOWN[name]
 
 
 @register_model(HandleType)

@@ -26,6 +26,7 @@ from typing import Any, ParamSpec, TypeVar
 
 from contfric.errors import ContfricError, ResultFileError
 from contfric.files import unwritable
+from contfric.sources import package_digest
 from contfric.stored import Reader, UnstorableError, Writer
 from contfric.tally import add, tally
 
@@ -52,10 +53,7 @@ def digest_of(content: bytes) -> bytes:
 @cache
 def program() -> str:
     """Return a digest of the program: all its sources, and what else may change the last digits."""
-    content = hashlib.blake2b(digest_size=_SIZE)
-    root = Path(__file__).parent
-    for path in sorted(root.rglob("*.py")):
-        content.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
+    content = hashlib.blake2b(package_digest().encode(), digest_size=_SIZE)
     for name in _NUMERICS:
         with suppress(PackageNotFoundError):
             content.update(f"{name} {version(name)}".encode())

@@ -18,6 +18,8 @@ _PLACES: dict[str, tuple[Path, ...]] = {
     "signatures": (_PACKAGE / "_data" / "signatures", _PACKAGE.parent / "signatures"),
     "studies": (_PACKAGE / "_data" / "studies", _PACKAGE.parent / "docs" / "studies"),
 }
+#: Kernels that came with the wheel, if any: a folder like that of the user's cache.
+SHIPPED_KERNELS = _PACKAGE / "_data" / "kernels"
 
 
 def bundled_dir(kind: Kind) -> Path:

@@ -104,11 +104,11 @@ def versions(model: Model) -> dict[str, Any]:
     """Return what the last digits of a tile depend on, beyond its numbers: the program and the model."""
     from importlib.metadata import version
 
-    from contfric.compiled import cache_folder
+    from contfric.sources import kernels_digest
 
     return {
         "contfric": version("contfric"),
-        "kernels": cache_folder(Path(__file__)).name,
+        "kernels": kernels_digest(),
         "model": model.name,
         **({"definition": model.definition} if model.definition else {}),
     }

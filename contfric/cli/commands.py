@@ -235,9 +235,11 @@ def simulate(options: argparse.Namespace) -> int:
 def _say_what_settles(
     model: Model, params: dict[str, float], state: list[float] | None, time: float
 ) -> None:
+    from contfric.cli.progress import ProgressLine
     from contfric.orbit.find import find_orbit
 
-    orbit = find_orbit(model, params, state=state, time=time)
+    with ProgressLine() as progress:
+        orbit = find_orbit(model, params, state=state, time=time, progress=progress)
     multipliers = ", ".join(f"{value:.6g}" for value in orbit.multipliers)
     say(f"converges to {orbit.name} over {orbit.periods} period(s): {orbit.signature}")
     say(f"x from {orbit.x_min:.12g} to {orbit.x_max:.12g}, multipliers {multipliers}")

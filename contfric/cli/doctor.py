@@ -4,43 +4,48 @@ from __future__ import annotations
 
 import argparse
 import platform
-from pathlib import Path
 
 from contfric.cli.exits import Exit
 from contfric.cli.progress import ProgressLine
 
 
 def doctor(options: argparse.Namespace) -> int:
-    """Report the state of the kernels; throw away damaged ones, and compile what is missing if asked to."""
+    """Report the state of the kernels; compile what is missing or damaged if asked to."""
     import llvmlite
     import numba
 
-    from contfric import __file__ as package
     from contfric import __version__
-    from contfric.ahead import compile_missing, every_kernel, missing, writable
-    from contfric.compiled import cache_folder, processor
+    from contfric.ahead import can_keep, compile_missing, duration, every_kernel, missing, waiting
+    from contfric.resources import SHIPPED_KERNELS
+    from contfric.shipped import describe
+    from contfric.sources import kernels_folder
+    from contfric.targets import target
 
     absent = missing()
     count = len(every_kernel())
     if options.compile and absent:
         with ProgressLine() as show:
-            show(f"compiling the engine, once: {len(absent)} of {count} kernels")
+            show(waiting(absent, len(absent), options.workers))
             compile_missing(options.workers, show)
         absent = missing()
+    kept = [kernel.kept() for kernel in every_kernel().values()]
+    shipped = sum(file is not None and SHIPPED_KERNELS in file.parents for file in kept)
     lines = {
         "contfric": f"{__version__}, Python {platform.python_version()}, numba {numba.__version__}, "
         f"llvmlite {llvmlite.__version__}",
-        "processor": f"{processor()} ({platform.machine()})",
-        "cache": str(cache_folder(Path(package))),
-        "kernels": f"{count - len(absent)} of {count} compiled",
+        "processor": f"{target().processor} ({platform.machine()})",
+        "wheel": describe(),
+        "cache": str(kernels_folder()),
+        "kernels": f"{count - len(absent)} of {count} compiled, {shipped} of them with the wheel",
     }
     for name, text in lines.items():
         print(f"{name:10} {text}")
     if absent:
         hint = (
-            "contfric doctor --compile compiles them now, else who needs one waits for it"
-            if writable()
+            f"contfric doctor --compile compiles them now ({duration(absent, options.workers)}), "
+            "else who needs one waits for it"
+            if can_keep()
             else "the cache cannot be written: kernels are compiled in every process, slower"
         )
         print(f"{'':10} {hint}")
-    return Exit.FAILED if options.compile and absent and writable() else Exit.DONE
+    return Exit.FAILED if options.compile and absent and can_keep() else Exit.DONE

@@ -11,7 +11,7 @@ each direction off them adds one eigenvalue ``-c``. So equilibria, folds and Hop
 of an ordinary field in all states, by one set of formulas, and the centre manifold of a Hopf point on
 surfaces lies in them.
 
-This module imports sympy, and is loaded where equilibria are asked for.
+sympy is imported where formulas are asked for: results are saved and loaded without it.
 """
 
 from __future__ import annotations
@@ -22,10 +22,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy
 
 from contfric.models.definition import FloatArray
-from contfric.models.numbers import function_of_numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +46,8 @@ class Fields:
 
     @cached_property
     def _pull(self) -> Any:
+        import sympy
+
         return sympy.Symbol("pull", positive=True)
 
     @cached_property
@@ -55,11 +55,15 @@ class Fields:
         """The field g."""
         if not self.on:
             return list(self.field)
-        slopes = sympy.Matrix([[h.diff(s) for s in self.states] for h in self.on])
-        back = slopes.T * (slopes * slopes.T).inv() * sympy.Matrix(self.on)
+        from sympy import Matrix
+
+        slopes = Matrix([[h.diff(s) for s in self.states] for h in self.on])
+        back = slopes.T * (slopes * slopes.T).inv() * Matrix(self.on)
         return [f - self._pull * b for f, b in zip(self.field, back, strict=True)]
 
     def _function(self, formulas: Any, *more: Sequence[Any]) -> Callable[..., Any]:
+        from contfric.models.numbers import function_of_numbers
+
         args = [list(self.states), list(self.parameters), self._pull, *map(list, more)]
         return function_of_numbers(args, formulas)
 
@@ -76,19 +80,25 @@ class Fields:
         """Heights above the own surfaces, and their gradients."""
         return self._function([[h, *(h.diff(s) for s in self.states)] for h in self.on])
 
+    def _directions(self, name: str) -> Sequence[Any]:
+        """Return the symbols of a direction of the states."""
+        from sympy import symbols
+
+        return symbols(f"{name}:{len(self.states)}")  # type: ignore[no-any-return]
+
     def _along(self, formulas: Sequence[Any], symbols: Sequence[Any]) -> list[Any]:
         """Return the derivatives of formulas in a direction."""
         pairs = list(zip(self.states, symbols, strict=True))
-        return [sum((g.diff(s) * u for s, u in pairs), sympy.Integer(0)) for g in formulas]
+        return [sum(g.diff(s) * u for s, u in pairs) for g in formulas]
 
     @cached_property
     def _second(self) -> Callable[..., Any]:
-        u, v = (sympy.symbols(f"{name}:{len(self.states)}") for name in "uv")
+        u, v = map(self._directions, "uv")
         return self._function(self._along(self._along(self._attracted, u), v), u, v)
 
     @cached_property
     def _third(self) -> Callable[..., Any]:
-        u, v, w = (sympy.symbols(f"{name}:{len(self.states)}") for name in "uvw")
+        u, v, w = map(self._directions, "uvw")
         formulas = self._along(self._along(self._along(self._attracted, u), v), w)
         return self._function(formulas, u, v, w)
 
@@ -99,7 +109,7 @@ class Fields:
     def _parametric(self, active: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
         """Return the derivative by a parameter, and that of it in a direction."""
         if active not in self._by_parameter:
-            u = sympy.symbols(f"u:{len(self.states)}")
+            u = self._directions("u")
             formulas = [g.diff(self.parameters[active]) for g in self._attracted]
             mixed = self._function(self._along(formulas, u), u)
             self._by_parameter[active] = self._function(formulas), mixed

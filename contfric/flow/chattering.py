@@ -201,7 +201,7 @@ def second(motion, mode, c, t0, y0, d, p, which, along, jac, workspace):  # type
     return motion.second(mode, c, t0, y0, d, p, which, along, jac, workspace)
 
 
-_KERNELS = {
+KERNELS = {
     "flow": Kernel(flow, with_handle(flow_signature, CHATTERING)),
     "hit": Kernel(hit, with_handle(hit_signature, CHATTERING)),
     "stationary": Kernel(stationary, with_handle(stationary_signature, CHATTERING)),
@@ -252,4 +252,4 @@ def with_chatter(flow: CompiledFlow, modes: int, chatters: Sequence[ChatterMode]
         "stationary": Block(LAYOUT, values),
         "second": Block(LAYOUT, {**tables, "second": flow.second or no_second}),
     }
-    return replace(flow, **{name: Bound(_KERNELS[name], block) for name, block in blocks.items()})
+    return replace(flow, **{name: Bound(KERNELS[name], block) for name, block in blocks.items()})

@@ -1,7 +1,7 @@
-"""Generated modules on disk: written once, named by what they depend on, imported when they are needed.
+"""Generated modules on disk: written once, named by their code, imported when they are needed.
 
-A module lies in a folder of its own below the cache of compiled kernels, so that numba's cache of its
-kernels is renewed exactly when the module is. Its name carries a digest of the definition and of all
+A module lies in a folder of its own below the cache of compiled kernels; those of bundled models may come
+with the wheel, as kernels do. It is found by a digest of the definition, of all
 compiled sources of contfric, and of what generates it. It is written under another name and moved
 into place: two processes that build the same model at once do not disturb each other. One that is damaged is
 generated again.
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import atexit
 import hashlib
+import json
 import shutil
 import sys
 import tempfile
@@ -25,8 +26,11 @@ from contfric.checked import read_sealed, write_sealed
 from contfric.errors import ResultFileError
 from contfric.models.coded import forms_of
 from contfric.models.coded_flow import coded_flow
+from contfric.resources import SHIPPED_KERNELS, user_cache
+from contfric.sources import kernels_digest
 
 if TYPE_CHECKING:
+    from contfric.compiled import Kernel
     from contfric.flow.interface import CompiledFlow
 
 
@@ -39,7 +43,11 @@ class GeneratedFlow:
     def __call__(self) -> CompiledFlow:
         """Return the compiled functions; a module is generated if one is needed and was never written."""
         coded = coded_flow(self.definition)
-        found = load_module(self.definition).compiled_flow() if coded is None else coded.flow
+        if coded is None:
+            tolerance = json.loads(self.definition)["integration"]["tolerance"]
+            found: CompiledFlow = load_module(self.definition).compiled_flow(tolerance)
+        else:
+            found = coded.flow
         if '"chatters":' not in self.definition:
             return found
         return _with_chatter(found, self.definition)
@@ -72,6 +80,17 @@ def field_of(definition: str) -> Any:
     return load_module(definition).field_of if found is None else found.field
 
 
+def kernels_of(flow: GeneratedFlow) -> list[Kernel]:
+    """Return the kernels of a model; none where its formulas are tables."""
+    from contfric.compiled import Kernel
+
+    if forms_of(flow.definition) is not None:
+        return []
+    module = load_module(flow.definition)
+    found = [k for k in vars(module).values() if isinstance(k, Kernel)]
+    return [k for k in found if k.__wrapped__.__module__ == module.__name__]
+
+
 def prepare(definition: str) -> None:
     """Write the module of a definition, if it has one and that was never done.
 
@@ -84,10 +103,13 @@ def prepare(definition: str) -> None:
         module_path(definition)
 
 
-@cache
 def load_module(definition: str) -> ModuleType:
     """Import the generated module of a definition."""
-    path = module_path(definition)
+    return _imported(module_path(definition))
+
+
+@cache
+def _imported(path: Path) -> ModuleType:
     name = path.stem
     # from the text that was checked: Python's own copy of it (.pyc) could be damaged unseen
     code = compile(read_sealed(path), str(path), "exec")
@@ -100,25 +122,35 @@ def load_module(definition: str) -> ModuleType:
 
 @cache
 def module_path(definition: str) -> Path:
-    """Return the file of the generated module; it is written if it is not there, or damaged."""
-    from contfric import compiled
+    """Return the file of the generated module; it is written if it is not there, or damaged.
 
-    sources = compiled.cache_folder(Path(__file__))  # of the package, with what generates modules
-    text = f"{sources.name}\n{_generator()}\n{definition}"
-    digest = hashlib.sha256(text.encode()).hexdigest()[:16]
-    path = sources / "models" / digest / f"contfric_model_{digest}.py"
-    with suppress(ResultFileError):
-        read_sealed(path)
-        return path
-    text = _generated(definition, f"{sources.name} {digest}")
-    for folder in (path.parent, _temporary_folder()):
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            write_sealed(folder / path.name, text)
-        except (OSError, ResultFileError):
-            continue  # no such folder can be written: this process has one of its own
-        return folder / path.name
+    A small file, named by the definition, has the name of the module: definitions that differ in defaults or
+    tolerances have one module.
+    """
+    sources = kernels_digest()  # what generates modules has digests of its own
+    models = Path(sources, "models")
+    name = f"{_digest(sources, _generator(), definition)}.name"
+    for root in (SHIPPED_KERNELS, user_cache()):
+        with suppress(ResultFileError):
+            path = root / models / read_sealed(root / models / name).strip()
+            read_sealed(path)
+            return path
+    text = _generated(definition, sources)
+    code = _digest(text)
+    own = Path(code, f"contfric_model_{code}.py")
+    for folder in (user_cache() / models, _temporary_folder()):
+        with suppress(
+            OSError, ResultFileError
+        ):  # no such folder can be written: try one of this process
+            (folder / code).mkdir(parents=True, exist_ok=True)
+            write_sealed(folder / own, text)
+            write_sealed(folder / name, f"{own.as_posix()}\n")
+            return folder / own
     raise ResultFileError("no folder can be written, not even a temporary one: free some space")
+
+
+def _digest(*texts: str) -> str:
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
 
 
 @cache

@@ -12,6 +12,7 @@ from contfric.models.describe import describe, from_text
 from contfric.models.description import Description
 from contfric.models.entries import EntryError
 from contfric.models.matrices import loaded
+from contfric.models.on_disk import derived
 
 if TYPE_CHECKING:
     from contfric.yaml_lines import Address, LocatedYaml
@@ -54,7 +55,8 @@ def read_model(path: Path) -> Model:
     try:
         located = read_yaml(_file(path))
         try:
-            return built(describe(loaded(located.data, path.parent)))
+            data = loaded(located.data, path.parent)
+            return model_of(derived("text", repr(data), lambda: describe(data).text))
         except EntryError as error:
             located.fail(_written_at(located, error.address), str(error))
     except NotationError as error:
@@ -94,6 +96,10 @@ def model_of(definition: str) -> Model:
     ModelError
         If it cannot be built.
     """
+    return derived("model", definition, lambda: _model_from(definition))
+
+
+def _model_from(definition: str) -> Model:
     from contfric.models.build import prepare
     from contfric.models.derive import model_from
 

@@ -17,12 +17,17 @@ ENTRY_POINTS = "contfric.models"
 
 def names() -> list[str]:
     """Return all names: the closed form first, then bundled files, then those of packages."""
-    found = ["coulomb", *sorted(_in_folder(bundled_dir("models")))]
+    found = ["coulomb", *bundled()]
     for entry in sorted(entry_points(group=ENTRY_POINTS), key=lambda e: e.name):
         folder = _folder_of(entry)
         offered = [entry.name] if folder is None else sorted(_in_folder(folder))
         found.extend(name for name in offered if name not in found)
     return found
+
+
+def bundled() -> list[str]:
+    """Return the names of the models whose files ship with contfric."""
+    return sorted(_in_folder(bundled_dir("models")))
 
 
 def find(model: Any) -> Model:

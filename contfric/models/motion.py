@@ -61,29 +61,31 @@ AFFINE = AffineModes(
 """
 
 _FLOW = '''
-FUNCTIONS = Functions(
-    field={field},
-    observe=observe,
-    rate={rate},
-    period=period,
-    scale=scale_of,
-    modes={modes},
-    observables={observables},
-    method={method!r},
-    relative={tolerance!r},
-    absolute={tolerance!r},
-    kinks={kinks},
-    slides={slides},
-    onto=onto,
-    idle={idle},
-    timed={timed},
-    affine={affine},
-)
+def functions(tolerance):
+    """Return what motions are found from."""
+    return Functions(
+        field={field},
+        observe=observe,
+        rate={rate},
+        period=period,
+        scale=scale_of,
+        modes={modes},
+        observables={observables},
+        method={method!r},
+        relative=tolerance,
+        absolute=tolerance,
+        kinks={kinks},
+        slides={slides},
+        onto=onto,
+        idle={idle},
+        timed={timed},
+        affine={affine},
+    )
 
 
-def compiled_flow():
-    """Return the compiled functions of this model."""
-    return FUNCTIONS.flow(level, rate=rate{reset})
+def compiled_flow(tolerance):
+    """Return the compiled functions of this model, with the error that a step may make."""
+    return functions(tolerance).flow(level, rate=rate{reset})
 '''
 
 
@@ -133,7 +135,6 @@ def motion_code(
         modes=len(description.modes),
         observables=len(observables),
         method=description.method,
-        tolerance=description.tolerance,
         kinks=kinks,
         slides=[m for m, mode in enumerate(description.modes) if 0 in mode.sides.values()],
         idle=list(idle),

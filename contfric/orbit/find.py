@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contfric.errors import AperiodicError, ConvergenceError, real_number, whole_number
+from contfric.errors import AperiodicError, ConvergenceError, function_of, real_number, whole_number
 from contfric.journal import remembered
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
@@ -50,6 +50,7 @@ def find_orbit(
     state: ArrayLike | None = None,
     time: float = 0.0,
     longest: int = 50_000,
+    progress: Callable[[str], None] | None = None,
 ) -> Orbit:
     """Simulate until the motion repeats itself, read off its signature and solve for it.
 
@@ -60,6 +61,7 @@ def find_orbit(
     state, time : initial condition; by default displaced from rest
     longest : int
         Periods to simulate before the motion is called aperiodic.
+    progress : called with one line of text now and then, where it takes long
 
     Raises
     ------
@@ -78,23 +80,37 @@ def find_orbit(
     if periods is not None:
         periods = whole_number("periods", periods, least=1, most=MOST_PERIODS)
     longest = whole_number("longest", longest, least=1)
-    checked = model.check_params({} if params is None else params)
-    return _wanted(_settled(model, checked, state, real_number("time", time), longest), periods)
+    function_of("progress", progress)
+    checked, time = model.check_params({} if params is None else params), real_number("time", time)
+    return _wanted(_settled(model, checked, state, time, longest, progress=progress), periods)
 
 
 @remembered()
 def _settled(
-    model: Model, params: dict[str, float], state: ArrayLike | None, time: float, longest: int
+    model: Model,
+    params: dict[str, float],
+    state: ArrayLike | None,
+    time: float,
+    longest: int,
+    *,
+    progress: Callable[[str], None] | None = None,
 ) -> Orbit:
     """Return the orbit that a motion converges to."""
     span, done = _FIRST, 0
-    trajectory = simulate(model, params, state=state, time=time, periods=span, events=10_000_000)
+
+    def heard(text: str) -> None:
+        if progress is not None:
+            progress(f"simulating: {done} periods without an orbit, then {text}")
+
+    trajectory = simulate(
+        model, params, state=state, time=time, periods=span, events=10_000_000, progress=heard
+    )
     if trajectory.end is SimulationEnd.CHATTER and not model.chatters:
         from contfric.models.chatter import with_chatter  # which takes sympy
 
         resting = with_chatter(model)
         if resting is not None:
-            return _settled(resting, params, state, time, longest)
+            return _settled(resting, params, state, time, longest, progress=progress)
     while True:
         _check_motion(trajectory)
         done += span
@@ -109,7 +125,8 @@ def _settled(
                 raise ConvergenceError(_unbounded(trajectory), trajectory)
             raise AperiodicError(_advice(trajectory, done), trajectory)
         span = min(span * _LONGER, longest - done)
-        trajectory = go_on(trajectory, span)
+        heard(f"{span} more")
+        trajectory = go_on(trajectory, span, heard)
 
 
 def _wanted(orbit: Orbit, periods: int | None) -> Orbit:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from time import perf_counter
@@ -10,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contfric.errors import real_number, whole_number
+from contfric.errors import function_of, real_number, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
@@ -22,6 +23,9 @@ from contfric.orbit.system import IntArray
 from contfric.orbit.tables import surfaces_under, tables
 from contfric.shown import Shown
 from contfric.tally import tally
+
+#: Hears one line of text now and then.
+Progress = Callable[[str], None]
 
 
 class SimulationEnd(str, Enum):
@@ -118,6 +122,7 @@ def simulate(
     periods: float = 100.0,
     events: int = 1_000_000,
     domain: str | None = None,
+    progress: Progress | None = None,
 ) -> Trajectory:
     """Follow a trajectory, event by event.
 
@@ -129,6 +134,7 @@ def simulate(
     periods : time to follow, in periods of the excitation (units of time if there is none)
     events : most events to follow
     domain : initial domain, where the state alone does not decide
+    progress : called with one line of text now and then
 
     Raises
     ------
@@ -146,11 +152,12 @@ def simulate(
     y = checked_state(model, vector, state)
     time, periods = real_number("time", time), real_number("periods", periods, least=0.0)
     events = whole_number("events", events, least=1)
+    function_of("progress", progress)
     mode, on = start_of(model, time, y, vector, domain)
-    return run(model, vector, mode, on, time, y, periods, events)
+    return run(model, vector, mode, on, time, y, periods, events, progress)
 
 
-def go_on(trajectory: Trajectory, periods: float) -> Trajectory:
+def go_on(trajectory: Trajectory, periods: float, progress: Progress | None = None) -> Trajectory:
     """Follow a trajectory from where it ended, in the mode that it was in."""
     model, (_, time, y, mode) = trajectory.model, trajectory.last
     on = surfaces_under(model, mode)
@@ -163,6 +170,7 @@ def go_on(trajectory: Trajectory, periods: float) -> Trajectory:
         y,
         periods,
         _MOST_EVENTS,
+        progress,
     )
 
 
@@ -175,8 +183,12 @@ def run(
     y: FloatArray,
     periods: float,
     events: int,
+    progress: Progress | None = None,
 ) -> Trajectory:
-    """Run the compiled simulation; the state is copied. Rows are grown as they are needed."""
+    """Run the compiled simulation; the state is copied. Rows are grown as they are needed.
+
+    ``progress`` hears the number of events where that takes more than a tenth of a second.
+    """
     from contfric.orbit.trajectory import ALL_EVENTS, CARRIED
     from contfric.orbit.trajectory import simulate as kernel
 
@@ -216,6 +228,8 @@ def run(
             model_tables = growing.tables()
         if end != ALL_EVENTS or done >= events:
             break
+        if progress is not None:
+            progress(f"{done} events")
         time = phase
         pace.took(count if grown else pace.budget, perf_counter() - began)
     found = joined(pieces)

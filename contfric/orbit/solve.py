@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from contfric.errors import ConvergenceError, ParameterError, whole_number
+from contfric.errors import ConvergenceError, ParameterError, function_of, whole_number
 from contfric.journal import SLOW, remembered
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray
@@ -64,6 +64,7 @@ def solve_orbit(
     params: Parameters,
     *,
     seed: int = 0,
+    progress: Callable[[str], None] | None = None,
 ) -> Orbit:
     """Find an admissible orbit of a signature at given parameters, stable or not.
 
@@ -77,6 +78,7 @@ def solve_orbit(
         that are (or are not) their own mirror image count.
     seed : int
         Seed of the starts; the same seed gives the same orbit.
+    progress : called with one line of text now and then
 
     Raises
     ------
@@ -96,6 +98,7 @@ def solve_orbit(
         signature = load_signature(signature, model)
     vector = model.vector(params)
     seed = whole_number("seed", seed, least=0)
+    function_of("progress", progress)
     word = reduced_word(signature)
     half = half_of(model, word, signature.periods) if signature.symmetric else None
     if half is not None:
@@ -103,7 +106,7 @@ def solve_orbit(
     else:
         system = build_system(model, word, signature.periods)
     nearest: Orbit | None = None
-    for orbit in _solved_starts(system, vector, seed):
+    for orbit in _solved_starts(system, vector, seed, progress or _nothing):
         if orbit.converged and orbit.admissible and _is_wanted(orbit, signature):
             return orbit
         if nearest is None or (orbit.converged, -orbit.residual) > (
@@ -139,14 +142,21 @@ def _explain(signature: Signature, params: Mapping[str, float], nearest: Orbit |
     return text
 
 
-def _solved_starts(system: System, vector: FloatArray, seed: int) -> Iterator[Orbit]:
+def _nothing(text: str) -> None:
+    """Take what nobody wants to hear."""
+
+
+def _solved_starts(
+    system: System, vector: FloatArray, seed: int, say: Callable[[str], None]
+) -> Iterator[Orbit]:
     """Yield Newton's results from the best-closing stretches, nearest first, round by round."""
     tried: list[FloatArray] = []
     for batch in range(4):
         found = sorted(
-            _matching_stretches(system, vector, seed + batch, STARTS // 4), key=lambda pair: pair[0]
+            _matching_stretches(system, vector, seed + batch, say), key=lambda pair: pair[0]
         )
-        for _, joints in found[:CANDIDATES]:
+        for k, (_, joints) in enumerate(found[:CANDIDATES]):
+            say(f"solving: candidate {k + 1} of {min(len(found), CANDIDATES)}")
             if any(np.max(np.abs(joints - other)) < 1e-3 for other in tried):
                 continue
             tried.append(joints)
@@ -154,7 +164,7 @@ def _solved_starts(system: System, vector: FloatArray, seed: int) -> Iterator[Or
 
 
 def _matching_stretches(
-    system: System, vector: FloatArray, seed: int, starts: int
+    system: System, vector: FloatArray, seed: int, say: Callable[[str], None]
 ) -> Iterator[tuple[float, FloatArray]]:
     """Yield (mismatch, joints) of simulated stretches that walk the word of one turn."""
     model = system.model
@@ -165,7 +175,9 @@ def _matching_stretches(
     length, events = 2.0 + 2.0 * turn, 40 * (1 + int(turn))
     if model.autonomous:
         length, events = _LONGEST, 4 * system.segments + 40
-    for _ in range(starts):
+    starts = STARTS // 4
+    for k in range(starts):
+        say(f"simulating from start {k + 1} of {starts}")
         y = rng.uniform(-1.0, 1.0, spread.shape) * spread
         if rng.random() < 0.5:
             y[1:] = 0.0  # at rest: the start of a stick or of a slide

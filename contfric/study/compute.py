@@ -38,11 +38,15 @@ def find_start(study: Study, say: Say) -> Orbit:
     """Return the first orbit: saved, solved for, or what a simulation converges to."""
     if study.orbit is not None:
         return study.orbit
+
+    def heard(text: str) -> None:
+        say(f"orbit: {text}")
+
     if study.signature is not None:
         from contfric.orbit.solve import solve_orbit
 
         say(f"orbit: solving for {study.signature.name or study.signature}")
-        return solve_orbit(study.model, study.signature, study.params)
+        return solve_orbit(study.model, study.signature, study.params, progress=heard)
     from contfric.orbit.find import find_orbit
 
     how = study.content.start.simulate
@@ -55,6 +59,7 @@ def find_start(study: Study, say: Say) -> Orbit:
         state=how.state,
         time=how.time,
         longest=how.longest,
+        progress=heard,
     )
 
 

@@ -9,12 +9,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 import yaml
 from numba.core import config
 
-from contfric.checked import discard
+from contfric import announced
+from contfric.ahead import every_kernel
 from contfric.cli.progress import compiling_shown
 from contfric.compiled import allocating_helper, f8, helper, kernel
 from contfric.inlined import part_options
@@ -56,25 +58,34 @@ def fresh_cache(tmp_path, monkeypatch):
 def test_a_kernel_contains_its_helpers(fresh_cache):
     first, second = kernel(f8(f8))(twice), kernel(f8(f8))(twice)
     assert first(1.5) == 2.0 * (3 * 1.5**4 + 3) + 1.5
-    assert any(fresh_cache.rglob("*.nbc"))
+    assert any(fresh_cache.rglob("*.kernel"))
     assert second(1.5) == first(1.5)  # this one is loaded
     assert sum(second.dispatcher.stats.cache_hits.values()) == 1
+
+
+def test_a_loaded_kernel_cannot_be_linked_into_other_code(fresh_cache):
+    """It has no code for that: linked, it would do nothing."""
+    assert kernel(f8(f8))(twice)(1.5) == kernel(f8(f8))(twice)(1.5)
+    loaded = kernel(f8(f8))(twice).dispatcher
+    assert sum(loaded.stats.cache_hits.values()) == 1
+    with pytest.raises(Exception, match="unfit for linking"):
+        numba.njit(f8(f8))(lambda x: loaded(x) + 1.0)
 
 
 @pytest.mark.parametrize("told", [{"CPU_NAME": "generic"}, {"CPU_FEATURES": "-avx2"}], ids=str)
 def test_what_is_compiled_for_another_processor_does_not_count(fresh_cache, monkeypatch, told):
     here = kernel(f8(f8))(twice)
     value = here(1.5)
-    files = sorted(fresh_cache.rglob("*.nbc"))
-    assert here.cached()
+    files = sorted(fresh_cache.rglob("*.kernel"))
+    assert [here.kept()] == files
     for name, text in told.items():
         monkeypatch.setattr(config, name, text)
-    assert not kernel(f8(f8))(twice).cached()
+    assert kernel(f8(f8))(twice).kept() is None
     monkeypatch.undo()
     monkeypatch.setenv("CONTFRIC_CACHE_DIR", str(fresh_cache))
-    assert sorted(fresh_cache.rglob("*.nbc")) == files  # and nothing was thrown away
+    assert sorted(fresh_cache.rglob("*.kernel")) == files  # and nothing was thrown away
     again = kernel(f8(f8))(twice)
-    assert again.cached() and again(1.5) == value
+    assert again.kept() and again(1.5) == value
     assert sum(again.dispatcher.stats.cache_hits.values()) == 1
 
 
@@ -82,8 +93,8 @@ def test_what_is_compiled_is_logged_and_what_is_loaded_is_not(fresh_cache, caplo
     caplog.set_level(logging.INFO, logger="contfric")
     assert kernel(f8(f8))(twice)(1.0) == kernel(f8(f8))(twice)(1.0)  # compiled, loaded
     begin, end = caplog.records
-    assert begin.getMessage() == f"compiling {twice.__module__}.twice, once"
-    assert end.getMessage().startswith(f"compiled {twice.__module__}.twice, once: ")
+    assert begin.getMessage().startswith(f"compiling {twice.__module__}.twice, once: about ")
+    assert end.getMessage().startswith(f"compiled {twice.__module__}.twice: ")
     assert end.seconds > 0.0
 
 
@@ -93,7 +104,7 @@ def test_a_terminal_shows_what_is_compiled(fresh_cache, monkeypatch, capsys):
     assert capsys.readouterr().err == ""  # a library is silent by itself
     for quiet, lines in ((True, 0), (False, 1)):
         monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-        discard(next(fresh_cache.rglob("*.nbc")).parent, (".nbi", ".nbc"))
+        next(fresh_cache.rglob("*.kernel")).unlink()
         with compiling_shown(quiet=quiet):
             kernel(f8(f8))(twice)(1.0)
         shown = capsys.readouterr().err
@@ -130,11 +141,10 @@ DAMAGE = {
 
 
 @pytest.mark.parametrize("damage", DAMAGE)
-@pytest.mark.parametrize("suffix", [".nbi", ".nbc", ".json"])
-def test_a_damaged_file_of_the_cache_is_compiled_again(fresh_cache, damage, suffix):
-    rng = np.random.default_rng([len(damage), len(suffix), ord(suffix[-1])])
+def test_a_damaged_file_of_the_cache_is_compiled_again(fresh_cache, damage):
+    rng = np.random.default_rng(len(damage))
     value = kernel(f8(f8))(twice)(1.5)
-    (path,) = (p for p in fresh_cache.rglob("*") if p.suffix == suffix)
+    (path,) = fresh_cache.rglob("*.kernel")
     path.write_bytes(DAMAGE[damage](path.read_bytes(), rng))
     again, later = kernel(f8(f8))(twice), kernel(f8(f8))(twice)
     assert again(1.5) == later(1.5) == value
@@ -142,22 +152,9 @@ def test_a_damaged_file_of_the_cache_is_compiled_again(fresh_cache, damage, suff
     assert sum(later.dispatcher.stats.cache_hits.values()) == 1  # mended for good
 
 
-def test_a_damaged_file_that_cannot_be_deleted_is_not_used(fresh_cache, monkeypatch):
-    value = kernel(f8(f8))(twice)(1.5)
-    for path in fresh_cache.rglob("*.nbc"):
-        path.write_bytes(b"")
-
-    def refused(path, missing_ok=False):
-        raise PermissionError(13, "read-only")
-
-    monkeypatch.setattr("pathlib.Path.unlink", refused)
-    again = kernel(f8(f8))(twice)
-    assert again(1.5) == value
-    assert not again.dispatcher.stats.cache_hits
-
-
+@pytest.mark.parametrize("suffix", [".py", ".name"])
 @pytest.mark.parametrize("damage", DAMAGE)
-def test_a_damaged_module_of_a_model_is_generated_again(fresh_cache, damage, monkeypatch):
+def test_a_damaged_module_of_a_model_is_generated_again(fresh_cache, damage, suffix, monkeypatch):
     from contfric.models.files import read_model
 
     definition = read_model(MODELS / "bilinear.yaml").definition
@@ -170,10 +167,11 @@ def test_a_damaged_module_of_a_model_is_generated_again(fresh_cache, damage, mon
     assert build.module_path.__wrapped__(definition) == path
     assert build.module_path.__wrapped__(definition) == path
     assert len(asked) == 1
-    path.write_bytes(DAMAGE[damage](path.read_bytes(), np.random.default_rng(len(damage))))
+    for file in (p for p in fresh_cache.rglob("*") if p.suffix == suffix):
+        file.write_bytes(DAMAGE[damage](file.read_bytes(), np.random.default_rng(len(damage))))
     assert build.module_path.__wrapped__(definition) == path
     assert len(asked) == 2
-    assert callable(build.load_module.__wrapped__(definition).compiled_flow)
+    assert callable(build._imported.__wrapped__(path).compiled_flow)
 
 
 def test_a_model_by_another_name_is_not_compiled_again():
@@ -203,3 +201,29 @@ def test_a_damaged_cache_is_mended_in_a_run_from_the_shell(tmp_path):
         path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     assert printed() == "6.0 0"
     assert printed() == "6.0 1"
+
+
+def test_the_time_that_a_kernel_will_take_is_that_of_the_last_time(fresh_cache, caplog):
+    caplog.set_level(logging.INFO, logger="contfric")
+    name = f"{twice.__module__}.twice"
+    assert announced.expected([name]) == announced.OTHER  # nothing is known of it
+    kernel(f8(f8))(twice)(1.0)
+    (_, end) = caplog.records
+    assert announced.expected([name]) == pytest.approx(end.seconds, abs=0.01)
+    assert announced.expected([name, name]) == pytest.approx(2 * end.seconds, abs=0.02)
+
+
+def test_a_slower_machine_multiplies_the_times_of_the_table(fresh_cache):
+    (slow, taken), (other, there), *_ = announced.SECONDS.items()
+    announced._keep(slow, 3.0 * taken)
+    assert announced.expected([slow]) == pytest.approx(3.0 * taken, abs=0.01)
+    assert announced.expected([other]) == pytest.approx(3.0 * there, rel=0.01)
+    announced._keep("contfric_model_0123abcd.field", 7.0)  # that of one model tells of others
+    assert announced.expected(["contfric_model_4567.field"]) == 7.0
+    (file,) = fresh_cache.iterdir()
+    file.write_text("[1, 2")
+    assert announced.expected([other]) == there
+
+
+def test_every_time_of_the_table_is_of_a_kernel():
+    assert announced.SECONDS.keys() <= every_kernel().keys()

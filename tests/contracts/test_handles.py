@@ -98,12 +98,15 @@ def test_functions_that_do_not_fit_are_refused(wrong, message):
         Functions(**dict.fromkeys(names, thrice), modes=1, observables=1, **wrong)
 
 
-def test_a_generated_module_is_named_by_what_generates_it(monkeypatch, tmp_path):
+def test_a_module_is_generated_again_by_another_generator(monkeypatch, tmp_path):
     monkeypatch.setenv("CONTFRIC_CACHE_DIR", str(tmp_path))
     definition = load_model("belt").definition
     before = build.module_path.__wrapped__(definition)
     assert build.module_path.__wrapped__(definition) == before
     monkeypatch.setattr(build, "_generator", lambda: "another one")
+    assert build.module_path.__wrapped__(definition) == before  # it wrote the same code
+    monkeypatch.setattr(build, "_generator", lambda: "one that writes other code")
+    monkeypatch.setattr(build, "_generated", lambda *arguments: "code = 2\n")
     assert build.module_path.__wrapped__(definition) != before
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.compiled import flow_signature, kernel
+from contfric.compiled import allocating_helper, flow_signature, kernel
 from contfric.flow import forced_oscillator
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Status
@@ -19,7 +19,7 @@ from contfric.orbit.system import build_system
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 #: The flow of the test model is not a number above this frequency.
 HIGHEST = 0.53
-whole_flow = forced_oscillator.flow.dispatcher
+whole_flow = allocating_helper(forced_oscillator.flow.__wrapped__)
 
 
 @kernel(flow_signature)

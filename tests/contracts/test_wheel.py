@@ -9,13 +9,22 @@ from pathlib import Path
 
 import pytest
 
+from contfric.targets import shipped_target
+
 ROOT = Path(__file__).parents[2]
+#: Kernels that come with the wheel of these tests: one of each model, and some of the engine.
+SHIPPED = (
+    "contfric_model_*.scale_of",
+    *("contfric.flow.forced_oscillator.period", "contfric.flow.forced_oscillator.level"),
+    "contfric.orbit.extent.extent",
+)
 
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder that the wheel, and nothing else of this checkout, is installed in."""
     folder = tmp_path_factory.mktemp("wheel")
+    environment = {**os.environ, "CONTFRIC_WHEEL_KERNELS": " ".join(SHIPPED)}
     for step in (
         ["wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", str(folder), str(ROOT)],
         ["install", "--no-deps", "--no-index", "--target", str(folder / "site"), "--find-links"],
@@ -23,8 +32,26 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
         command = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", *step]
         if step[0] == "install":
             command += [str(folder), "contfric"]
-        subprocess.run(command, check=True, cwd=folder, capture_output=True, timeout=300)
+        subprocess.run(
+            command, check=True, cwd=folder, env=environment, capture_output=True, timeout=600
+        )
     return folder / "site"
+
+
+def run_installed(installed: Path, code: str, cache: Path) -> str:
+    """Run code with what is installed, in a folder of its own; return what it prints."""
+    empty = installed.parent / "empty"
+    empty.mkdir(exist_ok=True)
+    done = subprocess.run(
+        check=True,
+        args=[sys.executable, "-P" if sys.version_info >= (3, 11) else "-B", "-c", code],
+        cwd=empty,
+        env={**os.environ, "PYTHONPATH": str(installed), "CONTFRIC_CACHE_DIR": str(cache)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    return done.stdout
 
 
 @pytest.mark.slow
@@ -59,3 +86,30 @@ def test_wheel_ships_models_signatures_and_studies(installed: Path) -> None:
     assert (data / "signatures" / "2s.yaml").is_file()
     for number in ("03", "04", "05", "06", "07", "13"):
         assert (data / "studies" / f"fig{number}.yaml").is_file()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    shipped_target() is None, reason="this processor cannot run what a wheel carries"
+)
+def test_the_kernels_in_the_wheel_are_used_where_nothing_can_be_written(installed: Path) -> None:
+    (wheel,) = installed.parent.glob("*.whl")
+    assert not wheel.name.endswith("-none-any.whl")  # it is for one Python and one platform
+    code = f"""if True:
+        from contfric.ahead import every_kernel, models_kernels
+        from contfric.shipped import describe
+        print(describe())
+        scales = [k for name, k in models_kernels().items() if name.endswith(".scale_of")]
+        for kernel in [*scales, *map(every_kernel().get, {SHIPPED[1:]!r})]:
+            print(kernel.kept(), sum(kernel.dispatcher.stats.cache_hits.values()))
+    """
+    before = sorted(path for path in installed.rglob("*") if path.suffix != ".pyc")
+    nowhere = installed / "contfric" / "py.typed" / "cache"  # below a file: no folder
+    said, *lines = run_installed(installed, code, nowhere).splitlines()
+    assert said.startswith(f"{len(lines)} kernels for ")
+    assert said.endswith(", used")
+    assert len(lines) > len(SHIPPED)
+    for line in lines:
+        assert line.startswith(str(installed))
+        assert line.endswith(" 1")  # loaded, not compiled
+    assert sorted(path for path in installed.rglob("*") if path.suffix != ".pyc") == before

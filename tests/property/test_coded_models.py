@@ -32,7 +32,7 @@ POINTS = 12
 def flows(name: str) -> tuple[cf.Model, Any, Any]:
     model = cf.load_model(name)
     coded = CodedFlow(Forms(from_text(model.definition))).flow
-    return model, coded, load_module(model.definition).compiled_flow()
+    return model, coded, load_module(model.definition).compiled_flow(1e-12)
 
 
 def close(a: Any, b: Any, within: float = 1e-12) -> None:
