@@ -173,6 +173,10 @@ def trace_side(
             return side
 
 
+#: Why an orbit with chatter is not finite beyond a point.
+_NO_REST = "incomplete chatter: beyond this point the impacts do not come to rest"
+
+
 def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple[bool, float]:
     """March once and deal with what stopped it; (whether the side is finished, next step)."""
     from contfric.continuation import march as kernels
@@ -201,6 +205,8 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     }
     if why in reasons:
         side.end = End(reasons[why])
+        if why == kernels.BROKEN and any(m in orbit.model.chatter_by_mode for m, _ in orbit.word):
+            side.end = End(EndReason.BROKEN, _NO_REST)
         if why in (kernels.STEP, kernels.BROKEN) and is_at_limit(side.tip.value, settings):
             side.end = limit_end(side.tip.value, settings)
         elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):

@@ -47,8 +47,8 @@ _EXACT = 4e-16
 _CLOSE = 1e-8
 #: Impacts after which there is no limit: with a restitution of 0.99 speeds fall by a thousand in 700.
 MOST_IMPACTS = 10_000
-#: Impacts of which one is faster than this times the one before are not one chatter: the wall, or a force,
-#: has thrown the mass off.
+#: Impacts of which one is faster than this times the one before, after they had become slow, are not one
+#: chatter: the wall, or a force, has thrown the mass off.
 FASTER = 2.0
 #: A speed below this share of that of the first impact, and of 1, is rest.
 _REST = 1e-14
@@ -175,16 +175,17 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
     flight, c, side = motion.flights[mode], motion.gaps[mode], motion.sides[mode]
     unit = motion.period(p, which[:0], grad[:0])
     unit = unit if unit > 0.0 else 1.0
-    count, first_speed, last, found, before = 0, 0.0, np.inf, False, np.inf
+    count, highest, last, found, before = 0, 0.0, np.inf, False, np.inf
     for _ in range(MOST_IMPACTS):
         v = side * motion.rate(flight, c, t, y, p, which, grad)
-        first_speed = max(first_speed, abs(v))
-        if not v > _REST * max(1.0, first_speed):  # without restitution at once
+        thrown = v > FASTER * before and before < _SHARE * highest
+        highest = max(highest, abs(v))
+        if not v > _REST * max(1.0, highest):  # without restitution at once
             limit[0], limit[1:] = t, y
             for i in range(slopes.shape[0]):
                 jac[i, :] = slopes[i, :]
-            return 0.0 if v > -1e-6 * max(1.0, first_speed) else -1.0
-        if v > FASTER * before:
+            return 0.0 if v > -1e-6 * max(1.0, highest) else -1.0
+        if thrown:
             break
         before = v
         if count > 0 and v > speeds[count - 1]:
