@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from contfric.curves.quantity_trace import continue_quantity
     from contfric.curves.special import CodimTwo
     from contfric.curves.trace import continue_bifurcation
+    from contfric.ensembles.compute import ensemble
+    from contfric.ensembles.ensemble import Ensemble
     from contfric.equilibria.branch import EquilibriumBranch
     from contfric.equilibria.events import BoundaryPoint, EquilibriumEvent, HopfPoint
     from contfric.equilibria.explore import EquilibriumDiagram, explore_equilibria
@@ -96,6 +98,8 @@ _HOMES = {
     "Series": "contfric.fitting.data",
     "fit": "contfric.fitting.fit",
     "EndReason": "contfric.continuation.events",
+    "Ensemble": "contfric.ensembles.ensemble",
+    "ensemble": "contfric.ensembles.compute",
     "Equilibria": "contfric.equilibria.result",
     "Equilibrium": "contfric.equilibria.result",
     "EquilibriumBranch": "contfric.equilibria.branch",
@@ -175,6 +179,7 @@ __all__ = [
     "Curve",
     "Diagram",
     "EndReason",
+    "Ensemble",
     "Equilibria",
     "Equilibrium",
     "EquilibriumBranch",
@@ -219,6 +224,7 @@ __all__ = [
     "continue_equilibrium",
     "continue_orbit",
     "continue_quantity",
+    "ensemble",
     "explore",
     "explore_equilibria",
     "explore_plane",
