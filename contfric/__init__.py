@@ -76,6 +76,7 @@ if TYPE_CHECKING:
     from contfric.response.sweep import Sweep
     from contfric.response.sweeping import sweep
     from contfric.results import load, save
+    from contfric.results.export import export
     from contfric.signature import Signature, load_signature, signature_names, transition_graph
     from contfric.study import run_study
 
@@ -141,6 +142,7 @@ _HOMES = {
     "continue_orbit": "contfric.continuation.trace",
     "explore_equilibria": "contfric.equilibria.explore",
     "continue_quantity": "contfric.curves.quantity_trace",
+    "export": "contfric.results.export",
     "explore": "contfric.atlas.explore",
     "explore_plane": "contfric.atlas.plane_explore",
     "find_equilibria": "contfric.equilibria.find",
@@ -228,6 +230,7 @@ __all__ = [
     "explore",
     "explore_equilibria",
     "explore_plane",
+    "export",
     "find_equilibria",
     "find_orbit",
     "find_two_folds",
