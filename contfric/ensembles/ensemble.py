@@ -59,16 +59,16 @@ class EnsembleEvent:
         return np.asarray(np.nanquantile(self.values, shares))
 
     def sobol(self) -> SobolIndices | None:
-        """Return the Sobol indices of its place; None if too few samples have it.
+        """Return the Sobol indices of its place; None if less than 16 blocks of samples have it.
 
         Examples
         --------
         >>> import contfric as cf
         >>> box = {"S": (0.30, 0.34)}
         >>> fixed = {"Omega": 0.5, "S0": 0.4}
-        >>> found = cf.ensemble("coulomb", "Omega", (0.48, 0.55), box, fixed, samples=12)
+        >>> found = cf.ensemble("coulomb", "Omega", (0.48, 0.55), box, fixed, samples=48)
         >>> found.event("SN 1a").sobol().blocks
-        4
+        16
         """
         return sobol_indices(self.values, self.names, self.seed)
 
@@ -107,7 +107,7 @@ class Band:
     Attributes
     ----------
     name : str
-        Name of the branches; mirror images have the same, and both count.
+        Name of the branches; ``... (image)`` of asymmetric ones is the image with the smaller row.
     stable : str
         ``"stable"``, ``"unstable"`` or ``"unknown"``.
     quantiles : ndarray, shape (shares, values)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,10 @@ from contfric.quantities.registry import Quantity
 _AT_ONCE = 1e-9
 #: Newton steps for the place of a value between two points: of a nearly straight cubic three reach rounding.
 _STEPS = 4
+
+
+#: What follows the name of a branch where its mirror image is meant.
+IMAGE = " (image)"
 
 
 def names_of(diagram: Diagram) -> list[str]:
@@ -55,6 +60,27 @@ class Crossings:
     index: IntArray
     stable: NDArray[np.int8]
     row: FloatArray
+
+
+def named_crossings(
+    diagram: Diagram, quantity: Quantity, values: FloatArray
+) -> Iterator[tuple[str, Crossings]]:
+    """Yield the orbits of each branch at some values, with its name.
+
+    Of an asymmetric orbit and its mirror image the one with the larger quantity has the name, the other one
+    stands as image: which of them was computed depends on the start.
+    """
+    names, branches = names_of(diagram), diagram.branches
+    for k, (name, branch) in enumerate(zip(names, branches, strict=True)):
+        if branch.mirrored:
+            continue
+        found = crossings_of(branch, quantity, values)
+        if k + 1 == len(branches) or not branches[k + 1].mirrored:
+            yield name, found
+            continue
+        other = crossings_of(branches[k + 1], quantity, values)
+        yield name, replace(found, row=np.maximum(found.row, other.row))
+        yield name + IMAGE, replace(other, row=np.minimum(found.row, other.row))
 
 
 def crossings_of(branch: Branch, quantity: Quantity, values: FloatArray) -> Crossings:

@@ -16,6 +16,8 @@ _QUANTILE = 1.959963984540054
 #: Resamples for the intervals of Sobol indices: their ends are the 10th of each side, good to a third of the
 #: interval's own width at most.
 _RESAMPLES = 400
+#: Fewest blocks for indices: of fewer they are no better than 0.5, with an error of about 2 / sqrt(blocks).
+_LEAST = 16
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def _wilson(share: float, total: float) -> tuple[float, float]:
 
 
 def sobol_indices(values: FloatArray, names: tuple[str, ...], seed: int) -> SobolIndices | None:
-    """Return the Sobol indices of a number of each sample, nan where it has none; None of one block.
+    """Return the Sobol indices of a number of each sample, nan where it has none; None of few blocks.
 
     Parameters
     ----------
@@ -96,7 +98,7 @@ def sobol_indices(values: FloatArray, names: tuple[str, ...], seed: int) -> Sobo
     table = values[: whole * (d + 2)].reshape(whole, d + 2)
     table = table[np.isfinite(table).all(axis=1)]
     found = len(table)
-    if found < 2:
+    if found < _LEAST:
         return None
     blocks = 1 << (found.bit_length() - 1)
     table = table[:blocks]
@@ -118,6 +120,8 @@ def _indices(table: FloatArray) -> tuple[FloatArray, FloatArray]:
     from scipy.stats import sobol_indices as of_scipy
 
     columns = table.T
-    parts = {"f_A": columns[:1], "f_B": columns[1:2], "f_AB": columns[2:, None, :]}
+    d = len(columns) - 2
+    mixed = np.resize(columns[2:], (max(d, 2), len(table)))  # scipy fails at a single parameter
+    parts = {"f_A": columns[:1], "f_B": columns[1:2], "f_AB": mixed[:, None, :]}
     found = of_scipy(func=parts, n=len(table))
-    return np.atleast_1d(found.first_order), np.atleast_1d(found.total_order)
+    return np.asarray(found.first_order[:d]), np.asarray(found.total_order[:d])

@@ -11,7 +11,7 @@ from contfric.atlas.diagram import Diagram
 from contfric.atlas.explore import explore
 from contfric.chaos.tiles import packed, unpacked
 from contfric.continuation.events import EndReason
-from contfric.ensembles.reading import crossings_of, events_of, names_of
+from contfric.ensembles.reading import events_of, named_crossings
 from contfric.ensembles.rows import Drawn, Rows
 from contfric.errors import ContfricError, ConvergenceError, ParameterError
 from contfric.models.definition import FloatArray, Model
@@ -104,8 +104,7 @@ class _Gathered:
         labels, places = events_of(diagram)
         self.events += [(number, *event) for event in zip(labels, places, strict=True)]
         quantity = quantity_of(tile.row, tile.model)
-        for name, branch in zip(names_of(diagram), diagram.branches, strict=True):
-            found = crossings_of(branch, quantity, tile.values)
+        for name, found in named_crossings(diagram, quantity, tile.values):
             self.names += [name] * len(found.index)
             where = np.full(len(found.index), number, dtype=np.int32)
             self.parts.append((where, found.index, found.stable, found.row))

@@ -58,15 +58,16 @@ def plot_ensemble(found: Ensemble, ax: Axes | None = None, *, bridges: bool = Fa
     bands = [
         b for b in found.bands() if b.samples.max() > most and (bridges or "hold" not in b.name)
     ]
-    colours = branch_colours(dict.fromkeys(b.name for b in bands))
+    called = [b.name.removesuffix(" (image)") for b in bands]
+    colours = branch_colours(called)
     named: set[str] = set()
-    for band in bands:
+    for name, band in zip(called, bands, strict=True):
         low, middle, high = (np.where(band.samples > most, q, np.nan) for q in band.quantiles)
-        stable, colour = band.stable != "unstable", colours[band.name]
+        stable, colour = band.stable != "unstable", colours[name]
         area = _STABLE_AREA if stable else _UNSTABLE_AREA
         ax.fill_between(found.values, low, high, color=colour, alpha=area, linewidth=0)
-        label = None if band.name in named else band.name
-        named.add(band.name)
+        label = None if name in named else name
+        named.add(name)
         style = STABLE if stable else UNSTABLE
         ax.plot(found.values, middle, color=colour, ls=style, lw=LINE_WIDTH, label=label)
     _draw_events(ax, found)

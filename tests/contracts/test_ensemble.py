@@ -173,6 +173,15 @@ def test_sobol_indices_of_a_known_function() -> None:
         assert low < got.first[name] < high and high - low < 0.2
 
 
+def test_one_parameter_has_all_of_the_variance() -> None:
+    one, other = np.random.default_rng(2).random((2, 1024))
+    got = sobol_indices(np.stack([one, other, other], axis=1).ravel(), ("x",), 0)
+    assert got is not None
+    assert got.first["x"] == pytest.approx(1.0, abs=0.1)
+    assert got.total["x"] == pytest.approx(1.0, abs=0.1)
+    assert sobol_indices(one[:45], ("x",), 0) is None
+
+
 def test_samples_depend_on_seed_and_number_only(found: cf.Ensemble) -> None:
     more = compute(samples=17).samples
     assert (more[:12] == found.samples).all()
@@ -351,3 +360,12 @@ def test_errors_of_a_study_name_the_line(old: str, new: str, what: str, tmp_path
     (tmp_path / "x.yaml").write_text(STUDY.replace(old, new), encoding="utf-8")
     with pytest.raises(cf.StudyError, match=rf"x\.yaml:\d+: .*{what}"):
         cf.run_study(tmp_path / "x.yaml", out=tmp_path / "out")
+
+
+def test_images_are_told_apart_by_the_row(found: cf.Ensemble) -> None:
+    """Asymmetric orbits come in pairs; the larger maximum has the name, whichever was computed."""
+    rows = found.rows
+    own, image = rows.orbit_name == "1a", rows.orbit_name == "1a (image)"
+    assert own.sum() == image.sum() > 0 and (rows.orbit_index[own] == rows.orbit_index[image]).all()
+    assert (rows.orbit_row[own] > rows.orbit_row[image]).mean() > 0.99
+    assert not np.any(rows.orbit_name == "2s (image)")
