@@ -25,7 +25,7 @@ def test_the_page_runs(tmp_path: Path) -> None:
     exec(compile(block, str(PAGE), "exec"), scope)
     found = scope["found"]
     assert isinstance(found, cf.Ensemble) and found.complete
-    assert found.counts()["complete"] + found.counts().get("limited", 0) == 40
+    assert found.counts()["complete"] + found.counts().get("limited", 0) == 80
     (study,) = blocks("yaml")
     (tmp_path / "random.yaml").write_text(study, encoding="utf-8")
     assert read_study(tmp_path / "random.yaml").content.ensemble is not None
