@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from contfric.curves.quantity_trace import continue_quantity
     from contfric.curves.special import CodimTwo
     from contfric.curves.trace import continue_bifurcation
+    from contfric.ensembles.compute import ensemble
+    from contfric.ensembles.ensemble import Ensemble
     from contfric.equilibria.branch import EquilibriumBranch
     from contfric.equilibria.events import BoundaryPoint, EquilibriumEvent, HopfPoint
     from contfric.equilibria.explore import EquilibriumDiagram, explore_equilibria
@@ -74,6 +76,7 @@ if TYPE_CHECKING:
     from contfric.response.sweep import Sweep
     from contfric.response.sweeping import sweep
     from contfric.results import load, save
+    from contfric.results.export import export
     from contfric.signature import Signature, load_signature, signature_names, transition_graph
     from contfric.study import run_study
 
@@ -96,6 +99,8 @@ _HOMES = {
     "Series": "contfric.fitting.data",
     "fit": "contfric.fitting.fit",
     "EndReason": "contfric.continuation.events",
+    "Ensemble": "contfric.ensembles.ensemble",
+    "ensemble": "contfric.ensembles.compute",
     "Equilibria": "contfric.equilibria.result",
     "Equilibrium": "contfric.equilibria.result",
     "EquilibriumBranch": "contfric.equilibria.branch",
@@ -137,6 +142,7 @@ _HOMES = {
     "continue_orbit": "contfric.continuation.trace",
     "explore_equilibria": "contfric.equilibria.explore",
     "continue_quantity": "contfric.curves.quantity_trace",
+    "export": "contfric.results.export",
     "explore": "contfric.atlas.explore",
     "explore_plane": "contfric.atlas.plane_explore",
     "find_equilibria": "contfric.equilibria.find",
@@ -175,6 +181,7 @@ __all__ = [
     "Curve",
     "Diagram",
     "EndReason",
+    "Ensemble",
     "Equilibria",
     "Equilibrium",
     "EquilibriumBranch",
@@ -219,9 +226,11 @@ __all__ = [
     "continue_equilibrium",
     "continue_orbit",
     "continue_quantity",
+    "ensemble",
     "explore",
     "explore_equilibria",
     "explore_plane",
+    "export",
     "find_equilibria",
     "find_orbit",
     "find_two_folds",

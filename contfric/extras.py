@@ -51,3 +51,14 @@ def need_flint() -> None:
         If it is not installed.
     """
     _need("flint", "proofs", "certify")
+
+
+def need_xarray() -> None:
+    """See that xarray can be imported.
+
+    Raises
+    ------
+    MissingPackageError
+        If it is not installed.
+    """
+    _need("xarray", "labelled arrays", "xarray")

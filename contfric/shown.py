@@ -28,6 +28,7 @@ _FACTS = {
     "Returns": "section params outcome cycles complete",
     "ReleaseMap": "mode surface period params branches complete",
     "Basins": "shape shares orbits params complete",
+    "Ensemble": "parameter range distributions counts classes events complete",
     "Equilibria": "points sets params complete",
     "Rest": "state eigenvalues stable params",
     "EquilibriumBranch": "parameter params events ends",

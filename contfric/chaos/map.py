@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from contfric.chaos.exponents import lyapunov_dimension
 from contfric.chaos.status import Motion
 from contfric.chaos.tiles import TileRows
-from contfric.extras import need_pandas
+from contfric.extras import need_pandas, need_xarray
 from contfric.models.definition import FloatArray, Model
 from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
     from matplotlib.axes import Axes
 
 #: Exact exponents that differ by more than this belong to different orbits: far above their errors, and
@@ -195,6 +196,25 @@ class LyapunovMap(Shown):
         columns["periods"] = self.periods.ravel()
         columns["followed"] = self.followed.ravel()
         return pd.DataFrame(columns)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return exponents, their errors and kinds over parameters and starts as a dataset (needs xarray)."""
+        need_xarray()
+        import xarray as xr
+
+        dims = (*self.axes, "start")
+        names = np.array([motion.name.lower() for motion in Motion])
+        return xr.Dataset(
+            {
+                "exponents": ((*dims, "exponent"), self.exponents),
+                "error": (dims, self.errors),
+                "motion": (dims, names[self.motions]),
+                "periods": (dims, self.periods),
+                "followed": (dims, self.followed),
+            },
+            coords=dict(self.axes),
+            attrs={"model": self.model.name, **self.params},
+        )
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the map: positive exponents are shaded."""

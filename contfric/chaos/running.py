@@ -53,7 +53,11 @@ def check_executor(executor: object) -> None:
 
 
 def compute_all(
-    tiles: Mapping[int, T], executor: Executor | None, say: Progress, compute: Compute
+    tiles: Mapping[int, T],
+    executor: Executor | None,
+    say: Progress,
+    compute: Compute,
+    threads: int | None = None,
 ) -> Iterator[tuple[int, Any]]:
     """Yield (number, rows) of each tile as it is finished.
 
@@ -63,6 +67,7 @@ def compute_all(
     executor : where the tiles are computed; by default threads of this process, as the kernels run
         without Python's lock
     say : called when the executor has lost tiles
+    threads : most threads of this process; one where tiles are Python, which holds the lock
 
     A tile that fails there (a killed worker, a broken pool, a lost connection) is computed in this
     process; only if that fails, too, is it an error.
@@ -76,7 +81,7 @@ def compute_all(
             why = type(next(iter(lost.values()))).__name__
             say(f"{len(left)} tiles were lost by the executor ({why}): they are computed here")
     if left:
-        yield from _on_threads(left, compute)
+        yield from _on_threads(left, compute, threads or processors())
 
 
 def _on_executor(
@@ -102,8 +107,10 @@ def _on_executor(
         _cancel(numbers)
 
 
-def _on_threads(tiles: Mapping[int, T], compute: Compute) -> Iterator[tuple[int, Any]]:
-    count = min(processors(), len(tiles))
+def _on_threads(
+    tiles: Mapping[int, T], compute: Compute, threads: int
+) -> Iterator[tuple[int, Any]]:
+    count = min(threads, len(tiles))
     pool = ThreadPoolExecutor(count, thread_name_prefix="contfric-tile")
     waiting = iter(tiles.items())
     running: dict[Future[Any], int] = {}

@@ -32,6 +32,7 @@ def findings(record: Record) -> Iterator[str]:
         ("poincare", _points),
         ("basins", _basins),
         ("equilibria", _equilibria),
+        ("ensemble", _ensemble),
     ):
         if key in record:
             yield ""
@@ -62,6 +63,34 @@ def _basins(entry: Record) -> Iterator[str]:
         interval = f"{s['low']:.2%} to {s['high']:.2%}"
         rows.append([s["name"], str(s["count"]), f"{s['share']:.2%}", interval])
     yield from table(rows)
+    if not entry["complete"]:
+        yield "incomplete: the same command goes on from the finished tiles"
+
+
+#: Events and classes that the summary lists; the record has all of them.
+_MOST = 12
+
+
+def _ensemble(entry: Record) -> Iterator[str]:
+    low, high = entry["range"]
+    varied = "; ".join(f"{name} {text}" for name, text in entry["distributions"].items())
+    found = ", ".join(f"{count} {outcome}" for outcome, count in entry["outcomes"].items())
+    name = entry["parameter"]
+    yield f"ensemble of {entry['samples']} diagrams, {name} from {low:g} to {high:g}: {found}"
+    yield f"random    {varied}"
+    events, classes = entry["events"], entry["classes"]
+    rows = [["event", "share", f"{name} (5 %)", "median", "95 %"]]
+    for e in events[:_MOST]:
+        rows.append([e["label"], f"{e['share']:.1%}", *(f"{q:.6g}" for q in e["quantiles"])])
+    yield from table(rows)
+    rows = [["share", "95 % interval", "list of events"]]
+    for c in classes[:_MOST]:
+        interval = f"{c['low']:.1%} to {c['high']:.1%}"
+        rows.append([f"{c['share']:.1%}", interval, ", ".join(c["events"]) or "none"])
+    yield from table(rows)
+    left = max(0, len(events) - _MOST), max(0, len(classes) - _MOST)
+    if any(left):
+        yield f"and {left[0]} rarer events, {left[1]} rarer classes, which run.json has"
     if not entry["complete"]:
         yield "incomplete: the same command goes on from the finished tiles"
 

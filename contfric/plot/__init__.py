@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from contfric.plot.basins import plot_basins
     from contfric.plot.branch_graph import plot_branch_graph
     from contfric.plot.diagram import plot_branches, plot_diagram, plot_diagram_row
+    from contfric.plot.ensemble import plot_ensemble
     from contfric.plot.graph import plot_transition_graph
     from contfric.plot.lyapunov import plot_lyapunov_map
     from contfric.plot.orbit import plot_orbit, plot_orbit_in_time, plot_orbit_panels
@@ -34,6 +35,7 @@ _HOMES = {
     "plot_curves": "contfric.plot.plane",
     "plot_diagram": "contfric.plot.diagram",
     "plot_diagram_row": "contfric.plot.diagram",
+    "plot_ensemble": "contfric.plot.ensemble",
     "plot_lyapunov_map": "contfric.plot.lyapunov",
     "plot_orbit": "contfric.plot.orbit",
     "plot_orbit_in_time": "contfric.plot.orbit",
@@ -56,6 +58,7 @@ __all__ = [
     "plot_curves",
     "plot_diagram",
     "plot_diagram_row",
+    "plot_ensemble",
     "plot_lyapunov_map",
     "plot_orbit",
     "plot_orbit_in_time",

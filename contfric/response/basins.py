@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.chaos.status import Motion
-from contfric.extras import need_pandas
+from contfric.extras import need_pandas, need_xarray
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.response.attractors import named
@@ -19,6 +19,7 @@ from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
     from matplotlib.axes import Axes
 
 #: Quantile of the normal distribution for intervals of 95 percent.
@@ -143,6 +144,23 @@ class Basins(Shown):
                 "name": names[self.labels.ravel()],
                 "motion": motions[self.motions.ravel()],
             }
+        )
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return labels and kinds over the two states as a dataset (needs xarray)."""
+        need_xarray()
+        import xarray as xr
+
+        dims, motions = tuple(self.axes), np.array([motion.name.lower() for motion in Motion])
+        names = np.array([*self.names, ""])
+        return xr.Dataset(
+            {
+                "orbit": (dims, self.labels),
+                "name": (dims, names[self.labels]),
+                "motion": (dims, motions[self.motions]),
+            },
+            coords=dict(self.axes),
+            attrs={"model": self.model.name, **self.params, **self.at},
         )
 
     def plot(self, ax: Axes | None = None) -> Axes:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.errors import ParameterError, shown
-from contfric.extras import need_pandas
+from contfric.extras import need_pandas, need_xarray
 from contfric.models.definition import FloatArray, Model
 from contfric.response.outcome import Outcome
 from contfric.response.sections import STOPS
@@ -19,6 +19,7 @@ from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
     from matplotlib.axes import Axes
 
 #: Quantities of a diagram that the displacements at stops have, too.
@@ -208,6 +209,33 @@ class Sweep(Shown):
             columns |= {state: run.states[:, k] for k, state in enumerate(self.model.states)}
             tables.append(pd.DataFrame(columns))
         return pd.concat(tables, ignore_index=True)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return outcomes and periods over direction and parameter, and all points, as a dataset (xarray)."""
+        need_xarray()
+        import xarray as xr
+
+        runs, outcomes = self.runs.values(), np.array([o.name.lower() for o in Outcome])
+        modes = np.array([mode.name for mode in self.model.modes])
+        grid, at = ("direction", self.parameter), "point"
+        lengths = [len(run) for run in runs]
+        points = {
+            "point_direction": (at, np.repeat(list(self.runs), lengths)),
+            f"point_{self.parameter}": (at, np.concatenate([self.values[r.index] for r in runs])),
+            "mode": (at, modes[np.concatenate([run.modes for run in runs])]),
+            "t": (at, np.concatenate([run.times for run in runs])),
+        }
+        states = np.concatenate([run.states for run in runs])
+        points |= {name: (at, states[:, k]) for k, name in enumerate(self.model.states)}
+        return xr.Dataset(
+            {
+                "outcome": (grid, np.array([outcomes[run.outcomes] for run in runs])),
+                "period": (grid, np.array([run.periods for run in runs])),
+                **points,
+            },
+            coords={"direction": list(self.runs), self.parameter: self.values},
+            attrs={"model": self.model.name, "section": self.section, **self.params},
+        )
 
     def plot(self, ax: Axes | None = None, state: str | None = None) -> Axes:
         """Draw one state of all points, the displacement by default, against the parameter."""

@@ -22,6 +22,7 @@ from contfric.atlas.plane import Plane
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
 from contfric.curves.curve import Curve
+from contfric.ensembles.ensemble import Ensemble
 from contfric.equilibria.branch import EquilibriumBranch
 from contfric.equilibria.explore import EquilibriumDiagram
 from contfric.errors import ModelError, ParameterError, ResultFileError, path_of
@@ -33,6 +34,7 @@ from contfric.response.basins import Basins
 from contfric.response.returns import ReleaseMap, Returns
 from contfric.response.sweep import Sweep
 from contfric.results.curves import pack_curve, pack_plane, unpack_curve, unpack_plane
+from contfric.results.ensemble import pack_ensemble, unpack_ensemble
 from contfric.results.equilibria import (
     pack_equilibria,
     pack_equilibrium_branch,
@@ -66,6 +68,7 @@ Saveable: TypeAlias = (
     | Basins
     | EquilibriumBranch
     | EquilibriumDiagram
+    | Ensemble
 )
 
 #: Version of the format; it grows when an older contfric could not read what is written. Files of version 1
@@ -192,6 +195,8 @@ def _content(x: Saveable, packer: Packer) -> Header:
         return {"kind": "equilibrium branch", **pack_equilibrium_branch(x, packer.arrays)}
     if isinstance(x, EquilibriumDiagram):
         return {"kind": "equilibria", **pack_equilibria(x, packer.arrays)}
+    if isinstance(x, Ensemble):
+        return {"kind": "ensemble", **pack_ensemble(x, packer.arrays)}
     return {"kind": "diagram", **packer.diagram(x)}
 
 
@@ -262,6 +267,8 @@ def _restored(content: Header, pool: Unpacker) -> Saveable:
         return unpack_equilibrium_branch(pool.model, content, pool.arrays)
     if kind == "equilibria":
         return unpack_equilibria(pool.model, content, pool.arrays)
+    if kind == "ensemble":
+        return unpack_ensemble(pool.model, content, pool.arrays)
     raise ValueError(f"unknown kind of result {kind!r}")
 
 

@@ -26,7 +26,13 @@ from contfric.study.schema import (
     StudyFile,
     Want,
 )
-from contfric.study.schema_response import BasinsTask, EquilibriaTask, PoincareTask, SweepTask
+from contfric.study.schema_response import (
+    BasinsTask,
+    EnsembleTask,
+    EquilibriaTask,
+    PoincareTask,
+    SweepTask,
+)
 from contfric.yaml_lines import comma_hint
 
 if TYPE_CHECKING:
@@ -47,6 +53,7 @@ _PARTS: dict[str, type[BaseModel]] = {
     "poincare": PoincareTask,
     "basins": BasinsTask,
     "equilibria": EquilibriaTask,
+    "ensemble": EnsembleTask,
     "figures": Figure,
 }
 #: Keys whose values are names out of a list.

@@ -30,6 +30,7 @@ _SIZES = {
     FigureKind.POINCARE: (6.4, 6.0, 0.0),
     FigureKind.BASINS: (8.4, 6.0, 0.0),
     FigureKind.EQUILIBRIA: (8.4, 5.0, 0.0),
+    FigureKind.ENSEMBLE: (9.6, 6.0, 0.0),
 }
 #: Rows of a diagram that show a state, which an equilibrium has, too.
 _STATES = frozenset({"x_max", "x_min", "stops"})

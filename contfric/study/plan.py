@@ -62,6 +62,7 @@ class StepName(str, Enum):
     POINCARE = "poincare"
     BASINS = "basins"
     EQUILIBRIA = "equilibria"
+    ENSEMBLE = "ensemble"
     TABLES = "tables"
     DATA = "data"
     FIGURES = "figures"

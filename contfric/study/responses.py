@@ -1,4 +1,4 @@
-"""Steps of a run that need no orbit, simulated responses and equilibria: what they compute, check and say."""
+"""Steps of a run that need no orbit (responses, equilibria, ensembles): what they compute, check and say."""
 
 from __future__ import annotations
 
@@ -11,9 +11,17 @@ import numpy as np
 
 from contfric.errors import ContfricError
 from contfric.models.definition import Model
-from contfric.study.schema_response import BasinsTask, EquilibriaTask, PoincareTask, SweepTask
+from contfric.study import ensemble as study_ensemble
+from contfric.study.schema_response import (
+    BasinsTask,
+    EnsembleTask,
+    EquilibriaTask,
+    PoincareTask,
+    SweepTask,
+)
 
 if TYPE_CHECKING:
+    from contfric.ensembles.ensemble import Ensemble
     from contfric.equilibria.explore import EquilibriumDiagram
     from contfric.response.basins import Basins
     from contfric.response.returns import Returns
@@ -22,11 +30,11 @@ if TYPE_CHECKING:
     from contfric.study.schema import StudyFile
     from contfric.yaml_lines import LocatedYaml
 
-Response: TypeAlias = "Sweep | Returns | Basins | EquilibriumDiagram"
+Response: TypeAlias = "Sweep | Returns | Basins | EquilibriumDiagram | Ensemble"
 Say = Callable[[str], None]
 
 #: The keys of a study that ask for a response, in the order of the steps.
-KEYS = ("sweep", "poincare", "basins", "equilibria")
+KEYS = ("sweep", "poincare", "basins", "equilibria", "ensemble")
 
 
 @dataclass(frozen=True)
@@ -56,6 +64,10 @@ def text_of(task: Any) -> str:
     if isinstance(task, EquilibriaTask):
         low, high = task.range
         return f"equilibria, {task.parameter} from {low:g} to {high:g}, and their events"
+    if isinstance(task, EnsembleTask):
+        low, high = task.range
+        varied = ", ".join(task.distributions)
+        return f"diagrams of random {varied}, {task.parameter} from {low:g} to {high:g}"
     low, high, count = task.values
     direction = "both" if task.direction is None else task.direction.value
     return (
@@ -70,6 +82,7 @@ def row_text(key: str) -> str:
         "poincare": "one row a point of the section",
         "basins": "one row a start of the basins",
         "equilibria": "one row a point or event of the equilibria",
+        "ensemble": "one row an event of a sample",
     }[key]
 
 
@@ -81,6 +94,9 @@ def check(located: LocatedYaml, content: StudyFile, model: Model) -> None:
             continue
         if isinstance(task, EquilibriaTask):
             _check_equilibria(located, task, model)
+            continue
+        if isinstance(task, EnsembleTask):
+            study_ensemble.check(located, task, model, content.params)
             continue
         if task.state is not None and len(task.state) != len(model.states):
             located.fail(
@@ -172,7 +188,9 @@ def compute(study: Study, key: str, task: Any, tiles: Path, say: Say) -> Respons
         return poincare(study.model, study.params, **task.options())
     if isinstance(task, EquilibriaTask):
         return _equilibria(study, task, say)
-    if isinstance(task, BasinsTask):
+    if isinstance(task, EnsembleTask):
+        found = study_ensemble.compute(study, task, tiles, say)
+    elif isinstance(task, BasinsTask):
         found = _basins(study, task, tiles, say)
     else:
         found = _sweep(study, task, tiles, say)

@@ -17,6 +17,7 @@ from contfric.study.read import Study
 if TYPE_CHECKING:
     from contfric.atlas.plane import Plane
     from contfric.chaos.map import LyapunovMap
+    from contfric.ensembles.ensemble import Ensemble
     from contfric.equilibria.explore import EquilibriumDiagram
     from contfric.response.basins import Basins
     from contfric.response.returns import Returns
@@ -92,6 +93,12 @@ class StudyResult(Shown):
         """The basins, if the study asks for them."""
         found = self.responses.get("basins")
         return None if found is None else cast("Basins", found)
+
+    @property
+    def ensemble(self) -> Ensemble | None:
+        """The ensemble, if the study asks for one."""
+        found = self.responses.get("ensemble")
+        return None if found is None else cast("Ensemble", found)
 
     @property
     def equilibria(self) -> EquilibriumDiagram | None:

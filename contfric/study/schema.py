@@ -7,7 +7,13 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
-from contfric.study.schema_response import BasinsTask, EquilibriaTask, PoincareTask, SweepTask
+from contfric.study.schema_response import (
+    BasinsTask,
+    EnsembleTask,
+    EquilibriaTask,
+    PoincareTask,
+    SweepTask,
+)
 from contfric.study.schema_response import Part as _Part
 from contfric.yaml_lines import as_truth
 
@@ -36,6 +42,7 @@ class FigureKind(str, Enum):
     POINCARE = "poincare"
     BASINS = "basins"
     EQUILIBRIA = "equilibria"
+    ENSEMBLE = "ensemble"
 
 
 class Row(str, Enum):
@@ -267,7 +274,7 @@ class Figure(_Part):
 
     kind: Annotated[FigureKind, Field(strict=False)] = Field(
         description="one of diagram, orbit, transitions, branches, lyapunov, plane, sweep, "
-        "poincare, basins, equilibria"
+        "poincare, basins, equilibria, ensemble"
     )
     rows: _Rows | None = Field(
         None,
@@ -338,6 +345,11 @@ class StudyFile(_Part):
         None,
         description="a mapping with parameter and range; also values, starts, max_step",
     )
+    ensemble: EnsembleTask | None = Field(
+        None,
+        description="a mapping with parameter, range and distributions; also samples, seed, row, values, "
+        "workers, max_step, bridges, max_periods, copies, max_branches, max_points",
+    )
     want: _Wants = Field(
         [],
         description="a list with any of stability, asymmetry, extrema, stops, and of quantities",
@@ -358,8 +370,8 @@ class StudyFile(_Part):
     def needs_orbit(self) -> bool:
         """Whether anything is asked for that needs the orbit of the start."""
         shown = {figure.kind for figure in self.figures}
-        responses = (self.lyapunov, self.sweep, self.poincare, self.basins, self.equilibria)
-        simulated = any(task is not None for task in responses)
+        others = (self.sweep, self.poincare, self.basins, self.equilibria, self.ensemble)
+        simulated = any(task is not None for task in (self.lyapunov, *others))
         alone = simulated and self.task is None and self.plane is None
         return (
             not alone

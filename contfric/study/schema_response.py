@@ -1,4 +1,4 @@
-"""The part of a study file that asks for simulated responses: sweeps, return maps, basins."""
+"""The part of a study file that asks for what needs no orbit: responses, equilibria, ensembles."""
 
 from __future__ import annotations
 
@@ -97,6 +97,37 @@ class EquilibriaTask(Part):
     def options(self) -> dict[str, Any]:
         """Return what is given beyond the parameter and the range, as arguments."""
         return self.model_dump(exclude={"parameter", "range"}, exclude_none=True)
+
+
+class EnsembleTask(Part):
+    """Diagrams of random parameters."""
+
+    parameter: str = Field(description="the name of a parameter of the model")
+    range: list[float] = Field(
+        min_length=2, max_length=2, description="two finite numbers [low, high]"
+    )
+    distributions: dict[str, list[float] | dict[str, list[float]]] = Field(
+        description="a mapping of parameters to [low, high], or to a distribution of scipy.stats with its "
+        "arguments, such as {norm: [0.32, 0.01]}"
+    )
+    samples: int | None = Field(None, ge=1, description="a whole number >= 1: diagrams")
+    seed: int | None = Field(None, ge=0, description="a whole number >= 0")
+    row: str | None = Field(None, description="a quantity, of which bands are made")
+    values: int | None = Field(
+        None, ge=2, description="a whole number >= 2: values of the parameter for bands"
+    )
+    max_step: float | None = Field(None, gt=0.0, description="a number > 0")
+    bridges: bool | None = Field(None, description="true or false")
+    max_periods: int | None = Field(None, ge=1, description="a whole number >= 1")
+    copies: int | None = Field(None, ge=1, description="a whole number >= 1")
+    max_branches: int | None = Field(None, ge=1, description="a whole number >= 1")
+    max_points: int | None = Field(None, ge=1, description="a whole number >= 1")
+    workers: int | None = Field(None, ge=1, description="a whole number >= 1: processes")
+
+    def options(self) -> dict[str, Any]:
+        """Return what is given beyond parameter, range, distributions and processes, as arguments."""
+        given = {"parameter", "range", "distributions", "workers"}
+        return self.model_dump(exclude=given, exclude_none=True)
 
 
 class SweepTask(Part):

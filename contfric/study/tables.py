@@ -74,11 +74,15 @@ def write_bifurcations(path: Path, diagram: Diagram) -> None:
             _known(node.bifurcation.stable_before),
             _known(node.bifurcation.stable_after),
             getattr(diagram.scenario(node), "value", ""),
+            node.bifurcation.label,
+            " ".join(str(k + 1) for k in node.branches),
+            node.bifurcation.orbit.period,
             *([" ".join(node.bifurcation.contacts)] if contacts else []),
         )
         for node in listed_nodes(diagram)
     )
     header = ["kind", "branch", "signature", *names, "stable_before", "stable_after", "scenario"]
+    header += ["label", "branches", "period"]
     write_table(path, [*header, *(["contacts"] if contacts else [])], rows)
 
 

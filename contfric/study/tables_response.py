@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from contfric.chaos.status import Motion
+from contfric.ensembles.ensemble import Ensemble
 from contfric.equilibria.events import BoundaryPoint, EquilibriumEvent, HopfPoint
 from contfric.equilibria.explore import EquilibriumDiagram
 from contfric.response.basins import Basins
@@ -22,6 +23,8 @@ def header_of(found: Response) -> list[str]:
     if isinstance(found, EquilibriumDiagram):
         states = found.model.states
         return ["branch", "event", found.parameter, "mode", *states, "stable", "admissible"]
+    if isinstance(found, Ensemble):
+        return ["sample", *found.distributions, "event", found.parameter]
     if isinstance(found, Basins):
         return [*found.axes, "orbit", "name", "motion"]
     if isinstance(found, Returns):
@@ -33,6 +36,8 @@ def rows_of(found: Response) -> Iterator[tuple[Any, ...]]:
     """Yield the rows of the table of a response."""
     if isinstance(found, EquilibriumDiagram):
         return _equilibria(found)
+    if isinstance(found, Ensemble):
+        return _places(found)
     if isinstance(found, Basins):
         return _starts(found)
     return _points(found) if isinstance(found, Returns) else _swept(found)
@@ -71,6 +76,35 @@ def _starts(found: Basins) -> Iterator[tuple[Any, ...]]:
         for j, b in enumerate(columns):
             label = int(found.labels[i, j])
             yield a, b, label, names[label], motions[found.motions[i, j]]
+
+
+def _places(found: Ensemble) -> Iterator[tuple[Any, ...]]:
+    rows = found.rows
+    events = zip(rows.event_label.tolist(), rows.event_value.tolist(), strict=True)
+    for sample, event in zip(rows.event_sample.tolist(), events, strict=True):
+        yield sample, *found.samples[sample].tolist(), *event
+
+
+def _ensemble_entry(found: Ensemble) -> dict[str, Any]:
+    return {
+        "parameter": found.parameter,
+        "range": list(found.range),
+        "distributions": found.distributions,
+        "seed": found.seed,
+        "samples": len(found),
+        "outcomes": found.counts(),
+        "complete": found.complete,
+        "events": [
+            {"label": e.label, "share": e.share, "low": e.low, "high": e.high, "count": e.count}
+            | {"quantiles": e.quantiles().tolist()}
+            for e in found.events
+        ],
+        "classes": [
+            {"events": list(c.events), "share": c.share, "low": c.low, "high": c.high}
+            | {"samples": len(c.samples)}
+            for c in found.classes
+        ],
+    }
 
 
 def _points(found: Returns) -> Iterator[tuple[Any, ...]]:
@@ -116,6 +150,8 @@ def entries_of(found: Response) -> dict[str, Any]:
             "events": [_event_entry(event) for event in found.events],
             "complete": found.complete,
         }
+    if isinstance(found, Ensemble):
+        return _ensemble_entry(found)
     if isinstance(found, Basins):
         return {
             "grid": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in found.axes.items()},

@@ -305,6 +305,7 @@ def test_tables_are_exact(tmp_path, write) -> None:
         *("kind", "branch", "signature"),
         *("Omega", "S", "S0", "h", "zeta"),
         *("stable_before", "stable_after", "scenario"),
+        *("label", "branches", "period"),
     ]
     assert [float(row["Omega"]) for row in table] == [
         b.params["Omega"] for b in result.diagram.bifurcations
@@ -312,6 +313,10 @@ def test_tables_are_exact(tmp_path, write) -> None:
     assert {row["kind"] for row in table} >= {"SN", "CS", "SS", "BP", "T"}
     for row in table:
         assert result.diagram.branches[int(row["branch"]) - 1].name == row["signature"]
+    for row, node in zip(table, result.diagram.events, strict=True):
+        assert row["branches"] == " ".join(str(k + 1) for k in node.branches)
+        assert row["label"] == node.bifurcation.label
+        assert float(row["period"]) == node.bifurcation.orbit.period
 
 
 def test_without_stability_no_multiplier_is_evaluated(tmp_path, write) -> None:

@@ -1,0 +1,237 @@
+"""The computation of an ensemble: arguments checked, samples drawn, tiles spread, gathered, kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from contfric.chaos.compute import ascending
+from contfric.chaos.running import Progress, Timer, check_executor, compute_all
+from contfric.chaos.store import TileFolder, digest, open_tiles, versions
+from contfric.ensembles.drawing import Varied, checked_distributions
+from contfric.ensembles.ensemble import Ensemble
+from contfric.ensembles.rows import Rows, joined
+from contfric.ensembles.tile import EnsembleTile, compute_ensemble_tile
+from contfric.errors import (
+    ParameterError,
+    checked_range,
+    function_of,
+    mapping_of,
+    real_number,
+    truth,
+    whole_number,
+)
+from contfric.memory import must_fit
+from contfric.models import ModelSource, Parameters
+from contfric.models.definition import FloatArray, Model
+from contfric.models.tied import tied
+from contfric.quantities.registry import number_quantity
+
+#: Bytes that a sample takes at each of the values, for ten branches: 41 of a row with a name of five letters.
+_BYTES = 410
+#: Most branches of a diagram: Fig. 5 has 8, with mirror images; one that reaches this has a cascade.
+_MAX_BRANCHES = 100
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """An ensemble to be computed."""
+
+    model: Model
+    vectors: FloatArray
+    parameter: str
+    range: tuple[float, float]
+    row: str
+    values: FloatArray
+    options: dict[str, Any]
+    side: int
+
+    def parts(self) -> list[slice]:
+        count = len(self.vectors)
+        return [slice(k, min(k + self.side, count)) for k in range(0, count, self.side)]
+
+    def tile(self, part: slice) -> EnsembleTile:
+        rest = (self.parameter, self.range, self.row, self.values, self.options)
+        return EnsembleTile(self.model, self.vectors[part], *rest)
+
+    def record(self) -> dict[str, Any]:
+        """Describe the ensemble, so that tiles of another one are not taken for its."""
+        return {
+            **versions(self.model),
+            "kind": "ensemble",
+            "samples": digest(self.vectors),
+            "parameter": self.parameter,
+            "range": list(self.range),
+            "row": self.row,
+            "values": digest(self.values),
+            "options": self.options,
+            "tile": self.side,
+        }
+
+
+def ensemble(
+    model: ModelSource,
+    parameter: str,
+    range: tuple[float, float],
+    distributions: Mapping[str, Any],
+    params: Parameters | None = None,
+    *,
+    samples: int = 1000,
+    seed: int = 0,
+    row: str = "x_max",
+    values: int | ArrayLike = 101,
+    max_step: float | None = None,
+    bridges: bool = True,
+    max_periods: int | None = None,
+    copies: int | None = None,
+    max_branches: int = _MAX_BRANCHES,
+    max_points: int | None = None,
+    executor: Executor | None = None,
+    folder: str | Path | None = None,
+    tile: int = 20,
+    progress: Progress | None = None,
+) -> Ensemble:
+    """Explore the diagrams of random parameters.
+
+    Each sample is an exploration, as by :func:`contfric.explore`, from an orbit that a simulation finds at
+    ``params[parameter]``, or elsewhere in the range. Sample i depends on ``seed`` and i only: the result is
+    the same to the last bit for any number of workers. Ctrl-C ends the computation; the samples that are
+    finished are returned.
+
+    Parameters
+    ----------
+    model, params : the model (or its name) and the parameters that do not vary; defaults fill in
+    parameter, range : the parameter of the diagrams, and where it is followed
+    distributions : of the parameters that vary: (low, high) is uniform; or a frozen one of scipy.stats
+    samples : number of diagrams; Sobol indices of d parameters use (d + 2) times a power of 2 of them
+    seed : whole number that the samples are drawn from
+    row : a quantity, of which bands are made
+    values : number of values of the parameter for bands, or the values, ascending
+    max_step, bridges, max_periods, copies, max_branches, max_points : as for :func:`contfric.explore`;
+        a sample that a limit cuts is counted, and is in bands but not in classes
+    executor : any :class:`concurrent.futures.Executor` of processes: loky, dask, MPI; by default one
+        sample after the other in this process. What it loses is computed here.
+    folder : where finished tiles are kept; the same call goes on from them
+    tile : samples in a tile
+    progress : called with one line of text now and then
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not valid.
+    ResultFileError
+        If the folder holds tiles of another ensemble, or cannot be written.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> box = {"S": (0.30, 0.34)}
+    >>> found = cf.ensemble("coulomb", "Omega", (0.48, 0.55), box, {"Omega": 0.5, "S0": 0.4}, samples=6)
+    >>> found.event("SN 1a").count
+    6
+    """
+    model, params = tied(model, params)
+    check_executor(executor)
+    function_of("progress", progress)
+    model.index_of(parameter)
+    bounds = checked_range(parameter, range)
+    varied = checked_distributions(model, distributions, parameter)
+    number_quantity(row, model, "an ensemble")
+    count = whole_number("samples", samples, least=1)
+    grid = _values(parameter, bounds, values)
+    must_fit(f"an ensemble of {count} diagrams at {len(grid)} values", count * len(grid) * _BYTES)
+    whole = {
+        "max_periods": max_periods,
+        "copies": copies,
+        "max_branches": max_branches,
+        "max_points": max_points,
+    }
+    options: dict[str, Any] = {"bridges": truth("bridges", bridges)}
+    options |= {k: whole_number(k, v, least=1) for k, v in whole.items() if v is not None}
+    if max_step is not None:
+        options["max_step"] = real_number("max_step", max_step)
+    vector = _vector(model, params, parameter, bounds, varied)
+    whole_number("seed", seed, least=0)
+    drawn = varied.draw(seed, count)
+    vectors = np.tile(vector, (count, 1))
+    vectors[:, [model.index_of(name) for name in varied.names]] = drawn
+    side = whole_number("tile", tile, least=1)
+    job = _Job(model, vectors, parameter, bounds, row, grid, options, side)
+    kept = None if folder is None else open_tiles(Path(folder), job.record())
+    rows = _computed(job, executor, kept, progress)
+    texts = dict(zip(varied.names, varied.texts, strict=True))
+    return Ensemble(model, parameter, bounds, vector, row, grid, texts, seed, drawn, rows)
+
+
+def _values(parameter: str, bounds: tuple[float, float], given: Any) -> FloatArray:
+    if isinstance(given, int | np.integer) and not isinstance(given, bool):
+        return np.linspace(*bounds, whole_number("values", given, least=2))
+    values = ascending(parameter, given)
+    if values[0] < bounds[0] or values[-1] > bounds[1]:
+        raise ParameterError(
+            f"the values of '{parameter}' lie within its range, {bounds[0]:g} to {bounds[1]:g}; got "
+            f"{values[0]:g} to {values[-1]:g}"
+        )
+    return values
+
+
+def _vector(
+    model: Model,
+    params: Parameters | None,
+    parameter: str,
+    bounds: tuple[float, float],
+    varied: Varied,
+) -> FloatArray:
+    """Return the parameters, those that vary at their medians."""
+    fixed = dict(mapping_of("params", {} if params is None else params, "{'S0': 0.4}"))
+    for name in varied.names:
+        if name in fixed:
+            raise ParameterError(f"'{name}' has a value in params, and a distribution: give one")
+    fixed.setdefault(parameter, 0.5 * (bounds[0] + bounds[1]))
+    half = np.array([0.5])
+    medians = (float(x.ppf(half)[0]) for x in varied.distributions)
+    vector = model.vector({**fixed, **dict(zip(varied.names, medians, strict=True))})
+    start = vector[model.index_of(parameter)]
+    if not bounds[0] <= start <= bounds[1]:
+        raise ParameterError(
+            f"an orbit to begin with is looked for at {parameter} = {start:g}, which is not between "
+            f"{bounds[0]:g} and {bounds[1]:g}"
+        )
+    return vector
+
+
+def _computed(
+    job: _Job, executor: Executor | None, kept: TileFolder | None, progress: Progress | None
+) -> Rows:
+    parts, tiles, found = job.parts(), {}, {}
+    for number, part in enumerate(parts):
+        finished = None
+        if kept is not None:
+            finished = Rows.checked(kept.read(number), part.stop - part.start)
+        if finished is None:
+            tiles[number] = job.tile(part)
+        else:
+            found[number] = finished
+    timer = Timer(len(parts), len(found), progress, "ensemble")
+    if found and kept is not None:
+        timer.say(f"{timer.done} of {len(parts)} tiles are in {kept.path} already")
+    try:
+        for number, rows in compute_all(tiles, executor, timer.say, compute_ensemble_tile, 1):
+            if kept is not None:
+                kept.write(number, vars(rows))
+            found[number] = rows
+            timer.tick()
+    except KeyboardInterrupt:
+        timer.say(f"interrupted: {timer.done} of {len(parts)} tiles are finished")
+    return joined(
+        [
+            found[number] if number in found else Rows.empty(part.stop - part.start)
+            for number, part in enumerate(parts)
+        ]
+    )

@@ -1,0 +1,169 @@
+"""Results as columns: points and events, each column with its unit, for files that other programs read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.atlas.diagram import Diagram
+from contfric.atlas.plane import Plane
+from contfric.continuation.branch import Branch
+from contfric.continuation.events import Bifurcation
+from contfric.curves.curve import Curve
+from contfric.models.definition import Model
+from contfric.orbit.orbit import Orbit
+
+Exported: TypeAlias = Orbit | Branch | Diagram | Curve | Plane
+
+
+@dataclass
+class Columns:
+    """A table.
+
+    Attributes
+    ----------
+    values : columns by name, all of one length
+    units : units of those that have one: what 1 in the column is, in units of the model's file
+    """
+
+    values: dict[str, NDArray[Any]] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(next(iter(self.values.values()), ()))
+
+    def add(self, name: str, values: Any, unit: float | None = None) -> None:
+        """Append a column of numbers with a unit, or of texts."""
+        self.values[name] = np.asarray(values)
+        self.units[name] = "" if unit is None else f"{unit:g}"
+
+    def multipliers(self, values: Any) -> None:
+        """Append real and imaginary parts of multipliers, shape (rows, n)."""
+        for k, column in enumerate(np.asarray(values, dtype=np.complex128).T, start=1):
+            self.add(f"multiplier_{k}_re", column.real, 1.0)
+            self.add(f"multiplier_{k}_im", column.imag, 1.0)
+
+
+def stacked(tables: Sequence[Columns]) -> Columns:
+    """Return tables below each other; what one lacks is nan, or empty where it is text."""
+    found = Columns()
+    for name in dict.fromkeys(name for table in tables for name in table.values):
+        like = next(t.values[name] for t in tables if name in t.values)
+        empty: Any = "" if like.dtype.kind == "U" else np.nan
+        parts = [t.values.get(name, np.full(len(t), empty)) for t in tables]
+        found.values[name] = np.concatenate(parts)
+        found.units[name] = next(t.units[name] for t in tables if name in t.units)
+    return found
+
+
+def points_of(x: Exported) -> Columns:
+    """Return the points of a result: one period of an orbit; else one row an orbit."""
+    if isinstance(x, Orbit):
+        return _motion(x)
+    if isinstance(x, Branch):
+        return _branch(x, 1)
+    if isinstance(x, Curve):
+        return _curve(x, 1)
+    if isinstance(x, Plane):
+        return stacked([_curve(curve, k) for k, curve in enumerate(x.curves, start=1)])
+    return stacked([_branch(branch, k) for k, branch in enumerate(x.branches, start=1)])
+
+
+def events_of(x: Exported) -> Columns | None:
+    """Return the events of a branch or diagram, or the special points of curves; None of an orbit."""
+    if isinstance(x, Orbit):
+        return None
+    if isinstance(x, Branch):
+        return stacked([_event(b, ("1",), (x.name,)) for b in x.bifurcations])
+    if isinstance(x, Diagram):
+        names = [branch.name for branch in x.branches]
+        return stacked(
+            [
+                _event(
+                    node.bifurcation,
+                    [str(k + 1) for k in node.branches],
+                    [names[k] for k in node.branches],
+                )
+                for node in x.events
+            ]
+        )
+    table = Columns()
+    special = x.special
+    table.add("label", np.array([point.name for point in special], dtype=np.str_))
+    for name in x.parameters:
+        table.add(name, [point.params[name] for point in special], 1.0)
+    return table
+
+
+def _lengths(model: Model) -> tuple[float, float]:
+    """Return the units of the displacement and of time."""
+    units = dict(model.units)
+    return units.get(model.states[0], 1.0), units.get("t", 1.0)
+
+
+def _motion(orbit: Orbit) -> Columns:
+    table, units = Columns(), dict(orbit.model.units)
+    times, states, names = orbit.trajectory()
+    table.add("t", times, units.get("t", 1.0))
+    for k, name in enumerate(orbit.model.states):
+        table.add(name, states[:, k], units.get(name, 1.0))
+    table.add("domain", np.array(names, dtype=np.str_))
+    return table
+
+
+def _branch(branch: Branch, number: int) -> Columns:
+    table, (length, time) = Columns(), _lengths(branch.model)
+    table.add("branch", np.full(len(branch), number), 1.0)
+    table.add("signature", np.full(len(branch), branch.name))
+    for name, values in branch.params.items():
+        table.add(name, values, 1.0)
+    table.add("period", branch.period, time)
+    table.add("x_max", branch.x_max, length)
+    table.add("x_min", branch.x_min, length)
+    table.add("psi", branch.asymmetry, 1.0)
+    for k, stops in enumerate(branch.stops.T, start=1):
+        table.add(f"stop_{k}", stops, length)
+    if branch.stable is not None:
+        table.add("stable", branch.stable.astype(np.float64), 1.0)
+    if branch.multipliers is not None:
+        table.multipliers(branch.multipliers)
+    return table
+
+
+def _event(event: Bifurcation, branches: Sequence[str], names: Sequence[str]) -> Columns:
+    table, (length, time) = Columns(), _lengths(event.orbit.model)
+    table.add("label", [event.label])
+    table.add("kind", [event.kind.value])
+    table.add("branches", [" ".join(branches)])
+    table.add("signatures", ["; ".join(names)])
+    for name, value in event.params.items():
+        table.add(name, [value], 1.0)
+    table.add("period", [event.orbit.period], time)
+    table.add("x_max", [event.orbit.x_max], length)
+    for name in ("stable_before", "stable_after"):
+        stable = getattr(event, name)
+        table.add(name, [np.nan if stable is None else float(stable)], 1.0)
+    if not event.orbit.system.holds:
+        table.multipliers(event.orbit.multipliers[None, :])
+    return table
+
+
+def _curve(curve: Curve, number: int) -> Columns:
+    table, (length, time) = Columns(), _lengths(curve.model)
+    orbits = list(curve)
+    table.add("curve", np.full(len(curve), number), 1.0)
+    table.add("label", np.full(len(curve), curve.label))
+    table.add("kind", [kind.value for kind in curve.kinds])
+    for name, values in curve.params.items():
+        table.add(name, values, 1.0)
+    table.add("period", [orbit.period for orbit in orbits], time)
+    table.add("x_max", [orbit.x_max for orbit in orbits], length)
+    table.add("x_min", [orbit.x_min for orbit in orbits], length)
+    table.add("stable", curve.stable.astype(np.float64), 1.0)
+    if not any(orbit.system.holds for orbit in orbits):
+        table.multipliers(np.array([orbit.multipliers for orbit in orbits]))
+    return table
