@@ -105,12 +105,15 @@ class Inside:
         contacts : whose forces it is made of
         given : further named expressions
         """
+        leaves: dict[str, set[str]] = {}
 
         def value(segment: Segment, shares: FloatArray, kinks: Kinks) -> Dual:
             tree = tree_in(segment.mode)
             forces = {FORCE_OF + c: parse(self.laws[c].force(segment.mode)) for c in contacts}
             defined = {**self.definitions, **forces, **(given or {})}
-            names = _leaves(tree, defined)
+            if segment.mode not in leaves:  # looked for once: it is asked for at every segment
+                leaves[segment.mode] = _leaves(tree, defined)
+            names = leaves[segment.mode]
             time, states = segment.at(shares)
             values: dict[str, Any] = {TIME: time}
             values.update(zip(self.model.states, states, strict=True))
