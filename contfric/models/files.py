@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from contfric.errors import ModelError, NotationError, did_you_mean
 from contfric.models.definition import Model
@@ -56,11 +56,20 @@ def read_model(path: Path) -> Model:
         located = read_yaml(_file(path))
         try:
             data = loaded(located.data, path.parent)
-            return model_of(derived("text", repr(data), lambda: describe(data).text))
+            return model_of(_described(data))
         except EntryError as error:
             located.fail(_written_at(located, error.address), str(error))
     except NotationError as error:
         raise ModelError(str(error)) from None
+
+
+def _described(data: dict[str, Any]) -> str:
+    """Return the text of the description of a model's data; the same data are read once."""
+    try:
+        source = repr(data)
+    except ValueError:  # a number of more digits than Python prints: whoever reads it says so
+        return describe(data).text
+    return derived("text", source, lambda: describe(data).text)
 
 
 def _written_at(located: LocatedYaml, address: Address) -> Address:

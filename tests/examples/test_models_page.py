@@ -32,6 +32,7 @@ EXAMPLES = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re
 #: The words of their orbits: domains may be many, modes are few.
 WORDS = {
     "neuron": {("rest", "threshold")},
+    "ball": {("flight", "table"), ("chatter", "table_lift")},
     "relay": {("up", "high"), ("down", "low")},
     "latch": {("on", "trip"), ("off", "tick")},
     "knob": {("turns", "phi+")},
