@@ -29,6 +29,7 @@ DOCS = ROOT / "docs"
 ELSEWHERE = {
     *("bridges", "census", "certificates", "curves", "equilibria", "lyapunov", "models"),
     *("quantities", "response"),
+    "ensembles",
 }
 #: Pages whose code is run here, and what it prints or makes.
 HERE = {
