@@ -25,6 +25,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.linear import tangent_of
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.sections import canonical
 from contfric.orbit.slides import SAME_MOTION
 from contfric.orbit.system import Word, build_system
 from contfric.orbit.words import half_of
@@ -130,6 +131,8 @@ def _candidate(unit: Unit, forms: tuple[Form, ...], reason: str) -> Candidate:
         return Candidate(reason, None, str(error))
     words = frozenset(form.word for form in forms)
     if not np.any(away):
+        plain = canonical(orbit)  # joints on sections are of no use beside others
+        orbit = plain.as_half() if orbit.system.half and plain is not orbit else plain
         return Candidate(reason, orbit, words=words)
     moves = np.zeros(orbit.joints.shape)
     moves[:, 0] = away

@@ -28,6 +28,10 @@ from contfric.signature import canonical_word
 _BESIDE = (1e-7, 1e-5, 1e-3)
 #: A turn may last this much longer than that at the event: a grazing changes it by the root of a distance.
 _LONGER = 1.2
+#: Where in a segment motions may start: odd shares, no two of them symmetric to its middle.
+_PLACES = np.array([0.17, 0.26, 0.37, 0.44, 0.52, 0.61, 0.70, 0.79])
+#: A surface that the state leaves by less than this all along (rounding of states of order 1) is lain on.
+_LEFT = 1e-9
 
 
 def walked(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator[Orbit]:
@@ -41,8 +45,9 @@ def walked(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator
     shifts : (parameter, change) of further motions, from the orbit itself at other parameters
     """
     own, seen = canonical_word(orbit.word, orbit.model), set()
-    for size, vector, state in _beside(orbit, shifts):
-        found = _one_turn(orbit, vector, state)
+    start = _inside(orbit)
+    for size, vector, state in _beside(orbit, start[1], shifts):
+        found = _one_turn(orbit, start, vector, state)
         if found is None:
             continue
         word = canonical_word(found.word, orbit.model)
@@ -51,43 +56,55 @@ def walked(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator
             yield found
 
 
-def _middle(orbit: Orbit) -> tuple[int, float]:
-    """Return the longest segment that does not rest, and the time of its middle: far from any surface."""
+def _inside(orbit: Orbit) -> tuple[int, float]:
+    """Return the longest segment that does not rest, and a time of it at which no surface is near.
+
+    Its middle will not do: by symmetry, or behind a touch, it may be a stationary point.
+    """
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
     resting = resting_modes(orbit)
     rests = [mode in resting for mode, _ in orbit.word]
     i = int(np.argmax(np.where(rests, -1.0, lasts)))
-    return i, float(orbit.cycle[i, 0] + 0.5 * lasts[i])
+    times = orbit.cycle[i, 0] + _PLACES * lasts[i]
+    states = [orbit.state(float(time)) for time in times]
+    flow = orbit.model.view(orbit.vector)
+    apart = [
+        [abs(flow.height(surface.name, float(t), y)) for t, y in zip(times, states, strict=True)]
+        for surface in orbit.model.surfaces
+    ]
+    clear = np.array([row / np.max(row) for row in apart if np.max(row) > _LEFT])
+    best = len(times) // 2 if len(clear) == 0 else int(np.argmax(clear.min(axis=0)))
+    return i, float(times[best])
 
 
 def _beside(
-    orbit: Orbit, shifts: tuple[tuple[int, float], ...]
+    orbit: Orbit, time: float, shifts: tuple[tuple[int, float], ...]
 ) -> Iterator[tuple[float, FloatArray, FloatArray]]:
     """Yield the distance, the parameters and the state of motions near an orbit, the nearest first."""
-    _, time = _middle(orbit)
-    middle = orbit.state(time)
+    start = orbit.state(time)
     data = orbit.system.layout.conserved  # which are given: motions beside the orbit have the same
     for size in _BESIDE:
-        for k in range(len(middle)):
-            apart = np.zeros(len(middle))
-            apart[k] = size * (1.0 + abs(middle[k]))
+        for k in range(len(start)):
+            apart = np.zeros(len(start))
+            apart[k] = size * (1.0 + abs(start[k]))
             apart -= data.T @ (data @ apart)
             for sign in (1.0, -1.0):
-                yield size, orbit.vector, middle + sign * apart
+                yield size, orbit.vector, start + sign * apart
     for index, change in shifts:
         vector = orbit.vector.copy()
         vector[index] += change
-        yield np.inf, vector, middle
+        yield np.inf, vector, start
 
 
-def _one_turn(orbit: Orbit, vector: FloatArray, state: FloatArray) -> Orbit | None:
+def _one_turn(
+    orbit: Orbit, start: tuple[int, float], vector: FloatArray, state: FloatArray
+) -> Orbit | None:
     """Follow a motion for one turn; return the orbit that it nearly is, None if it breaks off."""
-    model = orbit.model
-    i, time = _middle(orbit)
+    model, (i, time) = orbit.model, start
     mode = model.mode_index[_declared(orbit, i, time, state)]
     unit = 1.0 if model.autonomous else orbit.period / orbit.periods
     trajectory = run(model, vector, mode, 0, time, state, _LONGER * orbit.period / unit, 10_000)
-    stop = _end_of_turn(orbit, trajectory, time, unit)
+    stop = _end_of_turn(orbit, trajectory, start, unit)
     if stop is None:
         return None
     word: Word = trajectory.word[:stop]
@@ -106,12 +123,14 @@ def _one_turn(orbit: Orbit, vector: FloatArray, state: FloatArray) -> Orbit | No
     return Orbit(system, clocked(model, joints, end), vector.copy(), np.inf, Status.NOT_CONVERGED)
 
 
-def _end_of_turn(orbit: Orbit, trajectory: Trajectory, start: float, unit: float) -> int | None:
+def _end_of_turn(
+    orbit: Orbit, trajectory: Trajectory, start: tuple[int, float], unit: float
+) -> int | None:
     """Return the number of events of one turn; None if the motion is in another mode after it."""
     model, word = orbit.model, trajectory.word
     clock = trajectory.times + trajectory.cycles * unit * (not model.autonomous)
-    count = int(np.searchsorted(clock, start + orbit.period))
-    i, _ = _middle(orbit)
+    i, time = start
+    count = int(np.searchsorted(clock, time + orbit.period))
     mode = word[count][0] if count < len(word) else trajectory.last[3]
     same = bool(mode) and model.whole_mode(mode) == model.whole_mode(orbit.word[i][0])
     return count if count > 0 and same else None

@@ -35,6 +35,7 @@ from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.section_joints import divided
 from contfric.orbit.slides import SHORT, resting_modes
 from contfric.orbit.system import Margin, Test, Word, build_system
 from contfric.signature.edits import apply_edit, edited_pieces
@@ -95,10 +96,12 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
         return Incident(
             unit, (), (Refusal("what moves", "nothing moves any more", True),), (), least
         )
-    collection = _started(orbit, unit, least)
+    cut = divided(orbit, orbit.periods // bifurcation.outline.periods)
+    collection = _started(cut or orbit, unit_of(cut) if cut else unit, least)
     unit = collection.unit
-    places = [(place, bifurcation.kind) for place in places_of(bifurcation)]
-    collection.edit(orbit, np.zeros(len(orbit.word)), "", places)
+    if cut is None:
+        places = [(place, bifurcation.kind) for place in places_of(bifurcation)]
+        collection.edit(orbit, np.zeros(len(orbit.word)), "", places)
     collection.close()
     return Incident(
         unit,

@@ -66,7 +66,7 @@ def smooth_events(
             continue  # chi(1) of a fold vanishes with it
         if max(abs(a), abs(b)) < LEVEL:
             continue  # zero on both sides: a continuum of orbits, and the sign is rounding
-        share = a / (a - b)
+        share = a / (a - b) if np.isfinite(a) else 0.5  # infinite at a grazing: nothing is known
         if column == CHI_ONE and not _passes_vertex(orbit, before, after, share, settings):
             crossing = _crossing(orbit, before, after, beyond, share, settings)
             if crossing is not None:
@@ -132,7 +132,9 @@ def _at_multiplier(
     """Return what a multiplier on the unit circle is: a branch point, a doubling, a torus, or nothing."""
     from contfric.continuation.steps import CHI_MINUS, CHI_PAIR
 
-    kind = Kind.BP
+    kind, value = Kind.BP, -1.0 if column == CHI_MINUS else 1.0
+    if column != CHI_PAIR and np.all(np.abs(point.mu - value) > _NEAR_ONE):
+        return []  # chi changed its sign through infinity, where an impact grazes
     if column == CHI_PAIR:
         if abs(point.mu[0].imag) < _COMPLEX:
             return []  # two real multipliers with product 1: nothing happens
@@ -174,6 +176,8 @@ def _crossing(
     if found is None:
         return None
     crossing, point = found
+    if np.all(np.abs(crossing.orbit.multipliers - 1.0) > _NEAR_ONE):
+        return None  # where an impact grazes multipliers are infinite, and singular is no crossing
     return bifurcation_at(Kind.BP, crossing.orbit, before, beyond, point, settings), point
 
 

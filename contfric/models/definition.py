@@ -113,6 +113,9 @@ class Model(Shown, TransitionMaps):
     displacement : str
         The displacement as an observable, where it may have extrema inside of segments; empty where they
         are at joints, as they are with a joint wherever the mass stops.
+    phase : str
+        The surface of the excitation's phase that divides modes in which an orbit may stay: a joint of orbits
+        that meet no other surface, and no label (:mod:`contfric.models.phases`); empty if there is none.
     quantities : tuple of (str, str)
         Name and expression of each quantity of its own (:mod:`contfric.quantities`), such as an energy.
     ball_factory : callable or None
@@ -148,6 +151,7 @@ class Model(Shown, TransitionMaps):
     max_step: float | None = None
     rounding: float = 1e-13
     displacement: str = ""
+    phase: str = ""
     quantities: tuple[tuple[str, str], ...] = ()
     units: tuple[tuple[str, float], ...] = ()
     ball_factory: Callable[[Mapping[str, Any], str | None], BallModel] | None = field(
@@ -175,14 +179,16 @@ class Model(Shown, TransitionMaps):
 
         if forms_of(self.definition) is not None:
             return {}
-        return integrated_modes(from_text(self.definition))
+        found = integrated_modes(from_text(self.definition))
+        return {mode: why for mode, why in found.items() if mode not in self.phase_parts}
 
     @property
     def closed_form(self) -> tuple[str, ...]:
         """Modes whose motion is a closed form, of a model that is declared by its equations."""
         if not self.definition:
             return ()
-        return tuple(mode.name for mode in self.modes if mode.name not in self.integrated)
+        names = (mode.name for mode in self.modes if mode.name not in self.integrated)
+        return tuple(name for name in names if name not in self.phase_parts)
 
     def __repr__(self) -> str:
         """Say what the model is, and how its modes move."""

@@ -113,6 +113,7 @@ def model_from(description: Description) -> Model:
         max_step=description.max_step,
         quantities=description.quantities,
         units=description.units,
+        phase=description.phase,
         definition=description.text,
     )
     if undecided := model.undecided():

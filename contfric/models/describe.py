@@ -33,6 +33,7 @@ KEYS = (
     LAWS,
     STRUCTURE,
     "chatters",
+    "phase",
 )
 _PARAMETER = ("default", "meaning")
 _SURFACE = ("observable", "level", "switching")
@@ -120,6 +121,7 @@ def _described(data: dict[str, Any]) -> Description:
         quantities=read_quantities(top),
         laws=read_laws(top),
         units=tuple(read_units(top, APPLIED, states).items()),
+        phase=top.text("phase", ""),
         structure=mapping_in(data, STRUCTURE),
     )
     _check_expressions(found, names)

@@ -67,6 +67,7 @@ class Description:
     quantities : (name, expression) of each quantity that the file declares
     laws : what the contacts of a structure carry and dissipate
     units : (state or t, its unit): all formulas are in these (:mod:`contfric.models.units`)
+    phase : surface of the phase that divides modes (:mod:`contfric.models.phases`); empty if there is none
     structure : what modes are made from when they are visited; empty where all are listed
     """
 
@@ -98,6 +99,7 @@ class Description:
     quantities: tuple[tuple[str, str], ...] = ()
     laws: tuple[ContactLaws, ...] = ()
     units: tuple[tuple[str, float], ...] = ()
+    phase: str = ""
     structure: Mapping[str, Any] = field(default_factory=dict)
 
     def data(self) -> dict[str, Any]:
@@ -158,6 +160,8 @@ class Description:
             found[LAWS] = written(self.laws)
         if self.units:
             found["in_units"] = dict(self.units)
+        if self.phase:
+            found["phase"] = self.phase
         if self.structure:
             found[STRUCTURE] = dict(self.structure)
         return found

@@ -105,8 +105,12 @@ def domains_of(description: Description, surfaces: list[Surface]) -> tuple[Domai
                 sides = next(s for s in regions if tuple(s.values()) in place)
                 raise EntryError(("modes", mode.name, "in"), _shared(mode, other, sides))
         known = {name for name in order if len({sides[name] for sides in regions}) == 1}
+        hidden = description.phase if description.phase not in known else ""
+        known |= {hidden} & {*order}
         for sides in regions:
-            name = mode.name if len(regions) == 1 else _auto_name(mode, sides, surfaces, known)
+            name = mode.name if known >= {*order} else _auto_name(mode, sides, surfaces, known)
+            if sides.get(hidden) == -1:
+                name += f"{',' if ':' in name else ':'}{hidden}-"
             found.append(Domain(name, mode.name, {n: sides[n] for n in order}, name))
     return _renamed(found, description.domains)
 

@@ -7,6 +7,7 @@ surface is a section: transparent, but for cycles that meet nothing else.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ class SectionMaps(Lookup):
 
     if TYPE_CHECKING:
         stop_surface: str
+        phase: str
 
         @cached_property
         def transitions(self) -> dict[tuple[str, str], str]:
@@ -69,6 +71,33 @@ class SectionMaps(Lookup):
     def section_surfaces(self) -> frozenset[str]:
         """Surfaces that are sections, of some mode at least."""
         return frozenset(surface for _, surface in self.sections)
+
+    def shown(self, domain: str) -> str:
+        """Return the domain that stands for one in labels: the same on the first side of the phase."""
+        return self._shown.get(domain, domain) if self.phase else domain
+
+    @cached_property
+    def _shown(self) -> dict[str, str]:
+        place = {(d.mode, *d.signs.items()): d.name for d in reversed(self.domains)}
+        first = {d.name: (d.mode, *{**d.signs, self.phase: 1}.items()) for d in self.domains}
+        return {name: place.get(key, name) for name, key in first.items()}
+
+    @cached_property
+    def phase_parts(self) -> frozenset[str]:
+        """The second parts of modes that the phase divides, as the engine calls them."""
+        if not self.phase:
+            return frozenset()
+        others = {d.own_mode for d in self.domains if self.shown(d.name) != d.name}
+        return frozenset(others - {d.own_mode for d in self.domains if d.signs[self.phase] > 0})
+
+    def without_phase(self, walk: Sequence[str]) -> list[str]:
+        """Return a cyclic walk as labels show it; as it is where it has joints at the phase."""
+        if not self.phase:
+            return list(walk)
+        ends = zip(walk, (*walk[1:], *walk[:1]), strict=True)
+        if any(a != b and self.shown(a) == self.shown(b) for a, b in ends):
+            return list(walk)
+        return [self.shown(name) for name in walk]
 
     @property
     def stops_at_joints(self) -> bool:

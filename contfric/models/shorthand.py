@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from contfric.errors import ModelError
 from contfric.models.angles import with_angles
 from contfric.models.clocks import with_clock
 from contfric.models.contact_modes import with_contacts
@@ -45,8 +46,22 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
     if walls:
         from contfric.models.chatter import chatter_parts
 
-        found = read(plain | chatter_parts(found, walls, _with_fields(plain)))
-    return found
+        plain = plain | chatter_parts(found, walls, _with_fields(plain))
+        found = read(plain)
+    return _divided(found, plain, read)
+
+
+def _divided(
+    found: Description, data: Mapping[str, Any], read: Callable[[dict[str, Any]], Description]
+) -> Description:
+    """Return a description in which modes that an orbit may stay in are divided by the phase."""
+    from contfric.models.phases import phase_parts
+
+    try:
+        parts = phase_parts(found, _with_fields(data))
+        return read({**data, **parts}) if parts else found
+    except (ModelError, ArithmeticError, StopIteration):
+        return found  # whoever builds the model says what is wrong, and where
 
 
 #: Parts of a model that are mappings, and those of them whose entries are mappings.

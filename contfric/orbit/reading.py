@@ -46,9 +46,9 @@ def segment_domains(orbit: Orbit, labels: IntArray) -> list[list[str]]:
         found = [[name] for name in system.domains]
     else:
         found = _paths(orbit, labels)
-    return (
-        found + [[model.mirror_domain[d] for d in own] for own in found] if system.half else found
-    )
+    if system.half:
+        found += [[model.mirror_domain[d] for d in own] for own in found]
+    return [[model.shown(d) for d in own] for own in found]
 
 
 def _paths(orbit: Orbit, labels: IntArray) -> list[list[str]]:
@@ -79,7 +79,7 @@ def _domains(orbit: Orbit, labels: IntArray) -> list[str]:
         assert model.symmetry is not None
         image = ChainMap(model.mirror_domain, dict(model.symmetry.surfaces))
         domains += [mirror_name(d, image) for d in domains]
-    return domains
+    return model.without_phase(domains)
 
 
 def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
@@ -111,6 +111,7 @@ def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
         (ends[i - 1], entry), ()
     )  # a surface met at the impact is on either side
     own = [d for d in own if d.name in led] or own
+    signs |= dict.fromkeys([model.phase] if model.phase else [], 1)
     return _nearest(own, signs)
 
 
@@ -126,6 +127,8 @@ def _end_domains(orbit: Orbit) -> list[str]:
         end = orbit.ends[i]
         signs = signs_at(model, float(end[0]), end[1:].copy(), orbit.vector)
         after, following = word[(i + 1) % len(word)]
+        if model.phase and exit_ != model.phase:
+            signs[model.phase] = 1  # no label, and no joint here
         if is_hold(exit_):
             found.append(mode_domains(model, mode)[0])
             continue

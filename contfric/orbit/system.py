@@ -342,7 +342,9 @@ def _label_rows(
             clear = [
                 s.name
                 for s in model.surfaces
-                if s.observable == observable.name and inside_sign(model, mode, s.name) == 0
+                if s.observable == observable.name
+                and s.name != model.phase
+                and inside_sign(model, mode, s.name) == 0
             ]
             if clear and not model.mode_by_name[mode].sliding:
                 pin = next((h.pin for h in holds if h.segment == i + 1), exit_)

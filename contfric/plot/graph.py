@@ -56,6 +56,8 @@ def plot_transition_graph(
     places = domain_places(model)
     steps = _steps(signature)
     for (source, surface), target in model.transitions.items():
+        if source not in places or target not in places:
+            continue
         numbers = [k for k, pair in enumerate(steps, start=1) if pair == (source, target)]
         _draw_transition(new, places, source, target, surface, numbers, bool(steps))
     colours = domain_colours(model)
@@ -79,6 +81,8 @@ def domain_places(model: Model) -> dict[str, tuple[float, float]]:
     switching = {s.name for s in model.surfaces if s.switching}
     places: dict[str, tuple[float, float]] = {}
     for domain in model.domains:
+        if model.shown(domain.name) != domain.name:
+            continue  # the phase is no label
         x = float(sum(v for name, v in domain.signs.items() if name not in switching))
         y = float(sum(v for name, v in domain.signs.items() if name in switching))
         while (x, y) in places.values():

@@ -359,7 +359,8 @@ def _mirrored(model: Model, segments: Iterable[str]) -> tuple[str, ...]:
         raise NotationError(f"model '{model.name}' has no symmetry: there is no mirror image")
     surfaces = model.symmetry.surfaces
     images = ChainMap(model.mirror_domain, dict(surfaces))
-    return tuple(mirror_name(s, images) if is_event(s) else images[s] for s in segments)
+    found = [mirror_name(s, images) if is_event(s) else images[s] for s in segments]
+    return tuple(model.without_phase(found))
 
 
 def _exit(model: Model, segments: Sequence[str], index: int) -> str | None:

@@ -23,19 +23,20 @@ _PHASES = 16
 def check_reached(report: ModelReport, probe: Probe) -> None:
     """Check that motion can come into every mode from another one."""
     model = probe.model
-    if len(model.modes) == 1:
+    typed = {d.name: model.domain_by_name[model.shown(d.name)].own_mode for d in model.domains}
+    modes = dict.fromkeys(typed.values())
+    if len(modes) == 1:
         return
-    for mode in model.modes:
+    for mode in modes:
         report.count(Topic.REACHED)
         entered = any(
-            model.domain_by_name[source].own_mode != mode.name
-            and any(model.domain_by_name[target].own_mode == mode.name for target in targets)
+            typed[source] != mode and any(typed[target] == mode for target in targets)
             for (source, _), targets in model.targets.items()
         )
         if not entered:
             report.warn(
                 Topic.REACHED,
-                f"nothing leads into mode '{mode.name}' from another one: motion is in it only if it starts "
+                f"nothing leads into mode '{mode}' from another one: motion is in it only if it starts "
                 "there. Correct the sides of the modes, or lead a reset to it ('to: ...')",
             )
 

@@ -1,0 +1,114 @@
+"""A section where there is none: orbits along which nothing happens, in a model that is excited.
+
+An orbit needs a joint. One that stays in one mode (below a grazing, off a wall, pressed against it all the
+time) has none, unless a surface divides that mode. So each mode in which an orbit may stay is divided by the
+phase of the excitation, ``sin(2 pi t / T) = 0``: it is crossed twice a period whatever the motion does, never
+touched, and is its own image half a period later. To all else it is not there: a section is no joint of
+orbits that meet other surfaces (:mod:`contfric.models.sections`), and what labels name leaves it out.
+
+No orbit stays in a mode that ends at known times, or of which the region fixes the sign of the rate of a
+state (a slide, ``x' = v > 0``), nor where a state that is no angle has a constant rate.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from contfric.models.description import Description, ModeText
+from contfric.models.evaluate import Sampler, defaults, floats
+from contfric.models.regions import domains_of, engine_order, known_sides
+from contfric.models.sections import joined_modes
+
+#: The key of what has been divided, and the name of the observable and the surface.
+KEY = "phase"
+#: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
+_SAME = 1e-9
+#: States at which two expressions must agree to be the same.
+_POINTS = 8
+
+
+def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parts of a model's data in which its modes are divided; none where none has to be.
+
+    Parameters
+    ----------
+    data : with the field of each mode in it
+    """
+    if not description.period or description.phase or description.domains:
+        return {}
+    staying = [mode.name for mode in _staying(description)]
+    if not staying:
+        return {}
+    names = description.names
+    taken = {
+        *names.states,
+        *names.parameters,
+        *names.parts,
+        *(s.name for s in description.surfaces),
+    }
+    name = next(n for n in (KEY + "_" * k for k in range(len(taken) + 1)) if n not in taken)
+    modes: dict[str, Any] = {}
+    for mode, entry in data["modes"].items():
+        if mode not in staying:
+            modes[mode] = entry
+            continue
+        other = f"{mode}-"
+        while other in data["modes"]:
+            other += "-"
+        for part, side in (mode, "+"), (other, "-"):
+            modes[part] = {**entry, "in": {**(entry.get("in") or {}), name: side}}
+    formula = f"sin(2*pi*t/({description.period}))"
+    return {
+        "observables": {**(data.get("observables") or {}), name: formula},
+        "surfaces": {**data["surfaces"], name: {"observable": name, "level": "0"}},
+        "modes": modes,
+        KEY: name,
+    }
+
+
+def _staying(description: Description) -> list[ModeText]:
+    """Return the modes in which an orbit may stay and that no section divides."""
+    surfaces = engine_order(description)
+    domains = domains_of(description, surfaces)
+    if len({tuple(d.signs.items()) for d in domains}) < len(domains):
+        return []  # modes overlap: which of them motion is in is part of its state, none are joined
+    sampler = Sampler(floats(description), defaults(description))
+    timed = {s.name for s in surfaces if _is_timed(sampler, s.name)}
+    parts = Counter(joined_modes(description).values())
+    return [
+        mode
+        for mode in description.modes
+        if parts[joined_modes(description)[mode.name]] == 1
+        and 0 not in mode.sides.values()
+        and not timed & mode.sides.keys()
+        and _may_stay(sampler, mode, known_sides(mode, surfaces))
+    ]
+
+
+def _is_timed(sampler: Sampler, surface: str) -> bool:
+    """Tell whether a surface is met at times that do not depend on the motion."""
+    (t, first), *others = sampler.states(_POINTS)
+    apart = [sampler.evaluator.height(surface, sampler.params, t, y) for _, y in others]
+    at = sampler.evaluator.height(surface, sampler.params, t, first)
+    return all(abs(h - at) <= _SAME * (1.0 + abs(at)) for h in apart)
+
+
+def _may_stay(sampler: Sampler, mode: ModeText, sides: Mapping[str, int]) -> bool:
+    """Tell whether no rate of a mode keeps its sign all over the region."""
+    evaluator, params = sampler.evaluator, sampler.params
+    points, moves = list(sampler.states(_POINTS)), False
+    heights = [[evaluator.height(name, params, t, y) for t, y in points] for name in sides]
+    for state, text in zip(evaluator.description.states, mode.field, strict=True):
+        rates = [evaluator.value(text, params, t, y) for t, y in points]
+        if max(rates) - min(rates) <= _SAME * (1.0 + abs(rates[0])):
+            if abs(rates[0]) > _SAME and state not in evaluator.description.angles:
+                return False
+            continue
+        moves = True
+        for height, sign in ((h, s) for h in heights for s in (1.0, -1.0)):
+            pairs = zip(rates, height, strict=True)
+            if all(abs(r - sign * h) <= _SAME * (1.0 + abs(r) + abs(h)) for r, h in pairs):
+                return False
+    return moves

@@ -1,0 +1,108 @@
+"""An orbit in one mode with joints on a section as well, for what follows when its other joints vanish.
+
+An orbit whose only joint is an impact that comes to graze goes on without any: it is smooth behind the event.
+So that both are words of one motion, joints are put where the motion crosses a section.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contfric.models.definition import FloatArray
+from contfric.orbit.clock import clocked
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.sections import is_smooth
+from contfric.orbit.system import build_system
+
+#: Most crossings of one segment that are looked for, and how near to its end one is the end itself.
+_MOST, _AT_JOINT = 1000, 1e-8
+#: Crossings whose rates differ by less than this share are equally fast.
+_AS_FAST = 1e-6
+
+
+def divided(whole: Orbit, turns: int) -> Orbit | None:
+    """Return a whole orbit with joints on a section too, where all of it is in one mode.
+
+    One each way in each of the equal ``turns`` of the motion. None where there is no section, or where it is
+    of no use.
+    """
+    model, mode = whole.model, whole.model.whole_mode(whole.word[0][0])
+    sections = {s for part, s in model.sections if model.whole_mode(part) == mode}
+    others = [pair for pair in whole.word if model.whole_mode(pair[0]) != mode]
+    if not sections or others or whole.system.holds or is_smooth(model, whole.word):
+        return None
+    surface = min(sections, key=model.surface_index.__getitem__)
+    chosen = _by_turns(whole, surface, turns)
+    if not chosen:
+        return None
+    sides = model.section_sides.items()
+    pairs = {-side: model.section_pair(*pair) for pair, side in sides if pair[1] == surface}
+    word: list[tuple[str, str]] = []
+    joints: list[FloatArray] = []
+    for i, pair in enumerate(whole.word):
+        cuts = sorted((c for c in chosen if c.segment == i), key=lambda c: c.time)
+        joints += [whole.cycle[i], *(c.joint for c in cuts)]
+        word += [*(pairs[c.way] for c in cuts), pair]
+    system = build_system(model, tuple(word), whole.periods)
+    found = clocked(model, np.array(joints), float(joints[0][0]) + whole.period)
+    return replace(whole, system=system, joints=found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Crossing:
+    """A crossing of the section: the segment in which it is, its time and state, and how fast it is."""
+
+    segment: int
+    joint: FloatArray
+    rate: float
+
+    @property
+    def time(self) -> float:
+        return float(self.joint[0])
+
+    @property
+    def way(self) -> int:
+        """1 upwards, -1 downwards."""
+        return 1 if self.rate > 0.0 else -1
+
+
+def _by_turns(whole: Orbit, surface: str, turns: int) -> list[_Crossing]:
+    """Return the fastest crossings of a surface, one each way in each turn."""
+    every = [c for i in range(len(whole.word)) for c in _inside(whole, i, surface)]
+    ways = {way: [c for c in every if c.way == way] for way in (-1, 1)}
+    if not all(ways.values()):
+        return []
+
+    def apart(crossing: _Crossing, time: float) -> float:
+        period = whole.period
+        return abs((crossing.time - time + 0.5 * period) % period - 0.5 * period)
+
+    down = max(ways[-1], key=lambda c: abs(c.rate)).time
+    fast = (1.0 - _AS_FAST) * max(c.rate for c in ways[1])
+    half = down + 0.5 * whole.period / turns  # where a symmetric motion has the image
+    up = min((c for c in ways[1] if c.rate >= fast), key=lambda c: apart(c, half)).time
+    starts = [
+        (way, t + k * whole.period / turns)
+        for way, t in ((-1, down), (1, up))
+        for k in range(turns)
+    ]
+    return [min(ways[way], key=lambda c, t=t: apart(c, t)) for way, t in starts]  # type: ignore[misc]
+
+
+def _inside(whole: Orbit, i: int, surface: str) -> list[_Crossing]:
+    """Return the crossings of a surface inside of one segment."""
+    flow, mode = whole.flow, whole.word[i][0]
+    observable, level = whole.model.surface_by_name[surface].observable, flow.level(surface)
+    place, end = whole.begins[i], float(whole.ends[i, 0])
+    found, on = [], whole.word[i - 1][1] == surface
+    for _ in range(_MOST):
+        time = float(place[0])
+        hit = flow.first(mode, observable, level, time, place[1:], end - time, on=on)
+        if hit is None or end - time - hit[0] < _AT_JOINT:
+            break
+        place, on = np.array([time + hit[0], *hit[1]]), True
+        rate = flow.rate(mode, observable, float(place[0]), place[1:])
+        found.append(_Crossing(i, place, rate))
+    return found
