@@ -36,6 +36,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.section_joints import divided
+from contfric.orbit.sections import named_by_ends
 from contfric.orbit.slides import SHORT, resting_modes
 from contfric.orbit.system import Margin, Test, Word, build_system
 from contfric.signature.edits import apply_edit, edited_pieces
@@ -246,7 +247,7 @@ def edited_whole(
         edit |= outcome.edit
         joints |= outcome.joints
         speeds |= outcome.away
-    word = apply_edit(orbit.word, edit, orbit.model)
+    word = named_by_ends(apply_edit(orbit.word, edit, orbit.model), orbit.model)
     origins = [origin for origin, _ in edited_pieces(orbit.word, edit)]
     starts = np.array([joints[o] if o in joints else orbit.cycle[o[0]] for o in origins])
     kept = np.zeros(len(orbit.word)) if away is None else away

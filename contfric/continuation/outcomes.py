@@ -351,8 +351,11 @@ def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
         raise NotationError(
             f"the impact behind segment {i + 1} changes the mode: it cannot be left out"
         )
-    edit = Edit(frozenset({behind}), {i: word[behind][1]})
-    return Outcome(edit, {}, f"no impact on {place.surface} behind segment {i + 1}")
+    reason = f"no impact on {place.surface} behind segment {i + 1}"
+    if word[behind] in orbit.model.sections:  # its mode says from which side the section is crossed
+        edit = Edit(frozenset({i, behind}), {}, {i: (word[behind],)})
+        return Outcome(edit, {(i, 0): orbit.cycle[i]}, reason)
+    return Outcome(Edit(frozenset({behind}), {i: word[behind][1]}), {}, reason)
 
 
 def _check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:

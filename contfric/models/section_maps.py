@@ -67,6 +67,15 @@ class SectionMaps(Lookup):
             if pair[1] == surface and other == side and self.joined[pair[0]] == whole
         )
 
+    def section_pairs(self, mode: str, surface: str) -> dict[int, tuple[str, str]]:
+        """Return (mode, surface) of a section that divides a mode, by the side from which it is crossed."""
+        whole = self.whole_mode(mode)
+        return {
+            side: self.section_pair(*pair)
+            for pair, side in self.section_sides.items()
+            if pair[1] == surface and self.joined[pair[0]] == whole
+        }
+
     @cached_property
     def section_surfaces(self) -> frozenset[str]:
         """Surfaces that are sections, of some mode at least."""

@@ -37,8 +37,7 @@ def divided(whole: Orbit, turns: int) -> Orbit | None:
     chosen = _by_turns(whole, surface, turns)
     if not chosen:
         return None
-    sides = model.section_sides.items()
-    pairs = {-side: model.section_pair(*pair) for pair, side in sides if pair[1] == surface}
+    pairs = {-side: pair for side, pair in model.section_pairs(mode, surface).items()}
     word: list[tuple[str, str]] = []
     joints: list[FloatArray] = []
     for i, pair in enumerate(whole.word):

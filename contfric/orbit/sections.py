@@ -35,6 +35,15 @@ def is_smooth(model: Model, word: Word) -> bool:
     return bool(model.sections) and all(pair in model.sections for pair in word)
 
 
+def named_by_ends(word: Word, model: Model) -> Word:
+    """Return a word with the names of parts of modes only where a segment ends on a section."""
+    if not model.joined:
+        return word
+    return tuple(
+        pair if pair in model.sections else (model.whole_mode(pair[0]), pair[1]) for pair in word
+    )
+
+
 def without_sections(
     model: Model, word: Word, joints: FloatArray, end: float, vector: FloatArray, periods: int
 ) -> tuple[Word, FloatArray, float]:
@@ -178,7 +187,7 @@ def _every_crossing(whole: Orbit) -> tuple[Word, FloatArray]:
     model, flow = whole.model, whole.flow
     mode, surface = whole.word[0]
     observable, level = model.surface_by_name[surface].observable, flow.level(surface)
-    pairs = {side: pair for pair, side in model.section_sides.items() if pair[1] == surface}
+    pairs = model.section_pairs(mode, surface)
     found: list[FloatArray] = []
     for joint, end in zip(whole.cycle, whole.ends, strict=True):
         found.append(joint)

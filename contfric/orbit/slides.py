@@ -36,11 +36,15 @@ def slides_of(orbit: Orbit) -> list[int]:
     """Return the segments with which slides of some length begin, joined over a touch of rest.
 
     Segments of rest are left out, and those of no length; a segment that goes on in the mode and from
-    the state in which the one before it ended is a part of that.
+    the state in which the one before it ended is a part of that. Where there are joints on sections slides
+    begin there.
     """
     sliding = resting_modes(orbit)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
     some = [i for i in range(len(orbit.word)) if lasts[i] > SHORT]
+    cut = [i for i in some if orbit.word[i - 1] in orbit.model.sections]
+    if cut:  # the only joints that are in every word
+        return cut
     found = []
     for k, i in enumerate(some):
         before, mode = some[k - 1], orbit.word[i][0]
