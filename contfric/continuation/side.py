@@ -144,9 +144,10 @@ class Side:
     @property
     def second_multipliers(self) -> NDArray[np.complex128]:
         """Multipliers of one turn at the second point (at the first, if it is the only one)."""
-        kept = self._kept.arrays["mu"][: self._kept.count] if self._kept.count else []
+        count = self._kept.count
+        kept = [*self._kept.arrays["mu"][: min(2, count)]] if count else []
         here = self.rows.mu[self._fresh : self.last + 1]
-        return np.array([*kept[:2], *here[:2]][min(1, self.count - 1)])
+        return np.array([*kept, *here[:2]][min(1, self.count - 1)])
 
     def put_tip(self, point: Point) -> None:
         """Replace the last point."""

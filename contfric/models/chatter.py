@@ -68,8 +68,9 @@ def chatter_parts(
         found["observables"][lift] = own.text(own.lift)
         found["surfaces"][lift] = {"observable": lift, "level": "0"}
         pressed = "-" if own.side > 0 else "+"
+        sides = {s: side for s, side in own.flight.sides.items() if s != description.phase}
         found["modes"][name] = {
-            "in": {**own.flight.sides, surface: 0, lift: pressed},
+            "in": {**sides, surface: 0, lift: pressed},
             "field": dict(zip(description.states, map(own.text, own.field), strict=True)),
             "rank": len(description.states) - 2,
         }

@@ -9,7 +9,7 @@ labels and no events.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from contfric.errors import ModelError
@@ -79,8 +79,16 @@ def _keeps_its_sign(sampler: Sampler, mode: ModeText, bounds: set[str]) -> bool:
         return True
     for name in bounds:
         heights = [evaluator.height(name, params, t, y) for t, y in points]
-        for sign in (1.0, -1.0):
-            pairs = zip(rates, heights, strict=True)
-            if all(abs(r - sign * h) <= _SAME * (1.0 + abs(r) + abs(h)) for r, h in pairs):
-                return True
+        if proportional(rates, heights):
+            return True
     return False
+
+
+def proportional(rates: Sequence[float], heights: Sequence[float]) -> bool:
+    """Tell whether rates keep their sign as long as heights do: one is a constant times the other."""
+    k = max(range(len(heights)), key=lambda i: abs(heights[i]))
+    if not abs(heights[k]) > 0.0 or rates[k] == 0.0:
+        return False
+    factor = rates[k] / heights[k]
+    pairs = zip(rates, heights, strict=True)
+    return all(abs(r - factor * h) <= _SAME * (1.0 + abs(r) + abs(factor * h)) for r, h in pairs)

@@ -18,6 +18,7 @@ from typing import Any
 
 from contfric.models.description import Description, ModeText
 from contfric.models.evaluate import Sampler, defaults, floats
+from contfric.models.measuring import proportional
 from contfric.models.regions import domains_of, engine_order, known_sides
 from contfric.models.sections import joined_modes
 
@@ -27,6 +28,9 @@ KEY = "phase"
 _SAME = 1e-9
 #: States at which two expressions must agree to be the same.
 _POINTS = 8
+#: The phase doubles the regions of a model: one with more modes, of many contacts, has thousands already, and
+#: a section of its own where no contact acts.
+_MOST_MODES = 16
 
 
 def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, Any]:
@@ -36,7 +40,8 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
     ----------
     data : with the field of each mode in it
     """
-    if not description.period or description.phase or description.domains:
+    listed = not description.structure and len(description.modes) <= _MOST_MODES
+    if not description.period or description.phase or description.domains or not listed:
         return {}
     staying = [mode.name for mode in _staying(description)]
     if not staying:
@@ -81,7 +86,6 @@ def _staying(description: Description) -> list[ModeText]:
         mode
         for mode in description.modes
         if parts[joined_modes(description)[mode.name]] == 1
-        and 0 not in mode.sides.values()
         and not timed & mode.sides.keys()
         and _may_stay(sampler, mode, known_sides(mode, surfaces))
     ]
@@ -107,8 +111,6 @@ def _may_stay(sampler: Sampler, mode: ModeText, sides: Mapping[str, int]) -> boo
                 return False
             continue
         moves = True
-        for height, sign in ((h, s) for h in heights for s in (1.0, -1.0)):
-            pairs = zip(rates, height, strict=True)
-            if all(abs(r - sign * h) <= _SAME * (1.0 + abs(r) + abs(h)) for r, h in pairs):
-                return False
+        if any(proportional(rates, height) for height in heights):
+            return False
     return moves

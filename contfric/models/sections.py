@@ -65,12 +65,12 @@ def _joined(key: _Key) -> dict[str, str]:
     if len({tuple(d.signs.items()) for d in domains}) < len(domains):
         return first  # modes overlap: which of them motion is in is part of its state
     places = {tuple(d.signs.items()): d.mode for d in domains}
-    moving = [mode for mode in description.modes if 0 not in mode.sides.values()]
+    lies_on = {m.name: {s for s, side in m.sides.items() if side == 0} for m in description.modes}
     going_on = True
     while going_on:
         going_on = False
-        for a, b in itertools.combinations(moving, 2):
-            if first[a.name] == first[b.name]:
+        for a, b in itertools.combinations(description.modes, 2):
+            if first[a.name] == first[b.name] or lies_on[a.name] != lies_on[b.name]:
                 continue
             both = {name for name, lead in first.items() if lead in (first[a.name], first[b.name])}
             between = _between(description, domains, places, both, (a.name, b.name))

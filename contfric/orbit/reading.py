@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from contfric.models.definition import Domain
+from contfric.models.definition import Domain, FloatArray
 from contfric.orbit.starts import signs_at
 from contfric.orbit.structure import mode_domains
 from contfric.orbit.words import decode, end_domain, passed_domains
@@ -95,12 +95,12 @@ def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
         state = model.view(orbit.vector).state(
             word[i][0], float(begin[0]), begin[1:].copy(), _AHEAD * lasts
         )
-        signs = signs_at(model, float(begin[0] + _AHEAD * lasts), state, orbit.vector)
+        signs = _signs_at(orbit, float(begin[0] + _AHEAD * lasts), state)
         return _nearest([model.domain_by_name[d] for d in mode_domains(model, word[i][0])], signs)
     if entry not in model.reset_by_surface and not is_hold(entry):
         return model.transitions[ends[i - 1], entry]
     begin = orbit.begins[i]
-    signs = signs_at(model, float(begin[0]), begin[1:].copy(), orbit.vector)
+    signs = _signs_at(orbit, float(begin[0]), begin[1:].copy())
     if is_hold(entry):
         after = [model.domain_by_name[d] for d in domains_after(model, mode, word[i][0])]
         return _nearest(after, signs)
@@ -111,8 +111,13 @@ def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
         (ends[i - 1], entry), ()
     )  # a surface met at the impact is on either side
     own = [d for d in own if d.name in led] or own
-    signs |= dict.fromkeys([model.phase] if model.phase else [], 1)
     return _nearest(own, signs)
+
+
+def _signs_at(orbit: Orbit, time: float, state: FloatArray) -> dict[str, int]:
+    """Return the sides of a joint that is on no section; the first side of the phase stands for it."""
+    signs = signs_at(orbit.model, time, state, orbit.vector)
+    return {**signs, orbit.model.phase: 1} if orbit.model.phase else signs
 
 
 def _nearest(domains: Sequence[Domain], signs: Mapping[str, int]) -> str:
@@ -125,10 +130,8 @@ def _end_domains(orbit: Orbit) -> list[str]:
     found, word, model = [], orbit.word, orbit.model
     for i, (mode, exit_) in enumerate(word):
         end = orbit.ends[i]
-        signs = signs_at(model, float(end[0]), end[1:].copy(), orbit.vector)
+        signs = _signs_at(orbit, float(end[0]), end[1:].copy())
         after, following = word[(i + 1) % len(word)]
-        if model.phase and exit_ != model.phase:
-            signs[model.phase] = 1  # no label, and no joint here
         if is_hold(exit_):
             found.append(mode_domains(model, mode)[0])
             continue
