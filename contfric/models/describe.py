@@ -195,7 +195,7 @@ def _surfaces(
 ) -> tuple[tuple[Observable, ...], tuple[Surface, ...]]:
     formulas = _expressions(top.part("observables", "a mapping of names to expressions"))
     wanted = "a mapping of names to {observable: name, level: expression}"
-    part = top.part("surfaces", wanted, required=True)
+    part = top.part("surfaces", wanted, required="period" not in top.data)
     surfaces = []
     for name in part.data:
         entry = part.part(name, "{observable: name, level: expression}")
@@ -205,8 +205,8 @@ def _surfaces(
         formulas.setdefault(observable, observable)
         level = _expression(entry, "level") if "level" in entry.data else "0"
         surfaces.append(Surface(name, observable, level, bool(entry.flag("switching"))))
-    if not surfaces:
-        top.fail("surfaces", "a model has at least one surface")
+    if not surfaces and "period" not in top.data:
+        top.fail("surfaces", "a model without excitation has at least one surface: it fixes orbits")
     for name in top.texts("kinks"):
         if name not in (*formulas, *states):
             top.fail(

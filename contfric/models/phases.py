@@ -67,7 +67,7 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
     formula = f"sin(2*pi*t/({description.period}))"
     return {
         "observables": {**(data.get("observables") or {}), name: formula},
-        "surfaces": {**data["surfaces"], name: {"observable": name, "level": "0"}},
+        "surfaces": {**(data.get("surfaces") or {}), name: {"observable": name, "level": "0"}},
         "modes": modes,
         KEY: name,
     }

@@ -6,6 +6,7 @@ Each is put into the data of a model, before it is read, as if it had been typed
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 from contfric.errors import ModelError
@@ -13,7 +14,7 @@ from contfric.models.angles import with_angles
 from contfric.models.clocks import with_clock
 from contfric.models.contact_modes import with_contacts
 from contfric.models.description import Description
-from contfric.models.entries import Part
+from contfric.models.entries import EntryError, Part
 from contfric.models.tied import with_ties_put_in
 from contfric.models.units import in_units
 
@@ -33,6 +34,8 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
     data = with_contacts(data)
     if not _is_regular(data):
         return read(data)  # which says what is wrong, and where
+    if not data.get("surfaces") and "modes" not in data and "field" in data:
+        data = {**data, "modes": {"smooth": {}}}
     data = _with_observables(with_ties_put_in(data))
     walls, data = _chattering(data)
     surfaces, plain = _derived_sliding(with_angles(with_clock(data)))
@@ -57,11 +60,13 @@ def _divided(
     """Return a description in which modes that an orbit may stay in are divided by the phase."""
     from contfric.models.phases import phase_parts
 
-    try:
+    divided = found
+    with suppress(ModelError, ArithmeticError, StopIteration):  # whoever builds the model says why
         parts = phase_parts(found, _with_fields(data))
-        return read({**data, **parts}) if parts else found
-    except (ModelError, ArithmeticError, StopIteration):
-        return found  # whoever builds the model says what is wrong, and where
+        divided = read({**data, **parts}) if parts else found
+    if not divided.surfaces:
+        raise EntryError((), "nothing moves: a model without surfaces has one mode, and a field")
+    return divided
 
 
 #: Parts of a model that are mappings, and those of them whose entries are mappings.

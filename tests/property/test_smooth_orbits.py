@@ -127,6 +127,47 @@ def test_a_smooth_orbit_of_several_modes_doubles() -> None:
     assert np.abs(np.linalg.eigvals(columns) + 1.0).min() < 1e-5
 
 
+def test_a_model_needs_no_surface_at_all(tmp_path: Path) -> None:
+    """The Duffing oscillator: its folds, held against a shooting method of scipy's."""
+    path = tmp_path / "duffing.yaml"
+    path.write_text(
+        "name: duffing\nstates: [x, v]\nparameters: {w: 1.2, zeta: 0.05, A: 0.3}\nperiod: 2*pi/w\n"
+        "field: {x: v, v: -x - x**3 - 2*zeta*v + A*cos(w*t)}\n",
+        encoding="utf-8",
+    )
+    branch = cf.continue_orbit(cf.find_orbit(path), "w", (1.0, 2.0))
+    folds = [b for b in branch.bifurcations if b.kind is cf.Kind.SN]
+    assert len(folds) == 2
+    for fold in folds:
+        w = fold.params["w"]
+
+        def field(t: float, y: np.ndarray, w: float = w) -> tuple[float, float]:
+            return y[1], -y[0] - y[0] ** 3 - 0.1 * y[1] + 0.3 * np.cos(w * t)
+
+        def turn(start: np.ndarray, w: float = w) -> np.ndarray:
+            span = (0.0, 2.0 * np.pi / w)
+            return solve_ivp(field, span, start, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+
+        start = fold.orbit.state(0.0)
+        assert np.abs(turn(start) - start).max() < 1e-9
+        steps = 1e-5 * np.eye(2)
+        columns = np.array([(turn(start + h) - turn(start - h)) / 2e-5 for h in steps]).T
+        assert np.abs(np.linalg.eigvals(columns) - 1.0).min() < 1e-4
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "name: a\nstates: [x, v]\nparameters: {c: 1}\nautonomous: true\nfield: {x: v, v: -c*x}\n",
+        "name: a\nstates: [x, v]\nparameters: {c: 1}\nperiod: 2*pi/c\nfield: {x: 0, v: 0}\n",
+    ],
+)
+def test_a_model_without_surfaces_that_has_no_orbits_is_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
+    with pytest.raises(cf.ModelError, match="surface"):
+        cf.load_model(tmp_path / "a.yaml")
+
+
 def test_labels_leave_the_phase_out() -> None:
     size = amplitude({"omega": 0.5, "zeta": 0.05, "A": 1.0})
     orbit = cf.find_orbit(MODELS / "soft_stops.yaml", {"omega": 0.5, "k": 1.0, "gap": 0.7 * size})
