@@ -2,7 +2,7 @@
 
 An orbit needs a joint. One that stays in one mode (below a grazing, off a wall, pressed against it all the
 time) has none, unless a surface divides that mode. So each mode in which an orbit may stay is divided by the
-phase of the excitation, ``sin(2 pi t / T) = 0``: it is crossed twice a period whatever the motion does, never
+phase of the excitation, ``sin(2 pi t / T - 1) = 0``: it is crossed twice a period whatever the motion does, never
 touched, and is its own image half a period later. To all else it is not there: a section is no joint of
 orbits that meet other surfaces (:mod:`contfric.models.sections`), and what labels name leaves it out.
 
@@ -28,6 +28,8 @@ KEY = "phase"
 _SAME = 1e-9
 #: States at which two expressions must agree to be the same.
 _POINTS = 8
+#: Where in a period: at no time at which motions start, forces are largest, or simulations end.
+_LATE = 1
 #: The phase doubles the regions of a model: one with more modes, of many contacts, has thousands already, and
 #: a section of its own where no contact acts.
 _MOST_MODES = 16
@@ -64,7 +66,7 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
             other += "-"
         for part, side in (mode, "+"), (other, "-"):
             modes[part] = {**entry, "in": {**(entry.get("in") or {}), name: side}}
-    formula = f"sin(2*pi*t/({description.period}))"
+    formula = f"sin(2*pi*t/({description.period}) - {_LATE})"
     return {
         "observables": {**(data.get("observables") or {}), name: formula},
         "surfaces": {**(data.get("surfaces") or {}), name: {"observable": name, "level": "0"}},

@@ -41,6 +41,13 @@ def start_of(
     if name is None:
         raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
     mode = model.domain_by_name[name].own_mode
+    rest = model.chatter_by_mode.get(mode) if domain is None else None
+    if rest and model.view(vector).height(rest.lift, t, y) * model.settled_sides[rest.lift] < 0.0:
+        side = model.domains_of(rest.flight)[0].signs[
+            rest.surface
+        ]  # the wall does not press: it is left
+        flight = model.domain_at({**signs, rest.surface: side}, rest.flight)
+        mode = model.domain_by_name[flight].own_mode if flight else mode
     on = sum(1 << model.surface_index[k] for k in cut_bounds(model)[mode] if signs[k] == 0)
     return model.mode_index[mode], on
 

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import contfric as cf
+from contfric.models.chatter import with_chatter
 
 MODELS = Path(__file__).parents[1] / "models"
 RANDOM = np.random.default_rng(13)
@@ -168,6 +169,16 @@ def test_a_model_without_surfaces_that_has_no_orbits_is_refused(tmp_path: Path, 
         cf.load_model(tmp_path / "a.yaml")
 
 
+@pytest.mark.parametrize("gap", [0.3, 0.8, 1.2, 2.0])
+def test_a_mass_at_rest_on_a_wall_leaves_it_where_nothing_presses(gap: float) -> None:
+    resting = with_chatter(cf.load_model(MODELS / "one_wall.yaml"))
+    assert resting is not None
+    params = {"gap": gap, "omega": 0.8, "A": 1.0, "zeta": 0.05}
+    found = cf.simulate(resting, params, state=(gap, 0.0), periods=1)
+    rests = found.word[0][0] == "chatter"
+    assert rests == (np.cos(0.0) - gap > 0.0)  # the force on a mass there
+
+
 def test_labels_leave_the_phase_out() -> None:
     size = amplitude({"omega": 0.5, "zeta": 0.05, "A": 1.0})
     orbit = cf.find_orbit(MODELS / "soft_stops.yaml", {"omega": 0.5, "k": 1.0, "gap": 0.7 * size})
@@ -186,7 +197,7 @@ def test_a_mass_that_never_slips_while_another_one_moves() -> None:
     wanted = np.sort_complex(np.exp(roots * 2.0 * np.pi / 0.7))
     moving = np.sort_complex(orbit.multipliers[np.abs(orbit.multipliers) > 1e-3])
     assert moving == pytest.approx(wanted, abs=1e-10)
-    branch = cf.continue_orbit(orbit, "mu", (0.5, 3.0))
+    branch = cf.continue_orbit(orbit, "mu", (0.1, 3.0))
     at = branch.ends[0].bifurcation
     assert at is not None
     rest = orbit.state(0.0)[2]
