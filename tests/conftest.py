@@ -18,6 +18,21 @@ settings.register_profile("untimed", deadline=None, suppress_health_check=[Healt
 settings.load_profile("untimed")
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark as slow what `long_tests.txt` lists; a line that names no test is an error of a full run."""
+    lines = (Path(__file__).with_name("long_tests.txt")).read_text(encoding="utf-8").splitlines()
+    starts = tuple(line for line in lines if line and not line.startswith("#"))
+    for item in items:
+        if item.nodeid.startswith(starts):
+            item.add_marker(pytest.mark.slow)
+    if config.args == ["tests"]:
+        names = [item.nodeid for item in items]
+        stale = [line for line in starts if not any(name.startswith(line) for name in names)]
+        if stale:
+            raise pytest.UsageError(f"long_tests.txt names no test in: {stale[0]}")
+
+
 @pytest.fixture(autouse=True)
 def figures_are_closed() -> Iterator[None]:
     """Forget the figures of a test: pyplot warns of many, and which tests share a process is chance."""

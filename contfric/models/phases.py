@@ -2,7 +2,7 @@
 
 An orbit needs a joint. One that stays in one mode (below a grazing, off a wall, pressed against it all the
 time) has none, unless a surface divides that mode. So each mode in which an orbit may stay is divided by the
-phase of the excitation, ``sin(2 pi t / T - 1) = 0``: it is crossed twice a period whatever the motion does, never
+phase of the excitation, ``sin(2 pi t / T - 1) = 0``: it is crossed twice a period whatever motion does, never
 touched, and is its own image half a period later. To all else it is not there: a section is no joint of
 orbits that meet other surfaces (:mod:`contfric.models.sections`), and what labels name leaves it out.
 

@@ -52,7 +52,7 @@ class TransitionMaps(SectionMaps):
 
     def domains_of(self, mode: str) -> tuple[Domain, ...]:
         """Return the domains of a mode."""
-        return self._domains_by_mode.get(mode, ())
+        return self._domains_by_mode.get(self.whole_mode(mode), ())
 
     @cached_property
     def _domains_by_mode(self) -> dict[str, tuple[Domain, ...]]:
