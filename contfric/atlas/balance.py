@@ -154,8 +154,8 @@ def _rests(orbit: Orbit, parameter: str, value: float) -> bool:
 def _joined(diagram: Diagram, number: int) -> tuple[list[int], float]:
     """Return a node with those that have the same place, and how near to it orbits are on no side of it.
 
-    Those that agree to their accuracies, and those that branches join to them on which there is no orbit on
-    either side: continua, and branches on which the parameter changes by less than it is known to.
+    Those that agree to their accuracies, and those that parts of branches join to them on which there is no
+    orbit on either side: continua, and parts along which the parameter changes by less than it is known to.
     """
     b, width = diagram.nodes[number].bifurcation, diagram.range[1] - diagram.range[0]
     found = [number]
@@ -166,19 +166,28 @@ def _joined(diagram: Diagram, number: int) -> tuple[list[int], float]:
             found.append(k)
     slack = max(_BESIDE * diagram.nodes[k].bifurcation.accuracy * width for k in found)
     value = b.params[diagram.parameter]
-    flat = {
-        i
-        for i, branch in enumerate(diagram.branches)
-        if is_continuum(branch) or np.max(np.abs(branch.values - value)) <= slack
-    }
     for known in found:  # grows
-        through = flat & set(diagram.nodes[known].branches)
-        found += [
-            k
-            for k, node in enumerate(diagram.nodes)
-            if k not in found and through & set(node.branches)
-        ]
+        for i in diagram.nodes[known].branches:
+            for pair in _flat_parts(diagram, i, value, slack):
+                found += [k for k in pair if known in pair and k not in found]
     return found, slack
+
+
+def _flat_parts(diagram: Diagram, i: int, value: float, slack: float) -> Iterator[tuple[int, int]]:
+    """Yield the pairs of nodes between which a branch leaves a value by no more than the slack."""
+    branch = diagram.branches[i]
+    continuum = is_continuum(branch)
+    places = sorted(
+        (position, k)
+        for k, node in enumerate(diagram.nodes)
+        if i in node.branches and node.bifurcation.kind is not Kind.T
+        for position, _ in _positions(diagram, node, branch)
+    )
+    for (a, one), (b, other) in pairwise(places):
+        ends = (diagram.nodes[k].bifurcation.params[diagram.parameter] for k in (one, other))
+        part = (*ends, *branch.values[(branch.arc >= a) & (branch.arc <= b)])
+        if continuum or np.max(np.abs(np.subtract(part, value))) <= slack:
+            yield one, other
 
 
 def _families(

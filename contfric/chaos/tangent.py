@@ -42,9 +42,6 @@ from contfric.orbit.trajectory import (
     HOLD_PERIODS,
     IMPOSSIBLE,
     INFINITE,
-    MOST_AT_ONCE,
-    NO_FLIGHT,
-    NO_TIME,
     QUIET,
     SLIDE_PERIODS,
     TOO_LARGE,
@@ -52,13 +49,12 @@ from contfric.orbit.trajectory import (
     code_ahead,
     copy_state,
     first_hit,
-    is_pressed,
     leads_to_rest,
-    lying_on,
     mode_after,
     sign_code,
     whole_turns,
 )
+from contfric.orbit.walls import MOST_AT_ONCE, NO_FLIGHT, NO_TIME, is_pressed, lying_on
 
 #: A walk has come to the next joint; otherwise it ended as a simulation does (HELD, IMPOSSIBLE, INFINITE,
 #: QUIET, CHATTER), or the integration broke down.

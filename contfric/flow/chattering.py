@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 #: Flights that are looked into for stationary points: those that follow are lower in proportion.
 _LOOKED = 64
+#: Share of the time to the limit in which nothing is looked for: no two events are told apart by less.
+_REST_OF_TIME = 1e-10
 
 
 @allocating_helper
@@ -91,8 +93,8 @@ def hit_in_flights(motion, mode, c, target, t0, y0, within, p, y1):  # type: ign
     """Return the first time within which an observable takes a value between impacts; -1 if it does not."""
     none, nothing = np.empty(0, dtype=np.int64), np.empty((0, 0))
     t, y, before, flight = t0, y0.copy(), y0.copy(), motion.flights[mode]
-    for _ in range(_LOOKED):
-        if t >= t0 + within:
+    for _ in range(MOST_IMPACTS):
+        if t >= t0 + within * (1.0 - _REST_OF_TIME):
             break
         before[:] = y
         tau = fly(motion, mode, t, y, p, none, nothing)
@@ -113,10 +115,10 @@ def hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-
     """
     if motion.flights[mode] < 0:
         return motion.hit(mode, c, target, on, t0, y0, dt_max, p, y1)
-    if c == motion.gaps[mode]:
-        return -1.0
-    limit, nothing = np.empty(1 + y0.shape[0]), np.empty((0, 0))
     none = np.empty(0, dtype=np.int64)
+    if c == motion.gaps[mode] and target == motion.level(motion.walls[mode], p, none, np.empty(0)):
+        return -1.0  # another level of the same observable is another wall
+    limit, nothing = np.empty(1 + y0.shape[0]), np.empty((0, 0))
     if limit_of(motion, mode, t0, y0, p, none, limit, nothing) < 0.0:
         return -1.0
     rests = limit[0] - t0
@@ -138,12 +140,12 @@ def hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-
 def turning_in_flights(motion, mode, c, t0, y0, within, p, times, values):  # type: ignore[no-untyped-def]
     """Write the stationary points of an observable in the flights, and its values at the impacts.
 
-    Of the gap those of the first flight, and of others that come near the wall between two impacts: how high
-    the others are, lower and lower, is no distance from another motion.
+    Of the gap those of flights that are higher than all before, and of those that come near the wall between
+    two impacts: how high the others are, lower and lower, is no distance from another motion.
     """
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
     t, y, before, flight = t0, y0.copy(), y0.copy(), motion.flights[mode]
-    found, most, gap = 0, times.shape[0], c == motion.gaps[mode]
+    found, most, gap, highest = 0, times.shape[0], c == motion.gaps[mode], -np.inf
     for _ in range(_LOOKED):
         before[:] = y
         tau = fly(motion, mode, t, y, p, none, nothing)
@@ -152,8 +154,11 @@ def turning_in_flights(motion, mode, c, t0, y0, within, p, times, values):  # ty
         own = motion.stationary(flight, c, t, before, tau, p, times[found:], values[found:])
         if own < 0 or found + own + 1 > most:
             return -1
-        if gap and own == 1 and t > t0:
-            own = 0
+        if gap and own == 1:
+            if motion.sides[mode] * values[found] > highest:
+                highest = motion.sides[mode] * values[found]
+            else:
+                own = 0
         for i in range(found, found + own):
             times[i] += t - t0
         found += own

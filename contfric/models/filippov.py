@@ -17,6 +17,7 @@ This module imports sympy, and is loaded where a model asks for it.
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -172,13 +173,14 @@ class _Sliding:
 
 def _add(found: dict[str, Any], sliding: _Sliding) -> None:
     """Put a sliding mode into the parts of a model: its observables, the surfaces that end it, the mode."""
-    own, up = sliding.name, f"{sliding.name}_rate"
+    own, word = sliding.name, re.sub(r"\W", "_", sliding.name.replace("+", "p").replace("-", "n"))
+    up = f"{word}_rate"  # modes and surfaces may be named F+, observables not
     found["observables"][up] = sliding.text(sliding.rate_up)
     found["surfaces"][f"{own}-"] = {"observable": up, "level": "0"}
     if sliding.constant:
         low = {"observable": up, "level": f"-({sliding.text(sliding.apart)})"}
     else:
-        below = f"{sliding.name}_below"
+        below = f"{word}_below"
         found["observables"][below] = sliding.text(sliding.rate_down)
         low = {"observable": below, "level": "0"}
     found["surfaces"][f"{own}+"] = low

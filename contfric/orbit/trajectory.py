@@ -21,6 +21,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import Tables
+from contfric.orbit.walls import MOST_AT_ONCE, NO_FLIGHT, NO_TIME, in_flight, is_pressed, lying_on
 
 #: Types of the model's tables and of the rows of events, as kernels take them.
 TablesType = types.NamedTuple(
@@ -50,12 +51,6 @@ _STRETCH = 256.0
 #: Factor by which the search of a hit is extended: what was searched in vain costs a third more.
 _WIDER = 4.0
 
-#: Events within this share of a period follow each other at once; more of them in a row than this do
-#: not come to an end (a stop, a release and a reversal may fall together, twice).
-NO_TIME, MOST_AT_ONCE = 1e-12, 16
-#: The same where impacts chatter: a mass that bounces to less than rounding of its displacement (1e-16)
-#: is in flight for the root of that, and never for less.
-NO_FLIGHT = 1e-7
 #: A mass that a wall lets go moves off it with the third power of time: at this share of a period by far more
 #: than rounding, and less than anything else does.
 _AHEAD = 1e-3
@@ -197,22 +192,18 @@ def shortest_flight(tables, mode):  # type: ignore[no-untyped-def]
 
 
 @helper
-def is_pressed(functions, tables, mode, surface, following, t, before, y, p, unit, workspace):  # type: ignore[no-untyped-def]
-    """Tell whether a state behind an impact is driven back at once: its next flight is too short to resolve.
-
-    It is if the mean rate of the gap over the shortest flight does not lead away from the wall. Impacts
-    with a small restitution come to that before there are many, one without restitution at once; a first
-    hit would be searched on the other side of the wall.
-    """
-    if tables.walls >> surface & 1 == 0:
-        return False  # the reset leads elsewhere
-    c, none, empty = tables.observables[surface], workspace.none, workspace.empty
-    toward = functions.rate(mode, c, t, before, p, none, empty)
-    h = NO_FLIGHT * unit
-    away = functions.rate(following, c, t, y, p, none, empty)
-    functions.flow(following, t, y, h, p, none, workspace.trial, workspace.nothing)
-    later = functions.rate(following, c, t + h, workspace.trial, p, none, empty)
-    return (away + later) * toward > 0.0
+def flight_of(functions, tables, mode, t, y, p, workspace):  # type: ignore[no-untyped-def]
+    """Return the mode of a state between the impacts of a chatter: the part of the flight that it is in."""
+    none, empty = workspace.none, workspace.empty
+    code = sign_code(functions, tables.observables, 0, t, y, p, none, empty)
+    for k in range(tables.observables.shape[0]):
+        if (
+            tables.bounds[mode, k] == 1
+        ):  # left by it, a mode of chatter is followed by one of these parts
+            following = mode_after(tables, mode, k, code)
+            if following >= 0 and tables.flights[following] < 0:
+                return following
+    return tables.flights[mode]
 
 
 @helper
@@ -223,18 +214,6 @@ def code_ahead(functions, tables, mode, t, y, p, unit, workspace):  # type: igno
     return sign_code(
         functions, tables.observables, 0, t + ahead, workspace.trial, p, none, workspace.empty
     )
-
-
-@helper
-def lying_on(functions, tables, t, y, p, workspace):  # type: ignore[no-untyped-def]
-    """Return the surfaces that a state is on to rounding, as bits."""
-    found = 0
-    for k in range(tables.observables.shape[0]):
-        value = functions.observe(tables.observables[k], t, y, p, workspace.none, workspace.empty)
-        level = functions.level(k, p, workspace.none, workspace.empty)
-        if abs(value - level) <= NO_TIME * (1.0 + abs(level)):
-            found |= 1 << k
-    return found
 
 
 @helper
@@ -294,6 +273,12 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         turns, t = whole_turns(t + tau, period)
         cycle += turns
         if surface < 0:
+            if (  # the impacts that follow are another segment: a mode of chatter begins behind an impact
+                tables.flights[mode] >= 0
+                and bounced > 0
+                and in_flight(functions, tables, mode, bounced - 1, t, y, p, workspace)
+            ):
+                mode, bounced = flight_of(functions, tables, mode, t, y, p, workspace), 0
             if left > stretch:
                 continue
             return ALL_TIME, event, mode, cycle, t

@@ -234,3 +234,23 @@ def test_motion_that_could_go_on_in_two_modes_is_refused() -> None:
     apart = copy.deepcopy(data)
     apart["modes"]["fast"]["in"]["q"] = "-"
     assert built(describe(apart)).targets["up:x0,y+", "hi"] == ("down:x0",)  # it turns back there
+
+
+def test_names_of_modes_with_signs_have_sliding_between_them(tmp_path: Path) -> None:
+    text = """
+name: capsubot
+states: [y, u, V]
+parameters: {w: 1.1, a: 0.6, xi: 0.05, b: 15.0, d: 0.3, g: 2.0, mu: 0.4}
+period: 2*pi/w
+define: {F: a*cos(w*t), S: y + 2*xi*u, C: b*(y - d)}
+surfaces: {wall: {observable: y, level: d}, ground: {observable: V, sliding: filippov}}
+modes:
+  n+: {in: {wall: -, ground: +}, field: {y: u, u: "F - S - (S - mu)/g", V: "(S - mu)/g"}}
+  n-: {in: {wall: -, ground: -}, field: {y: u, u: "F - S - (S + mu)/g", V: "(S + mu)/g"}}
+  c+: {in: {wall: +, ground: +}, field: {y: u, u: "F - S - C - (S + C - mu)/g", V: "(S + C - mu)/g"}}
+  c-: {in: {wall: +, ground: -}, field: {y: u, u: "F - S - C - (S + C + mu)/g", V: "(S + C + mu)/g"}}
+"""
+    path = tmp_path / "capsubot.yaml"
+    path.write_text(text, encoding="utf-8")
+    orbit = cf.find_orbit(path, {})
+    assert orbit.admissible and any(mode.startswith("slide_ground") for mode, _ in orbit.word)

@@ -22,7 +22,7 @@ from contfric.continuation.events import EndReason
 from contfric.errors import ModelError, ParameterError
 from contfric.models.chatter import with_chatter
 from contfric.models.check import check_model
-from contfric.orbit.simulation import SimulationEnd
+from contfric.orbit.simulation import SimulationEnd, go_on
 
 BALL = """
 name: ball
@@ -352,3 +352,43 @@ def test_proofs_are_not_offered_for_chatter() -> None:
     orbit = cf.find_orbit("bouncing-ball", {"a": 1.2, "e": 0.5})
     with pytest.raises(ParameterError, match="infinitely many impacts"):
         orbit.certify()
+
+
+CAPSULE = """
+name: capsule
+states: [z, w, q]
+parameters: {Om: 3.0, d: 0.5, r: 0.6, g: 0.1}
+period: 2*pi/Om
+surfaces: {top: {observable: z, level: d}, bottom: {observable: z, level: -d}}
+modes:
+  free: {in: {top: -, bottom: +}, field: {z: w, w: cos(Om*t) - g - 0.05*w - 0.2*q, q: 0.6*w - 1.5*q}}
+resets: {top: {w: -r*w, chatter: true}, bottom: {w: -r*w, chatter: true}}
+spread: {z: 0.5, w: 1, q: 1}
+"""
+
+
+@pytest.mark.parametrize("seed", [0, 1, 4, 5, 6, 7, 13, 14])
+def test_flights_between_two_walls_of_one_observable(seed: int, tmp_path: Path) -> None:
+    path = tmp_path / "capsule.yaml"
+    path.write_text(CAPSULE, encoding="utf-8")
+    model, draw = cf.load_model(path), np.random.default_rng(seed)
+    p = {"Om": float(draw.uniform(2.5, 3.2)), "g": float(draw.uniform(0.05, 0.25))}
+    p["r"] = float(draw.uniform(0.1, 0.65))
+    walk = cf.simulate(model, p, state=[0.1, 0.0, 0.0], periods=1000, events=10**6)
+    assert walk.end is SimulationEnd.TIME
+    period = 2.0 * np.pi / p["Om"]
+    clock = walk.times + walk.cycles * period
+    rests = [k for k, (mode, _) in enumerate(walk.word) if mode.startswith("chatter") and k > 0]
+    assert rests and np.max(np.abs(walk.states[:, 0])) < 0.5 + 1e-12
+    # a simulation that is cut in the flights of a chatter goes on in them
+    soon = [
+        k for k in rests if clock[k] - clock[k - 1] < 2.0 * period
+    ]  # others are chaotic for long
+    for k in soon[:8]:
+        cut = clock[k - 1] + 0.02 * float(draw.uniform()) * (clock[k] - clock[k - 1])
+        first = cf.simulate(model, p, state=[0.1, 0.0, 0.0], periods=cut / period, events=10**6)
+        assert first.last[3].startswith("free")
+        later = go_on(first, (clock[k] - cut) / period + 0.01)
+        again = next(i for i, (mode, _) in enumerate(later.word) if mode == walk.word[k][0])
+        own = later.times[again] + later.cycles[again] * period
+        assert own % period == pytest.approx(clock[k] % period, abs=1e-9)
