@@ -123,7 +123,15 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
                 beside = _REST_BESIDE * width
                 below += _rests(rest, diagram.parameter, value - beside)
                 above += _rests(rest, diagram.parameter, value + beside)
+            if any(_leads_elsewhere(diagram.nodes[joined].bifurcation) for joined in nodes):
+                below = above = None
             yield Balance(number, b.label, value, times * period, below, above)
+
+
+def _leads_elsewhere(b: Bifurcation) -> bool:
+    """Tell whether a reset off its surface is touched: nothing lies between motions with and without it."""
+    resets = b.orbit.model.reset_by_surface
+    return any(t.surface in resets and not resets[t.surface].stays for t in b.tests)
 
 
 def _rest_of(diagram: Diagram, node: Node) -> Orbit | None:

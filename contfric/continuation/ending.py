@@ -18,6 +18,9 @@ from contfric.orbit.orbit import Orbit
 _CROWD = 5e-4
 #: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
 _NO_SIZE = 1e-5
+#: Flights this high (relative to 1 + the states) between contacts are about to vanish: their impacts have
+#: speeds near the root of rounding, and no limit that is known to more than a few digits.
+_NO_HEIGHT = 1e-8
 
 
 def is_point(orbit: Orbit) -> bool:
@@ -28,6 +31,27 @@ def is_point(orbit: Orbit) -> bool:
     size = np.max(np.abs(states - states[0])) + np.max(np.abs(orbit.ends[-1, 1:] - states[0]))
     least = _NO_SIZE * (1.0 + np.max(np.abs(states)))
     return bool(size < least) and orbit.x_max - orbit.x_min < least
+
+
+def never_leaves(orbit: Orbit) -> bool:
+    """Tell whether the flights off a wall on which impacts come to rest have shrunk to nothing."""
+    model, least = orbit.model, _NO_HEIGHT * (1.0 + float(np.max(np.abs(orbit.joints[:, 1:]))))
+    for own in {model.chatter_by_mode[m] for m, _ in orbit.word if m in model.chatter_by_mode}:
+        gap, highest = model.surface_by_name[own.surface].observable, 0.0
+        level = orbit.flow.level(own.surface)
+        for (mode, _), begin, end in zip(orbit.word, orbit.begins, orbit.ends, strict=True):
+            if mode in model.chatter_by_mode:
+                continue
+            lasts = float(end[0] - begin[0])
+            _, values = orbit.flow.stationary(mode, gap, float(begin[0]), begin[1:], lasts)
+            highest = max(
+                highest,
+                *np.abs(values - level),
+                abs(orbit.flow.height(own.surface, end[0], end[1:])),
+            )
+        if highest < least:
+            return True
+    return False
 
 
 def end_at_limit(

@@ -10,7 +10,7 @@ from contfric.advance import foresee, foreseeable
 from contfric.continuation.accuracy import not_critical
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
-from contfric.continuation.ending import end_at_limit, ends_at, is_point
+from contfric.continuation.ending import end_at_limit, ends_at, is_point, never_leaves
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.limits import is_at_limit, limit_crossed, limit_end
 from contfric.continuation.locate import belongs_to, locate_events
@@ -209,6 +209,8 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
             side.end = End(EndReason.BROKEN, _NO_REST)
         if why in (kernels.STEP, kernels.BROKEN) and is_at_limit(side.tip.value, settings):
             side.end = limit_end(side.tip.value, settings)
+        elif why in (kernels.STEP, kernels.BROKEN) and never_leaves(_tip(orbit, side, settings)):
+            side.end = End(EndReason.REST)
         elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
             end_stalled(orbit, side, settings)
         if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and _slows_down(side, settings):
@@ -217,6 +219,11 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     if why == kernels.FULL:
         return _end_of_holds(orbit, side, settings, step < _CRAWLS), step
     return _resolve(orbit, side, settings), step
+
+
+def _tip(orbit: Orbit, side: Side, settings: Settings) -> Orbit:
+    """Return the last orbit of a side."""
+    return side.tip.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
 
 
 def _slows_down(side: Side, settings: Settings) -> bool:
@@ -274,6 +281,10 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         if bifurcation.kind in TERMINAL and is_point(bifurcation.orbit):
             side.put_tip(point)
             side.end = End(EndReason.POINT)
+            return True
+        if bifurcation.kind in TERMINAL and never_leaves(bifurcation.orbit):
+            side.put_tip(point)
+            side.end = End(EndReason.REST)
             return True
         if not point.lost and (note := not_critical(bifurcation, before, after, settings)):
             side.notes.append(note)

@@ -98,16 +98,19 @@ def _is_regular(data: Mapping[str, Any]) -> bool:
 def _with_observables(data: dict[str, Any]) -> dict[str, Any]:
     """Return a model in which an expression that a surface is the zero of has a name: that of the surface."""
     surfaces, observables = data.get("surfaces") or {}, dict(data.get("observables") or {})
+    parts = {str(name) for name in data.get("define") or {}}
+    taken = {*map(str, data.get("states") or ()), *map(str, data.get("parameters") or ()), *parts}
     named: dict[Any, Any] = {}
     for name, entry in surfaces.items():
         named[name] = entry
         text = entry.get("observable")
-        if not isinstance(text, str) or text.strip().isidentifier() or name in observables:
+        if not isinstance(text, str) or (text.strip().isidentifier() and text.strip() not in parts):
             continue
-        if str(name) in {*map(str, data.get("states") or ()), *(data.get("parameters") or ())}:
-            continue
-        observables[name] = text
-        named[name] = {**entry, "observable": name}
+        own = str(name)
+        while own in taken or own in observables:
+            own += "_"
+        observables[own] = text
+        named[name] = {**entry, "observable": own}
     return {**data, "surfaces": named, "observables": observables} if observables else data
 
 

@@ -392,3 +392,36 @@ def test_flights_between_two_walls_of_one_observable(seed: int, tmp_path: Path) 
         again = next(i for i, (mode, _) in enumerate(later.word) if mode == walk.word[k][0])
         own = later.times[again] + later.cycles[again] * period
         assert own % period == pytest.approx(clock[k] % period, abs=1e-9)
+
+
+FOLLOWER = """
+name: follower
+states: [x, v]
+parameters: {{W: 1.0}}
+period: 2*pi/W
+surfaces: {{cam: {{observable: x - cos(W*t)}}}}
+modes: {{off: {{in: {{cam: +}}, field: {{x: v, v: -{k}*x - {c}*v - {pre}}}}}}}
+resets: {{cam: {{v: -(1 + {e})*W*sin(W*t) - {e}*v, chatter: true}}}}
+spread: {{x: 2, v: 2}}
+"""
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_where_flights_shrink_to_nothing_the_mass_rests_for_ever(seed: int, tmp_path: Path) -> None:
+    draw = np.random.default_rng(seed)
+    k, c = float(draw.uniform(0.1, 0.5)), float(draw.uniform(0.0, 0.2))
+    pre, e = float(draw.uniform(0.4, 0.7)), float(draw.uniform(0.2, 0.5))
+    path = tmp_path / "follower.yaml"
+    path.write_text(FOLLOWER.format(k=k, c=c, pre=pre, e=e), encoding="utf-8")
+    phase = np.linspace(0.0, 2.0 * np.pi, 200_001)
+
+    def pressed(w: float) -> float:  # the least force of a follower that stays on x = cos(w t)
+        force = pre + (k - w * w) * np.cos(phase) - c * w * np.sin(phase)
+        return float(force.min())
+
+    leaves = brentq(pressed, 0.3, 2.0)
+    orbit = cf.find_orbit(path, {"W": 1.05 * leaves}, state=[1.1, 0.0])
+    branch = cf.continue_orbit(orbit, "W", (0.5 * leaves, 1.06 * leaves))
+    assert branch.ends[0].reason is EndReason.REST
+    # the height of a flight falls with the square of the distance: at 1e-8 of it the place is known to 1e-4
+    assert branch.values[0] == pytest.approx(leaves, rel=1e-4) and branch.values[0] > leaves

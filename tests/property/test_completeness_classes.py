@@ -103,3 +103,24 @@ def test_located_openings_open() -> None:
                 assert event.accuracy <= ROUGH
                 checked += 1
     assert checked >= 4
+
+
+FIRES = """
+name: resonator
+states: [x, y]
+parameters: {W: 0.9, A: 0.9, I: 0.2}
+period: 2*pi/W
+surfaces: {fire: {observable: y, level: 1}, s: {observable: x}}
+field: {x: -0.1*x - y + I + A*cos(W*t), y: x - 0.1*y}
+modes: {a: {in: {fire: -, s: +}}, c: {in: {fire: -, s: -}}}
+resets: {fire: {x: -0.3, y: 0.2}}
+"""
+
+
+def test_where_a_firing_comes_in_the_sum_of_indices_jumps(tmp_path: Path) -> None:
+    path = tmp_path / "resonator.yaml"
+    path.write_text(FIRES, encoding="utf-8")
+    diagram = cf.explore(cf.find_orbit(path, {}), "W", (0.8, 1.0))
+    assert [b.kind.value for b in diagram.bifurcations] == ["GS"]  # below it the neuron fires twice
+    found = diagram.verify()
+    assert found.passed and [b.below for b in found.balances] == [None]
