@@ -105,7 +105,10 @@ def _entries(node: yaml.Node, known: dict[int, int]) -> int:
 
 @cache
 def _loader() -> type[yaml.SafeLoader]:
-    """Return PyYAML's safe loader, with the truth values of YAML 1.2: on, off, yes and no are names."""
+    """Return PyYAML's safe loader, with truth values and numbers as in YAML 1.2.
+
+    On, off, yes and no are names; 1e-3 and 1.0e6 are numbers.
+    """
     import yaml
     from yaml.scanner import ScannerError
 
@@ -127,6 +130,8 @@ def _loader() -> type[yaml.SafeLoader]:
     Loader.add_implicit_resolver(
         truth, re.compile("^(?:true|True|TRUE|false|False|FALSE)$"), list("tTfF")
     )
+    power = re.compile(r"^[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)[eE][-+]?[0-9]+$")
+    Loader.add_implicit_resolver("tag:yaml.org,2002:float", power, list("-+.0123456789"))
     return Loader
 
 

@@ -154,7 +154,7 @@ def _parameters(top: Part) -> tuple[Parameter, ...]:
 def _number(part: Part, key: str, value: object, name: str) -> float:
     if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300:
         return float(value)
-    hint = "; YAML reads 1e-3 as text: write 1.0e-3" if isinstance(value, str) else ""
+    hint = "; a number has no quotes" if isinstance(value, str) else ""
     part.fail(key, f"the default of '{name}' must be a finite number, got {value!r}{hint}")
 
 
@@ -352,8 +352,7 @@ def _integration(top: Part) -> tuple[str, float]:
     if not _is_number(tolerance) or not low <= tolerance <= high:
         part.fail(
             "tolerance",
-            f"'tolerance' is a number from {low:g} to {high:g}, got {tolerance!r}; YAML reads 1e-12 "
-            "as text: write 1.0e-12",
+            f"'tolerance' is a number from {low:g} to {high:g}, got {tolerance!r}",
         )
     return method, float(tolerance)
 
@@ -366,7 +365,7 @@ def _max_step(top: Part) -> float | None:
         top.fail(
             "max_step",
             f"'max_step' is the largest step of a continuation as a share of the range, from {low:g} to "
-            f"{high:g}, got {step!r}; YAML reads 1e-3 as text: write 1.0e-3",
+            f"{high:g}, got {step!r}",
         )
     return float(step)
 

@@ -43,7 +43,7 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
     data : with the field of each mode in it
     """
     listed = not description.structure and len(description.modes) <= _MOST_MODES
-    if not description.period or description.phase or description.domains or not listed:
+    if not description.period or description.phase or not listed:
         return {}
     staying = [mode.name for mode in _staying(description)]
     if not staying:
@@ -67,7 +67,12 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
         for part, side in (mode, "+"), (other, "-"):
             modes[part] = {**entry, "in": {**(entry.get("in") or {}), name: side}}
     formula = f"sin(2*pi*t/({description.period}) - {_LATE})"
+    named = {
+        key: {**entry, "in": {**(entry.get("in") or {}), name: "+"}}
+        for key, entry in (data.get("domains") or {}).items()
+    }
     return {
+        **({"domains": named} if named else {}),
         "observables": {**(data.get("observables") or {}), name: formula},
         "surfaces": {**(data.get("surfaces") or {}), name: {"observable": name, "level": "0"}},
         "modes": modes,

@@ -25,7 +25,7 @@ _WANTED = {
     "periods": "a whole number >= 1",
     "segments": "a text such as 'x0v+ -> stick -> x-v+' or a list of domains",
     "symmetric": "true or false",
-    "example": "a mapping of parameters to numbers (YAML reads 1e-3 as text: write 1.0e-3)",
+    "example": "a mapping of parameters to numbers",
     "description": "a text",
 }
 

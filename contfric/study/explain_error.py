@@ -105,7 +105,7 @@ def _shown(value: object) -> str:
             float(value)
         except ValueError:
             return text
-        return f"{text}; a number has no quotes, and YAML reads 1e-3 as text: write 1.0e-3"
+        return f"{text}; a number has no quotes"
     return text
 
 

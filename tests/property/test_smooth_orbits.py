@@ -188,6 +188,17 @@ def test_labels_leave_the_phase_out() -> None:
     assert solved.x_max == pytest.approx(orbit.x_max, abs=1e-12)
 
 
+def test_regions_may_have_names_of_their_own(tmp_path: Path) -> None:
+    text = (MODELS / "soft_stops.yaml").read_text(encoding="utf-8")
+    path = tmp_path / "named.yaml"
+    path.write_text(
+        text + "domains: {middle: {mode: free, in: {right: -, left: +}}}\n", encoding="utf-8"
+    )
+    size = amplitude({"omega": 0.5, "zeta": 0.05, "A": 1.0})
+    orbit = cf.find_orbit(path, {"omega": 0.5, "k": 1.0, "gap": 0.7 * size})
+    assert str(orbit.signature) == "pressed -> middle -> drawn -> middle"
+
+
 def test_a_mass_that_never_slips_while_another_one_moves() -> None:
     """The ground holds one of two masses; the other is a linear oscillator."""
     model = MODELS / "stuck_mass.yaml"
