@@ -52,7 +52,9 @@ MOST_IMPACTS = 10_000
 FASTER = 2.0
 #: A speed below this share of that of the first impact, and of 1, is rest.
 _REST = 1e-14
-#: A flight longer than this many periods (or units of time) is none between impacts of chatter.
+#: A flight longer than this many periods (or units of time) is none between impacts of chatter; and where
+#: impacts have not come to rest in so many periods of an excitation, a mass is thrown about (10,000 of them,
+#: followed behind each of its impacts, took a second).
 _LONGEST = 64.0
 
 
@@ -173,8 +175,11 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
     speeds_by = np.zeros((_NODES, width))
     nodes_by = np.zeros((_NODES, 1 + n if width > 0 else 0, width))
     flight, c, side = motion.flights[mode], motion.gaps[mode], motion.sides[mode]
-    unit = motion.period(p, which[:0], grad[:0])
-    unit = unit if unit > 0.0 else 1.0
+    unit, longest = motion.period(p, which[:0], grad[:0]), np.inf
+    if unit > 0.0:
+        longest = _LONGEST * unit
+    else:
+        unit = 1.0
     count, highest, last, found, before = 0, 0.0, np.inf, False, np.inf
     for _ in range(MOST_IMPACTS):
         v = side * motion.rate(flight, c, t, y, p, which, grad)
@@ -185,7 +190,7 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
             for i in range(slopes.shape[0]):
                 jac[i, :] = slopes[i, :]
             return 0.0 if v > -1e-6 * max(1.0, highest) else -1.0
-        if thrown:
+        if thrown or t - t0 > longest:
             break
         before = v
         if count > 0 and v > speeds[count - 1]:
