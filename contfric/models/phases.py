@@ -89,10 +89,12 @@ def _staying(description: Description) -> list[ModeText]:
     sampler = Sampler(floats(description), defaults(description))
     timed = {s.name for s in surfaces if _is_timed(sampler, s.name)}
     parts = Counter(joined_modes(description).values())
+    resting = {own.mode for own in description.chatters}  # each is one mode, by its name
     return [
         mode
         for mode in description.modes
-        if parts[joined_modes(description)[mode.name]] == 1
+        if mode.name not in resting
+        and parts[joined_modes(description)[mode.name]] == 1
         and not timed & mode.sides.keys()
         and _may_stay(sampler, mode, known_sides(mode, surfaces))
     ]
