@@ -89,10 +89,14 @@ def _staying(description: Description) -> list[ModeText]:
     sampler = Sampler(floats(description), defaults(description))
     timed = {s.name for s in surfaces if _is_timed(sampler, s.name)}
     parts = Counter(joined_modes(description).values())
+    chatter = {
+        own.mode for own in description.chatters
+    }  # these begin behind an impact, and nowhere else
     return [
         mode
         for mode in description.modes
-        if parts[joined_modes(description)[mode.name]] == 1
+        if mode.name not in chatter
+        and parts[joined_modes(description)[mode.name]] == 1
         and not timed & mode.sides.keys()
         and _may_stay(sampler, mode, known_sides(mode, surfaces))
     ]
