@@ -254,3 +254,25 @@ modes:
     path.write_text(text, encoding="utf-8")
     orbit = cf.find_orbit(path, {})
     assert orbit.admissible and any(mode.startswith("slide_ground") for mode, _ in orbit.word)
+
+
+def test_a_part_of_define_may_be_an_observable_and_its_surface_have_any_name(
+    tmp_path: Path,
+) -> None:
+    text = """
+name: relay
+states: [x, v]
+parameters: {h: 0.2}
+autonomous: true
+define: {signal: x + 0.1*v}
+surfaces: {signal: {observable: signal, level: h}, x: {observable: x + 0.1*v, level: -h}}
+modes:
+  up: {in: {signal: -}, field: {x: v, v: -0.6*v - x + 1}}
+  down: {in: {x: +}, field: {x: v, v: -0.6*v - x - 1}}
+"""
+    path = tmp_path / "relay.yaml"
+    path.write_text(text, encoding="utf-8")
+    orbit = cf.find_orbit(path, {})
+    assert orbit.admissible
+    for end, (mode, _) in zip(orbit.ends, orbit.word, strict=True):
+        assert abs(end[1] + 0.1 * end[2]) == pytest.approx(0.2, abs=1e-12), mode
