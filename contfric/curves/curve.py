@@ -72,9 +72,13 @@ class CurvePart:
         mu = self.turn_multipliers
         if self.test is not None:
             return np.asarray(np.all(np.abs(mu) < 1.0, axis=1))
+        others = np.abs(mu)
+        if self.kind is Kind.NS:  # two pass: the nearest to the circle, and its conjugate
+            critical = np.argsort(np.abs(others - 1.0), axis=1)[:, :2]
+            np.put_along_axis(others, critical, 0.0, axis=1)
+            return np.asarray(np.all(others < 1.0, axis=1))
         sign = 1.0 if self.kind is Kind.SN else -1.0
         critical = np.argmin(np.abs(mu - sign), axis=1)
-        others = np.abs(mu)
         others[np.arange(len(mu)), critical] = 0.0
         return np.asarray(np.all(others < 1.0, axis=1))
 

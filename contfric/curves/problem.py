@@ -170,6 +170,20 @@ def problem_of(bifurcation: Bifurcation, box: Box) -> Problem:
     ParameterError
         If the bifurcation has no curve of its own, or is not what it says.
     """
+    check_start(bifurcation, box)
+    kind, orbit = bifurcation.kind, bifurcation.orbit
+    make = _sliding_problem if kind in TERMINAL or kind is Kind.T else _spectral_problem
+    return make(bifurcation, orbit, box)
+
+
+def check_start(bifurcation: Bifurcation, box: Box) -> None:
+    """Refuse what no curve starts from.
+
+    Raises
+    ------
+    ParameterError
+        For what is no located bifurcation inside the plane, or lies on a bridge.
+    """
     if not isinstance(bifurcation, Bifurcation):
         raise ParameterError(
             f"a curve starts from a Bifurcation, got {type(bifurcation).__name__}: take one of "
@@ -178,8 +192,6 @@ def problem_of(bifurcation: Bifurcation, box: Box) -> Problem:
     if not bifurcation.located:
         raise ParameterError(f"{bifurcation!r} is not located: its curve has no start")
     kind, orbit = bifurcation.kind, bifurcation.orbit
-    if kind is Kind.NS:
-        raise ParameterError("curves of NS are not continued: SN, BP, PD, CS, SS, AS, GS and T are")
     if orbit.system.holds:
         raise ParameterError(
             f"{bifurcation!r} lies on a bridge: curves of orbits with holds are not"
@@ -188,8 +200,6 @@ def problem_of(bifurcation: Bifurcation, box: Box) -> Problem:
     if not box.contains(here):
         where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(box.names, here, strict=True))
         raise ParameterError(f"{kind.value} is at {where}, outside of the ranges")
-    make = _sliding_problem if kind in TERMINAL or kind is Kind.T else _spectral_problem
-    return make(bifurcation, orbit, box)
 
 
 def _spectral_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Problem:

@@ -19,10 +19,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contfric.curves.problem import Box
+from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import equations_at
 from contfric.orbit.orbit import Orbit
-from contfric.quantities.measure import differentiated
+from contfric.quantities.measure import Measured, differentiated
 from contfric.quantities.motion import Directions
 from contfric.quantities.registry import Quantity
 
@@ -40,12 +41,12 @@ class Held:
     Attributes
     ----------
     orbit : any orbit of the curve: its equations, and the parameters that do not vary
-    quantity, value : what is held, and at what
+    quantity, value : what is held, and at what; None where :meth:`measured` is another condition
     box : the plane
     """
 
     orbit: Orbit
-    quantity: Quantity
+    quantity: Quantity | None
     value: float
     box: Box
 
@@ -81,6 +82,19 @@ class Held:
         vector[self.which] = plain[-2:]
         return Directions(plain[:-2].reshape(*self.orbit.joints.shape, -1), vector)
 
+    def measured(self, orbit: Orbit, columns: FloatArray) -> Measured:
+        """Return what is held, with its slopes in scaled directions, shape (N m + 2, D)."""
+        assert self.quantity is not None
+        return differentiated(self.quantity, orbit, self.directions(columns))
+
+    def bounds(self, orbit: Orbit) -> FloatArray:
+        """Return what else has to be positive along the curve."""
+        return np.empty(0)
+
+    def end_at_bound(self, orbit: Orbit) -> CurveEnd:
+        """Return why the curve ends where one of these is zero."""
+        return CurveEnd(CurveEndReason.LOST)
+
 
 @dataclass(frozen=True, eq=False)
 class Solved:
@@ -111,9 +125,7 @@ def solve_held(held: Held, guess: FloatArray, tangent: FloatArray | None) -> Sol
         except np.linalg.LinAlgError:
             return None
         plane = basis[:, rows:]
-        measured = differentiated(
-            held.quantity, orbit, held.directions(np.column_stack([shortest, plane]))
-        )
+        measured = held.measured(orbit, np.column_stack([shortest, plane]))
         slopes = measured.ahead[1:]
         missing = held.value - measured.value
         step = shortest + plane @ _in_plane(

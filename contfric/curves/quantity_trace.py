@@ -76,7 +76,9 @@ def continue_quantity(
     ConvergenceError
         If no orbit with that value is found.
 
-    Notes ----- The curve ends where the signature of its orbits does (at CS, SS, AS or GS), with the
+    Notes
+    -----
+    The curve ends where the signature of its orbits does (at CS, SS, AS or GS), with the
     reason MEETS. Stability is that of the points; where it changes between two of them is not located.
 
     Examples
@@ -102,9 +104,9 @@ def continue_quantity(
         raise ConvergenceError(
             f"the orbits with {quantity} = {value:g} have no unique direction at the start", start
         )
-    ahead = _Side(held, [first], largest)
+    ahead = HeldSide(held, [first], largest)
     ahead.trace(max_points)
-    behind = _Side(held, [Solved(first.x, -first.tangent, first.orbit)], largest)
+    behind = HeldSide(held, [Solved(first.x, -first.tangent, first.orbit)], largest)
     if ahead.end.reason is CurveEndReason.CLOSED or ahead.end.reason is CurveEndReason.INTERRUPTED:
         behind.end = ahead.end
     else:
@@ -143,7 +145,7 @@ def _start(orbit: Orbit, quantity: Quantity, value: float, box: Box) -> Orbit:
 
 
 @dataclass(eq=False)
-class _Side:
+class HeldSide:
     """One side of a curve while it grows."""
 
     held: Held
@@ -176,7 +178,7 @@ class _Side:
                 break
             step *= 0.5
         taken = float(np.linalg.norm(found.x - last.x))
-        if _inside(self.held, found) < 0.0:
+        if inside(self.held, found) < 0.0:
             self._finish(last, found)
             return step, True
         self.points.append(found)
@@ -231,12 +233,10 @@ class _Side:
             return found
 
         def inside_at(share: float) -> float:
-            return (
-                _inside(self.held, solved_at(share)) if share < 1.0 else _inside(self.held, after)
-            )
+            return inside(self.held, solved_at(share)) if share < 1.0 else inside(self.held, after)
 
         try:
-            if _inside(self.held, before) > 0.0:
+            if inside(self.held, before) > 0.0:
                 # to the last digits of a step
                 share = float(brentq(inside_at, 0.0, 1.0, xtol=1e-15, rtol=1e-14))
                 point = solved_at(share)
@@ -263,9 +263,10 @@ def _bounds(held: Held, point: Solved) -> tuple[FloatArray, FloatArray, FloatArr
     return edges, np.array(limits), point.orbit.margins
 
 
-def _inside(held: Held, point: Solved) -> float:
+def inside(held: Held, point: Solved) -> float:
     """Return the least of what has to be positive."""
     least = [np.min(part, initial=np.inf) for part in _bounds(held, point)]
+    least.append(np.min(held.bounds(point.orbit), initial=np.inf))
     return float(np.nan_to_num(min(least), nan=-1.0, posinf=1e3))
 
 
@@ -276,18 +277,20 @@ def _end_at(held: Held, point: Solved) -> CurveEnd:
     first = int(np.argmin(least))
     if first < 2:
         return CurveEnd((CurveEndReason.RANGE, CurveEndReason.LIMIT)[first])
+    if np.min(held.bounds(point.orbit), initial=np.inf) < least[2]:
+        return held.end_at_bound(point.orbit)
     test = held.orbit.system.tests[int(np.argmin(margins))]
     kind = kind_of_margin(held.orbit.system, test, point.orbit)
     return CurveEnd(CurveEndReason.MEETS, f"{kind.value}: beyond it the orbits are not admissible")
 
 
-def _joined(held: Held, behind: _Side, ahead: _Side) -> QuantityCurve:
+def _joined(held: Held, behind: HeldSide, ahead: HeldSide) -> QuantityCurve:
     """Return one curve from the two sides of its start."""
     points = [*behind.points[:0:-1], *ahead.points]
     arc = np.array([*(-a for a in behind.arc[:0:-1]), *ahead.arc])
     orbits = [point.orbit for point in points]
     return QuantityCurve(
-        held.quantity.name,
+        held.quantity.name if held.quantity else "",
         held.value,
         held.box.names,
         held.orbit.system,

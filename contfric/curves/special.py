@@ -19,6 +19,8 @@ class CodimTwo(str, Enum):
     DBP = "degenerate symmetry breaking: a fold curve of asymmetric orbits begins (SN-BP)"
     R1 = "strong resonance 1:1, two multipliers 1"
     R2 = "strong resonance 1:2, two multipliers -1"
+    R3 = "strong resonance 1:3, two multipliers exp(+-2 pi i / 3)"
+    R4 = "strong resonance 1:4, two multipliers i and -i"
     SN_PD = "fold and period doubling at once"
     SN_BP = "fold and symmetry breaking at once"
     TURNOVER = "the load at the stop stands still: CS and SS change places, an AS begins"

@@ -18,7 +18,7 @@ from contfric.curves.going_on import Start, goes_on, is_continuum, prove
 from contfric.curves.locating import by_place, locate
 from contfric.curves.naming import crossings
 from contfric.curves.points import CHUNK, first_curve_point, march_rows
-from contfric.curves.problem import Problem, box_of, problem_of
+from contfric.curves.problem import Problem, box_of, check_start, problem_of
 from contfric.curves.special import CurveEnd, CurveEndReason, SpecialPoint
 from contfric.errors import ConvergenceError, ParameterError, real_number, whole_number
 from contfric.journal import remembered
@@ -86,7 +86,7 @@ def continue_bifurcation(
     Parameters
     ----------
     bifurcation : Bifurcation
-        An SN, BP, PD, CS, SS, AS, GS or T of a branch or of a diagram.
+        An SN, BP, PD, NS, CS, SS, AS, GS or T of a branch or of a diagram.
     parameters : (str, str)
         The two parameters, such as ``("Omega", "S")``.
     ranges : dict
@@ -107,7 +107,8 @@ def continue_bifurcation(
     Notes
     -----
     SN, BP and PD are zeros of a bordered function of the chain's Jacobian (Govaerts 2000); CS, SS,
-    AS, GS and T of their own margins. ``docs/curves.md`` has the derivation.
+    AS, GS and T of their own margins; NS of the logarithm of the product of its pair.
+    ``docs/curves.md`` has the derivation.
 
     Examples
     --------
@@ -126,6 +127,11 @@ def continue_bifurcation(
     box = box_of(model, parameters, ranges)
     largest = largest_step(max_step, model)
     whole_number("max_points", max_points, least=2)
+    if bifurcation.kind is Kind.NS:
+        from contfric.curves.torus import continue_torus
+
+        check_start(bifurcation, box)
+        return continue_torus(bifurcation, box, largest, max_points)
     problem = problem_of(bifurcation, box)
     problem, start, border = start_of_curve(problem, bifurcation, largest)
     ahead = trace_curve_side(problem, start, border, largest, max_points, progress, keep=True)

@@ -79,7 +79,7 @@ def test_wrong_starts(branch, fold) -> None:
         cf.continue_bifurcation(replace(fold, kind=cf.Kind.PD), PLANE, RANGES)
     with pytest.raises(cf.ParameterError, match="breaks no symmetry"):
         cf.continue_bifurcation(replace(fold, kind=cf.Kind.BP), PLANE, RANGES)
-    with pytest.raises(cf.ParameterError, match="NS"):
+    with pytest.raises(cf.ParameterError, match="no NS"):
         cf.continue_bifurcation(replace(fold, kind=cf.Kind.NS), PLANE, RANGES)
     with pytest.raises(cf.ParameterError, match="not located"):
         cf.continue_bifurcation(replace(fold, located=False), PLANE, RANGES)

@@ -1,0 +1,201 @@
+"""Curves of Neimark-Sacker points (NS): a complex pair of multipliers stays on the unit circle.
+
+The condition is that the logarithm of the product of the pair vanishes, ``log(mu_1 mu_2) = 0``. The
+product is a smooth function of the orbit also where the pair meets on the real axis, at 1 (R1) or at -1
+(R2): there the curve of NS ends, and what goes on is a neutral saddle, no bifurcation. With the angle
+theta of the pair, the points theta = 2 pi / 3 and pi / 2 are the strong resonances 1:3 and 1:4. As
+everywhere on curves, multipliers are those of a turn: of the half map, for a symmetric orbit.
+
+The orbits and the march are those of a quantity that is held (:mod:`contfric.curves.quantity_step`).
+The value is computed from the multipliers to rounding; its slopes, in the three directions that Newton's
+method needs, are central differences: a point is as accurate as its multipliers, and only the speed of
+convergence depends on the slopes.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.continuation.events import Bifurcation, Kind
+from contfric.continuation.points import MOST_POINTS
+from contfric.curves.curve import Curve, CurvePart
+from contfric.curves.problem import Box
+from contfric.curves.quantity_step import Held, Solved, solve_held
+from contfric.curves.quantity_trace import HeldSide, inside
+from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
+from contfric.errors import ConvergenceError, ParameterError
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
+from contfric.quantities.measure import Measured
+
+#: Step of the central differences in scaled unknowns: the cube root of rounding balances both errors, 1e-10.
+_STEP = 6e-6
+#: A multiplier this far from the unit circle does not belong to a located NS.
+_MULTIPLIER = 1e-6
+#: Angles of the strong resonances that a curve passes.
+_RESONANCES = {CodimTwo.R3: 2.0 * math.pi / 3.0, CodimTwo.R4: math.pi / 2.0}
+
+
+def critical_pair(mu: NDArray[np.complex128]) -> tuple[int, int]:
+    """Return the two multipliers whose product is a real number nearest to 1.
+
+    Two conjugate ones, or two real ones of the same sign.
+    """
+
+    def distance(pair: tuple[int, int]) -> float:
+        product = complex(mu[pair[0]] * mu[pair[1]])
+        if abs(product.imag) > 1e-9 * abs(product) or product.real <= 0.0:
+            return math.inf  # of two pairs, or of a real one and one of a pair: not conjugate
+        return abs(math.log(product.real))
+
+    pairs = list(itertools.combinations(range(len(mu)), 2))
+    return min(pairs, key=distance)
+
+
+@dataclass(frozen=True, eq=False)
+class OnCircle(Held):
+    """The condition of a curve of NS, in place of a quantity that is held."""
+
+    def measured(self, orbit: Orbit, columns: FloatArray) -> Measured:
+        """Return log(mu_1 mu_2) and its slopes in scaled directions."""
+        x = self.scaled(orbit)
+        slopes = [
+            (self.defect(self.at(x + _STEP * c)) - self.defect(self.at(x - _STEP * c)))
+            / (2.0 * _STEP)
+            for c in columns.T
+        ]
+        return Measured(self.defect(orbit), np.array(slopes), np.array(slopes))
+
+    def defect(self, orbit: Orbit) -> float:
+        """Return log(mu_1 mu_2) of the critical pair."""
+        mu = orbit.turn_multipliers
+        one, other = critical_pair(mu)
+        return math.log(abs(mu[one] * mu[other]))
+
+    def bounds(self, orbit: Orbit) -> FloatArray:
+        """Return the discriminant of the pair, 1 - (trace / 2)^2 / determinant: positive if complex."""
+        mu = orbit.turn_multipliers
+        one, other = critical_pair(mu)
+        total, product = mu[one] + mu[other], mu[one] * mu[other]
+        return np.array([1.0 - float((total * total / (4.0 * product)).real)])
+
+    def end_at_bound(self, orbit: Orbit) -> CurveEnd:
+        """Return the end where the pair is real."""
+        mu = orbit.turn_multipliers
+        kind = CodimTwo.R1 if float(mu[critical_pair(mu)[0]].real) > 0.0 else CodimTwo.R2
+        special = SpecialPoint(kind, kind.name, orbit.params, orbit)
+        return CurveEnd(CurveEndReason.MEETS, f"{kind.value}: a neutral saddle follows", special)
+
+
+def angle_of(orbit: Orbit) -> float:
+    """Return the angle of the critical pair, in [0, pi]."""
+    mu = orbit.turn_multipliers
+    return abs(float(np.angle(mu[critical_pair(mu)[0]])))
+
+
+def continue_torus(
+    bifurcation: Bifurcation, box: Box, largest: float, max_points: int = MOST_POINTS
+) -> Curve:
+    """Continue an NS in two parameters, both ways.
+
+    Raises
+    ------
+    ParameterError
+        If no complex pair lies on the unit circle.
+    ConvergenceError
+        If the curve has no unique direction at the start.
+    """
+    orbit = bifurcation.orbit
+    mu = orbit.turn_multipliers
+    if not np.any((np.abs(np.abs(mu) - 1.0) < _MULTIPLIER) & (np.abs(mu.imag) > 0.0)):
+        raise ParameterError(
+            f"{bifurcation!r} is no NS: the multipliers of a turn are "
+            f"{', '.join(f'{m:.6g}' for m in mu)}, and no complex pair is on the unit circle"
+        )
+    held = OnCircle(orbit, None, 0.0, box)
+    first = solve_held(held, held.scaled(orbit), None)
+    if first is None:
+        raise ConvergenceError(f"{bifurcation!r} has no curve with a unique direction", orbit)
+    ahead = HeldSide(held, [first], largest)
+    ahead.trace(max_points)
+    behind = HeldSide(held, [Solved(first.x, -first.tangent, first.orbit)], largest)
+    if ahead.end.reason in (CurveEndReason.CLOSED, CurveEndReason.INTERRUPTED):
+        behind.end = CurveEnd(ahead.end.reason)
+    else:
+        behind.trace(max_points)
+    return _joined(held, behind, ahead)
+
+
+def _joined(held: OnCircle, behind: HeldSide, ahead: HeldSide) -> Curve:
+    points = [*behind.points[:0:-1], *ahead.points]
+    arc = np.array([*(-a for a in behind.arc[:0:-1]), *ahead.arc])
+    arc -= arc[0]
+    orbits = [point.orbit for point in points]
+    part = CurvePart(
+        Kind.NS,
+        None,
+        held.orbit.system,
+        None,
+        np.array([orbit.vector[held.which] for orbit in orbits]),
+        np.array([orbit.joints for orbit in orbits]),
+        arc,
+        np.array([orbit.labels for orbit in orbits], dtype=np.int64).reshape(len(orbits), -1),
+        np.array([orbit.turn_multipliers for orbit in orbits]),
+    )
+    special = _resonances(held, points, arc)
+    ends = []
+    for side, position in ((behind, 0.0), (ahead, float(arc[-1]))):
+        end = side.end
+        if end.special is not None:
+            kind = end.special.kind
+            place = _special(kind, end.special.orbit, position)
+            end = CurveEnd(end.reason, end.message, place)
+            special.append(place)
+        ends.append(end)
+    special.sort(key=lambda s: s.position)
+    return Curve(held.box.names, held.orbit.vector, (part,), tuple(special), (ends[0], ends[1]))
+
+
+def _special(kind: CodimTwo, orbit: Orbit, position: float) -> SpecialPoint:
+    return SpecialPoint(kind, kind.name, orbit.params, orbit, position=position)
+
+
+def _resonances(held: OnCircle, points: list[Solved], arc: FloatArray) -> list[SpecialPoint]:
+    """Return the strong resonances 1:3 and 1:4 between the points, located."""
+    found = []
+    angles = [angle_of(point.orbit) for point in points]
+    for k, (a, b) in enumerate(itertools.pairwise(points)):
+        for kind, angle in _RESONANCES.items():
+            if not (angles[k] - angle) * (angles[k + 1] - angle) < 0.0:
+                continue
+            place = _located(held, a, b, angle)
+            if place is not None:
+                share, orbit = place
+                position = float(arc[k] + share * (arc[k + 1] - arc[k]))
+                found.append(_special(kind, orbit, position))
+    return found
+
+
+def _located(held: OnCircle, a: Solved, b: Solved, angle: float) -> tuple[float, Orbit] | None:
+    """Return where between two points the pair has an angle; None where Newton fails."""
+    from scipy.optimize import brentq
+
+    chord = b.x - a.x
+    normal = chord / np.linalg.norm(chord)
+
+    def orbit_at(share: float) -> Orbit:
+        point = solve_held(held, a.x + share * chord, normal)
+        if point is None or inside(held, point) < 0.0:
+            raise ArithmeticError
+        return point.orbit
+
+    try:  # to the last digits of a step
+        share = brentq(lambda s: angle_of(orbit_at(s)) - angle, 0.0, 1.0, xtol=1e-15, rtol=1e-14)
+        return float(share), orbit_at(float(share))
+    except (ArithmeticError, ValueError):
+        return None
