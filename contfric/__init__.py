@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from contfric.continuation.events import Bifurcation, EndReason, Kind
     from contfric.continuation.trace import continue_orbit
     from contfric.curves.curve import Curve
+    from contfric.curves.homoclinic import HomoclinicCurve, continue_homoclinic
     from contfric.curves.quantity_curve import QuantityCurve
     from contfric.curves.quantity_trace import continue_quantity
     from contfric.curves.special import CodimTwo
@@ -141,6 +142,8 @@ _HOMES = {
     "continue_equilibrium": "contfric.equilibria.trace",
     "continue_orbit": "contfric.continuation.trace",
     "explore_equilibria": "contfric.equilibria.explore",
+    "HomoclinicCurve": "contfric.curves.homoclinic",
+    "continue_homoclinic": "contfric.curves.homoclinic",
     "continue_quantity": "contfric.curves.quantity_trace",
     "export": "contfric.results.export",
     "explore": "contfric.atlas.explore",
@@ -190,6 +193,7 @@ __all__ = [
     "EquilibriumSet",
     "Fit",
     "Gradient",
+    "HomoclinicCurve",
     "HopfPoint",
     "Kind",
     "LyapunovExponents",
@@ -224,6 +228,7 @@ __all__ = [
     "check_model",
     "continue_bifurcation",
     "continue_equilibrium",
+    "continue_homoclinic",
     "continue_orbit",
     "continue_quantity",
     "ensemble",

@@ -1,0 +1,100 @@
+"""Curves of homoclinic ends: a branch whose period grows without bound, at a long period that is fixed.
+
+Where an orbit of an autonomous model comes to a saddle its period T grows as ``-log(distance) / lambda``
+with the unstable eigenvalue lambda of the saddle. So the curve of one long period lies within a constant
+times ``exp(-lambda T)`` of the curve of homoclinic orbits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from contfric.continuation.branch import Branch
+from contfric.continuation.events import EndReason
+from contfric.continuation.points import MOST_POINTS
+from contfric.curves.quantity_curve import QuantityCurve
+from contfric.curves.quantity_trace import continue_quantity
+from contfric.errors import ParameterError, real_number
+
+
+@dataclass(frozen=True, eq=False)
+class HomoclinicCurve(QuantityCurve):
+    """Orbits of one long period near a homoclinic end, in the plane of two parameters."""
+
+    @property
+    def label(self) -> str:
+        """Name with the bound on the period, such as ``HOM (period 12)``."""
+        return f"HOM (period {self.value:g})"
+
+    def __repr__(self) -> str:
+        ends = " and ".join(end.reason.name for end in self.ends)
+        return f"<HomoclinicCurve {self.label}: {len(self)} points, ends {ends}>"
+
+
+def continue_homoclinic(
+    branch: Branch,
+    parameters: tuple[str, str],
+    ranges: Mapping[str, tuple[float, float]],
+    *,
+    period: float,
+    max_step: float | None = None,
+    max_points: int = MOST_POINTS,
+) -> HomoclinicCurve:
+    """Continue the end of a branch whose period grows without bound, at a fixed long period.
+
+    Parameters
+    ----------
+    branch : Branch
+        A branch of an autonomous model with an end PERIOD.
+    parameters : (str, str)
+        The two parameters that vary.
+    ranges : dict
+        Where each of them may go.
+    period : float
+        The bound: the period at which the curve is followed, in units of the model's time.
+    max_step, max_points
+        As for :func:`contfric.continue_bifurcation`.
+
+    Raises
+    ------
+    ParameterError
+        If no end of the branch is of that kind, or none of its orbits has that period.
+    ConvergenceError
+        If the curve has no unique direction at the start.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> branch = cf.continue_orbit(cf.find_orbit("rimless-wheel"), "slope", (0.001, 0.25))
+    >>> ranges = {"slope": (0.001, 0.25), "alpha": (0.25, 0.35)}
+    >>> cf.continue_homoclinic(branch, ("slope", "alpha"), ranges, period=12.0).label
+    'HOM (period 12)'
+    """
+    if not isinstance(branch, Branch):
+        raise ParameterError(f"a homoclinic end is one of a Branch, got {type(branch).__name__}")
+    bound = real_number("period", period)
+    periods = np.asarray(branch.period)
+    starts = [
+        side
+        for side, end in zip((0, len(branch) - 1), branch.ends, strict=True)
+        if end.reason is EndReason.PERIOD
+    ]
+    if not starts:
+        reasons = " and ".join(end.reason.name for end in branch.ends)
+        raise ParameterError(f"no end of this branch is homoclinic (PERIOD): it ends {reasons}")
+    if not np.min(periods) < bound < max(periods[side] for side in starts):
+        raise ParameterError(
+            f"period = {bound:g} is not one of the branch: they go from {np.min(periods):.6g} "
+            f"to {np.max(periods):.6g}"
+        )
+    side = next(side for side in starts if periods[side] > bound)
+    inwards = range(len(branch)) if side == 0 else range(len(branch) - 1, -1, -1)
+    first = next(k for k in inwards if periods[k] <= bound)
+    orbit = branch[first]  # the first one from the end that is not too long
+    found = continue_quantity(
+        orbit, "period", bound, parameters, ranges, max_step=max_step, max_points=max_points
+    )
+    return HomoclinicCurve(**{f.name: getattr(found, f.name) for f in fields(found)})
