@@ -115,7 +115,7 @@ def test_bundled_files_have_their_own_name(name: str) -> None:
 #: (what is written in the place of what, line of the error, what its message says)
 MISTAKES = [
     ("constraints:", "constrains:", 6, "did you mean 'constraints'?"),
-    ("S: 0.2", "S: 1e-2", 5, "write 1.0e-3"),
+    ("S: 0.2", "S: '1e-2'", 5, "a number has no quotes"),
     ("default: 0.5", "defualt: 0.5", 4, "did you mean 'default'?"),
     ("S: 0.2", "sin: 0.2", 5, "means a function"),
     ("S: 0.2", "lambda: 0.2", 5, "word of Python"),
@@ -151,7 +151,7 @@ MISTAKES = [
     ("name: spring", "name: spring\nintegration: {method: magic}", 2, "explicit, implicit"),
     ("name: spring", "name: spring\nstop_surface: w", 2, "no surface 'w'"),
     ("name: spring", "name: spring\nmax_step: 2", 2, "largest step of a continuation"),
-    ("name: spring", "name: spring\nmax_step: 1e-3", 2, "write 1.0e-3"),
+    ("name: spring", "name: spring\nmax_step: '1e-3'", 2, "got '1e-3'"),
     ("name: spring", "name: spring\nmax_step: true", 2, "got True"),
     ("name: spring", "name: spring\nresets: {v: {w: 1}}", 2, "unknown key 'w'"),
     (
