@@ -54,7 +54,7 @@ def test_truth_is_true_and_false(tmp_path, word) -> None:
 def test_modes_domains_and_surfaces_have_these_names(tmp_path, one, other, flag) -> None:
     text = MODEL.format(one=one, other=other, wall="wall", flag=flag)
     model = load_model(write(tmp_path, text))
-    assert [mode.name for mode in model.modes] == [one, other]
+    assert [m.name for m in model.modes if m.name not in model.phase_parts] == [one, other]
     assert list(dict.fromkeys(model.shown(d.name) for d in model.domains)) == [one, other]
     signature = cf.Signature(model, f"{one} -> {other}")
     assert signature.segments == (one, other)
