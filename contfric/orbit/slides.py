@@ -147,12 +147,26 @@ def _at_one_phase(whole: Orbit) -> Outline:
         and np.max(np.abs(np.roll(states, -k, axis=0) - states)) < SAME_MOTION
     )
     starts = np.column_stack([np.zeros(periods), states[:periods]])
+    impacts = _impacts(whole)
+    impacts = impacts[: len(impacts) * periods // whole.periods]
+    impacts[:, 0] %= cycle
+    starts = np.vstack([starts, impacts])
     images = starts
     if model.symmetry is not None:
-        back = model.symmetry.fraction * cycle
+        back, mirror = model.symmetry.fraction * cycle, model.symmetry.array()
         others = np.array([whole.state(k * cycle - back) for k in range(periods)])
-        images = np.column_stack([np.zeros(periods), others @ model.symmetry.array().T])
+        images = np.column_stack([np.zeros(periods), others @ mirror.T])
+        turned = np.column_stack([(impacts[:, 0] + back) % cycle, impacts[:, 1:] @ mirror.T])
+        images = np.vstack([images, turned])
     return Outline(periods, cycle, starts, images)
+
+
+def _impacts(whole: Orbit) -> FloatArray:
+    """Return time and state in front of each reset that changes the state: a grazing impact is none."""
+    behind = np.roll(whole.begins[:, 1:], -1, axis=0)
+    jumps = np.max(np.abs(behind - whole.ends[:, 1:]), axis=1) >= SAME_MOTION
+    struck = [exit_ in whole.model.reset_by_surface for _, exit_ in whole.word]
+    return np.array(whole.ends[jumps & np.array(struck)])
 
 
 def _apart(one: FloatArray, other: FloatArray, cycle: float) -> float:
