@@ -114,7 +114,7 @@ def _smooth(problem: Problem, before: Point, after: Point, border: FloatArray) -
             continue
         point, fine = locate(problem, before, after, border, by_test(index))
         value = abs(point.tests[index])
-        if not math.isfinite(value) or value > 0.5 * min(abs(a), abs(b)):
+        if not math.isfinite(value) or value > max(0.5 * min(abs(a), abs(b)), MARGINAL):
             continue  # it changes sign through infinity: an exit that becomes tangential
         named = _smooth_kind(problem, column, point)
         if named is not None:

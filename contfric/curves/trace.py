@@ -26,8 +26,6 @@ from contfric.models.definition import FloatArray, Model
 
 #: A first point farther than this from the bifurcation (in widths of the ranges) is another one.
 _SAME_START = 1e-4
-#: A point of codimension two this near to the start of a curve that leaves it is that start.
-AT_START = 1e-6
 #: Share of a range within which a curve that gets no farther has come to a physical limit, where
 #: conditions degenerate together.
 _NEAR_LIMIT = 1e-3
@@ -35,6 +33,8 @@ _NEAR_LIMIT = 1e-3
 _NO_TIME = 1e-9
 #: Most changes of the signature along one side of a curve: a chain longer than this goes round.
 _MOST_CHANGES = 24
+#: A piece of a curve that is shorter than this is at one place: located events are good to 1e-9 or so.
+_AT_ONE_PLACE = 1e-6
 
 Progress = Callable[[str], None]
 
@@ -199,16 +199,19 @@ def trace_curve_side(
     largest: float,
     max_points: int,
     progress: Progress | None = None,
-    changes: int = _MOST_CHANGES,
+    passed: tuple[tuple[Problem, float], ...] = (),
     keep: bool = False,
 ) -> CurveSide:
     """Follow a curve from a point along its tangent until it ends, through changes of its signature.
 
-    ``keep`` is that of :func:`contfric.continuation.trace.trace_side`.
+    ``passed`` is what it was before, and the arclengths at which that ended: at one place each comes
+    once. ``keep`` is that of :func:`contfric.continuation.trace.trace_side`.
     """
     side = _trace_piece(problem, start, border, largest, max_points, progress, keep)
     special = side.end.special
-    if side.end.reason is CurveEndReason.MEETS and special is not None and changes > 0:
+    passed = *passed, (problem, side.tip.arc)
+    meets = side.end.reason is CurveEndReason.MEETS and len(passed) <= _MOST_CHANGES
+    if meets and special is not None:
         try:
             on = goes_on(problem, side.tip, special, largest)
         except KeyboardInterrupt:
@@ -216,13 +219,19 @@ def trace_curve_side(
                 raise
             side.end = CurveEnd(CurveEndReason.INTERRUPTED, special=special)
             return side
-        if on is not None:
+        here = [was for was, arc in passed if side.tip.arc - arc < _AT_ONE_PLACE]
+        if on is not None and not any(_is_same(on[0], was) for was in here):
             other, point, border = on
             point.arc = side.tip.arc
             side.following = trace_curve_side(
-                other, point, border, largest, max_points, progress, changes - 1, keep
+                other, point, border, largest, max_points, progress, passed, keep
             )
     return side
+
+
+def _is_same(one: Problem, other: Problem) -> bool:
+    """Tell whether two problems follow the same condition in the same word."""
+    return one.test == other.test and one.system.word == other.system.word
 
 
 def _went_to_its_end(side: CurveSide) -> bool:
@@ -346,17 +355,10 @@ def _near_limit(problem: Problem, point: Point) -> CurveEnd | None:
 def _resolve(side: CurveSide, after: Point, border: FloatArray) -> bool:
     """Locate what happened over the last step; True if the side ends there."""
     problem, before = side.problem, side.tip
-    at_start = len(side.points) == 1
     limit = _range_crossed(side, after)
     for crossing in crossings(problem, before, after, side.border):
         if limit is not None and crossing.point.arc > limit.arc:
             break
-        if (
-            at_start
-            and crossing.point.arc - side.points[0].arc < AT_START
-            and not crossing.terminal
-        ):
-            continue
         side.special.append(crossing.special)
         if crossing.terminal:
             side.points.append(crossing.point)

@@ -84,3 +84,52 @@ def test_fold_of_doubled_orbits_leaves(doubling) -> None:
         assert orbit.residual == 0.0 or orbit.residual < 1e-10
     gap = [abs(side.points[0].w[k] - point.params[n]) for k, n in enumerate(PLANE)]
     assert max(gap) < 1e-3
+
+
+RANGES = {"Omega": (0.4, 0.6), "S": (0.15, 0.45)}
+
+
+def smooth_points(s0: float) -> list[tuple[cf.Curve, cf.SpecialPoint]]:
+    """Points at which curves of events of period 1 go on in the same word."""
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.6 * s0, "S0": s0})
+    found = []
+    for event in cf.explore(orbit, "Omega", (0.4, 0.6), max_periods=1).bifurcations:
+        simple = event.orbit.periods == 1 and not event.orbit.system.holds
+        if simple and event.kind is not cf.Kind.T:
+            curve = cf.continue_bifurcation(event, PLANE, RANGES)
+            sliding = {cf.Kind.CS, cf.Kind.SS, cf.Kind.AS, cf.Kind.GS, cf.Kind.T}
+            found += [(curve, point) for point in curve.special if point.meets not in sliding]
+    return found
+
+
+@pytest.mark.parametrize("s0", [0.37, 0.4, 0.46])
+def test_a_curve_that_starts_at_a_point_has_it(s0: float) -> None:
+    """The test that vanishes there begins at zero: its sign is that of rounding."""
+    points = smooth_points(s0)
+    assert {"CS-SS", "CS-SN"} <= {point.name for _, point in points}
+    for curve, point in points:
+        part = min(curve.parts, key=lambda p: float(np.min(np.abs(p.arc - point.position))))
+        margins = () if part.test is None else (part.test,)
+        event = cf.Bifurcation(part.kind, point.params, point.orbit, margins)
+        again = cf.continue_bifurcation(event, PLANE, RANGES)
+        near = [
+            other.name
+            for other in again.special
+            if all(abs(other.params[n] - point.params[n]) < 1e-8 for n in PLANE)
+        ]
+        assert near.count(point.name) == 1, (point, near)
+
+
+def test_a_curve_passes_each_word_once_at_one_place() -> None:
+    """Where margins vanish all along a curve, words followed one another to the limit of their number."""
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.322, "S0": 0.4})
+    diagram = cf.explore(orbit, "Omega", (0.4, 0.6))
+    curves = [
+        cf.continue_bifurcation(event, PLANE, {"Omega": (0.4, 0.6), "S": (0.25, 0.4)})
+        for event in diagram.bifurcations
+        if event.kind is cf.Kind.T and not event.orbit.system.holds
+    ]
+    assert len(curves) >= 3
+    for curve in curves:
+        places = [(p.name, *(round(p.params[n], 9) for n in PLANE)) for p in curve.special]
+        assert len(places) == len(set(places)), curve
