@@ -42,9 +42,10 @@ def every_kernel() -> dict[str, Kernel]:
     from contfric.flow.chattering import KERNELS as CHATTERING
     from contfric.flow.coded.kernels import KERNELS as CODED
     from contfric.flow.general import Kind, kernels_of
+    from contfric.models.unit import callers
 
     found = [kernel for kind in Kind for kernel in kernels_of(kind)]
-    found += [*CODED.values(), *CHATTERING.values()]
+    found += [*CODED.values(), *CHATTERING.values(), *callers()]
     root = Path(__file__).parent
     for file in package_files():
         if _MARK not in file.read_text(encoding="utf-8"):

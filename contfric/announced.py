@@ -46,8 +46,21 @@ def announced(name: str, folder: Path, log: Logger) -> Iterator[None]:
             finally:
                 took = passes.seconds()
         if took is not None:
-            log.info("compiled %s: %.1f s", name, took, extra={"seconds": took})
-            _keep(name, took)
+            _done(name, took, log)
+
+
+@contextmanager
+def timed(name: str, folder: Path, log: Logger) -> Iterator[None]:
+    """Log what the block compiles without numba's compiler, and its time."""
+    _say(name, folder, log)
+    began = perf_counter()
+    yield
+    _done(name, perf_counter() - began, log)
+
+
+def _done(name: str, took: float, log: Logger) -> None:
+    log.info("compiled %s: %.1f s", name, took, extra={"seconds": took})
+    _keep(name, took)
 
 
 def _say(name: str, folder: Path, log: Logger) -> None:

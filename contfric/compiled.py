@@ -140,7 +140,7 @@ class Kernel:
         found = numba.njit(**_OPTIONS)(function)
         found._cache = self._files()
         before = config.OPT, config.LOOP_VECTORIZE
-        config.OPT, config.LOOP_VECTORIZE = _OPTIMISATION, _VECTORISE
+        config.OPT, config.LOOP_VECTORIZE = OPTIMISATION
         # what the compiler makes lives as long as it does: looking for garbage takes a tenth of its time
         collects = gc.isenabled()
         gc.disable()
@@ -213,7 +213,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 #: LLVM's level, and vectorised loops or not: loops are over 3 to 10 numbers here, so that more of
 #: either does not run faster (measured: within 2 percent) and takes up to a quarter longer to compile.
-_OPTIMISATION, _VECTORISE = type(config.OPT)(1), 0
+OPTIMISATION = type(config.OPT)(1), 0
 
 
 def kernel(signature: Any) -> Callable[[Callable[..., Any]], Kernel]:

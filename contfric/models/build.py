@@ -81,14 +81,8 @@ def field_of(definition: str) -> Any:
 
 
 def kernels_of(flow: GeneratedFlow) -> list[Kernel]:
-    """Return the kernels of a model; none where its formulas are tables."""
-    from contfric.compiled import Kernel
-
-    if forms_of(flow.definition) is not None:
-        return []
-    module = load_module(flow.definition)
-    found = [k for k in vars(module).values() if isinstance(k, Kernel)]
-    return [k for k in found if k.__wrapped__.__module__ == module.__name__]
+    """Return what is compiled of a model, all at once; nothing where its formulas are tables."""
+    return [] if forms_of(flow.definition) is not None else [load_module(flow.definition).unit]
 
 
 def prepare(definition: str) -> None:

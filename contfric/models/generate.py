@@ -1,4 +1,4 @@
-"""The compiled functions of a described model, written as a module of Python for numba.
+"""The compiled functions of a described model, written as a module of Python.
 
 Each function comes from formulas and their exact derivatives; the rate of an observable along a mode,
 ``o_t + o_y . f``, has the second derivatives of the observable in its gradient. What the user wrote never
@@ -28,37 +28,39 @@ Digest of the sources that it was generated with: {digest}
 
 import math
 
-import numpy as np
-
 from contfric.compiled import (
-    allocating_helper,
+    f8,
     field_signature,
-    helper,
-    kernel,
+    i8,
     level_signature,
     observe_signature,
     period_signature,
     rate_signature,
     reset_signature,
     scale_signature,
+    vector,
 )
-from contfric.flow.layouts import AFFINE as SIGNATURES
 from contfric.flow.integrated import AffineModes, Functions
+from contfric.flow.layouts import AFFINE as SIGNATURES
+from contfric.models.unit import Unit
+
+unit = Unit(__name__, __file__)
+kernel, helper = unit.kernel, unit.helper
 
 
-@helper
+@helper(f8(f8))
 def sign(x):
     return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
 
 
-@helper
+@helper(f8(f8, f8))
 def power(base, exponent):
     if base >= 0.0 or exponent == math.floor(exponent):
         return base**exponent
     return -((-base) ** exponent)
 
 
-@helper
+@helper(f8(f8, f8))
 def power_log(base, exponent):
     return power(base, exponent) * math.log(abs(base)) if base != 0.0 else 0.0
 
@@ -112,8 +114,8 @@ def _idle(description: Description, rates: list[list[Any]]) -> list[tuple[int, i
     ]
 
 
-#: The functions that are kernels, with their signatures; those of them that take the piece of a mode.
-_KERNELS = {
+#: The functions with their signatures; those of them that take the piece of a mode.
+_KINDS = {
     "field": "field",
     "observe_at": "observe",
     "rate_at": "rate",
@@ -121,6 +123,7 @@ _KERNELS = {
     "period": "period",
     "reset": "reset",
     "onto": "field",
+    "size_of": "scale",
 }
 _OF_PIECES = {"field", "observe_at", "rate_at"}
 
@@ -218,10 +221,8 @@ class _Writer:
 
     def _decorator(self, name: str) -> str:
         """Return what a function is: a kernel, or a helper of others where these look for the piece first."""
-        kind = _KERNELS.get(name)
-        if kind is None or (self.f.description.kinks and name in _OF_PIECES):
-            return "helper"
-        return f"kernel({kind}_signature)"
+        inside = name == "size_of" or (self.f.description.kinks and name in _OF_PIECES)
+        return f"{'helper' if inside else 'kernel'}({_KINDS[name]}_signature)"
 
     def _head(self, head: str, formulas: Sequence[Any], decorator: str) -> None:
         self.code.add("", f"@{decorator}")

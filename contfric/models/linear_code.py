@@ -19,7 +19,12 @@ from contfric.models.code import VALUES, Lines, Output, write_block
 #: Coefficients that are taken out of their array before a loop: more would not stay in registers.
 _FEW = 24
 #: One over each whole number: a division in each term would cost as much as the rest of it.
-_TABLE = ("from contfric.flow.linear.system import INVERSE", "")
+_TABLE = (
+    "from contfric.flow.linear.system import INVERSE",
+    "",
+    'unit.tables["INVERSE"] = INVERSE',
+    "",
+)
 #: From a harmonic's frequency to its place among those of the model; place 0 is the constant.
 Places = dict[Any, int]
 

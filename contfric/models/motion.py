@@ -97,12 +97,13 @@ def piece_code(kinks: list[int]) -> str:
     kinks : the observables that vanish at the kinks
     """
     code = Lines()
-    code.add("", "", "@allocating_helper")
+    code.add("", "", "@helper(i8(i8, f8, vector, vector))")
     code.open("def piece_of(mode, t, y, p):")
-    code.add(f"piece = mode << {len(kinks)}")
-    code.add("none, empty = np.empty(0, dtype=np.int64), np.empty(0)")
+    code.add(f"piece = mode * {1 << len(kinks)}")
     for k, c in enumerate(kinks):
-        code.add(f"if observe_at({c}, t, y, p, none, empty) > 0.0:", f"    piece |= {1 << k}")
+        code.add(
+            f"if observe_at({c}, t, y, p, NO_INDICES, NO_NUMBERS) > 0.0:", f"    piece += {1 << k}"
+        )
     code.add("return piece")
     code.close()
     return str(code)
