@@ -11,6 +11,11 @@ SITE := site
 DEMO := demo
 STRESS := .stress
 
+# uv takes a tenth of pip's time; where it cannot be had, or does not find the packages, pip does it.
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+install = { $(PIP) uv && $(BIN)/uv pip install --quiet --python $(BIN)/python --editable '$(1)'; } 2>/dev/null \
+	    || $(PIP) --editable '$(1)'
+
 .DEFAULT_GOAL := help
 .PHONY: help setup kernels wheel demo test lint types contracts unit test-all gate bench stress studies gallery docs notebooks clean
 MAKEFLAGS += --no-print-directory
@@ -45,18 +50,18 @@ wheel: $(STAMP)
 $(STAMP): pyproject.toml
 	@echo "== setup: $(VENV)"
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@$(call install,.[dev])
 	@touch $@
 
 $(BENCH_STAMP): $(STAMP)
 	@echo "== setup: peers for the benchmarks"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,bench]' \
+	@$(call install,.[dev,bench]) \
 	    || echo "not all peers can be installed here: those that are missing are left out"
 	@touch $@
 
 $(DOCS_STAMP): $(STAMP)
 	@echo "== setup: mkdocs"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,docs]'
+	@$(call install,.[dev,docs])
 	@touch $@
 
 demo: $(STAMP)

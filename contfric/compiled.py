@@ -155,7 +155,8 @@ class Kernel:
         return found
 
     @cached_property
-    def _entry(self) -> Callable[..., Any]:
+    def entry(self) -> Callable[..., Any]:
+        """What Python calls."""
         (result,) = self.dispatcher.overloads.values()
         return result.entry_point  # type: ignore[no-any-return]
 
@@ -167,7 +168,7 @@ class Kernel:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled code."""
-        return self._entry(*arguments)
+        return self.entry(*arguments)
 
 
 #: Processes that compile a kernel into the cache, by its name "module:kernel".

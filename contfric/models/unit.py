@@ -88,12 +88,13 @@ class Formula(Kernel):
         return self._unit.address_of(self.__wrapped__.__name__)
 
     @cached_property
-    def _block(self) -> Block:
-        return Block({"code": self.signature}, {"code": self})
+    def _called(self) -> tuple[Callable[..., Any], Block]:
+        return caller(self.signature).entry, Block({"code": self.signature}, {"code": self})
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled code."""
-        return caller(self.signature)(self._block.address, arguments)
+        enter, block = self._called
+        return enter(block.address, arguments)
 
 
 class Unit(Kernel):
