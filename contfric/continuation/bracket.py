@@ -63,6 +63,9 @@ _COARSEST = 0.01
 #: Share of a step below which it is not narrowed down any further where Newton is lost: the multiplier that
 #: is sought is behind that.
 _LOST = 1e-6
+#: Share of the value at the start of a step that may be left at a place where trials fail: it is found, and
+#: they fail by rounding, as they do where joints are at times of many periods.
+_LEFT = 1e-9
 #: Trials after which a bracket has the width of the arithmetic, whatever the function.
 _MOST_TRIALS = 120
 
@@ -247,7 +250,7 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
         accuracy, two_sided, noise, narrowest, given_up = rules
         sign = -1.0 if two_sided and ends[0] < 0.0 else 1.0
         f_low, f_high = limited(sign * ends[0]), limited(sign * ends[1])
-        low, high, x, best, best_f = 0.0, 1.0, 0.5, 0.0, f_low
+        low, high, x, best, best_f, left = 0.0, 1.0, 0.5, 0.0, f_low, _LEFT * f_low
         x_old, f_old, lost, solved = low, f_low, False, False
         copy_row(points, 3, 0)
         if f_low > 0.0 and f_high < 0.0:
@@ -278,7 +281,7 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
             if lost and high - low < given_up:
                 break
             x = next_trial(low, high, f_low, f_high, x_old, f_old, x, 0.25 * narrowest)
-        return best, best_f, lost, solved
+        return best, best_f, lost and best_f > left, solved
 
     return bracket
 
