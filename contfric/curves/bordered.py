@@ -150,10 +150,10 @@ def chain_solve(bordered, sign, column, rhs, transposed, close, pencil):  # type
         for j in range(m):
             unit = 1.0 if i == j else 0.0
             bordered.close[i, j] = unit if transposed else sign * close[i, j]
-    start_border(work.border, bordered.d, bordered.e, bordered.s, m)
+    start_border(work, bordered.d, bordered.e, bordered.s, m)
     for i in range(count):
         if i > 0:
-            next_rows(rows, work.border, bordered.d, i, m)
+            next_rows(work, bordered.d, i, m)
         at = 0 if i == 0 else m
         after = i + 1 if i + 1 < count else 0
         for j in range(m):
@@ -176,7 +176,7 @@ def chain_solve(bordered, sign, column, rhs, transposed, close, pencil):  # type
             rows[m + j, 3 * m + 1] = rhs[row, j]
         if i > 0 and not take_out(work, i, m):
             return False
-    return finish(work, bordered.close, bordered.close_w, pencil[0], pencil[1])
+    return finish(work, bordered.close, bordered.close_w, bordered.d, pencil[0], pencil[1])
 
 
 @helper

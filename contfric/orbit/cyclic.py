@@ -11,6 +11,11 @@ link ``z_i`` and ``z_{i+1}``, and Gaussian elimination with row exchanges over a
 are carried along. What is left is one small system for ``z_0`` and w, and the pencil (P, Q) of the
 orbit: ``P z_0 + Q z_N = 0`` is the linear map of one turn, whose eigenvalues are the multipliers.
 
+Where the part of a chain between two holds folds by itself, its last joint has no pivot in these rows: only a
+border row knows of it. Such a pivot, and what is divided by it, would be rounding. The border row takes its
+place, with its parts on all later joints, and a row of the chain is carried along instead; what the other
+rows have in that column (less than :data:`_WEAK` of it) is left out. One turn has no finite map then.
+
 Nothing is stored but what the back substitution needs: the rows of a segment are written where they
 are eliminated. The columns are ``[z_0 | z_i | z_{i+1} | w | right-hand sides]``.
 """
@@ -20,9 +25,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contfric.compiled import allocating_helper, helper
 from contfric.models.definition import FloatArray
+
+#: Share of a border row's entry below which all other pivots for it are weak: dividing by one loses as many
+#: digits as it is smaller, and leaving it out costs a step of Newton's method as many.
+_WEAK = 1e-9
 
 
 class Elimination(NamedTuple):
@@ -36,6 +46,7 @@ class Elimination(NamedTuple):
     small, rhs : the system that is left, shapes (m + q, m + q) and (m + q, right)
     after : shape (m, right)
     z, w : solution, shapes (N, m, right) and (q, right)
+    exchanged : joint whose pivot is that of the border row, and which of its rows; -1 if there is none
     """
 
     rows: FloatArray
@@ -46,6 +57,7 @@ class Elimination(NamedTuple):
     after: FloatArray
     z: FloatArray
     w: FloatArray
+    exchanged: NDArray[np.int64]
 
 
 @allocating_helper
@@ -61,6 +73,7 @@ def elimination_workspace(count, m, free, right):  # type: ignore[no-untyped-def
         np.empty((m, right)),
         np.empty((count, m, right)),
         np.empty((free, right)),
+        np.full(2, -1),
     )
 
 
@@ -112,8 +125,12 @@ def subtract(target, row, source, j, factor, m, col):  # type: ignore[no-untyped
 
 
 @helper
-def eliminate_joint(rows, border, m):  # type: ignore[no-untyped-def]
-    """Take the columns m .. 2m out of the last m rows and of the border; False if singular."""
+def eliminate_joint(rows, border, m, exchanged):  # type: ignore[no-untyped-def]
+    """Take the columns m .. 2m out of the last m rows and of the border; False if singular.
+
+    The row in which the only border row is the pivot, if there is one, is written to ``exchanged[1]``.
+    """
+    free_to = border.shape[0] == 1 and exchanged[0] < 0
     for j in range(m):
         col = m + j
         best, largest = j, abs(rows[j, col])
@@ -121,6 +138,11 @@ def eliminate_joint(rows, border, m):  # type: ignore[no-untyped-def]
             size = abs(rows[row, col])
             if size > largest:
                 best, largest = row, size
+        if free_to and largest < _WEAK * abs(border[0, col]):
+            for k in range(rows.shape[1]):
+                rows[j, k], border[0, k] = border[0, k], rows[j, k]
+            exchanged[1], free_to = j, False
+            continue
         if not 0.0 < largest < np.inf:
             return False
         if best != j:
@@ -138,9 +160,10 @@ def eliminate_joint(rows, border, m):  # type: ignore[no-untyped-def]
 
 
 @helper
-def start_border(border, d, e, s, m):  # type: ignore[no-untyped-def]
+def start_border(workspace, d, e, s, m):  # type: ignore[no-untyped-def]
     """Start the border rows: their parts on z_0, z_1, the parameters and the right-hand sides."""
-    free, right = e.shape[0], s.shape[1]
+    border, free, right = workspace.border, e.shape[0], s.shape[1]
+    workspace.exchanged[:] = -1
     for k in range(free):
         for j in range(m):
             border[k, j] = d[k, 0, j]
@@ -153,9 +176,9 @@ def start_border(border, d, e, s, m):  # type: ignore[no-untyped-def]
 
 
 @helper
-def next_rows(rows, border, d, i, m):  # type: ignore[no-untyped-def]
+def next_rows(workspace, d, i, m):  # type: ignore[no-untyped-def]
     """Make the rows that remain (last m) the first ones of segment i, z_i in its place."""
-    width = rows.shape[1]
+    rows, border, width = workspace.rows, workspace.border, workspace.rows.shape[1]
     for row in range(m):
         for k in range(m):
             rows[row, k] = rows[m + row, k]
@@ -163,7 +186,7 @@ def next_rows(rows, border, d, i, m):  # type: ignore[no-untyped-def]
             rows[row, 2 * m + k] = 0.0
         for k in range(3 * m, width):
             rows[row, k] = rows[m + row, k]
-    count = d.shape[1]
+    count = d.shape[1] if workspace.exchanged[0] < 0 else 0  # a row of the chain has no later parts
     for row in range(border.shape[0]):
         for k in range(m):
             border[row, m + k] = border[row, 2 * m + k]
@@ -173,9 +196,11 @@ def next_rows(rows, border, d, i, m):  # type: ignore[no-untyped-def]
 @helper
 def take_out(workspace, i, m):  # type: ignore[no-untyped-def]
     """Eliminate joint i and keep its rows; False if singular."""
-    rows, kept = workspace.rows, workspace.kept
-    if not eliminate_joint(rows, workspace.border, m):
+    rows, kept, exchanged = workspace.rows, workspace.kept, workspace.exchanged
+    if not eliminate_joint(rows, workspace.border, m, exchanged):
         return False
+    if exchanged[0] < 0 <= exchanged[1]:
+        exchanged[0] = i
     for j in range(m):
         for k in range(rows.shape[1]):
             kept[i, j, k] = rows[j, k]
@@ -183,13 +208,18 @@ def take_out(workspace, i, m):  # type: ignore[no-untyped-def]
 
 
 @helper
-def finish(workspace, close, close_w, p, q):  # type: ignore[no-untyped-def]
-    """Solve for all unknowns when every joint but the first is out, and fill the pencil (p, q)."""
+def finish(workspace, close, close_w, d, p, q):  # type: ignore[no-untyped-def]
+    """Solve for all unknowns when every joint but the first is out, and fill the pencil (p, q).
+
+    With a border row ``d`` as a pivot the pencil is that of a map whose eigenvalues are all infinite.
+    """
     rows, m = workspace.rows, close.shape[0]
     for i in range(m):
         for j in range(m):
             p[i, j] = rows[m + i, j]
             q[i, j] = rows[m + i, 2 * m + j]
+            if workspace.exchanged[0] >= 0:
+                p[i, j], q[i, j] = 1.0 if i == j else 0.0, 0.0
     if not solve_ends(
         rows,
         workspace.border,
@@ -201,7 +231,7 @@ def finish(workspace, close, close_w, p, q):  # type: ignore[no-untyped-def]
         workspace.w,
     ):
         return False
-    back_substitute(workspace.kept, close, close_w, workspace.z, workspace.w, workspace.after)
+    back_substitute(workspace, close, close_w, d)
     return True
 
 
@@ -235,8 +265,10 @@ def solve_ends(rows, border, close, close_w, small, rhs, z, w):  # type: ignore[
 
 
 @helper
-def back_substitute(kept, close, close_w, z, w, after):  # type: ignore[no-untyped-def]
-    """Fill z_{N-1} .. z_1 from the kept rows."""
+def back_substitute(workspace, close, close_w, d):  # type: ignore[no-untyped-def]
+    """Fill z_{N-1} .. z_1 from the kept rows; that of a border row has parts on all later joints."""
+    kept, z, w, after = workspace.kept, workspace.z, workspace.w, workspace.after
+    joint, special = workspace.exchanged[0], workspace.exchanged[1]
     count, m, right = z.shape
     free = w.shape[0]
     for i in range(m):
@@ -257,6 +289,10 @@ def back_substitute(kept, close, close_w, z, w, after):  # type: ignore[no-untyp
                     value -= kept[i, j, 3 * m + n] * w[n, k]
                 for n in range(j + 1, m):
                     value -= kept[i, j, m + n] * z[i, n, k]
+                if i == joint and j == special:
+                    for later in range(i + 2, count):
+                        for n in range(m):
+                            value -= d[0, later, n] * z[later, n, k]
                 z[i, j, k] = value / kept[i, j, m + j]
         for j in range(m):
             for k in range(right):

@@ -134,11 +134,11 @@ def newton_step(functions, layout, z, p, which, tangential, probe, workspace):  
     count, m = z.shape
     work, equations = workspace.elimination, workspace.equations
     rows, second = work.rows, 3 * m + which.shape[0] + 1
-    start_border(work.border, workspace.d, workspace.e, workspace.s, m)
+    start_border(work, workspace.d, workspace.e, workspace.s, m)
     worst = noise = 0.0
     for i in range(count):
         if i > 0:
-            next_rows(rows, work.border, workspace.d, i, m)
+            next_rows(work, workspace.d, i, m)
         after = z[i + 1] if i + 1 < count else equations.last
         at = 0 if i == 0 else m
         here = segment_rows(functions, layout, i, at, z[i], after, p, which, equations, rows)
@@ -156,7 +156,7 @@ def newton_step(functions, layout, z, p, which, tangential, probe, workspace):  
         if i > 0 and not take_out(work, i, m):
             return False, worst, noise
     pencil = workspace.pencil
-    regular = finish(work, equations.close, equations.close_w, pencil[0], pencil[1])
+    regular = finish(work, equations.close, equations.close_w, workspace.d, pencil[0], pencil[1])
     return regular, worst, noise
 
 
