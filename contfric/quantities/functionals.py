@@ -134,6 +134,10 @@ class Measuring:
 
     def _extremum(self, asked: Functional, function: Function) -> Dual:
         sign = 1.0 if asked.kind == "max" else -1.0
+        if self._at_joints(asked):
+            joints, moved = self.motion.orbit.cycle[:, 1], self.motion.d_cycle[:, 1]
+            what = f"{asked.kind}({asked.text})"
+            return self.largest(what, sign * joints, lambda rows: sign * moved[rows]) * sign
         # without derivatives: only those of the extrema themselves are wanted
         pieces = self._still.pieces
         each = self._candidates(asked, function)
@@ -149,6 +153,12 @@ class Measuring:
             return sign * self._envelopes(function, where[rows], shares[rows], by_mode)
 
         return self.largest(f"{asked.kind}({asked.text})", sign * values, slopes) * sign
+
+    def _at_joints(self, asked: Functional) -> bool:
+        """Tell whether it is the displacement of a model whose motion is cut at its stops, without resets."""
+        model = self.motion.orbit.model
+        at_stops = model.stops_at_joints and not model.displacement and not model.reset_by_surface
+        return at_stops and asked.text == model.states[0]
 
     def _candidates(self, asked: Functional, function: Function) -> list[FloatArray]:
         """Return the shares of each segment at which the function can be extreme.

@@ -143,13 +143,23 @@ class _Part:
 
 @dataclass(frozen=True, eq=False)
 class _Sampled:
-    """A function at the nodes of one part: with the arguments of its kinks, and the last of its series."""
+    """A function at the nodes of P parts, its values and derivatives as columns.
 
-    values: Dual
-    kinks: list[Dual]
+    Attributes
+    ----------
+    columns : shape (P, nodes, 1 + columns of slopes)
+    tail, sizes : the last coefficients of the series, and the largest values, shape (P, 1 + ...)
+    kinks : arguments of kinks that change their sign, of the parts where one does
+    """
+
     columns: FloatArray
     tail: FloatArray
     sizes: FloatArray
+    kinks: dict[int, list[Dual]]
+
+    def values(self, k: int) -> Dual:
+        """Return the function at the nodes of a part."""
+        return Dual(self.columns[k, :, 0].copy(), self.columns[k, :, 1:].copy())
 
 
 def evaluated(
@@ -191,14 +201,20 @@ def resolve(
     """
     found = [Resolved(segment, function, what) for segment in pieces.segments]
     parts = _whole(pieces)
+    least: float | None = None  # of the function itself, known from whole segments
     while parts:
         sampled = _sampled(pieces, function, parts, by_mode)
-        if parts[0].depth == 0 and parts[0].low == 0.0 and parts[0].high == 1.0:
-            size = max(size, _least(sampled))
+        least = max(size, _least(sampled)) if least is None else least
+        sizes = np.array([max(least, part.size) for part in parts])
+        sizes = np.maximum(sizes, sampled.sizes[:, 0])
+        own = np.maximum(np.maximum(sampled.sizes, sizes[:, None]), 1e-300)
+        left = np.max(sampled.tail / own, axis=1)
         parts = [
             further
-            for part, own in zip(parts, sampled, strict=True)
-            for further in _judged(found[part.index], part, own, max(size, part.size))
+            for k, part in enumerate(parts)
+            for further in _judged(
+                found[part.index], part, sampled, k, float(sizes[k]), float(left[k])
+            )
         ]
     for each in found:
         each.panels.sort(key=lambda panel: panel.low)
@@ -210,56 +226,59 @@ def _whole(pieces: Pieces) -> list[_Part]:
     return [_Part(k, 0.0, 1.0) for k, s in enumerate(pieces.segments) if s.lasts > 0.0]
 
 
-def _least(sampled: list[_Sampled]) -> float:
+def _least(sampled: _Sampled) -> float:
     largest = 0.0
-    for each in sampled:
-        largest = max(largest, float(each.sizes[0]))
+    for value in sampled.sizes[:, 0].tolist():
+        largest = max(largest, value)
     return _ROUNDING / RESOLVED * largest if np.isfinite(largest) else 0.0
 
 
-def _sampled(
-    pieces: Pieces, function: Function, parts: list[_Part], by_mode: bool
-) -> list[_Sampled]:
+def _sampled(pieces: Pieces, function: Function, parts: list[_Part], by_mode: bool) -> _Sampled:
     """Return a function at the nodes of some parts."""
     where = np.repeat(np.array([part.index for part in parts], dtype=np.int64), _NODES)
     low, high = np.array([[part.low, part.high] for part in parts]).T[:, :, None]
     shares = (low + 0.5 * (high - low) * (_POINTS + 1.0)).ravel()
-    found: dict[int, _Sampled] = {}
+    columns = np.empty((0, 0))
+    changing: dict[int, list[Dual]] = {}
     for rows, values, kinks in evaluated(pieces, function, where, shares, by_mode):
-        columns = np.column_stack([values.values, values.slopes])
-        columns = columns.reshape(-1, _NODES, columns.shape[1])
-        with np.errstate(all="ignore"):
-            tail = np.max(np.abs(_SERIES[-2:] @ columns), axis=1)
-        sizes = np.max(np.abs(columns), axis=1)
-        for k, part in enumerate((rows[::_NODES] // _NODES).tolist()):
+        if not columns.size:
+            columns = np.empty((len(where), 1 + values.slopes.shape[1]))
+        columns[rows, 0], columns[rows, 1:] = values.values, values.slopes
+        arguments = np.array([a.values for a in kinks.arguments]).reshape(
+            -1, len(rows) // _NODES, _NODES
+        )
+        both = (arguments.min(axis=2) < 0.0) & (arguments.max(axis=2) > 0.0)
+        for k in np.flatnonzero(both.any(axis=0)).tolist():
             own = slice(k * _NODES, (k + 1) * _NODES)
-            arguments = [argument[own] for argument in kinks.arguments]
-            found[part] = _Sampled(values[own], arguments, columns[k], tail[k], sizes[k])
-    return [found[k] for k in range(len(parts))]
+            changing[int(rows[own][0]) // _NODES] = [a[own] for a in kinks.arguments]
+    by_part = columns.reshape(len(parts), _NODES, -1)
+    with np.errstate(all="ignore"):
+        tail = np.max(np.abs(_SERIES[-2:] @ by_part), axis=1)
+    return _Sampled(by_part, tail, np.max(np.abs(by_part), axis=1), changing)
 
 
-def _judged(found: Resolved, part: _Part, own: _Sampled, size: float) -> list[_Part]:
-    """Take a part as a panel, or return the parts that it is cut into."""
+def _judged(
+    found: Resolved, part: _Part, sampled: _Sampled, k: int, size: float, left: float
+) -> list[_Part]:
+    """Take a part as a panel, or return the parts that it is cut into; ``left`` is its share of noise."""
     segment, low, high = found.segment, part.low, part.high
-    if not np.all(np.isfinite(own.sizes)):
+    if not np.all(np.isfinite(sampled.sizes[k])):
         time = segment.start + low * segment.lasts
         raise ContfricError(
             f"{found.what} has no finite value in segment {segment.index + 1} near t = {time:.6g}"
         )
-    size = max(size, float(own.sizes[0]))
-    cut = _change(found, low + 0.5 * (high - low) * (_POINTS + 1.0), own.kinks)
+    shares = low + 0.5 * (high - low) * (_POINTS + 1.0)
+    cut = _change(found, shares, sampled.kinks[k]) if k in sampled.kinks else None
     if cut is not None and low < cut.share < high:
         found.cuts.append(cut)
         return [
             _Part(part.index, low, cut.share, part.depth, size),
             _Part(part.index, cut.share, high, part.depth, size),
         ]
-    sizes = np.maximum(own.sizes, size)
-    left = float(np.max(own.tail / np.maximum(sizes, 1e-300)))
     level = max(RESOLVED, _UNITS * segment.model.rounding)
     noise = part.depth >= _HALVED and _FALLS * part.before < left < _NOISE
     if left <= level or noise:
-        found.panels.append(Panel(low, high, own.values))
+        found.panels.append(Panel(low, high, sampled.values(k)))
         return []
     if part.depth == _DEEPEST:
         time = segment.start + low * segment.lasts
@@ -298,8 +317,6 @@ def _change(found: Resolved, shares: FloatArray, arguments: list[Dual]) -> Cut |
     best: tuple[float, int, float] | None = None
     for number, argument in enumerate(arguments):
         a = argument.values
-        if a.min() >= 0.0 or a.max() <= 0.0:
-            continue
         clear = np.flatnonzero(np.abs(a) > _NO_SIGN * (1.0 + np.max(np.abs(a))))
         for j, k in pairwise(clear.tolist()):
             if a[j] * a[k] < 0.0 and (best is None or shares[j] < best[0]):
