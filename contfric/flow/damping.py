@@ -22,8 +22,9 @@ def damping_response(p, load, v0, first, third, d):  # type: ignore[no-untyped-d
     a, b = roots(p[ZETA])
     # G*G, its slope G*C, and C*C' by exp_d over the repeated roots
     nodes = np.empty(5, dtype=np.complex128)
-    nodes[0], nodes[1], nodes[2], nodes[3] = a, b, a, b
-    e = divided_exponentials(nodes[:4], d)
+    nodes[0], nodes[1], nodes[2], nodes[3], nodes[4] = a, b, a, b, complex(0.0, w)
+    e = divided_exponentials(nodes, d)
+    q = e[4]
     g2 = e[3]
     g2_1 = b * e[3] + e[2]
     g2_2 = b * g2_1 + a * e[2] + e[1]
@@ -33,8 +34,9 @@ def damping_response(p, load, v0, first, third, d):  # type: ignore[no-untyped-d
         turn = first if k == 1 else third
         if turn != 0.0:
             node = complex(0.0, k * w)
-            nodes[4] = node
-            q = divided_exponentials(nodes, d)[4]
+            if k == 3:
+                nodes[4] = node
+                q = divided_exponentials(nodes, d)[4]
             q1 = node * q + g2
             q2 = node * q1 + g2_1
             x += turn * q1

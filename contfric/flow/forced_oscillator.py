@@ -63,23 +63,21 @@ def damping_slope(s, p, t0, x0, v0, d):  # type: ignore[no-untyped-def]
 
 
 @allocating_helper
-def parameter_slope(index, s, p, t0, x0, v0, d):  # type: ignore[no-untyped-def]
-    """Return d(x, v) with respect to one parameter after a slide."""
-    w, h, zeta = p[OMEGA], p[H], p[ZETA]
+def parameter_slope(index, s, p, t0, x0, v0, d, g, r, one, three):  # type: ignore[no-untyped-def]
+    """Return d(x, v) by one parameter after a slide: from G, R and the responses to both harmonics."""
+    h = p[H]
     if index == OMEGA:
-        one = forced(zeta, w, w * t0, d)
         x = t0 * one[2] + one[4]
         v = t0 * one[3] + one[5]
         if h != 0.0:
-            three = forced(zeta, 3 * w, 3 * w * t0, d)
             x += 3 * h * (t0 * three[2] + three[4])
             v += 3 * h * (t0 * three[3] + three[5])
         return x, v
     if index == S:
-        g, _, r = free(zeta, d)
         return -s * r, -s * g
     if index == H:
-        three = forced(zeta, 3 * w, 3 * w * t0, d)
+        if h == 0.0:
+            three = forced(p[ZETA], 3 * p[OMEGA], 3 * p[OMEGA] * t0, d)
         return three[0], three[1]
     if index == ZETA:
         return damping_slope(s, p, t0, x0, v0, d)
@@ -110,6 +108,7 @@ def flow(mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
     v = v0 * c - load * g + one[1]
     jac[0, 0] = w * one[2]
     jac[1, 0] = w * one[3]
+    three = one
     if h != 0.0:
         three = forced(zeta, 3 * w, 3 * w * t0, dt)
         x += h * three[0]
@@ -124,7 +123,9 @@ def flow(mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
     jac[0, 3] = v
     jac[1, 3] = excitation(p, t0 + dt)[0] - 2 * zeta * v - x - s * p[S]
     for k in range(which.shape[0]):
-        jac[0, 4 + k], jac[1, 4 + k] = parameter_slope(which[k], s, p, t0, x0, v0, dt)
+        jac[0, 4 + k], jac[1, 4 + k] = parameter_slope(
+            which[k], s, p, t0, x0, v0, dt, g, r, one, three
+        )
 
 
 @kernel(observe_signature)

@@ -190,31 +190,29 @@ def divided_exponentials(nodes, d):  # type: ignore[no-untyped-def]
     norm += abs(d)
     squarings = max(0, math.ceil(math.log2(max(norm, 1e-300))) + 1)  # scaled norm at most 1/2
     step = d / 2.0**squarings
-    bidiagonal = np.empty((n, n), dtype=np.complex128)
-    total = np.empty((n, n), dtype=np.complex128)
-    product = np.empty((n, n), dtype=np.complex128)
+    total = np.empty((n, n), dtype=np.complex128)  # below its diagonal nothing is read
     for i in range(n):
-        for j in range(n):
-            bidiagonal[i, j] = nodes[i] * step if i == j else (step if j == i + 1 else 0.0)
+        for j in range(i, n):
             total[i, j] = 1.0 if i == j else 0.0
     for k in range(16, 0, -1):  # Horner; 0.5^17 / 17! is below 1e-19
-        upper_product(bidiagonal, total, product)
-        for i in range(n):
-            for j in range(n):
-                total[i, j] = product[i, j] / k + (1.0 if i == j else 0.0)
+        share = step / k
+        for i in range(n):  # in place: row i of the product is made of rows i and i + 1
+            own = nodes[i] * share
+            total[i, i] = own * total[i, i] + 1.0
+            for j in range(i + 1, n):
+                total[i, j] = own * total[i, j] + share * total[i + 1, j]
     for _ in range(squarings):
-        upper_product(total, total, product)
-        total, product = product, total
+        square_upper(total)
     return total[0]
 
 
 @helper
-def upper_product(left, right, out):  # type: ignore[no-untyped-def]
-    """Write the product of two upper triangular matrices."""
-    n = left.shape[0]
+def square_upper(a):  # type: ignore[no-untyped-def]
+    """Square an upper triangular matrix in place: what an entry is made of is overwritten after it."""
+    n = a.shape[0]
     for i in range(n):
-        for j in range(n):
-            value = complex(0.0, 0.0)
-            for k in range(i, j + 1):
-                value += left[i, k] * right[k, j]
-            out[i, j] = value
+        for j in range(n - 1, i - 1, -1):
+            value = a[i, i] * a[i, j]
+            for k in range(i + 1, j + 1):
+                value += a[i, k] * a[k, j]
+            a[i, j] = value

@@ -12,6 +12,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any
 
 from contfric.errors import ModelError, did_you_mean
@@ -64,12 +65,13 @@ class Parsed:
     tree: ast.expr
     functionals: dict[str, Functional]
 
-    @property
+    @cached_property
     def names(self) -> set[str]:
         """Names outside of functionals: parameters and other quantities."""
         return names_in(self.tree) - set(self.functionals)
 
 
+@lru_cache(maxsize=512)
 def read(text: str) -> Parsed:
     """Read the text of a quantity; names are looked up later.
 

@@ -55,9 +55,7 @@ def _flight(part: Segment, own: Chatter, gap: str, lasts: float) -> tuple[Segmen
     if not part.exact:
         state = model.view(vector).state(own.flight, part.start, part.state, lasts)
         behind = model.view(vector).reset(own.surface, end, state)
-        return replace(part, mode=own.flight, lasts=lasts, _known={}), replace(
-            part, start=end, state=behind, _known={}
-        )
+        return replace(part, mode=own.flight, lasts=lasts), replace(part, start=end, state=behind)
     before, moved, by_time = _moved(part, own.flight, lasts)
     every = np.arange(len(vector))
     grad, slope = np.empty(1 + n + len(every)), np.empty(len(every))
@@ -72,10 +70,8 @@ def _flight(part: Segment, own: Chatter, gap: str, lasts: float) -> tuple[Segmen
     behind, jac = np.empty(n), np.empty((n, 1 + n + len(every)))
     model.flow.reset(k, end, before, vector, every, behind, jac)
     d_behind = jac[:, : 1 + n] @ joint + jac[:, 1 + n :] @ part.d_vector
-    flight = replace(part, mode=own.flight, lasts=lasts, d_lasts=d_lasts, _known={})
-    following = replace(
-        part, start=end, state=behind, d_start=joint[0], d_state=d_behind, _known={}
-    )
+    flight = replace(part, mode=own.flight, lasts=lasts, d_lasts=d_lasts)
+    following = replace(part, start=end, state=behind, d_start=joint[0], d_state=d_behind)
     return flight, following
 
 
@@ -95,10 +91,10 @@ def _contact(part: Segment, whole: Segment) -> Segment:
     state, moved, by_time = _moved(own, whole.mode, part.start - whole.start)
     lasts = whole.start + whole.lasts - part.start
     if not whole.exact:
-        return replace(part, state=state, lasts=lasts, _known={})
+        return replace(part, state=state, lasts=lasts)
     d_state = moved + np.outer(by_time, part.d_start - whole.d_start)
     d_lasts = whole.d_start + whole.d_lasts - part.d_start
-    return replace(part, state=state, d_state=d_state, lasts=lasts, d_lasts=d_lasts, _known={})
+    return replace(part, state=state, d_state=d_state, lasts=lasts, d_lasts=d_lasts)
 
 
 def _still(part: Segment) -> Segment:
@@ -108,5 +104,4 @@ def _still(part: Segment) -> Segment:
         d_start=np.zeros(1),
         d_state=np.zeros((len(part.state), 1)),
         d_vector=np.zeros((len(part.vector), 1)),
-        _known={},
     )

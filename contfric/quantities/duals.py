@@ -130,6 +130,13 @@ def apply(name: str, x: Number) -> Number:
     return float(value(np.float64(x)))
 
 
+def _applied(name: str) -> Callable[[Number], Number]:
+    return lambda x: apply(name, x)
+
+
+_APPLIED = {name: _applied(name) for name in _SMOOTH}
+
+
 @dataclass(eq=False)
 class Kinks:
     """The arguments of ``abs``, ``sign`` and ``where`` that an evaluation met, in its order."""
@@ -157,13 +164,8 @@ class Kinks:
 
     def algebra(self) -> Algebra[Any]:
         """Return the algebra of duals that notes kinks here."""
-        smooth = {name: _applied(name) for name in _SMOOTH}
         kinked = {name: self._noting(name) for name in ("abs", "sign")}
-        return Algebra(float, smooth | kinked, self.where, divide, power, math.pi)
+        return Algebra(float, _APPLIED | kinked, self.where, divide, power, math.pi)
 
     def _noting(self, name: str) -> Callable[[Number], Number]:
         return lambda x: apply(name, self.noted(x))
-
-
-def _applied(name: str) -> Callable[[Number], Number]:
-    return lambda x: apply(name, x)

@@ -16,9 +16,9 @@ the derivatives as each direction is followed, and against it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
@@ -27,8 +27,8 @@ from contfric.models.definition import FloatArray
 from contfric.models.quantity_texts import WORK, Functional
 from contfric.quantities.duals import Dual, Kinks, Number, apply, constant, divide
 from contfric.quantities.inside import Inside
-from contfric.quantities.motion import Motion, Segment
-from contfric.quantities.panels import Function, Resolved, least_size, resolve
+from contfric.quantities.motion import Directions, IndexArray, Motion, Nodes, Place
+from contfric.quantities.panels import Function, Resolved, evaluated, integral, least_size, resolve
 
 #: Extrema that differ by less than this, relative to 1 + their size, are equal: orbits are solved to 1e-13.
 _EQUAL = 1e-10
@@ -81,19 +81,15 @@ class Measuring:
         return self.number(self.motion.orbit.period, self.motion.d_period)
 
     def _integral(self, asked: Functional, function: Function, size: float = 0.0) -> Dual:
-        parts = [resolved.integral() for resolved in self._resolved(asked, function, size)]
-        value = math.fsum(float(part.values[0]) for part in parts)
-        slopes = np.zeros(self.motion.count)
-        for part in parts:
-            slopes = slopes + part.slopes[0, : self.motion.count]
-        return self.number(value, slopes)
+        value, slopes = integral(self._resolved(self.motion, asked, function, size))
+        return self.number(value, np.zeros(self.motion.count) + slopes)
 
     def _work(self, asked: Functional) -> Dual:
         """Return what a contact dissipates in a period of the orbit: where it slides, and at impacts."""
         contact = asked.text
         # where it has just begun to slide all values are small: beside those of any mode they are rounding
         laws = self.inside.powers(contact)
-        size = max(least_size(self.motion.segments, function) for function in laws)
+        size = max(least_size(self.motion.pieces, function) for function in laws)
         total = self._integral(asked, self.inside.power(contact), size)
         loss, word = self.inside.loss(contact), self.motion.orbit.word
         for segment, (_, exit_) in zip(self.motion.segments, word, strict=True):
@@ -103,12 +99,12 @@ class Measuring:
                 total = _dual(total + self.number(float(lost.values[0]), slopes))
         return total
 
-    def _resolved(self, asked: Functional, function: Function, size: float) -> Iterator[Resolved]:
-        variants = () if asked.kind == WORK else self.inside.variants(asked)
-        for each in (function, *variants):
-            size = max(size, least_size(self.motion.segments, each))
-        for segment in self.motion.segments:
-            yield resolve(segment, function, asked.text, size)
+    def _resolved(
+        self, motion: Motion, asked: Functional, function: Function, size: float = 0.0
+    ) -> list[Resolved]:
+        for each in () if asked.kind == WORK else self.inside.variants(asked):
+            size = max(size, least_size(motion.pieces, each))
+        return resolve(motion.pieces, function, asked.text, size, bool(asked.contacts))
 
     # ---------------------------------------------------------------------------- harmonics
 
@@ -138,38 +134,89 @@ class Measuring:
 
     def _extremum(self, asked: Functional, function: Function) -> Dual:
         sign = 1.0 if asked.kind == "max" else -1.0
-        found: list[tuple[Segment, float, float]] = []
-        size = max(
-            least_size(self._still.segments, each)
-            for each in (function, *self.inside.variants(asked))
-        )
+        if self._at_joints(asked):
+            joints, moved = self.motion.orbit.cycle[:, 1], self.motion.d_cycle[:, 1]
+            what = f"{asked.kind}({asked.text})"
+            return self.largest(what, sign * joints, lambda rows: sign * moved[rows]) * sign
         # without derivatives: only those of the extrema themselves are wanted
-        for still, segment in zip(self._still.segments, self.motion.segments, strict=True):
-            shares = _candidates(asked, still, function, size)
-            values = function(still, shares, Kinks()).values
-            found += [(segment, float(s), float(v)) for s, v in zip(shares, values, strict=True)]
-        if not all(math.isfinite(value) for _, _, value in found):
+        pieces = self._still.pieces
+        each = self._candidates(asked, function)
+        where = np.repeat(np.arange(len(each)), [len(shares) for shares in each])
+        shares, by_mode = np.concatenate(each), bool(asked.contacts)
+        values = np.empty(len(shares))
+        for rows, found, _ in evaluated(pieces, function, where, shares, by_mode):
+            values[rows] = found.values
+        if not np.all(np.isfinite(values)):
             raise ParameterError(f"{asked.kind}({asked.text}) has no finite value")
-        candidates = [
-            (sign * value, partial(_signed_envelope, sign, segment, share, function))
-            for segment, share, value in found
+
+        def slopes(rows: IndexArray) -> FloatArray:
+            return sign * self._envelopes(function, where[rows], shares[rows], by_mode)
+
+        return self.largest(f"{asked.kind}({asked.text})", sign * values, slopes) * sign
+
+    def _at_joints(self, asked: Functional) -> bool:
+        """Tell whether it is the displacement of a model whose motion is cut at its stops, without resets."""
+        model = self.motion.orbit.model
+        at_stops = model.stops_at_joints and not model.displacement and not model.reset_by_surface
+        return at_stops and asked.text == model.states[0]
+
+    def _candidates(self, asked: Functional, function: Function) -> list[FloatArray]:
+        """Return the shares of each segment at which the function can be extreme.
+
+        The displacement has its extrema at joints where the model's motion is cut at its stops; observables
+        have stationary points that the flow certifies; of any other expression the resolved series has them.
+        """
+        model, name, segments = self.motion.orbit.model, asked.text, self._still.segments
+        at_ends = name == model.states[0] and model.stops_at_joints and not model.displacement
+        if name == model.states[0]:
+            name = model.displacement or name
+        inside: list[list[FloatArray]] = [[] for _ in segments]
+        if not at_ends and name in model.observable_index:
+            view = model.view(self.motion.orbit.vector)
+            for found, s in zip(inside, segments, strict=True):
+                if s.lasts > 0.0:
+                    times, _ = view.stationary(s.mode, name, s.start, s.state, s.lasts)
+                    found.append(times / s.lasts)
+        elif not at_ends:
+            resolved = self._resolved(self._still, asked, function)
+            for found, of in zip(inside, resolved, strict=True):
+                found.append(np.array([panel.low for panel in of.panels[1:]]))
+                found += [panel.stationary() for panel in of.panels]
+        return [
+            np.concatenate([[0.0, 1.0] if s.lasts > 0.0 else [0.0], *found])
+            for found, s in zip(inside, segments, strict=True)
         ]
-        return self.largest(f"{asked.kind}({asked.text})", candidates) * sign
+
+    def _envelopes(
+        self, function: Function, where: IndexArray, shares: FloatArray, by_mode: bool
+    ) -> FloatArray:
+        """Return the derivatives of values that are extreme at shares of segments, shape (k, D).
+
+        A stationary point inside is sharpened first, by its rate and that of its rate (by a difference).
+        """
+        sharp = shares.copy()
+        for k in np.flatnonzero((shares > 0.0) & (shares < 1.0)):
+            for _ in range(_STEPS):
+                nodes = self._timed.pieces.nodes(np.repeat(where[k : k + 1], 3))
+                sharp[k] = _sharper(nodes, float(sharp[k]), function)
+        slopes = np.empty((len(shares), self.motion.count))
+        for rows, found, _ in evaluated(self.motion.pieces, function, where, sharp, by_mode):
+            slopes[rows] = found.slopes[:, :-1]
+        return slopes
 
     def largest(
-        self, what: str, candidates: Sequence[tuple[float, Callable[[], FloatArray]]]
+        self, what: str, values: FloatArray, slopes_of: Callable[[IndexArray], FloatArray]
     ) -> Dual:
-        """Return the largest of some values, given with functions that return their derivatives.
+        """Return the largest of some values; their derivatives are asked for by number.
 
         Where several are the largest, and move differently, the derivatives of both sides differ: that
         ahead is the largest derivative, that behind the smallest.
         """
-        best = max(value for value, _ in candidates)
+        best = float(np.max(values))
         if not self.motion.count:
             return self.number(best, np.empty(0))
-        level = best - _EQUAL * (1.0 + abs(best))
-        tied = sorted((c for c in candidates if c[0] >= level), key=lambda c: -c[0])
-        slopes = np.array([slope() for _, slope in tied])
+        tied = np.flatnonzero(values >= best - _EQUAL * (1.0 + abs(best)))
+        slopes = slopes_of(tied[np.argsort(-values[tied], kind="stable")])
         ahead, behind = np.max(slopes, axis=0), np.min(slopes, axis=0)
         apart = max(_APART, _UNITS * self.motion.orbit.model.rounding)
         if np.any(ahead - behind > apart * (1.0 + np.abs(ahead))):
@@ -183,28 +230,12 @@ class Measuring:
         """The same motion without directions."""
         return self.motion if self.motion.directions is None else Motion(self.motion.orbit)
 
-
-def _candidates(asked: Functional, segment: Segment, function: Function, size: float) -> FloatArray:
-    """Return the shares of a segment at which the function can be extreme.
-
-    The displacement has its extrema at joints where the model's motion is cut at its stops; observables have
-    stationary points that the flow certifies; of any other expression the resolved series has them.
-    """
-    ends, model, name = [0.0, 1.0], segment.model, asked.text
-    if not segment.lasts > 0.0:
-        return np.array(ends[:1])
-    if name == model.states[0]:
-        if model.stops_at_joints and not model.displacement:
-            return np.array(ends)
-        name = model.displacement or name
-    if name in model.observable_index:
-        view = model.view(segment.vector)
-        times, _ = view.stationary(segment.mode, name, segment.start, segment.state, segment.lasts)
-        return np.concatenate([ends, times / segment.lasts])
-    resolved = resolve(segment, function, asked.text, size)
-    inside = [panel.stationary() for panel in resolved.panels]
-    cuts = [panel.low for panel in resolved.panels[1:]]
-    return np.concatenate([ends, cuts, *inside])
+    @cached_property
+    def _timed(self) -> Motion:
+        """The same motion in one direction in which nothing moves: for rates, its derivatives by time."""
+        joints, vector = self.motion.orbit.joints, self.motion.orbit.vector
+        nothing = np.zeros((*joints.shape, 1)), np.zeros((len(vector), 1))
+        return Motion(self.motion.orbit, Directions(*nothing))
 
 
 def _dual(number: Number) -> Dual:
@@ -213,8 +244,8 @@ def _dual(number: Number) -> Dual:
 
 
 def _squared(function: Function) -> Function:
-    def square(segment: Segment, shares: FloatArray, kinks: Kinks) -> Dual:
-        g = function(segment, shares, kinks)
+    def square(place: Place, shares: FloatArray, kinks: Kinks) -> Dual:
+        g = function(place, shares, kinks)
         return g * g
 
     return square
@@ -225,32 +256,18 @@ def _turning(function: Function, motion: Motion, cycles: int, wave: str) -> Func
     period = motion.orbit.period
     rate = 2.0 * math.pi * cycles / period
 
-    def turning(segment: Segment, shares: FloatArray, kinks: Kinks) -> Dual:
-        time, _ = segment.at(shares)
+    def turning(place: Place, shares: FloatArray, kinks: Kinks) -> Dual:
+        time, _ = place.at(shares)
         slopes = np.zeros(time.slopes.shape[1])
-        if segment.exact:
+        if place.exact:
             slopes[:-1] = -rate / period * motion.d_period
         frequency = constant(rate, time) + Dual(np.zeros(1), slopes[None, :])
-        return _dual(function(segment, shares, kinks) * apply(wave, frequency * time))
+        return _dual(function(place, shares, kinks) * apply(wave, frequency * time))
 
     return turning
 
 
-def _signed_envelope(sign: float, segment: Segment, share: float, function: Function) -> FloatArray:
-    return sign * _envelope(segment, share, function)
-
-
-def _envelope(segment: Segment, share: float, function: Function) -> FloatArray:
-    """Return the derivatives of a value that is extreme at a share of a segment, shape (D,).
-
-    A stationary point inside is sharpened first, by its rate and that of its rate (by a difference).
-    """
-    for _ in range(_STEPS if 0.0 < share < 1.0 else 0):
-        share = _sharper(segment, share, function)
-    return np.asarray(function(segment, np.array([share]), Kinks()).slopes[0, :-1])
-
-
-def _sharper(segment: Segment, share: float, function: Function) -> float:
+def _sharper(nodes: Nodes, share: float, function: Function) -> float:
     """Return a stationary point by one step of Newton's method on the rate; as it was at a kink.
 
     The bend is a difference over shares as wide as it is the same on: a step that is not inside of them
@@ -259,7 +276,7 @@ def _sharper(segment: Segment, share: float, function: Function) -> float:
     for width in _WIDTHS:
         step = min(width, 0.5 * share, 0.5 * (1.0 - share))
         around = np.array([share - step, share, share + step])
-        rates = function(segment, around, Kinks()).slopes[:, -1]
+        rates = function(nodes, around, Kinks()).slopes[:, -1]
         bend = (rates[2] - rates[0]) / (2.0 * step)
         if bend != 0.0 and abs(rates[1]) < abs(bend) * step:
             return share - float(rates[1] / bend)

@@ -6,6 +6,7 @@ import ast
 from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.models.grammar import PI, TIME, Scope, names_in, parse
 from contfric.models.quantity_texts import FORCE_OF, WORK, Functional, no_contact
 from contfric.quantities.duals import Dual, Kinks, constant
-from contfric.quantities.motion import Segment
+from contfric.quantities.motion import Place
 from contfric.quantities.panels import Function
 
 
@@ -40,6 +41,7 @@ class Inside:
         self.laws = {law.name: law for law in laws_of(model)}
         named = [o.name for o in model.observables if o.name not in model.states]
         self.observables = [name for name in named if name not in self.definitions]
+        self._functions: WeakKeyDictionary[Functional, Function] = WeakKeyDictionary()
         self.known = tuple(
             dict.fromkeys(
                 (TIME, *model.states, *named, *self.definitions, *model.parameter_names, PI)
@@ -67,7 +69,11 @@ class Inside:
 
     def function(self, asked: Functional) -> Function:
         """Return the expression of a functional as a function along a segment."""
-        return self.along(lambda _: asked.tree, asked.contacts)
+        known = self._functions.get(asked)
+        if known is None:
+            known = self.along(partial(_always, asked.tree), asked.contacts)
+            self._functions[asked] = known
+        return known
 
     def power(self, contact: str) -> Function:
         """Return the power that a contact dissipates as a function along a segment."""
@@ -105,30 +111,39 @@ class Inside:
         contacts : whose forces it is made of
         given : further named expressions
         """
-        leaves: dict[str, set[str]] = {}
+        known: dict[str, tuple[ast.expr, dict[str, ast.expr], set[str]]] = {}
 
-        def value(segment: Segment, shares: FloatArray, kinks: Kinks) -> Dual:
-            tree = tree_in(segment.mode)
-            forces = {FORCE_OF + c: parse(self.laws[c].force(segment.mode)) for c in contacts}
+        def prepared(mode: str) -> tuple[ast.expr, dict[str, ast.expr], set[str]]:
+            tree = tree_in(mode)
+            forces = {FORCE_OF + c: parse(self.laws[c].force(mode)) for c in contacts}
             defined = {**self.definitions, **forces, **(given or {})}
-            if segment.mode not in leaves:  # looked for once: it is asked for at every segment
-                leaves[segment.mode] = _leaves(tree, defined)
-            names = leaves[segment.mode]
-            time, states = segment.at(shares)
+            return tree, defined, _leaves(tree, defined)
+
+        def value(place: Place, shares: FloatArray, kinks: Kinks) -> Dual:
+            if place.mode not in known:  # looked for once
+                known[place.mode] = prepared(place.mode)
+            tree, defined, names = known[place.mode]
+            time, states = place.at(shares)
             values: dict[str, Any] = {TIME: time}
             values.update(zip(self.model.states, states, strict=True))
             for k, name in enumerate(self.model.parameter_names):
                 if name in names:
-                    values[name] = segment.parameter(k, len(shares))
+                    values[name] = place.parameter(k, len(shares))
             for name in self.observables:
                 if name in names:
-                    values[name] = segment.observable(name, time, states)
+                    values[name] = place.observable(name, time, states)
             scope: Scope[Any] = Scope(kinks.algebra(), values, defined)
             with np.errstate(all="ignore"):
                 found = scope.evaluate(tree)
             return found if isinstance(found, Dual) else constant(found, time)
 
         return value
+
+
+@lru_cache(maxsize=64)
+def inside_of(model: Model) -> Inside:
+    """Return the names of a model inside of functionals: looked up once a model."""
+    return Inside(model)
 
 
 @lru_cache(maxsize=64)

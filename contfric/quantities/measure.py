@@ -16,7 +16,7 @@ from contfric.models.grammar import Scope
 from contfric.models.quantity_texts import Parsed, read
 from contfric.quantities.duals import Dual, Kinks, constant
 from contfric.quantities.functionals import Measuring
-from contfric.quantities.inside import Inside
+from contfric.quantities.inside import inside_of
 from contfric.quantities.motion import Directions, Motion
 from contfric.quantities.registry import NAMED, Quantity
 from contfric.quantities.special import impact_velocity, multiplier, sticking
@@ -84,7 +84,7 @@ def differentiated(quantity: Quantity, orbit: Orbit, directions: Directions | No
         raise ParameterError(
             f"'{quantity.name}' has no derivatives: give a quantity by its name, or as an expression"
         )
-    measuring = Measuring(Motion(orbit, directions), Inside(orbit.model))
+    measuring = Measuring(Motion(orbit, directions), inside_of(orbit.model))
     with np.errstate(all="ignore"):
         found = _value(quantity.parsed, measuring)
     ahead, behind = found.slopes

@@ -16,11 +16,13 @@ with the flow's own exact derivatives. One more direction, the last one, is time
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray, Model
 from contfric.quantities.chatter import pieces
@@ -29,10 +31,10 @@ from contfric.quantities.duals import Dual
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
 
+IndexArray = NDArray[np.int64]
+
 #: Relative rounding of the closed forms written by hand; what is above may be integrated.
 _CLOSED = 1e-14
-_NONE = np.empty(0, dtype=np.int64)
-_EMPTY, _NOTHING = np.empty(0), np.empty((0, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +51,60 @@ class Directions:
     vector: FloatArray
 
 
+class Place:
+    """Where a function of time is evaluated: at shares of one segment, or of several.
+
+    Attributes
+    ----------
+    model, vector, d_vector : the model, its parameters, and how they move, shape (parameters, D)
+    mode : the mode there
+    """
+
+    model: Model
+    vector: FloatArray
+    d_vector: FloatArray
+    mode: str
+
+    @property
+    def exact(self) -> bool:
+        """Whether derivatives are wanted."""
+        return bool(self.d_vector.shape[1])
+
+    def at(self, shares: FloatArray) -> tuple[Dual, list[Dual]]:
+        """Return time and states at some shares; the last direction is time."""
+        raise NotImplementedError
+
+    def parameter(self, index: int, count: int) -> Dual:
+        """Return a parameter as a constant of so many nodes."""
+        slopes = np.zeros((count, self.d_vector.shape[1] + 1 if self.exact else 0))
+        if self.exact:
+            slopes[:, :-1] = self.d_vector[index]
+        return Dual(np.full(count, self.vector[index]), slopes)
+
+    def observable(self, name: str, time: Dual, states: list[Dual]) -> Dual:
+        """Return an observable of the model at some nodes, with the model's own exact gradient."""
+        from contfric.quantities.nodes import observe
+
+        c, flow = self.model.observable_index[name], self.model.flow.following()
+        values, slopes = np.empty(len(time.values)), np.empty(time.slopes.shape)
+        which, moved = moving(self.d_vector)
+        points = np.stack([s.values for s in states], axis=1)
+        points_moved = np.stack([s.slopes for s in states], axis=1)
+        observe(
+            *(flow, c, time.values, time.slopes, points, points_moved),
+            *(self.vector, which, moved, values, slopes),
+        )
+        return Dual(values, slopes)
+
+
+def moving(d_vector: FloatArray) -> tuple[IndexArray, FloatArray]:
+    """Return the parameters that move, and how: the flow is differentiated by no others."""
+    which = np.flatnonzero(d_vector.any(axis=1))
+    return which, np.ascontiguousarray(d_vector[which])
+
+
 @dataclass(frozen=True, eq=False)
-class Segment:
+class Segment(Place):
     """A smooth piece of an orbit; derivatives have D columns, none if they are not wanted.
 
     Attributes
@@ -72,107 +126,82 @@ class Segment:
     d_start: FloatArray
     d_state: FloatArray
     d_lasts: FloatArray
-    _known: dict[tuple[float, ...], tuple[Dual, list[Dual]]] = field(default_factory=dict)
-
-    @property
-    def exact(self) -> bool:
-        """Whether derivatives are wanted."""
-        return bool(self.d_start.size)
 
     def at(self, shares: FloatArray) -> tuple[Dual, list[Dual]]:
         """Return time and states at some shares of the segment; the last direction is time."""
-        key = tuple(shares.tolist())
+        return self._alone.at(np.zeros(len(shares), dtype=np.int64), shares)
+
+    @cached_property
+    def _alone(self) -> Pieces:
+        return Pieces((self,))
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Segments of one orbit in arrays: their nodes are computed in one compiled call."""
+
+    segments: Sequence[Segment]
+    _known: dict[tuple[bytes, bytes], tuple[Dual, list[Dual]]] = field(default_factory=dict)
+
+    def nodes(self, where: IndexArray) -> Nodes:
+        """Return some shares of some segments as a place where functions are evaluated."""
+        first, mode = self.segments[0], self.segments[int(where[0])].mode
+        return Nodes(first.model, first.vector, first.d_vector, mode, self, where)
+
+    def at(self, where: IndexArray, shares: FloatArray) -> tuple[Dual, list[Dual]]:
+        """Return time and states at shares of the segments ``where``; the last direction is time."""
+        key = where.tobytes(), shares.tobytes()
         if key not in self._known:
-            self._known[key] = self._moved(shares) if self.exact else self._plain(shares)
+            self._known[key] = self._at(where, shares)
         return self._known[key]
 
-    @property
-    def _chained(self) -> bool:
-        """Whether the motion to a node starts at the node before: where it is integrated, step by step."""
-        return self.model.rounding > _CLOSED
+    def _at(self, where: IndexArray, shares: FloatArray) -> tuple[Dual, list[Dual]]:
+        from contfric.quantities.nodes import move
 
-    def _plain(self, shares: FloatArray) -> tuple[Dual, list[Dual]]:
-        flow, m = self.model.flow, self.model.mode_index[self.mode]
-        states = np.empty((len(shares), len(self.state)))
-        since, state = self.start, self.state
-        for k, share in enumerate(shares):
-            at = self.start + share * self.lasts
-            if at < since:  # a node before the last one
-                since, state = self.start, self.state
-            flow.flow(m, since, state, at - since, self.vector, _NONE, states[k], _NOTHING)
-            if self._chained:
-                since, state = at, states[k]
-        none = np.empty((len(shares), 0))
-        time = Dual(self.start + shares * self.lasts, none)
-        return time, [Dual(column, none) for column in states.T.copy()]
+        first, count = self.segments[0], len(shares)
+        n, columns = len(first.state), first.d_vector.shape[1] + 1 if first.exact else 0
+        times, d_times = np.empty(count), np.empty((count, columns))
+        states, slopes = np.empty((count, n)), np.empty((count, n, columns))
+        # the motion to a node starts at the node before where it is integrated, step by step
+        chained = first.model.rounding > _CLOSED
+        move(
+            *(first.model.flow.following(), *self._arrays, first.vector, *moving(first.d_vector)),
+            *(chained, where, shares, times, d_times, states, slopes),
+        )
+        return Dual(times, d_times), [
+            Dual(states[:, i].copy(), slopes[:, i].copy()) for i in range(n)
+        ]
 
-    def _moved(self, shares: FloatArray) -> tuple[Dual, list[Dual]]:
-        count, columns = len(shares), len(self.d_start) + 1
-        d_times = np.ones((count, columns))
-        d_times[:, :-1] = self.d_start + np.outer(shares, self.d_lasts)
-        times = Dual(self.start + shares * self.lasts, d_times)
-        states, jacobians = self._jacobians(times.values)
-        n = len(self.state)
-        slopes = np.empty((count, n, columns))
-        slopes[:, :, -1] = jacobians[:, :, 1 + n]
-        begin = first = np.vstack([self.d_start, self.d_state])
-        if not self._chained:
-            slopes[:, :, :-1] = self._carried(jacobians, begin, d_times)
-        for k in range(count if self._chained else 0):
-            slopes[k, :, :-1] = self._carried(jacobians[k : k + 1], begin, d_times[k : k + 1])[0]
-            onward = k + 1 < count and times.values[k + 1] >= times.values[k]
-            begin = np.vstack([d_times[k, :-1], slopes[k, :, :-1]]) if onward else first
-        return times, [Dual(states[:, i].copy(), slopes[:, i].copy()) for i in range(n)]
-
-    def _carried(self, jacobians: FloatArray, begin: FloatArray, d_times: FloatArray) -> FloatArray:
-        """Return how states move whose motion starts where time and state move by ``begin``, (1 + n, D)."""
-        n = len(self.state)
-        lasts = d_times[:, None, :-1] - begin[0]
-        return np.asarray(
-            jacobians[:, :, : 1 + n] @ begin
-            + jacobians[:, :, 1 + n, None] * lasts
-            + jacobians[:, :, 2 + n :] @ self.d_vector
+    @cached_property
+    def _arrays(self) -> tuple[FloatArray | IndexArray, ...]:
+        """Modes, starts, states and durations, and how the last three move."""
+        own = self.segments
+        modes = np.array([s.model.mode_index[s.mode] for s in own], dtype=np.int64)
+        return (
+            modes,
+            np.array([s.start for s in own]),
+            np.array([s.state for s in own]),
+            np.array([s.lasts for s in own]),
+            np.array([s.d_start for s in own]),
+            np.array([s.d_state for s in own]),
+            np.array([s.d_lasts for s in own]),
         )
 
-    def _jacobians(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return states at some times, (k, n), and their derivatives by where the motion to each starts.
 
-        By its time, state and duration and by all parameters, shape (k, n, 2 + n + parameters).
-        """
-        flow, m, n = self.model.flow, self.model.mode_index[self.mode], len(self.state)
-        every = np.arange(len(self.vector))
-        states, found = np.empty((len(times), n)), np.empty((len(times), n, 2 + n + len(every)))
-        since, state = self.start, self.state
-        for k, at in enumerate(times):
-            if at < since:  # a node before the last one
-                since, state = self.start, self.state
-            flow.flow(m, since, state, at - since, self.vector, every, states[k], found[k])
-            if self._chained:
-                since, state = at, states[k]
-        return states, found
+@dataclass(frozen=True, eq=False)
+class Nodes(Place):
+    """Shares of several segments, those of ``where`` in turn."""
 
-    def parameter(self, index: int, count: int) -> Dual:
-        """Return a parameter as a constant of so many nodes."""
-        slopes = np.zeros((count, len(self.d_start) + 1 if self.exact else 0))
-        if self.exact:
-            slopes[:, :-1] = self.d_vector[index]
-        return Dual(np.full(count, self.vector[index]), slopes)
+    model: Model
+    vector: FloatArray
+    d_vector: FloatArray
+    mode: str
+    pieces: Pieces
+    where: IndexArray
 
-    def observable(self, name: str, time: Dual, states: list[Dual]) -> Dual:
-        """Return an observable of the model at some nodes, with the model's own exact gradient."""
-        flow, c = self.model.flow, self.model.observable_index[name]
-        count, n = len(time.values), len(states)
-        points = np.ascontiguousarray(np.array([s.values for s in states]).T)
-        values, slopes = np.empty(count), np.zeros(time.slopes.shape)
-        every = np.arange(len(self.vector)) if self.exact else _NONE
-        grad = np.empty(1 + n + len(every)) if self.exact else _EMPTY
-        for k in range(count):
-            values[k] = flow.observe(c, time.values[k], points[k], self.vector, every, grad)
-            if self.exact:
-                slopes[k] = grad[0] * time.slopes[k]
-                slopes[k] += sum(grad[1 + j] * states[j].slopes[k] for j in range(n))
-                slopes[k, :-1] += grad[1 + n :] @ self.d_vector
-        return Dual(values, slopes)
+    def at(self, shares: FloatArray) -> tuple[Dual, list[Dual]]:
+        """Return time and states at a share of each segment; the last direction is time."""
+        return self.pieces.at(self.where, shares)
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,6 +278,11 @@ class Motion:
             for s in self._whole_segments
             for piece in (pieces(s, chatters[s.mode]) if s.mode in chatters else (s,))
         )
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """The same in arrays."""
+        return Pieces(self.segments)
 
     def last_of(self, index: int) -> Segment:
         """Return the piece that ends with a segment of the orbit."""

@@ -11,7 +11,8 @@ of panels.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -20,7 +21,7 @@ import numpy as np
 from contfric.errors import ContfricError
 from contfric.models.definition import FloatArray
 from contfric.quantities.duals import Dual, Kinks
-from contfric.quantities.motion import Segment
+from contfric.quantities.motion import IndexArray, Pieces, Place, Segment
 
 #: Nodes of a panel: a segment of half a period of the excitation is resolved by one panel, or two.
 _NODES = 16
@@ -48,8 +49,8 @@ _SERIES = (
     * _WEIGHTS
 )
 
-#: A function of time along a segment, at nodes; the arguments of its kinks are noted.
-Function = Callable[[Segment, FloatArray, Kinks], Dual]
+#: A function of time along segments, at nodes; the arguments of its kinks are noted.
+Function = Callable[[Place, FloatArray, Kinks], Dual]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,15 +66,6 @@ class Panel:
     low: float
     high: float
     values: Dual
-
-    def integral(self, segment: Segment) -> Dual:
-        """Return the integral over the panel by time, where its ends are fixed shares of the segment."""
-        half = 0.5 * (self.high - self.low)
-        mean = half * (_WEIGHTS @ self.values.values)
-        slopes = half * (_WEIGHTS @ self.values.slopes) * segment.lasts
-        if segment.exact:
-            slopes[:-1] += mean * segment.d_lasts
-        return Dual(np.array([mean * segment.lasts]), slopes[None, :])
 
     def stationary(self) -> FloatArray:
         """Return the shares of the segment at which the function is stationary inside of the panel."""
@@ -110,16 +102,14 @@ class Resolved:
         """Return the function at some shares of the segment."""
         return self.function(self.segment, shares, Kinks())
 
-    def integral(self) -> Dual:
-        """Return the integral over the segment by time; moving jumps contribute to its derivatives."""
-        zero = Dual(np.zeros(1), np.zeros((1, self.segment.d_start.size + int(self.segment.exact))))
-        total = sum((panel.integral(self.segment) for panel in self.panels), zero)
-        if self.segment.exact:
-            for cut in self.cuts:
-                total = total + self._moving(cut)
-        return total
+    def jumps(self) -> FloatArray:
+        """Return what jumps that move add to the derivatives of the integral, shape (D,)."""
+        found = np.zeros(self.segment.d_vector.shape[1])
+        for cut in self.cuts if self.segment.exact else ():
+            found += self._moving(cut)
+        return found
 
-    def _moving(self, cut: Cut) -> Dual:
+    def _moving(self, cut: Cut) -> FloatArray:
         """Return what the motion of a jump adds: the jump times how far its time moves against the segment.
 
         At the jump the argument a is zero; a fixed share moves it by da, time by its rate, so that the jump
@@ -127,98 +117,205 @@ class Resolved:
         """
         sides = self.value(np.array([cut.share - _BESIDE, cut.share + _BESIDE]))
         jump = sides.values[0] - sides.values[1]
-        slopes = np.zeros((1, sides.slopes.shape[1]))
-        if abs(jump) > 1e3 * _BESIDE * (1.0 + np.max(np.abs(sides.values))):
-            kinks = Kinks()
-            self.function(self.segment, np.array([cut.share]), kinks)
-            moved = kinks.arguments[cut.number].slopes[0]
-            if moved[-1] == 0.0:
-                raise ContfricError(
-                    f"{self.what} jumps where its condition is only touched: it has no derivative there"
-                )
-            slopes[0, :-1] = -jump * moved[:-1] / moved[-1]
-        return Dual(np.zeros(1), slopes)
+        if abs(jump) <= 1e3 * _BESIDE * (1.0 + np.max(np.abs(sides.values))):
+            return np.zeros(sides.slopes.shape[1] - 1)
+        kinks = Kinks()
+        self.function(self.segment, np.array([cut.share]), kinks)
+        moved = kinks.arguments[cut.number].slopes[0]
+        if moved[-1] == 0.0:
+            raise ContfricError(
+                f"{self.what} jumps where its condition is only touched: it has no derivative there"
+            )
+        return np.asarray(-jump * moved[:-1] / moved[-1])
 
 
-def least_size(segments: Sequence[Segment], function: Function) -> float:
-    """Return the size below which values of a function are rounding of those elsewhere on the orbit."""
-    shares, largest = 0.5 * (_POINTS + 1.0), 0.0
-    for segment in segments:
-        if segment.lasts > 0.0:
-            with np.errstate(all="ignore"):
-                values = function(segment, shares, Kinks()).values
-            largest = max(largest, float(np.max(np.abs(values))))
-    return _ROUNDING / RESOLVED * largest if np.isfinite(largest) else 0.0
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A part of a segment to resolve; ``before`` is the share of noise of the part that it is a half of."""
+
+    index: int
+    low: float
+    high: float
+    depth: int = 0
+    size: float = 0.0
+    before: float = math.inf
 
 
-def resolve(segment: Segment, function: Function, what: str, size: float = 0.0) -> Resolved:
-    """Resolve a function on a segment.
+@dataclass(frozen=True, eq=False)
+class _Sampled:
+    """A function at the nodes of P parts, its values and derivatives as columns.
+
+    Attributes
+    ----------
+    columns : shape (P, nodes, 1 + columns of slopes)
+    tail, sizes : the last coefficients of the series, and the largest values, shape (P, 1 + ...)
+    kinks : arguments of kinks that change their sign, of the parts where one does
+    """
+
+    columns: FloatArray
+    tail: FloatArray
+    sizes: FloatArray
+    kinks: dict[int, list[Dual]]
+
+    def values(self, k: int) -> Dual:
+        """Return the function at the nodes of a part."""
+        return Dual(self.columns[k, :, 0].copy(), self.columns[k, :, 1:].copy())
+
+
+def evaluated(
+    pieces: Pieces, function: Function, where: IndexArray, shares: FloatArray, by_mode: bool
+) -> Iterator[tuple[IndexArray, Dual, Kinks]]:
+    """Yield a function at shares of segments, and which of them these are: all at once, or mode by mode."""
+    groups: dict[str, list[int]] = {}
+    for k, index in enumerate(where.tolist() if by_mode else ()):
+        groups.setdefault(pieces.segments[index].mode, []).append(k)
+    for rows in [np.array(g) for g in groups.values()] or [np.arange(len(where))]:
+        kinks = Kinks()
+        with np.errstate(all="ignore"):
+            found = function(pieces.nodes(where[rows]), shares[rows], kinks)
+        yield rows, found, kinks
+
+
+def least_size(pieces: Pieces, function: Function) -> float:
+    """Return the size below which values of a function, the same in all modes, are rounding of others."""
+    parts = _whole(pieces)
+    return _least(_sampled(pieces, function, parts, False)) if parts else 0.0
+
+
+def resolve(
+    pieces: Pieces, function: Function, what: str, size: float = 0.0, by_mode: bool = False
+) -> list[Resolved]:
+    """Resolve a function on segments: all their parts at once, then the halves of those that need it.
 
     Parameters
     ----------
     what : the function's name, for messages
-    size : values below it are rounding (:func:`least_size`): a slide that has just appeared has no others
+    size : values below it are rounding (:func:`least_size`): a slide that has just appeared has no others;
+        as are those below what is rounding of the function itself
+    by_mode : whether the function is another one in each mode
 
     Raises
     ------
     ContfricError
         If it is not finite, or nothing resolves it.
     """
-    found = Resolved(segment, function, what)
-    if segment.lasts > 0.0:
-        _resolve(found, 0.0, 1.0, 0, size, np.inf)
+    found = [Resolved(segment, function, what) for segment in pieces.segments]
+    parts = _whole(pieces)
+    least: float | None = None  # of the function itself, known from whole segments
+    while parts:
+        sampled = _sampled(pieces, function, parts, by_mode)
+        least = max(size, _least(sampled)) if least is None else least
+        sizes = np.array([max(least, part.size) for part in parts])
+        sizes = np.maximum(sizes, sampled.sizes[:, 0])
+        own = np.maximum(np.maximum(sampled.sizes, sizes[:, None]), 1e-300)
+        left = np.max(sampled.tail / own, axis=1)
+        parts = [
+            further
+            for k, part in enumerate(parts)
+            for further in _judged(
+                found[part.index], part, sampled, k, float(sizes[k]), float(left[k])
+            )
+        ]
+    for each in found:
+        each.panels.sort(key=lambda panel: panel.low)
+        each.cuts.sort(key=lambda cut: cut.share)
     return found
 
 
-def _resolve(
-    found: Resolved, low: float, high: float, depth: int, size: float, before: float
-) -> None:
-    """Resolve a part of a segment; ``before`` is the share of noise of the part that it is a half of."""
-    shares = low + 0.5 * (high - low) * (_POINTS + 1.0)
-    kinks = Kinks()
-    with np.errstate(all="ignore"):
-        values = found.function(found.segment, shares, kinks)
-    if not (np.all(np.isfinite(values.values)) and np.all(np.isfinite(values.slopes))):
-        time = found.segment.start + shares[0] * found.segment.lasts
-        raise ContfricError(
-            f"{found.what} has no finite value in segment {found.segment.index + 1} near t = {time:.6g}"
+def _whole(pieces: Pieces) -> list[_Part]:
+    return [_Part(k, 0.0, 1.0) for k, s in enumerate(pieces.segments) if s.lasts > 0.0]
+
+
+def _least(sampled: _Sampled) -> float:
+    largest = 0.0
+    for value in sampled.sizes[:, 0].tolist():
+        largest = max(largest, value)
+    return _ROUNDING / RESOLVED * largest if np.isfinite(largest) else 0.0
+
+
+def _sampled(pieces: Pieces, function: Function, parts: list[_Part], by_mode: bool) -> _Sampled:
+    """Return a function at the nodes of some parts."""
+    where = np.repeat(np.array([part.index for part in parts], dtype=np.int64), _NODES)
+    low, high = np.array([[part.low, part.high] for part in parts]).T[:, :, None]
+    shares = (low + 0.5 * (high - low) * (_POINTS + 1.0)).ravel()
+    columns = np.empty((0, 0))
+    changing: dict[int, list[Dual]] = {}
+    for rows, values, kinks in evaluated(pieces, function, where, shares, by_mode):
+        if not columns.size:
+            columns = np.empty((len(where), 1 + values.slopes.shape[1]))
+        columns[rows, 0], columns[rows, 1:] = values.values, values.slopes
+        arguments = np.array([a.values for a in kinks.arguments]).reshape(
+            -1, len(rows) // _NODES, _NODES
         )
-    cut = _change(found, shares, kinks)
+        both = (arguments.min(axis=2) < 0.0) & (arguments.max(axis=2) > 0.0)
+        for k in np.flatnonzero(both.any(axis=0)).tolist():
+            own = slice(k * _NODES, (k + 1) * _NODES)
+            changing[int(rows[own][0]) // _NODES] = [a[own] for a in kinks.arguments]
+    by_part = columns.reshape(len(parts), _NODES, -1)
+    with np.errstate(all="ignore"):
+        tail = np.max(np.abs(_SERIES[-2:] @ by_part), axis=1)
+    return _Sampled(by_part, tail, np.max(np.abs(by_part), axis=1), changing)
+
+
+def _judged(
+    found: Resolved, part: _Part, sampled: _Sampled, k: int, size: float, left: float
+) -> list[_Part]:
+    """Take a part as a panel, or return the parts that it is cut into; ``left`` is its share of noise."""
+    segment, low, high = found.segment, part.low, part.high
+    if not np.all(np.isfinite(sampled.sizes[k])):
+        time = segment.start + low * segment.lasts
+        raise ContfricError(
+            f"{found.what} has no finite value in segment {segment.index + 1} near t = {time:.6g}"
+        )
+    shares = low + 0.5 * (high - low) * (_POINTS + 1.0)
+    cut = _change(found, shares, sampled.kinks[k]) if k in sampled.kinks else None
     if cut is not None and low < cut.share < high:
-        found_size = max(size, float(np.max(np.abs(values.values))))
-        _resolve(found, low, cut.share, depth, found_size, np.inf)
         found.cuts.append(cut)
-        _resolve(found, cut.share, high, depth, found_size, np.inf)
-        return
-    size = max(size, float(np.max(np.abs(values.values))))
-    left, level = _left(values, size), max(RESOLVED, _UNITS * found.segment.model.rounding)
-    noise = depth >= _HALVED and _FALLS * before < left < _NOISE
+        return [
+            _Part(part.index, low, cut.share, part.depth, size),
+            _Part(part.index, cut.share, high, part.depth, size),
+        ]
+    level = max(RESOLVED, _UNITS * segment.model.rounding)
+    noise = part.depth >= _HALVED and _FALLS * part.before < left < _NOISE
     if left <= level or noise:
-        found.panels.append(Panel(low, high, values))
-    elif depth == _DEEPEST:
-        time = found.segment.start + low * found.segment.lasts
+        found.panels.append(Panel(low, high, sampled.values(k)))
+        return []
+    if part.depth == _DEEPEST:
+        time = segment.start + low * segment.lasts
         raise ContfricError(
             f"{found.what} is not smooth near t = {time:.12g}: no panel resolves it"
         )
-    else:
-        middle = 0.5 * (low + high)
-        _resolve(found, low, middle, depth + 1, size, left)
-        _resolve(found, middle, high, depth + 1, size, left)
+    middle, depth = 0.5 * (low + high), part.depth + 1
+    return [
+        _Part(part.index, low, middle, depth, size, left),
+        _Part(part.index, middle, high, depth, size, left),
+    ]
 
 
-def _left(values: Dual, size: float) -> float:
-    """Return the last coefficients of the series, relative to the largest values; of derivatives too."""
-    columns = np.column_stack([values.values, values.slopes])
-    tail = np.max(np.abs(_SERIES[-2:] @ columns), axis=0)
-    sizes = np.max(np.abs(columns), axis=0)
-    sizes[0] = max(sizes[0], size)
-    return float(np.max(tail / np.maximum(np.maximum(sizes, size), 1e-300)))
+def integral(resolved: Sequence[Resolved]) -> tuple[float, FloatArray]:
+    """Return the integral over all segments by time, and its derivatives, shape (D,).
+
+    The ends of panels are fixed shares of their segments; jumps that move against these contribute.
+    """
+    panels = [(each.segment, panel) for each in resolved for panel in each.panels]
+    jumps = sum((each.jumps() for each in resolved), np.zeros(1))
+    if not panels:
+        return 0.0, jumps
+    half = np.array([0.5 * (panel.high - panel.low) for _, panel in panels])
+    lasts = np.array([segment.lasts for segment, _ in panels])
+    means = half * np.array([_WEIGHTS @ panel.values.values for _, panel in panels])
+    value = math.fsum(means * lasts)
+    if not panels[0][0].exact:
+        return value, jumps
+    slopes = np.array([_WEIGHTS @ panel.values.slopes[:, :-1] for _, panel in panels])
+    d_lasts = np.array([segment.d_lasts for segment, _ in panels])
+    return value, jumps + (half * lasts) @ slopes + means @ d_lasts
 
 
-def _change(found: Resolved, shares: FloatArray, kinks: Kinks) -> Cut | None:
+def _change(found: Resolved, shares: FloatArray, arguments: list[Dual]) -> Cut | None:
     """Return the first root of an argument of a kink between nodes; None if no sign changes."""
     best: tuple[float, int, float] | None = None
-    for number, argument in enumerate(kinks.arguments):
+    for number, argument in enumerate(arguments):
         a = argument.values
         clear = np.flatnonzero(np.abs(a) > _NO_SIGN * (1.0 + np.max(np.abs(a))))
         for j, k in pairwise(clear.tolist()):

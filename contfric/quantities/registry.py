@@ -16,7 +16,7 @@ from contfric.errors import ModelError, ParameterError, did_you_mean, shown
 from contfric.models.definition import Model
 from contfric.models.grammar import PI
 from contfric.models.quantity_texts import FUNCTIONALS, Parsed, read
-from contfric.quantities.inside import Inside
+from contfric.quantities.inside import Inside, inside_of
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
@@ -188,7 +188,7 @@ def check(parsed: Parsed, model: Model, above: tuple[str, ...]) -> None:
     ParameterError
         If that is so.
     """
-    inside, own = Inside(model), dict(model.quantities)
+    inside, own = inside_of(model), dict(model.quantities)
     for functional in parsed.functionals.values():
         inside.check(functional)
     for name in sorted(parsed.names):

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +14,7 @@ from contfric.quantities.functionals import Measuring
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
-    from contfric.quantities.motion import Directions
+    from contfric.quantities.motion import Directions, IndexArray
 
 #: Displacement of an orbit for the derivatives of multipliers, relative to its size: its fourth power, and
 #: rounding divided by it, are both about 1e-12.
@@ -44,16 +42,18 @@ def impact_velocity(measuring: Measuring) -> Dual:
     The speed is the rate of the surface's observable before its reset.
     """
     orbit, resets = measuring.motion.orbit, measuring.motion.orbit.model.reset_by_surface
-    candidates: list[tuple[float, Callable[[], FloatArray]]] = []
+    met: list[tuple[int, float, FloatArray]] = []
     for i, (_, exit_) in enumerate(orbit.word):
         if exit_ in resets and resets[exit_].stays and not resets[exit_].wraps:
             rate, grad = _rate_at_end(orbit, i)
-            candidates.append(
-                (abs(rate), partial(_speed_slopes, measuring, i, np.sign(rate) * grad))
-            )
-    if not candidates:
+            met.append((i, abs(rate), np.sign(rate) * grad))
+    if not met:
         return measuring.number(0.0, np.zeros(measuring.motion.count))
-    return measuring.largest("the speed of impact", candidates)
+
+    def slopes(rows: IndexArray) -> FloatArray:
+        return np.array([_speed_slopes(measuring, met[k][0], met[k][2]) for k in rows])
+
+    return measuring.largest("the speed of impact", np.array([m[1] for m in met]), slopes)
 
 
 def _rate_at_end(orbit: Orbit, i: int) -> tuple[float, FloatArray]:

@@ -11,7 +11,11 @@ from hypothesis import strategies as st
 
 import contfric as cf
 from contfric.errors import ContfricError
+from contfric.orbit.gradient import by_parameters
+from contfric.orbit.linear import jacobian_blocks, stacked
+from contfric.orbit.sensitivity import joint_sensitivities
 from contfric.orbit.solve import polish
+from contfric.quantities.motion import Motion
 
 PARAMS = st.fixed_dictionaries(
     {
@@ -113,3 +117,34 @@ def test_the_gradient_of_a_multiplier_next_to_another_one() -> None:
     assert orbit.gradient("multiplier")["Omega"] == pytest.approx(
         (ends[0] - ends[1]) / 2e-5, rel=1e-5
     )
+
+
+@pytest.mark.parametrize("model", ["jenkins", "popp", "impact"])
+def test_joints_move_as_the_full_matrix_says(model: str) -> None:
+    """One elimination, joint by joint, against a dense solve: excited, autonomous, and with impacts."""
+    orbit = cf.find_orbit(model)
+    a, b, c, close = jacobian_blocks(orbit.system, orbit.joints, orbit.vector)
+    full = -np.linalg.solve(stacked(a, b, close), c.reshape(orbit.joints.size, -1))
+    moved = joint_sensitivities(orbit).reshape(full.shape)
+    assert np.allclose(moved, full, rtol=1e-9, atol=1e-9 * np.max(np.abs(full)))
+    assert np.max(np.abs(full)) > 1e-3
+
+
+@pytest.mark.parametrize("model", ["jenkins", "stribeck"])
+def test_nodes_of_all_segments_are_those_of_each(model: str) -> None:
+    """Also where motion is integrated from node to node, and a node lies before the last one."""
+    orbit = cf.find_orbit(model)
+    motion = Motion(orbit, by_parameters(orbit))
+    shares = np.array([0.0, 0.4, 1.0, 0.3])
+    count = len(motion.segments)
+    where = np.repeat(np.arange(count), len(shares))
+    time, states = motion.pieces.nodes(where).at(np.tile(shares, count))
+    for k, segment in enumerate(motion.segments):
+        own = slice(k * len(shares), (k + 1) * len(shares))
+        alone, those = segment.at(shares)
+        for one, other in zip((alone, *those), (time, *states), strict=True):
+            assert np.array_equal(one.values, other[own].values)
+            assert np.array_equal(one.slopes, other[own].slopes)
+        assert np.array_equal(those[0].values[:1], segment.state[:1])
+        ends = [orbit.cycle[(k + 1) % count, 1 + i] for i in range(len(those))]
+        assert np.allclose([s.values[2] for s in those], ends, atol=1e-8)
