@@ -32,7 +32,7 @@ def move_joints(functions, layout, z, p, out):  # type: ignore[no-untyped-def]
     close_chain(functions, layout, z, p, which, equations)
     for i in range(count):
         if i > 0:
-            next_rows(rows, work.border, no_border, i, m)
+            next_rows(work, no_border, i, m)
         after = z[i + 1] if i + 1 < count else equations.last
         worst = segment_rows(functions, layout, i, m, z[i], after, p, which, equations, rows)
         if not math.isfinite(worst):
@@ -51,7 +51,7 @@ def move_joints(functions, layout, z, p, out):  # type: ignore[no-untyped-def]
         if i > 0 and not take_out(work, i, m):
             return np.inf
     left, right = np.empty((m, m)), np.empty((m, m))
-    if not finish(work, equations.close, np.empty((m, 0)), left, right):
+    if not finish(work, equations.close, np.empty((m, 0)), no_border, left, right):
         return np.inf
     for i in range(count):
         for j in range(m):
