@@ -12,9 +12,10 @@ are carried along. What is left is one small system for ``z_0`` and w, and the p
 orbit: ``P z_0 + Q z_N = 0`` is the linear map of one turn, whose eigenvalues are the multipliers.
 
 Where the part of a chain between two holds folds by itself, its last joint has no pivot in these rows: only a
-border row knows of it. Such a pivot, and what is divided by it, would be rounding. The border row takes its
-place, with its parts on all later joints, and a row of the chain is carried along instead; what the other
-rows have in that column (less than :data:`_WEAK` of it) is left out. One turn has no finite map then.
+border row knows of it. Such a pivot would be rounding, and so would be all that the border row is left with.
+The two rows change places: the border row is the pivot, with its parts on all later joints, and the row of
+the chain is carried along in its stead. The other rows of the chain, and the pencil, are those of the plain
+elimination.
 
 Nothing is stored but what the back substitution needs: the rows of a segment are written where they
 are eliminated. The columns are ``[z_0 | z_i | z_{i+1} | w | right-hand sides]``.
@@ -25,14 +26,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contfric.compiled import allocating_helper, helper
 from contfric.models.definition import FloatArray
 
-#: Share of a border row's entry below which all other pivots for it are weak: dividing by one loses as many
-#: digits as it is smaller, and leaving it out costs a step of Newton's method as many.
-_WEAK = 1e-9
+#: Share of a border row's entry below which all other pivots for it are rounding.
+_WEAK = 1e-14
 
 
 class Elimination(NamedTuple):
@@ -46,7 +45,8 @@ class Elimination(NamedTuple):
     small, rhs : the system that is left, shapes (m + q, m + q) and (m + q, right)
     after : shape (m, right)
     z, w : solution, shapes (N, m, right) and (q, right)
-    exchanged : joint whose pivot is that of the border row, and which of its rows; -1 if there is none
+    exchanged : joint whose pivot is that of the border row, and which of its rows (-1: none); the share that
+        what is carried along in its stead has of the border's parts on later joints
     """
 
     rows: FloatArray
@@ -57,7 +57,7 @@ class Elimination(NamedTuple):
     after: FloatArray
     z: FloatArray
     w: FloatArray
-    exchanged: NDArray[np.int64]
+    exchanged: FloatArray
 
 
 @allocating_helper
@@ -73,7 +73,7 @@ def elimination_workspace(count, m, free, right):  # type: ignore[no-untyped-def
         np.empty((m, right)),
         np.empty((count, m, right)),
         np.empty((free, right)),
-        np.full(2, -1),
+        np.full(3, -1.0),
     )
 
 
@@ -128,7 +128,7 @@ def subtract(target, row, source, j, factor, m, col):  # type: ignore[no-untyped
 def eliminate_joint(rows, border, m, exchanged):  # type: ignore[no-untyped-def]
     """Take the columns m .. 2m out of the last m rows and of the border; False if singular.
 
-    The row in which the only border row is the pivot, if there is one, is written to ``exchanged[1]``.
+    Where the only border row is the pivot, its row and share are written to ``exchanged``.
     """
     free_to = border.shape[0] == 1 and exchanged[0] < 0
     for j in range(m):
@@ -138,20 +138,23 @@ def eliminate_joint(rows, border, m, exchanged):  # type: ignore[no-untyped-def]
             size = abs(rows[row, col])
             if size > largest:
                 best, largest = row, size
-        if free_to and largest < _WEAK * abs(border[0, col]):
-            for k in range(rows.shape[1]):
-                rows[j, k], border[0, k] = border[0, k], rows[j, k]
-            exchanged[1], free_to = j, False
-            continue
-        if not 0.0 < largest < np.inf:
+        weak = free_to and largest < _WEAK * abs(border[0, col])
+        if not largest < np.inf or (largest == 0.0 and not weak):
             return False
         if best != j:
             swap_rows(rows, j, best)
-        scale = 1.0 / rows[j, col]
+        scale = 1.0 / rows[j, col] if largest > 0.0 else 0.0
         for row in range(j + 1, 2 * m):
             factor = rows[row, col] * scale
             if factor != 0.0:
                 subtract(rows, row, rows, j, factor, m, col)
+        if weak:
+            for k in range(rows.shape[1]):
+                rows[j, k], border[0, k] = border[0, k], rows[j, k]
+            factor = border[0, col] / rows[j, col]
+            subtract(border, 0, rows, j, factor, m, col)
+            exchanged[1], exchanged[2], free_to = j, -factor, False
+            continue
         for row in range(border.shape[0]):
             factor = border[row, col] * scale
             if factor != 0.0:
@@ -186,11 +189,12 @@ def next_rows(workspace, d, i, m):  # type: ignore[no-untyped-def]
             rows[row, 2 * m + k] = 0.0
         for k in range(3 * m, width):
             rows[row, k] = rows[m + row, k]
-    count = d.shape[1] if workspace.exchanged[0] < 0 else 0  # a row of the chain has no later parts
+    exchanged, count = workspace.exchanged, d.shape[1]
+    share = 1.0 if exchanged[0] < 0.0 else exchanged[2]
     for row in range(border.shape[0]):
         for k in range(m):
             border[row, m + k] = border[row, 2 * m + k]
-            border[row, 2 * m + k] = d[row, i + 1, k] if i + 1 < count else 0.0
+            border[row, 2 * m + k] = share * d[row, i + 1, k] if i + 1 < count else 0.0
 
 
 @helper
@@ -199,7 +203,7 @@ def take_out(workspace, i, m):  # type: ignore[no-untyped-def]
     rows, kept, exchanged = workspace.rows, workspace.kept, workspace.exchanged
     if not eliminate_joint(rows, workspace.border, m, exchanged):
         return False
-    if exchanged[0] < 0 <= exchanged[1]:
+    if exchanged[0] < 0.0 <= exchanged[1]:
         exchanged[0] = i
     for j in range(m):
         for k in range(rows.shape[1]):
@@ -211,15 +215,13 @@ def take_out(workspace, i, m):  # type: ignore[no-untyped-def]
 def finish(workspace, close, close_w, d, p, q):  # type: ignore[no-untyped-def]
     """Solve for all unknowns when every joint but the first is out, and fill the pencil (p, q).
 
-    With a border row ``d`` as a pivot the pencil is that of a map whose eigenvalues are all infinite.
+    ``d`` are the border rows, one of which may be a pivot.
     """
     rows, m = workspace.rows, close.shape[0]
     for i in range(m):
         for j in range(m):
             p[i, j] = rows[m + i, j]
             q[i, j] = rows[m + i, 2 * m + j]
-            if workspace.exchanged[0] >= 0:
-                p[i, j], q[i, j] = 1.0 if i == j else 0.0, 0.0
     if not solve_ends(
         rows,
         workspace.border,
@@ -268,7 +270,7 @@ def solve_ends(rows, border, close, close_w, small, rhs, z, w):  # type: ignore[
 def back_substitute(workspace, close, close_w, d):  # type: ignore[no-untyped-def]
     """Fill z_{N-1} .. z_1 from the kept rows; that of a border row has parts on all later joints."""
     kept, z, w, after = workspace.kept, workspace.z, workspace.w, workspace.after
-    joint, special = workspace.exchanged[0], workspace.exchanged[1]
+    joint, special = int(workspace.exchanged[0]), int(workspace.exchanged[1])
     count, m, right = z.shape
     free = w.shape[0]
     for i in range(m):
