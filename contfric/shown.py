@@ -1,8 +1,8 @@
-"""How results look in a notebook: a short table, made of attributes that cost nothing."""
+"""How results look: a short table of attributes that cost nothing in a notebook, aligned columns as text."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from enum import Enum
 from html import escape
 from typing import Any
@@ -112,3 +112,17 @@ def _text(value: Any) -> str:
         if isinstance(value, Shown) and type(value).__name__ != "Signature"
         else str(value)
     )
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield rows of a table as lines with aligned columns.
+
+    Examples
+    --------
+    >>> list(aligned([["name", "points"], ["1a", "104"]]))
+    ['name  points', '1a    104']
+    """
+    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        yield "  ".join(cells).rstrip()

@@ -109,7 +109,7 @@ def _check_files(folder: Path, names: list[str]) -> None:
 
 def list_signatures(options: argparse.Namespace) -> int:
     """``contfric signatures list``."""
-    from contfric.cli.summary import table
+    from contfric.shown import aligned
     from contfric.signature import load_signature, signature_names
 
     rows = [["name", "model", "periods", "segments"]]
@@ -120,7 +120,7 @@ def list_signatures(options: argparse.Namespace) -> int:
             say(f"skipped: {error}")
             continue
         rows.append([name, signature.model.name, str(signature.periods), str(signature)])
-    print(*table(rows), sep="\n")
+    print(*aligned(rows), sep="\n")
     return Exit.DONE
 
 
