@@ -6,7 +6,7 @@ On another machine they are multiplied by a common factor (:mod:`contfric.announ
 """
 
 SECONDS = {
-    "contfric.atlas.census_sweep.sweep": 1.4,
+    "contfric.censuses.sweep.sweep": 1.4,
     "contfric.chaos.cells.follow_cells": 10.6,
     "contfric.continuation.bracket.locate": 14.1,
     "contfric.continuation.march.march": 8.4,

@@ -247,7 +247,7 @@ def _say_what_settles(
 
 def census(options: argparse.Namespace) -> int:
     """``contfric census``: the orbits as a table, then what was tried and what bounds it."""
-    from contfric.atlas.census import census as take
+    from contfric.censuses.census import census as take
     from contfric.cli.progress import ProgressLine
     from contfric.study.checkpoint import checkpoint_of
 

@@ -28,7 +28,7 @@ import faulthandler
 import sys
 import numpy as np
 import contfric as cf
-from contfric.atlas.census_sweep import sweep
+from contfric.censuses.sweep import sweep
 from contfric.chaos.cells import follow_cells
 from contfric.continuation.bracket import locate
 from contfric.continuation.march import march

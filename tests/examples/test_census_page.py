@@ -35,7 +35,7 @@ def test_output_is_that_of_the_command(capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_numbers_of_words() -> None:
-    from contfric.atlas.census_words import closed_words
+    from contfric.censuses.words import closed_words
     from contfric.models import load_model
 
     found = re.search(r"pair: ([\d, ]+) of the oscillator for N = ([\d, ]+),", PAGE)

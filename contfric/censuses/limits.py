@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from contfric.atlas.census_net import Limits
-from contfric.atlas.census_orbits import Catalogue
-from contfric.atlas.census_result import SectionSearch
+from contfric.censuses.net import Limits
+from contfric.censuses.orbits import Catalogue
+from contfric.censuses.result import SectionSearch
 from contfric.signature.edits import show
 
 #: Orbits within this share of a box leave space for others outside of those found.

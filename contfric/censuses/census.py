@@ -1,9 +1,9 @@
 """Census: all periodic orbits at given parameters, stable or not, up to a number of periods and stops.
 
-What is asked for are closed words of the transition graph (:mod:`contfric.atlas.census_words`); what
-is done is one search on each section that orbits meet (:mod:`contfric.atlas.census_sections`), which
+What is asked for are closed words of the transition graph (:mod:`contfric.censuses.words`); what
+is done is one search on each section that orbits meet (:mod:`contfric.censuses.sections`), which
 tries all words at once: a net of starts is simulated, and refined wherever a discontinuity or a
-near return is (:mod:`contfric.atlas.census_search`). Stability plays no part in it. ``docs/census.md`` says
+near return is (:mod:`contfric.censuses.search`). Stability plays no part in it. ``docs/census.md`` says
 what follows from that for completeness, and what does not.
 """
 
@@ -13,14 +13,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from contfric.atlas.census_conditions import Fate, Walk, fates_before
-from contfric.atlas.census_limits import NEAR_ENOUGH, limits_of
-from contfric.atlas.census_net import Limits, Net
-from contfric.atlas.census_orbits import Catalogue
-from contfric.atlas.census_result import Census, SectionSearch
-from contfric.atlas.census_search import Findings, Mesh, Progress, Search, Wanted, searched
-from contfric.atlas.census_sections import Section, exit_arcs, period_of, sections_of
-from contfric.atlas.census_words import canonical_pair, closed_words
+from contfric.censuses.conditions import Fate, Walk, fates_before
+from contfric.censuses.limits import NEAR_ENOUGH, limits_of
+from contfric.censuses.net import Limits, Net
+from contfric.censuses.orbits import Catalogue
+from contfric.censuses.result import Census, SectionSearch
+from contfric.censuses.search import Findings, Mesh, Progress, Search, Wanted, searched
+from contfric.censuses.sections import Section, exit_arcs, period_of, sections_of
+from contfric.censuses.words import canonical_pair, closed_words
 from contfric.errors import ParameterError, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.atlas.census_net import Net
+from contfric.censuses.net import Net
 from contfric.models.definition import FloatArray
 from contfric.orbit.system import IntArray
 

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.atlas.census_conditions import Arcs
-from contfric.atlas.census_words import letters_of, modes_after
+from contfric.censuses.conditions import Arcs
+from contfric.censuses.words import letters_of, modes_after
 from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray, exit_domains, mirror_mode
@@ -173,7 +173,7 @@ def sweep_from(
     periods : time to follow, in periods
     events : most events of each
     """
-    from contfric.atlas.census_sweep import sweep
+    from contfric.censuses.sweep import sweep
 
     model, count = section.model, len(phases)
     n, period = len(model.states), period_of(model, vector)

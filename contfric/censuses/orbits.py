@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from contfric.atlas.census_words import canonical_pair
 from contfric.atlas.matching import stops_distance
+from contfric.censuses.words import canonical_pair
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import settle

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from contfric.atlas.census_conditions import Fate, Walk
+from contfric.censuses.conditions import Fate, Walk
 from contfric.extras import need_pandas
 from contfric.models.definition import Model
 from contfric.orbit.orbit import DEGENERATE, Orbit

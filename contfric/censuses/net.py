@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.atlas.census_sections import (
+from contfric.censuses.sections import (
     Section,
     Sweep,
     dimension_of,
@@ -21,7 +21,7 @@ from contfric.atlas.census_sections import (
     period_of,
     sweep_from,
 )
-from contfric.atlas.census_words import is_stop, letters_of, modes_after
+from contfric.censuses.words import is_stop, letters_of, modes_after
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.simulation import SimulationEnd
 from contfric.orbit.system import IntArray, mirror_mode

@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.atlas.census_cells import (
+from contfric.censuses.cells import (
     Cells,
     Near,
     closing_nodes,
@@ -32,10 +32,10 @@ from contfric.atlas.census_cells import (
     make_cells,
     near_cells,
 )
-from contfric.atlas.census_conditions import Fate
-from contfric.atlas.census_net import Net
-from contfric.atlas.census_orbits import Catalogue
-from contfric.atlas.census_words import canonical_pair
+from contfric.censuses.conditions import Fate
+from contfric.censuses.net import Net
+from contfric.censuses.orbits import Catalogue
+from contfric.censuses.words import canonical_pair
 from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit, Status
