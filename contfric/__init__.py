@@ -266,7 +266,7 @@ def __getattr__(name: str) -> Any:
 
         return version("contfric")
     if name in _HOMES:
-        from contfric.interrupts import held_back
+        from contfric.base.interrupts import held_back
 
         with held_back():
             home = import_module(_HOMES[name])

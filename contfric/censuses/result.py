@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from contfric.base.extras import need_pandas
+from contfric.base.shown import Shown
 from contfric.censuses.conditions import Fate, Walk
-from contfric.extras import need_pandas
 from contfric.models.definition import Model
 from contfric.orbit.orbit import DEGENERATE, Orbit
-from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

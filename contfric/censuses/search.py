@@ -36,12 +36,12 @@ from contfric.censuses.conditions import Fate
 from contfric.censuses.net import Net
 from contfric.censuses.orbits import Catalogue
 from contfric.censuses.words import canonical_pair
-from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import polish
 from contfric.orbit.system import IntArray, build_system
 from contfric.orbit.words import whole_of
+from contfric.remember.journal import remembered
 from contfric.signature import ReducedWord
 
 Progress = Callable[[str], None]

@@ -20,14 +20,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.tally import tally
 from contfric.censuses.conditions import Arcs
 from contfric.censuses.words import letters_of, modes_after
-from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray, exit_domains, mirror_mode
 from contfric.orbit.tables import tables
+from contfric.remember.journal import remembered
 from contfric.signature.reduced import ReducedPair
-from contfric.tally import tally
 
 #: Phases at which it is asked whether an exit can be met: an arc narrower than this part of a period
 #: may be missed.

@@ -109,7 +109,7 @@ def _check_files(folder: Path, names: list[str]) -> None:
 
 def list_signatures(options: argparse.Namespace) -> int:
     """``contfric signatures list``."""
-    from contfric.shown import aligned
+    from contfric.base.shown import aligned
     from contfric.signature import load_signature, signature_names
 
     rows = [["name", "model", "periods", "segments"]]

@@ -20,6 +20,7 @@ from itertools import pairwise, product
 
 import numpy as np
 
+from contfric.base.shown import Shown
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import candidates
 from contfric.continuation.events import Bifurcation
@@ -30,7 +31,6 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import polish
 from contfric.orbit.system import Margin, build_system
-from contfric.shown import Shown
 from contfric.signature.cyclic import least_rotation, primitive_length
 from contfric.signature.edits import concatenate
 

@@ -8,13 +8,13 @@ from typing import TypeAlias
 
 from pydantic import ConfigDict, Field
 
+from contfric.base.yaml_lines import LocatedYaml, read_yaml
+from contfric.base.yaml_schema import Part, Truth, validated
 from contfric.errors import NotationError, ParameterError, did_you_mean
 from contfric.models import Model, load_model
 from contfric.models.files import is_path, relative_model
 from contfric.signature.library import SUFFIXES, signature_path
 from contfric.signature.notation import Signature, split_segments, walk_fault
-from contfric.yaml_lines import LocatedYaml, read_yaml
-from contfric.yaml_schema import Part, Truth, validated
 
 SignatureLike: TypeAlias = str | Path | Signature
 

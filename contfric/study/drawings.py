@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING
 
+from contfric.base.files import replacing
 from contfric.errors import did_you_mean
-from contfric.files import replacing
 from contfric.study.schema import FIGURES, Figure, Format, Journal, StudyFile
 from contfric.study.wanted import Row
 
 if TYPE_CHECKING:
+    from contfric.base.yaml_lines import LocatedYaml
     from contfric.study.tasks.task import Found, Task
-    from contfric.yaml_lines import LocatedYaml
 
 
 @dataclass(frozen=True)

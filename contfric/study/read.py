@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from contfric.base.yaml_lines import Address, LocatedYaml, read_yaml
+from contfric.base.yaml_schema import validated
 from contfric.errors import (
     NotationError,
     ParameterError,
@@ -24,8 +26,6 @@ from contfric.study.drawings import Drawing, drawings_of
 from contfric.study.library import SUFFIXES, study_path
 from contfric.study.schema import StudyFile
 from contfric.study.wanted import Row, Want
-from contfric.yaml_lines import Address, LocatedYaml, read_yaml
-from contfric.yaml_schema import validated
 
 if TYPE_CHECKING:
     from contfric.study.tasks.one_parameter import OneParameter

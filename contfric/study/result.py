@@ -7,8 +7,8 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from contfric.base.shown import Shown
 from contfric.errors import ResultFileError
-from contfric.shown import Shown
 from contfric.study.read import Study
 from contfric.study.tasks.branch import ContinueTask
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field, create_model
 
+from contfric.base.yaml_schema import Part
 from contfric.study.tasks import TASKS
 from contfric.study.tasks.one_parameter import OneParameter
 from contfric.study.tasks.orbit import Simulated, Start
 from contfric.study.wanted import Rows, Want, Wants
-from contfric.yaml_schema import Part
 
 if TYPE_CHECKING:
     from contfric.study.tasks.task import FigureKind, Task

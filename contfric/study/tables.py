@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from contfric.files import replacing
+from contfric.base.files import replacing
 from contfric.study.wanted import Want
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.shown import _FACTS, Shown
+from contfric.base.shown import _FACTS, Shown
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 CHAOS = {"Omega": 0.35, "S": 0.05, "S0": 0.4}

@@ -627,7 +627,7 @@ def test_interrupted_while_writing(tmp_path, write, monkeypatch) -> None:
 
 
 def test_a_full_disk_loses_no_result(tmp_path, write, monkeypatch) -> None:
-    from contfric import files
+    from contfric.base import files
 
     synced: list[int] = []
 

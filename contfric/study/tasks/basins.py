@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from contfric.shown import aligned
+from contfric.base.shown import aligned
 from contfric.study.tables import Table
 from contfric.study.tasks.response import Response
 from contfric.study.tasks.task import (
@@ -22,11 +22,11 @@ from contfric.study.tasks.task import (
 )
 
 if TYPE_CHECKING:
+    from contfric.base.yaml_lines import LocatedYaml
     from contfric.models.definition import Model
     from contfric.response.basins import Basins
     from contfric.study.read import Study
     from contfric.study.schema import StudyFile
-    from contfric.yaml_lines import LocatedYaml
 
 
 class BasinsTask(Response):

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field
 
+from contfric.base.yaml_schema import Truth, keys_of
 from contfric.study.tasks.one_parameter import OneParameter
 from contfric.study.tasks.task import Job, Seeds, Skipped
 from contfric.study.wanted import Want
-from contfric.yaml_schema import Truth, keys_of
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
+from contfric.base.shown import aligned
 from contfric.errors import ParameterError, checked_range, did_you_mean
-from contfric.shown import aligned
 from contfric.study.tables import Table
 from contfric.study.tasks.response import Response
 from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Job, attempt, incomplete
 
 if TYPE_CHECKING:
+    from contfric.base.yaml_lines import LocatedYaml
     from contfric.ensembles.ensemble import Ensemble
     from contfric.models.definition import Model
     from contfric.study.read import Study
     from contfric.study.schema import StudyFile
-    from contfric.yaml_lines import LocatedYaml
 
 #: Events and classes that the summary lists; the record has all of them.
 _MOST = 12

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
+from contfric.base.shown import aligned
 from contfric.errors import checked_range
-from contfric.shown import aligned
 from contfric.study.tables import Table
 from contfric.study.tasks.response import Response
 from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Job, attempt, incomplete
 
 if TYPE_CHECKING:
+    from contfric.base.yaml_lines import LocatedYaml
     from contfric.equilibria.events import EquilibriumEvent
     from contfric.equilibria.explore import EquilibriumDiagram
     from contfric.models.definition import Model
     from contfric.study.read import Study
     from contfric.study.schema import StudyFile
-    from contfric.yaml_lines import LocatedYaml
 
 
 class EquilibriaTask(Response):

@@ -27,12 +27,12 @@ from contfric.study.tasks.task import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from contfric.base.yaml_lines import LocatedYaml
     from contfric.chaos.map import LyapunovMap
     from contfric.models.definition import Model
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
     from contfric.study.schema import StudyFile
-    from contfric.yaml_lines import LocatedYaml
 
 
 class LyapunovTask(Task):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
-from contfric.shown import aligned
+from contfric.base.shown import aligned
 from contfric.study.tables import Table, points
 from contfric.study.tasks.orbit import POINTS, points_text
 from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Found, Task, attempt
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from contfric.atlas.diagram import Diagram
+    from contfric.base.yaml_lines import LocatedYaml
     from contfric.continuation.branch import Branch
     from contfric.continuation.events import Proposal
     from contfric.models.definition import Model
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
     from contfric.study.schema import StudyFile
-    from contfric.yaml_lines import LocatedYaml
 
 BIFURCATIONS = "bifurcations.csv"
 #: Rows of a diagram that show a state, which an equilibrium has, too.

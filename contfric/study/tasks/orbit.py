@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
+from contfric.base.yaml_schema import Part, keys_of
 from contfric.study.tables import Table, points
 from contfric.study.tasks.task import STATE, FigureKind, Found, Job, Skipped, Task, check_state
 from contfric.study.wanted import COLUMNS
-from contfric.yaml_schema import Part, keys_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from contfric.base.yaml_lines import LocatedYaml
     from contfric.models.definition import Model
     from contfric.orbit.orbit import Orbit
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
     from contfric.study.schema import StudyFile
-    from contfric.yaml_lines import LocatedYaml
 
 POINTS = "points.csv"
 

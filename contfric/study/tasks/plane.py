@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
+from contfric.base.yaml_schema import keys_of
 from contfric.errors import did_you_mean
 from contfric.study.tables import Table
 from contfric.study.tasks.task import FigureKind, Found, Job, Seeds, Task, attempt
-from contfric.yaml_schema import keys_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from contfric.atlas.plane import Plane
+    from contfric.base.yaml_lines import LocatedYaml
     from contfric.models.definition import Model
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
     from contfric.study.schema import StudyFile
-    from contfric.yaml_lines import LocatedYaml
 
 CURVES, SPECIAL, REGIONS = "curves.csv", "special.csv", "regions.csv"
 

@@ -12,10 +12,10 @@ from contfric.study.tasks.task import STATE, Found, Task, attempt, check_state
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from contfric.base.yaml_lines import LocatedYaml
     from contfric.models.definition import Model
     from contfric.study.drawings import Drawing
     from contfric.study.schema import StudyFile
-    from contfric.yaml_lines import LocatedYaml
 
 
 class Sense(str, Enum):

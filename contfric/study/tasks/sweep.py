@@ -14,11 +14,11 @@ from contfric.study.tasks.response import Section
 from contfric.study.tasks.task import PARAMETER, FigureKind, Job, attempt, check_axis, incomplete
 
 if TYPE_CHECKING:
+    from contfric.base.yaml_lines import LocatedYaml
     from contfric.models.definition import Model
     from contfric.response.sweep import Sweep
     from contfric.study.read import Study
     from contfric.study.schema import StudyFile
-    from contfric.yaml_lines import LocatedYaml
 
 
 class SweepDirection(str, Enum):

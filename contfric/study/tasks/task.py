@@ -13,18 +13,18 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
 
 from pydantic import Field
 
+from contfric.base.yaml_schema import Part, keys_of
 from contfric.errors import ContfricError
-from contfric.yaml_schema import Part, keys_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from contfric.base.yaml_lines import Address, LocatedYaml
     from contfric.models.definition import Model
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
     from contfric.study.schema import StudyFile
     from contfric.study.tables import Table
-    from contfric.yaml_lines import Address, LocatedYaml
 
 #: Results of a run by their names, as they come.
 Found: TypeAlias = dict[str, Any]

@@ -4,7 +4,7 @@ Numba optimises every function, with all that it calls, and turns it into machin
 into its callers, where the same is done again: along a chain of calls the innermost function is compiled
 once for each level. A helper is never called from outside, so all but the last time is wasted: half of the
 time that a new model takes to compile. Here its code stays as it was lowered, and the kernel alone
-is optimised, as a whole.
+(:mod:`contfric.compiled`) is optimised, as a whole.
 
 It is a compiler pipeline of its own (numba's manual, "Customizing the compiler") with a code library that
 leaves these steps out. The library is not a public class of numba: where it does not have what is

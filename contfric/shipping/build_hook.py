@@ -59,7 +59,7 @@ def _compiled(root: Path, folder: Path, patterns: list[str]) -> int:
     """
     sys.path.insert(0, str(root))
     try:
-        from contfric.targets import baseline, environment_of
+        from contfric.compiling.targets import baseline, environment_of
     finally:
         sys.path.remove(str(root))
     base = baseline()
@@ -69,6 +69,6 @@ def _compiled(root: Path, folder: Path, patterns: list[str]) -> int:
         "CONTFRIC_CACHE_DIR": str(folder),
         "PYTHONPATH": str(root),
     }
-    command = [sys.executable, "-m", "contfric.shipped", *patterns]
+    command = [sys.executable, "-m", "contfric.shipping.shipped", *patterns]
     done = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True)
     return int(done.stdout)

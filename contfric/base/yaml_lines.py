@@ -56,7 +56,7 @@ def read_yaml(path: Path) -> LocatedYaml:
 
     Examples
     --------
-    >>> from contfric.resources import bundled_dir
+    >>> from contfric.base.resources import bundled_dir
     >>> read_yaml(bundled_dir("signatures") / "1a.yaml").data["periods"]
     1
     """

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
+from contfric.base.yaml_lines import as_truth, comma_hint
 from contfric.errors import did_you_mean, shown
-from contfric.yaml_lines import as_truth, comma_hint
 
 if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
     from pydantic_core import ErrorDetails
 
-    from contfric.yaml_lines import Address, LocatedYaml
+    from contfric.base.yaml_lines import Address, LocatedYaml
 
 Truth = Annotated[bool, BeforeValidator(as_truth)]
 

@@ -22,9 +22,9 @@ from functools import wraps
 from threading import Event, Lock
 from typing import Any, ParamSpec, TypeVar
 
-from contfric.journal import digest_of
-from contfric.stored import UnstorableError, Writer
-from contfric.tally import count_apart
+from contfric.base.tally import count_apart
+from contfric.remember.journal import digest_of
+from contfric.remember.stored import UnstorableError, Writer
 
 P = ParamSpec("P")
 R = TypeVar("R")

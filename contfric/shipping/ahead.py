@@ -15,10 +15,10 @@ from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 
-from contfric.announced import about, expected
+from contfric.base.sources import kernels_folder, package_files
 from contfric.compiled import Kernel
-from contfric.kept import writable
-from contfric.sources import kernels_folder, package_files
+from contfric.compiling.announced import about, expected
+from contfric.compiling.kept import writable
 
 Progress = Callable[[str], None]
 
@@ -46,7 +46,7 @@ def every_kernel() -> dict[str, Kernel]:
 
     found = [kernel for kind in Kind for kernel in kernels_of(kind)]
     found += [*CODED.values(), *CHATTERING.values(), *callers()]
-    root = Path(__file__).parent
+    root = Path(__file__).parent.parent
     for file in package_files():
         if _MARK not in file.read_text(encoding="utf-8"):
             continue

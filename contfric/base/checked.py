@@ -8,8 +8,8 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
+from contfric.base.files import replacing
 from contfric.errors import ResultFileError
-from contfric.files import replacing
 
 #: Bytes of a digest: damage by chance is missed once in 2**128 times.
 _SIZE = 16

@@ -2,8 +2,8 @@
 
 Numba's own cache finds its files by the path and the line of the source, so that what is compiled in one
 folder is compiled again in another, and nothing can come with a wheel. Here a file's name says what the code
-depends on: function, signature, and what it was compiled for (:mod:`contfric.targets`). The folder says
-what sources it was compiled from, this one and :mod:`contfric.compiled` among them.
+depends on: function, signature, and what it was compiled for (:mod:`contfric.compiling.targets`). The folder
+says what sources it was compiled from, this one and :mod:`contfric.compiled` among them.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
-from contfric.checked import read_checked, write_checked
+from contfric.base.checked import read_checked, write_checked
+from contfric.compiling.targets import Target
 from contfric.errors import ResultFileError
-from contfric.targets import Target
 
 SUFFIX = ".kernel"
 

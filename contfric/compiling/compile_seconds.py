@@ -2,7 +2,7 @@
 
 Seconds on one core of an AMD EPYC of 2.6 GHz, all kernels of the package one after the other
 (``contfric doctor --compile --workers 1``): which kernel comes first pays for the helpers that others share.
-On another machine they are multiplied by a common factor (:mod:`contfric.announced`).
+On another machine they are multiplied by a common factor (:mod:`contfric.compiling.announced`).
 """
 
 SECONDS = {

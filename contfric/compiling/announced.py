@@ -1,7 +1,7 @@
 """What is compiled is said while it is, with the time that it will take, and how long it took.
 
 The times of this machine are kept in the cache. A kernel that was never compiled here takes what it took on
-the machine of :mod:`contfric.compile_seconds`, times what other kernels took here against there.
+the machine of :mod:`contfric.compiling.compile_seconds`, times what other kernels took here against there.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from typing import Any
 
 from numba.core.event import Listener, install_listener
 
-from contfric.compile_seconds import OTHER, SECONDS
+from contfric.base.files import replacing
+from contfric.base.interrupts import held_back
+from contfric.base.resources import user_cache
+from contfric.compiling.compile_seconds import OTHER, SECONDS
+from contfric.compiling.kept import writable
 from contfric.errors import ResultFileError
-from contfric.files import replacing
-from contfric.interrupts import held_back
-from contfric.kept import writable
-from contfric.resources import user_cache
 
 #: Kernels of models have the digest of the model in their names; another model's take about as long.
 _OF_A_MODEL = re.compile(r"^contfric_model_\w+")

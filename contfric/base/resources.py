@@ -12,7 +12,7 @@ from contfric.errors import ContfricError, did_you_mean
 #: Kinds of files that ship with contfric.
 Kind: TypeAlias = Literal["models", "signatures", "studies"]
 
-_PACKAGE = Path(__file__).resolve().parent
+_PACKAGE = Path(__file__).resolve().parent.parent
 _PLACES: dict[str, tuple[Path, ...]] = {
     "models": (_PACKAGE / "models" / "bundled",),
     "signatures": (_PACKAGE / "_data" / "signatures", _PACKAGE.parent / "signatures"),

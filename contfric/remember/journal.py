@@ -24,11 +24,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
+from contfric.base.files import unwritable
+from contfric.base.sources import package_digest
+from contfric.base.tally import add, tally
 from contfric.errors import ContfricError, ResultFileError
-from contfric.files import unwritable
-from contfric.sources import package_digest
-from contfric.stored import Reader, UnstorableError, Writer
-from contfric.tally import add, tally
+from contfric.remember.stored import Reader, UnstorableError, Writer
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -1,8 +1,8 @@
 """Kernels that come with the wheel: compiled when it is built, and what they fit.
 
-``python -m contfric.shipped`` compiles them into the cache, which the wheel carries as
-``contfric/_data/kernels`` (:mod:`contfric.build_hook`). With them goes a file that says what they were
-compiled by and for. It is for people: which code fits is decided by the names of the files.
+``python -m contfric.shipping.shipped`` compiles them into the cache, which the wheel carries as
+``contfric/_data/kernels`` (:mod:`contfric.shipping.build_hook`). With them goes a file that says what they
+were compiled by and for. It is for people: which code fits is decided by the names of the files.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from dataclasses import asdict
 from fnmatch import fnmatch
 from typing import Any
 
-from contfric.ahead import compile_missing, every_kernel, models_kernels
-from contfric.announced import forget_times
-from contfric.resources import SHIPPED_KERNELS, user_cache
-from contfric.sources import kernels_digest
-from contfric.targets import shipped_target, target
+from contfric.base.resources import SHIPPED_KERNELS, user_cache
+from contfric.base.sources import kernels_digest
+from contfric.compiling.announced import forget_times
+from contfric.compiling.targets import shipped_target, target
+from contfric.shipping.ahead import compile_missing, every_kernel, models_kernels
 
 _FACTS = "target.json"
 

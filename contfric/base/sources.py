@@ -10,11 +10,11 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
-from contfric.resources import user_cache
+from contfric.base.resources import user_cache
 
 #: Text of a file whose code may be part of a kernel.
 _MARK = b"contfric.compiled"
-_ROOT = Path(__file__).parent
+_ROOT = Path(__file__).parent.parent
 #: What came with a wheel beside the package: generated modules in it are none of its own.
 _DATA = _ROOT / "_data"
 
