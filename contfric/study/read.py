@@ -24,7 +24,7 @@ from contfric.quantities.registry import number_quantity, quantity_names
 from contfric.signature import Signature, load_signature
 from contfric.study.drawings import Drawing, drawings_of
 from contfric.study.library import SUFFIXES, study_path
-from contfric.study.schema import StudyFile
+from contfric.study.schema import SCHEMA, StudyFile
 from contfric.study.wanted import Row, Want
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def _validated(located: LocatedYaml) -> StudyFile:
             ("start",),
             f"'start' is 'simulate' or a mapping such as {{signature: 1a}}, got '{start}'",
         )
-    return validated(located, StudyFile, data)
+    return validated(located, SCHEMA, data)
 
 
 def _checked(located: LocatedYaml, content: StudyFile) -> Study:

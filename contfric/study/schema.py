@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 from keyword import iskeyword
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import Field, create_model
 
@@ -61,8 +62,10 @@ class Figure(Part):
     )
 
 
-class _Head(Part):
-    """What a study file has beside its tasks."""
+class StudyFile(Part):
+    """The content of a study file: what it has beside its tasks, and those that it asks for."""
+
+    known: ClassVar[tuple[type[Task], ...]] = ()
 
     title: str | None = Field(None, description="a text")
     model: str = Field(description="the name of a model, or the path of its YAML file")
@@ -89,7 +92,7 @@ class _Head(Part):
     @property
     def given(self) -> list[Task]:
         """The tasks that it asks for, in the order of the steps."""
-        found = (getattr(self, _field(task)) for task in TASKS)
+        found = (getattr(self, _field(task)) for task in self.known)
         return [task for task in found if task is not None]
 
     @property
@@ -119,21 +122,18 @@ def _field(task: type[Task]) -> str:
     return f"{task.name}_" if iskeyword(task.name) else task.name
 
 
-if TYPE_CHECKING:
-
-    class StudyFile(_Head):
-        """The content of a study file."""
-
-else:
-    StudyFile = create_model(
-        "StudyFile",
-        __base__=_Head,
-        __doc__="The content of a study file.",
-        **{
-            _field(task): (
-                task | None,
-                Field(None, alias=task.name, description=task.described()),
-            )
-            for task in TASKS
-        },
+def schema_of(tasks: Sequence[type[Task]]) -> type[StudyFile]:
+    """Return the schema of study files that may ask for these tasks."""
+    fields: dict[str, Any] = {
+        _field(task): (task | None, Field(None, alias=task.name, description=task.described()))
+        for task in tasks
+    }
+    made = create_model(
+        "StudyFile", __base__=StudyFile, __doc__="The content of a study file.", **fields
     )
+    made.known = tuple(tasks)
+    return made
+
+
+#: Files that may ask for every task of the list.
+SCHEMA = schema_of(TASKS)
