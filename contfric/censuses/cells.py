@@ -1,4 +1,4 @@
-"""Cells of a net, and where the return map of a section may have a fixed point.
+"""Cells of a grid, and where the return map of a section may have a fixed point.
 
 A cell is a box of the section whose corners are nodes. With the event j of all corners at the end of
 the same walk back to the section, the gap of a corner is what its return misses,
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.censuses.net import Net
+from contfric.censuses.grid import Grid
 from contfric.models.definition import FloatArray
 from contfric.orbit.system import IntArray
 
@@ -37,7 +37,7 @@ class Cells:
     ----------
     low : lowest corner of each, shape (K, d)
     size : of all of them, in units of the lattice
-    rows : of the net's nodes at the corners, shape (K, 2**d)
+    rows : of the grid's nodes at the corners, shape (K, 2**d)
     """
 
     low: IntArray
@@ -79,48 +79,48 @@ def corners_of(dimension: int) -> IntArray:
     return (places[:, None] >> np.arange(dimension)[None, :]) & 1
 
 
-def make_cells(net: Net, low: IntArray, size: int) -> Cells:
+def make_cells(grid: Grid, low: IntArray, size: int) -> Cells:
     """Return the cells with these lowest corners; those without any start are left out."""
     corners = low[:, None, :] + size * corners_of(low.shape[1])[None, :, :]
-    rows = net.rows(corners.reshape(-1, low.shape[1])).reshape(len(low), corners.shape[1])
-    alive = (net.code[rows, 0] >= 0).any(axis=1)
+    rows = grid.rows(corners.reshape(-1, low.shape[1])).reshape(len(low), corners.shape[1])
+    alive = (grid.code[rows, 0] >= 0).any(axis=1)
     return Cells(low[alive], size, rows[alive])
 
 
-def halved(net: Net, cells: Cells, chosen: NDArray[np.bool_]) -> Cells:
+def halved(grid: Grid, cells: Cells, chosen: NDArray[np.bool_]) -> Cells:
     """Return the parts of half the size of the chosen cells."""
     size = cells.size // 2
     dimension = cells.low.shape[1]
     low = cells.low[chosen][:, None, :] + size * corners_of(dimension)[None, :, :]
-    return make_cells(net, low.reshape(-1, dimension), size)
+    return make_cells(grid, low.reshape(-1, dimension), size)
 
 
-def common_walks(net: Net, cells: Cells) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def common_walks(grid: Grid, cells: Cells) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return the events that all corners have in common, shape (K, E), and which cells are mixed."""
-    code, lift = net.code[cells.rows], net.lift[cells.rows]
+    code, lift = grid.code[cells.rows], grid.lift[cells.rows]
     same = (code == code[:, :1]).all(axis=1)
     common = np.logical_and.accumulate(same, axis=1)
     first = np.argmin(common, axis=1)
     earliest = lift.min(axis=1)[np.arange(len(cells)), first]
-    mixed = ~common.all(axis=1) & (earliest <= net.limits.periods + _SLACK)
+    mixed = ~common.all(axis=1) & (earliest <= grid.limits.periods + _SLACK)
     return common & (code[:, 0] >= 0), mixed
 
 
-def near_cells(net: Net, cells: Cells, common: NDArray[np.bool_]) -> Iterator[Near]:
+def near_cells(grid: Grid, cells: Cells, common: NDArray[np.bool_]) -> Iterator[Near]:
     """Yield the cells that are near to a fixed point, for every walk and number of periods."""
-    code = net.code[cells.rows[:, 0]]
-    for event in range(net.events):
+    code = grid.code[cells.rows[:, 0]]
+    for event in range(grid.events):
         for half in (False, True):
-            closing = common[:, event] & (code[:, event] == (net.image if half else net.own))
+            closing = common[:, event] & (code[:, event] == (grid.image if half else grid.own))
             chosen = np.flatnonzero(closing)
             if len(chosen):
-                yield from _near(net, cells, chosen, event, half)
+                yield from _near(grid, cells, chosen, event, half)
 
 
-def _near(net: Net, cells: Cells, chosen: IntArray, event: int, half: bool) -> Iterator[Near]:
-    gaps = gaps_of(net, cells.rows[chosen], event, half)
-    step, fraction = (2, _fraction(net)) if half else (1, 1.0)
-    for periods in range(1, net.limits.periods + 1, step):
+def _near(grid: Grid, cells: Cells, chosen: IntArray, event: int, half: bool) -> Iterator[Near]:
+    gaps = gaps_of(grid, cells.rows[chosen], event, half)
+    step, fraction = (2, _fraction(grid)) if half else (1, 1.0)
+    for periods in range(1, grid.limits.periods + 1, step):
         here = gaps.copy()
         here[..., 0] -= periods * fraction
         low, high = here.min(axis=1), here.max(axis=1)
@@ -130,19 +130,19 @@ def _near(net: Net, cells: Cells, chosen: IntArray, event: int, half: bool) -> I
             yield Near(chosen[near], event, periods, half, here[near])
 
 
-def closing_nodes(net: Net, rows: IntArray, limit: FloatArray) -> Iterator[Near]:
+def closing_nodes(grid: Grid, rows: IntArray, limit: FloatArray) -> Iterator[Near]:
     """Yield the nodes with gaps below a limit, shape (d,), for every walk and number of periods.
 
     The cells of the result are the rows of the nodes.
     """
-    for event in range(net.events):
+    for event in range(grid.events):
         for half in (False, True):
-            chosen = rows[net.code[rows, event] == (net.image if half else net.own)]
+            chosen = rows[grid.code[rows, event] == (grid.image if half else grid.own)]
             if not len(chosen):
                 continue
-            gaps = gaps_of(net, chosen, event, half)
-            step, fraction = (2, _fraction(net)) if half else (1, 1.0)
-            for periods in range(1, net.limits.periods + 1, step):
+            gaps = gaps_of(grid, chosen, event, half)
+            step, fraction = (2, _fraction(grid)) if half else (1, 1.0)
+            for periods in range(1, grid.limits.periods + 1, step):
                 here = gaps.copy()
                 here[:, 0] -= periods * fraction
                 near = (np.abs(here) <= limit).all(axis=1)
@@ -150,19 +150,19 @@ def closing_nodes(net: Net, rows: IntArray, limit: FloatArray) -> Iterator[Near]
                     yield Near(chosen[near], event, periods, half, here[near][:, None, :])
 
 
-def _fraction(net: Net) -> float:
-    assert net.model.symmetry is not None  # there is no half without it
-    return net.model.symmetry.fraction
+def _fraction(grid: Grid) -> float:
+    assert grid.model.symmetry is not None  # there is no half without it
+    return grid.model.symmetry.fraction
 
 
-def gaps_of(net: Net, rows: IntArray, event: int, half: bool) -> FloatArray:
+def gaps_of(grid: Grid, rows: IntArray, event: int, half: bool) -> FloatArray:
     """Return the gaps of nodes at one event, shape (.., d); the periods are not yet taken off."""
-    start, end = net.start[rows], net.state[rows, event]
+    start, end = grid.start[rows], grid.state[rows, event]
     if half:
-        assert net.model.symmetry is not None
-        start = start @ net.model.symmetry.array().T
+        assert grid.model.symmetry is not None
+        start = start @ grid.model.symmetry.array().T
         # the section's own directions, as the symmetry sees them
-        basis = net.model.symmetry.array() @ net.section.basis
+        basis = grid.model.symmetry.array() @ grid.section.basis
     else:
-        basis = net.section.basis
-    return np.concatenate([net.lift[rows, event][..., None], (end - start) @ basis], axis=-1)
+        basis = grid.section.basis
+    return np.concatenate([grid.lift[rows, event][..., None], (end - start) @ basis], axis=-1)

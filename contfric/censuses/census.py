@@ -2,7 +2,7 @@
 
 What is asked for are closed words of the transition graph (:mod:`contfric.censuses.words`); what
 is done is one search on each section that orbits meet (:mod:`contfric.censuses.sections`), which
-tries all words at once: a net of starts is simulated, and refined wherever a discontinuity or a
+tries all words at once: a grid of starts is simulated, and refined wherever a discontinuity or a
 near return is (:mod:`contfric.censuses.search`). Stability plays no part in it. ``docs/census.md`` says
 what follows from that for completeness, and what does not.
 """
@@ -13,12 +13,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from contfric.censuses.asked import Findings, Mesh, Wanted
 from contfric.censuses.conditions import Fate, Walk, fates_before
+from contfric.censuses.grid import Grid, Limits
 from contfric.censuses.limits import NEAR_ENOUGH, limits_of
-from contfric.censuses.net import Limits, Net
 from contfric.censuses.orbits import Catalogue
 from contfric.censuses.result import Census, SectionSearch
-from contfric.censuses.search import Findings, Mesh, Progress, Search, Wanted, searched
+from contfric.censuses.search import Progress, Search, searched
 from contfric.censuses.sections import Section, exit_arcs, period_of, sections_of
 from contfric.censuses.words import canonical_pair, closed_words
 from contfric.errors import ParameterError, whole_number
@@ -70,7 +71,7 @@ def census(
     most_starts : int
         Most trajectories on one section; if they are used up, ``complete`` is False.
     seed : int
-        Shifts the nets; the same seed gives the same census.
+        Shifts the grids; the same seed gives the same census.
     progress : callable, optional
         Takes one line of text now and then.
 
@@ -164,32 +165,32 @@ class _Census:
         """Search one section in one box; None if no word needs it."""
         mesh = (_CURVE if section.dimension == 1 else _BOX).refined(self.finer)
         shift = np.random.default_rng(self.seed).uniform(size=section.dimension) / 2.0**mesh.coarse
-        net = Net(section, self.vector, self.limits, shift, _BITS, reach)
-        if not net.useful:
+        grid = Grid(section, self.vector, self.limits, shift, _BITS, reach)
+        if not grid.useful:
             return None
         wanted = Wanted(self.model, self.fates)
-        search = Search(net, mesh, self.catalogue, wanted, self.most_starts)
+        search = Search(grid, mesh, self.catalogue, wanted, self.most_starts)
         try:
             found = searched(search, self.progress)
         except BaseException:
-            self._record(net, mesh, search.findings())
+            self._record(grid, mesh, search.findings())
             raise
-        self._record(net, mesh, found)
+        self._record(grid, mesh, found)
         return found
 
-    def _record(self, net: Net, mesh: Mesh, found: Findings) -> None:
+    def _record(self, grid: Grid, mesh: Mesh, found: Findings) -> None:
         self.catalogue = found.catalogue
         for codes in found.walks:
-            word = net.word_of(codes)
-            half = codes[-1] != net.own
+            word = grid.word_of(codes)
+            half = codes[-1] != grid.own
             self.walked.add(canonical_pair(self.model, whole_of(self.model, word, half)))
         self.searches.append(
             SectionSearch(
-                str(net.section),
-                net.section.dimension,
+                str(grid.section),
+                grid.section.dimension,
                 0.5**mesh.coarse,
                 0.5 ** max(mesh.torn, mesh.near),
-                net.reach if net.section.dimension > 1 else 0.0,
+                grid.reach if grid.section.dimension > 1 else 0.0,
                 found.farthest,
                 found.starts,
                 found.solves,

@@ -34,7 +34,7 @@ class Fate(str, Enum):
 
     ONE_WAY = "pruned: the displacement never returns"
     TURNS = "pruned: its exits cannot be met in so few periods"
-    NOT_WALKED = "not walked by any start (heuristic: the net may be too coarse)"
+    NOT_WALKED = "not walked by any start (heuristic: the grid may be too coarse)"
     NOT_CLOSED = "walked, but no orbit of this many periods"
     FOUND = "walked by an orbit"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from contfric.censuses.net import Limits
+from contfric.censuses.grid import Limits
 from contfric.censuses.orbits import Catalogue
 from contfric.censuses.result import SectionSearch
 from contfric.signature.edits import show

@@ -72,7 +72,7 @@ class Census(Shown):
     limits : tuple of str
         What bounds the census: why an orbit could be missing.
     seed : int
-        Of the nets.
+        Of the grids.
     complete : bool
         False if it was interrupted, or ended by the limit on starts.
     interrupted : bool

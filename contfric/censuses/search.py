@@ -23,6 +23,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.censuses.asked import Findings, Mesh, Wanted
 from contfric.censuses.cells import (
     Cells,
     Near,
@@ -32,11 +33,9 @@ from contfric.censuses.cells import (
     make_cells,
     near_cells,
 )
-from contfric.censuses.conditions import Fate
-from contfric.censuses.net import Net
+from contfric.censuses.grid import Grid
 from contfric.censuses.orbits import Catalogue
-from contfric.censuses.words import canonical_pair
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import polish
 from contfric.orbit.system import IntArray, build_system
@@ -63,69 +62,11 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class Mesh:
-    """Sizes of cells, as powers of two a unit of each axis.
-
-    Attributes
-    ----------
-    coarse : of the first cells
-    torn, near : of the smallest ones that are torn, or near
-    settled : a cell with an orbit in it is halved down to this (sections of dimension above one)
-    """
-
-    coarse: int
-    torn: int
-    near: int
-    settled: int
-
-    def refined(self, by: int) -> Mesh:
-        """Return the mesh with all cells halved a number of times."""
-        return Mesh(self.coarse + by, self.torn + by, self.near + by, self.settled + by)
-
-
-@dataclass(frozen=True)
 class Root:
     """A fixed point of a walk's map: coordinates on the section and, in one dimension, its slope."""
 
     at: FloatArray
     slope: float | None
-
-
-@dataclass(frozen=True, eq=False)
-class Wanted:
-    """Which walks may have an orbit: those within the limits that no necessary condition rules out."""
-
-    model: Model
-    fates: dict[tuple[ReducedWord, int], Fate | None]
-
-    def __call__(self, word: ReducedWord, periods: int) -> bool:
-        """Return whether a walk may have an orbit."""
-        walk = canonical_pair(self.model, word), periods
-        return walk in self.fates and self.fates[walk] is None
-
-
-@dataclass(frozen=True, eq=False)
-class Findings:
-    """What a search has left behind.
-
-    Attributes
-    ----------
-    catalogue : the orbits known after it
-    walks : an example of each walk from the section back to it or to its mirror image
-    starts, held, cut, jumps, open, solves, complete : as of the net and of the search
-    farthest : largest position of a fixed point, 0 without any
-    """
-
-    catalogue: Catalogue
-    walks: tuple[tuple[int, ...], ...]
-    starts: int
-    held: int
-    cut: int
-    jumps: int
-    open: int
-    solves: int
-    complete: bool
-    farthest: float
 
 
 @dataclass(eq=False)
@@ -139,7 +80,7 @@ class Search:
     jumps, open : discontinuities, and near returns without an orbit, that are left at the smallest size
     """
 
-    net: Net
+    grid: Grid
     mesh: Mesh
     catalogue: Catalogue
     wanted: Wanted
@@ -155,24 +96,24 @@ class Search:
     def run(self) -> None:
         """Search the whole section."""
         level = self.mesh.coarse
-        cells = make_cells(self.net, self._first_cells(), 1 << (self.net.bits - level))
+        cells = make_cells(self.grid, self._first_cells(), 1 << (self.grid.bits - level))
         while len(cells):
             self._say(level, len(cells))
-            if self.net.count > self.most:
+            if self.grid.count > self.most:
                 self.complete = False
                 return
             chosen = self._judge(cells, level)
-            cells, level = halved(self.net, cells, chosen), level + 1
+            cells, level = halved(self.grid, cells, chosen), level + 1
 
     def findings(self) -> Findings:
         """Return what was found so far."""
-        net = self.net
+        grid = self.grid
         return Findings(
             self.catalogue.copy(),
-            tuple(net.walked.values()),
-            net.count,
-            net.held,
-            net.cut,
+            tuple(grid.walked.values()),
+            grid.count,
+            grid.held,
+            grid.cut,
             self.jumps,
             self.open,
             self.solves,
@@ -183,7 +124,7 @@ class Search:
     @property
     def farthest(self) -> float:
         """Largest position of a fixed point, 0 without any, and on a section that is a curve."""
-        if self.net.section.dimension == 1:
+        if self.grid.section.dimension == 1:
             return 0.0
         places = [np.abs(root.at[1:]).max() for found in self.roots.values() for root in found]
         return float(max(places, default=0.0))
@@ -192,24 +133,24 @@ class Search:
         if self.progress is not None:
             found = len(self.catalogue)
             self.progress(
-                f"{self.net.section}: {count} cells of 2^-{level}, {self.net.count} starts, "
+                f"{self.grid.section}: {count} cells of 2^-{level}, {self.grid.count} starts, "
                 f"{found} orbits"
             )
 
     def _first_cells(self) -> IntArray:
         axis = np.arange(1 << self.mesh.coarse, dtype=np.int64) << (
-            self.net.bits - self.mesh.coarse
+            self.grid.bits - self.mesh.coarse
         )
-        axes = np.meshgrid(*[axis] * self.net.section.dimension, indexing="ij")
+        axes = np.meshgrid(*[axis] * self.grid.section.dimension, indexing="ij")
         return np.stack([a.ravel() for a in axes], axis=1)
 
     def _judge(self, cells: Cells, level: int) -> NDArray[np.bool_]:
         """Return which cells are to be halved; orbits found in them are in the catalogue."""
-        common, mixed = common_walks(self.net, cells)
+        common, mixed = common_walks(self.grid, cells)
         torn, chosen = mixed.copy(), np.zeros(len(cells), dtype=bool)
-        limit = np.full(self.net.section.dimension, _COARSE)
-        limit[1:] *= 2.0 * self.net.reach
-        for near in near_cells(self.net, cells, common):
+        limit = np.full(self.grid.section.dimension, _COARSE)
+        limit[1:] *= 2.0 * self.grid.reach
+        for near in near_cells(self.grid, cells, common):
             coarse = (np.ptp(near.gaps, axis=1) > limit).any(axis=1)
             torn[near.cells[coarse]] = True
             if level >= self.mesh.torn:
@@ -220,7 +161,7 @@ class Search:
                 chosen[near.cells[k]] = True
                 if level >= self.mesh.near:
                     self._leave(near, int(k), level)
-        if self.net.section.dimension > 1:
+        if self.grid.section.dimension > 1:
             self._try_corners(cells, torn, level)
         return chosen & (level < self.mesh.near) | torn & (level < self.mesh.torn)
 
@@ -237,11 +178,11 @@ class Search:
 
     def _try_corners(self, cells: Cells, torn: NDArray[np.bool_], level: int) -> None:
         """Start Newton from those corners of torn cells whose return nearly closes."""
-        net = self.net
+        grid = self.grid
         rows = np.unique(cells.rows[torn])
-        limit = np.full(net.section.dimension, _STRETCH * 0.5**level)
-        limit[1:] *= 2.0 * net.reach
-        for walk in closing_nodes(net, rows, limit):
+        limit = np.full(grid.section.dimension, _STRETCH * 0.5**level)
+        limit[1:] *= 2.0 * grid.reach
+        for walk in closing_nodes(grid, rows, limit):
             for row in walk.cells.tolist():
                 place = (row, walk.event, walk.periods, walk.half)
                 if place not in self._tried:
@@ -249,9 +190,9 @@ class Search:
                     self._start(row, walk)
 
     def _start(self, row: int, walk: Near) -> None:
-        codes = tuple(self.net.code[row, : walk.event + 1].tolist())
-        word = self.net.word_of(codes)
-        if not self.wanted(whole_of(self.net.model, word, walk.half), walk.periods):
+        codes = tuple(self.grid.code[row, : walk.event + 1].tolist())
+        word = self.grid.word_of(codes)
+        if not self.wanted(whole_of(self.grid.model, word, walk.half), walk.periods):
             return
         root = self._solve(row, walk, word)
         _keep(self.roots.setdefault((codes, walk.periods, walk.half), []), root)
@@ -262,9 +203,9 @@ class Search:
         """Tell whether nothing is left to find in a near cell."""
         cell = int(near.cells[k])
         rows = cells.rows[cell]
-        codes = tuple(self.net.code[rows[0], : near.event + 1].tolist())
-        word = self.net.word_of(codes)
-        if not self.wanted(whole_of(self.net.model, word, near.half), near.periods):
+        codes = tuple(self.grid.code[rows[0], : near.event + 1].tolist())
+        word = self.grid.word_of(codes)
+        if not self.wanted(whole_of(self.grid.model, word, near.half), near.periods):
             return True
         roots = self.roots.setdefault((codes, near.periods, near.half), [])
         beside = [root for root in roots if self._distance(cells, cell, root) <= 1.0]
@@ -282,10 +223,10 @@ class Search:
 
     def _distance(self, cells: Cells, cell: int, root: Root) -> float:
         """Return the distance of a root from a cell (0: inside), in sizes of the cell."""
-        unit = float(1 << self.net.bits)
-        low, size = cells.low[cell] / unit + self.net.shift, cells.size / unit
+        unit = float(1 << self.grid.bits)
+        low, size = cells.low[cell] / unit + self.grid.shift, cells.size / unit
         share = root.at.copy()
-        share[1:] = 0.5 * (share[1:] / self.net.reach + 1.0)
+        share[1:] = 0.5 * (share[1:] / self.grid.reach + 1.0)
         away = share - low - 0.5 * size
         away[0] -= np.rint(away[0])
         return float(max(0.0, np.max(np.abs(away)) / size - 0.5))
@@ -293,31 +234,31 @@ class Search:
     def _is_straight(self, rows: IntArray, gaps: FloatArray, root: Root) -> bool:
         """Tell whether the gaps at the corners are those of the line through a root."""
         assert root.slope is not None
-        away = self.net.time[rows] - root.at[0]
+        away = self.grid.time[rows] - root.at[0]
         line = root.slope * (away - np.rint(away))
         return bool(np.all(np.abs(gaps - line) <= _BENT * np.abs(line) + _ROUNDING))
 
     def _solve(self, row: int, near: Near, word: ReducedWord) -> Root | None:
         """Start Newton from a node; the orbit goes to the catalogue, its place on the section back."""
-        net = self.net
+        grid = self.grid
         self.solves += 1
-        joints = np.empty((near.event + 1, 1 + net.start.shape[1]))
-        joints[0, 0], joints[0, 1:] = net.time[row], net.start[row]
-        joints[1:, 0] = net.time[row] + net.lift[row, : near.event]
-        joints[1:, 1:] = net.state[row, : near.event]
-        joints[:, 0] *= net.period
-        system = build_system(net.model, word, near.periods, near.half)
-        orbit = polish(Orbit(system, joints, net.vector.copy(), np.inf, Status.NOT_CONVERGED))
+        joints = np.empty((near.event + 1, 1 + grid.start.shape[1]))
+        joints[0, 0], joints[0, 1:] = grid.time[row], grid.start[row]
+        joints[1:, 0] = grid.time[row] + grid.lift[row, : near.event]
+        joints[1:, 1:] = grid.state[row, : near.event]
+        joints[:, 0] *= grid.period
+        system = build_system(grid.model, word, near.periods, near.half)
+        orbit = polish(Orbit(system, joints, grid.vector.copy(), np.inf, Status.NOT_CONVERGED))
         if orbit.converged:  # after cut corrections the last ones may not have come to rounding
             orbit = polish(orbit, damped=False)
         if not orbit.converged or not orbit.admissible:
             return None
         self.catalogue.add(orbit)
-        at = np.empty(net.section.dimension)
-        at[0] = (orbit.joints[0, 0] / net.period) % 1.0
-        at[1:] = orbit.joints[0, 1:] @ net.section.basis
+        at = np.empty(grid.section.dimension)
+        at[0] = (orbit.joints[0, 0] / grid.period) % 1.0
+        at[1:] = orbit.joints[0, 1:] @ grid.section.basis
         slope = None
-        if net.section.dimension == 1:
+        if grid.section.dimension == 1:
             slope = float(orbit.turn_multipliers[0].real) - 1.0
         return Root(at, slope)
 

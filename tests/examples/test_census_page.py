@@ -28,7 +28,7 @@ def test_output_is_that_of_the_command(capsys: pytest.CaptureFixture[str]) -> No
     assert shown is not None
     assert main(shlex.split(shown[1])) == Exit.DONE
     printed = capsys.readouterr().out
-    # how many starts the net takes may depend on the last bit of the flow; the rest may not
+    # how many starts the grid takes may depend on the last bit of the flow; the rest may not
     assert re.sub(r"\d+ (of \d+ )?starts", "N starts", printed) == re.sub(
         r"\d+ (of \d+ )?starts", "N starts", shown[2]
     )

@@ -16,7 +16,7 @@ import contfric as cf
 from contfric.atlas.matching import identity, stops_distance
 from contfric.censuses.census import _Census
 from contfric.censuses.conditions import Arcs, Fate, least_periods
-from contfric.censuses.net import Limits
+from contfric.censuses.grid import Limits
 from contfric.censuses.sections import sections_of
 from contfric.censuses.words import canonical_pair, closed_words, letters_of, stops_of
 from contfric.orbit.orbit import Orbit, Status

@@ -1,4 +1,4 @@
-"""A net of starts on a section, refined where it is asked for, and the walks that they take.
+"""A grid of starts on a section, refined where it is asked for, and the walks that they take.
 
 Nodes are points of a lattice of integers (2**bits of them an axis, shifted by the seed), so that cells
 of any size share them; each node is simulated once. What a node keeps of its trajectory are its events
@@ -49,7 +49,7 @@ class Limits:
 
 
 @dataclass(eq=False)
-class Net:
+class Grid:
     """Starts on one section and their trajectories.
 
     Attributes
