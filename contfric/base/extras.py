@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from importlib import import_module
 
 from contfric.errors import ContfricError
@@ -20,45 +21,8 @@ def _need(package: str, what: str, extra: str) -> None:
         ) from None
 
 
-def need_pandas() -> None:
-    """See that pandas can be imported.
-
-    Raises
-    ------
-    MissingPackageError
-        If it is not installed.
-    """
-    _need("pandas", "tables", "pandas")
-
-
-def need_bokeh() -> None:
-    """See that bokeh can be imported.
-
-    Raises
-    ------
-    MissingPackageError
-        If it is not installed.
-    """
-    _need("bokeh", "live diagrams", "live")
-
-
-def need_flint() -> None:
-    """See that python-flint can be imported.
-
-    Raises
-    ------
-    MissingPackageError
-        If it is not installed.
-    """
-    _need("flint", "proofs", "certify")
-
-
-def need_xarray() -> None:
-    """See that xarray can be imported.
-
-    Raises
-    ------
-    MissingPackageError
-        If it is not installed.
-    """
-    _need("xarray", "labelled arrays", "xarray")
+# Each sees that a package can be imported, and raises MissingPackageError if it is not installed.
+need_pandas = partial(_need, "pandas", "tables", "pandas")
+need_bokeh = partial(_need, "bokeh", "live diagrams", "live")
+need_flint = partial(_need, "flint", "proofs", "certify")
+need_xarray = partial(_need, "xarray", "labelled arrays", "xarray")

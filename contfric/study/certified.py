@@ -1,4 +1,4 @@
-"""The proof of what a run has found: a file beside its results, and a column in its table of events."""
+"""The proof of what a run has found: a file next to its results, and a column in its table of events."""
 
 from __future__ import annotations
 

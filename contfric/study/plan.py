@@ -79,7 +79,7 @@ def _steps(study: Study) -> Iterator[Step]:
     tasks = study.tasks
     for task in tasks:
         yield Step(task.name, task.does(study))
-    texts = "; ".join(text for task in tasks if (text := task.row_text(study)))
+    texts = "; ".join(text for task in tasks if (text := task.rows_text(study)))
     yield Step("tables", texts, tuple(file for task in tasks for file in task.tables(study)))
     saved = tuple(task.saved_as for task in tasks)
     yield Step("data", "all that a restart needs", saved)

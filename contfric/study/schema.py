@@ -97,7 +97,7 @@ class StudyFile(Part):
 
     @property
     def tasks(self) -> list[Task]:
-        """The same, behind the orbit of the start if anything needs it."""
+        """The same, after the orbit of the start if anything needs it."""
         return [self.start, *self.given] if self.needs_orbit else self.given
 
     @property

@@ -32,7 +32,7 @@ def points(study: Study, sources: Sequence[Branch | Orbit]) -> Table:
     """
     tables = [_columns(study, source) for source in sources]
     names = list(dict.fromkeys(name for table in tables for name in table))
-    # stop_3 of one branch belongs behind stop_2 of another, before what follows the stops
+    # stop_3 of one branch comes after stop_2 of another, before what follows the stops
     stops = sorted((n for n in names if n.startswith("stop_")), key=lambda n: int(n[5:]))
     last = [n for n in names if n == "stable"]
     header = [n for n in names if n not in stops and n not in last] + stops + last

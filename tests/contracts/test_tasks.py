@@ -29,6 +29,7 @@ class ShareTask(Task):
     name = "share"
     result = "share"
     saved_as = "share.npz"
+    row_text = "one row a share"
     own = frozenset({"of"})
 
     of: list[str] = Field(min_length=2, max_length=2, description="two names of parameters")
@@ -42,9 +43,6 @@ class ShareTask(Task):
 
     def does(self, study) -> str:
         return f"the share {self.of[0]} / {self.of[1]}"
-
-    def row_text(self, study) -> str:
-        return "one row a share"
 
     def compute(self, job) -> Any:
         self.asked.append(str(self.options()))

@@ -29,5 +29,5 @@ TASKS: tuple[type[Task], ...] = (
     EquilibriaTask,
     EnsembleTask,
 )
-#: The same behind the orbit of the start, which any of them may need.
+#: The same after the orbit of the start, which any of them may need.
 STEPS: tuple[type[Task], ...] = (Start, *TASKS)

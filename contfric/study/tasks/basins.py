@@ -35,6 +35,7 @@ class BasinsTask(Response):
     name = "basins"
     result = "basins"
     saved_as = "basins.npz"
+    row_text = "one row a start of the basins"
     own = frozenset({"grid", "at"})
     figures: ClassVar = {"basins": FigureKind(8.4, 6.0)}
 
@@ -70,10 +71,6 @@ class BasinsTask(Response):
     def does(self, study: Study) -> str:
         """Return the grid in words."""
         return f"what starts converge to, {axes_text(self.grid)}"
-
-    def row_text(self, study: Study) -> str:
-        """Return what a row is."""
-        return "one row a start of the basins"
 
     def compute(self, job: Job) -> Basins:
         """Follow the starts; a killed run goes on from its tiles."""

@@ -41,7 +41,7 @@ class ExploreTask(OneParameter):
         None,
         ge=1,
         le=16,
-        description="a whole number from 1 to 16: most copies of a motion at a sliding event",
+        description="a whole number from 1 to 16: most copies of a solution at a sliding event",
     )
     max_branches: int | None = Field(
         None, ge=1, description="a whole number >= 1: most branches to compute"

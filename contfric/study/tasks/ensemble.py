@@ -31,6 +31,7 @@ class EnsembleTask(Response):
     name = "ensemble"
     result = "ensemble"
     saved_as = "ensemble.npz"
+    row_text = "one row an event of a sample"
     own = frozenset({"parameter", "range", "distributions", "workers"})
     figures: ClassVar = {"ensemble": FigureKind(9.6, 6.0)}
 
@@ -113,10 +114,6 @@ class EnsembleTask(Response):
         low, high = self.range
         varied = ", ".join(self.distributions)
         return f"diagrams of random {varied}, {self.parameter} from {low:g} to {high:g}"
-
-    def row_text(self, study: Study) -> str:
-        """Return what a row is."""
-        return "one row an event of a sample"
 
     def compute(self, job: Job) -> Ensemble:
         """Compute it, in processes if there are several; a killed run goes on from its tiles."""

@@ -28,6 +28,7 @@ class EquilibriaTask(Response):
     name = "equilibria"
     result = "equilibria"
     saved_as = "equilibria.npz"
+    row_text = "one row a point or event of the equilibria"
     own = frozenset({"parameter", "range"})
     figures: ClassVar = {"equilibria": FigureKind(8.4, 5.0)}
 
@@ -62,10 +63,6 @@ class EquilibriaTask(Response):
         """Return the range in words."""
         low, high = self.range
         return f"equilibria, {self.parameter} from {low:g} to {high:g}, and their events"
-
-    def row_text(self, study: Study) -> str:
-        """Return what a row is."""
-        return "one row a point or event of the equilibria"
 
     def compute(self, job: Job) -> EquilibriumDiagram:
         """Find and follow equilibria."""

@@ -41,6 +41,7 @@ class LyapunovTask(Task):
     name = "lyapunov"
     result = "lyapunov"
     saved_as = "lyapunov.npz"
+    row_text = "one row a trajectory of the map"
     own = frozenset({"grid"})
     figures: ClassVar = {"lyapunov": FigureKind(8.0, 5.6, called="a map of Lyapunov exponents")}
 
@@ -64,7 +65,7 @@ class LyapunovTask(Task):
     starts: int | None = Field(
         None, ge=1, description="a whole number >= 1: initial conditions at each point"
     )
-    state: list[float] | None = Field(None, description=f"{STATE}: where every motion starts")
+    state: list[float] | None = Field(None, description=f"{STATE}: where every trajectory starts")
 
     def check(
         self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
@@ -83,11 +84,7 @@ class LyapunovTask(Task):
 
     def does(self, study: Study) -> str:
         """Return the grid in words."""
-        return f"exponents of motions at {axes_text(self.grid)}"
-
-    def row_text(self, study: Study) -> str:
-        """Return what a row is."""
-        return "one row a motion of the map"
+        return f"exponents of trajectories at {axes_text(self.grid)}"
 
     def compute(self, job: Job) -> LyapunovMap:
         """Compute a map; a killed run goes on from its tiles."""
@@ -104,7 +101,7 @@ class LyapunovTask(Task):
         )
 
     def table(self, file: str, study: Study, found: LyapunovMap) -> Table:
-        """Return one row for each motion."""
+        """Return one row for each trajectory."""
         from contfric.chaos.status import Motion
 
         (first, across), (second, up) = found.axes.items()
@@ -137,7 +134,7 @@ class LyapunovTask(Task):
         axes.set_title(text, fontsize=sized(TEXT))
 
     def entry(self, found: LyapunovMap) -> dict[str, Any]:
-        """Return what the motions of a map turned out to be."""
+        """Return what the trajectories of a map turned out to be."""
         return {
             "grid": {
                 name: [float(values[0]), float(values[-1]), len(values)]
@@ -152,7 +149,7 @@ class LyapunovTask(Task):
 
     @classmethod
     def lines(cls, entry: dict[str, Any]) -> Iterator[str]:
-        """Yield the motions and the largest exponent."""
+        """Yield the kinds of motion and the largest exponent."""
         found = ", ".join(f"{count} {motion}" for motion, count in entry["motions"].items())
         yield f"exponents at {grid_text(entry)}, {entry['starts']} start(s) each: {found}"
         yield f"largest   {entry['largest']:.6g}"

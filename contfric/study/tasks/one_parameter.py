@@ -89,7 +89,7 @@ class OneParameter(Task):
         """Return its two tables."""
         return POINTS, BIFURCATIONS
 
-    def row_text(self, study: Study) -> str:
+    def rows_text(self, study: Study) -> str:
         """Return what rows are."""
         return f"{points_text(study)}; one row a bifurcation"
 
@@ -124,7 +124,7 @@ class OneParameter(Task):
         from contfric.plot.diagram import plot_diagram
 
         rows = [row_name(row) for row in drawing.rows]
-        swept = _behind(found, rows)
+        swept = _sweep_of(found, rows)
         axes_of_rows = plot_diagram(diagram, rows, figure, swept, title, inset=drawing.inset)
         _draw_equilibria(axes_of_rows, rows, found)
 
@@ -240,8 +240,8 @@ def _known(value: bool | None) -> str:
 # ---------------------------------------------------------------------------------------- figures
 
 
-def _behind(found: Found, rows: list[str]) -> Sweep | None:
-    """Return the sweep that is drawn behind a diagram: along its parameter, with what its rows show."""
+def _sweep_of(found: Found, rows: list[str]) -> Sweep | None:
+    """Return the sweep that a diagram is drawn over: along its parameter, with what its rows show."""
     swept: Sweep | None = found.get("sweep")
     if swept is None or swept.parameter != found["diagram"].parameter:
         return None

@@ -26,7 +26,7 @@ POINTS = "points.csv"
 
 
 class Simulated(Part):
-    """Start from a simulation: the orbit that the motion converges to."""
+    """Start from a simulation: the orbit that the trajectory converges to."""
 
     state: list[float] | None = Field(None, description=STATE)
     time: float = Field(0.0, description="a finite number: the initial time")
@@ -72,7 +72,7 @@ class Start(Task):
             return f"read from {self.orbit}"
         if study.signature is not None:
             return f"solve for the signature {study.signature.name or study.signature}"
-        text = "simulate until the motion repeats itself, read off its signature, solve for it"
+        text = "simulate until the trajectory repeats itself, identify its signature, solve for it"
         if self.simulate and self.simulate.state is not None:
             text += f"; from the state {self.simulate.state}"
         if self.simulate and self.simulate.periods is not None:
@@ -83,7 +83,7 @@ class Start(Task):
         """Return its table, if no branch has its points."""
         return () if study.task else (POINTS,)
 
-    def row_text(self, study: Study) -> str:
+    def rows_text(self, study: Study) -> str:
         """Return what a row is."""
         return "" if study.task else points_text(study)
 

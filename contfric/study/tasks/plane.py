@@ -31,6 +31,7 @@ class PlaneTask(Task):
     name = "plane"
     result = "plane"
     saved_as = "plane.npz"
+    row_text = "points of curves, of codimension two, regions"
     of_orbit = True
     own = frozenset({"parameters", "range", "sections", "seeds"})
     figures: ClassVar = {"plane": FigureKind(9.6, 7.0, called="a plane")}
@@ -108,10 +109,6 @@ class PlaneTask(Task):
     def tables(self, study: Study) -> tuple[str, ...]:
         """Return its three tables."""
         return CURVES, SPECIAL, REGIONS
-
-    def row_text(self, study: Study) -> str:
-        """Return what rows are."""
-        return "points of curves, of codimension two, regions"
 
     def compute(self, job: Job) -> Plane:
         """Explore a plane; on Ctrl-C what was found so far, with ``complete`` False."""

@@ -22,6 +22,7 @@ class PoincareTask(Section):
     name = "poincare"
     result = "poincare"
     saved_as = "poincare.npz"
+    row_text = "one row a point of the section"
     figures: ClassVar = {"poincare": FigureKind(6.4, 6.0)}
 
     time: float | None = Field(None, description="a finite number: the initial time")
@@ -29,10 +30,6 @@ class PoincareTask(Section):
     def does(self, study: Study) -> str:
         """Return the section in words."""
         return f"points of one solution at {self.section if self.section is not None else 'stops'}"
-
-    def row_text(self, study: Study) -> str:
-        """Return what a row is."""
-        return "one row a point of the section"
 
     def compute(self, job: Job) -> Returns:
         """Simulate one solution."""

@@ -35,6 +35,7 @@ class SweepTask(Section):
     name = "sweep"
     result = "sweep"
     saved_as = "sweep.npz"
+    row_text = "one row a point of the sweep"
     own = frozenset({"parameter", "values"})
     figures: ClassVar = {"sweep": FigureKind(9.6, 5.0)}
 
@@ -61,10 +62,6 @@ class SweepTask(Section):
         direction = "both" if self.direction is None else self.direction.value
         return f"simulations at {where}, {direction}"
 
-    def row_text(self, study: Study) -> str:
-        """Return what a row is."""
-        return "one row a point of the sweep"
-
     def compute(self, job: Job) -> Sweep:
         """Simulate; a killed run goes on from its tiles."""
         from contfric.response.sweeping import sweep
@@ -87,7 +84,7 @@ class SweepTask(Section):
         return Table([*columns, *found.model.states], _rows(found))
 
     def entry(self, found: Sweep) -> dict[str, Any]:
-        """Return the values and what became of the motion at each."""
+        """Return the values and what the trajectory converged to at each."""
         return {
             "parameter": found.parameter,
             "values": [float(found.values[0]), float(found.values[-1]), len(found.values)],

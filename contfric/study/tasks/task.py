@@ -84,6 +84,7 @@ class Task(Part):
     name : the step of the run, and the key of the study
     result : what its result is called
     saved_as : file of the result
+    row_text : what a row of its tables is
     of_orbit : whether it begins with the orbit of the start
     own : keys that :meth:`compute` hands over itself; the others are arguments by their names
     figures : kinds of figures that show its result
@@ -92,6 +93,7 @@ class Task(Part):
     name: ClassVar[str]
     result: ClassVar[str]
     saved_as: ClassVar[str]
+    row_text: ClassVar[str] = ""
     of_orbit: ClassVar[bool] = False
     own: ClassVar[frozenset[str]] = frozenset()
     figures: ClassVar[Mapping[str, FigureKind]] = {}
@@ -120,9 +122,9 @@ class Task(Part):
         """Return the names of its tables."""
         return (f"{self.name}.csv",)
 
-    def row_text(self, study: Study) -> str:
+    def rows_text(self, study: Study) -> str:
         """Return what a row of its tables is."""
-        raise NotImplementedError
+        return self.row_text
 
     def skipped(self, study: Study) -> Iterator[Skipped]:
         """Yield what it leaves out."""
