@@ -73,8 +73,9 @@ def explain(options: argparse.Namespace) -> int:
 
 def info(options: argparse.Namespace) -> int:
     """``contfric info DIR``."""
-    from contfric.cli.summary import findings, headline, proposals, work
+    from contfric.cli.summary import findings, headline, work
     from contfric.study.plan import RECORD
+    from contfric.study.tasks.diagram_record import proposals
 
     path: Path = options.folder / RECORD
     try:

@@ -22,22 +22,6 @@ def findings(record: Record) -> Iterator[str]:
         yield from task.summary(record)
 
 
-def proposals(record: Record) -> Iterator[str]:
-    """Yield what was proposed to follow each event, and what became of it."""
-    events = [event for event in record.get("bifurcations", []) if event["proposals"]]
-    if not events:
-        return
-    name = record["parameter"]
-    yield ""
-    yield "what was proposed to follow the events"
-    for event in events:
-        yield f"  {event['label']} at {name} = {event['params'][name]:.10g}"
-        for item in event["proposals"]:
-            branch = "" if item["branch"] is None else f" as branch {item['branch']}"
-            why = f": {item['why']}" if item["why"] else ""
-            yield f"    {item['verdict']}{branch}: {item['reason']}{why}"
-
-
 def work(record: Record) -> Iterator[str]:
     """Yield what was done: counts, times, what was skipped, files."""
     yield ""

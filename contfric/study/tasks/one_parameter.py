@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
-from contfric.base.shown import aligned
 from contfric.study.tables import Table, points
+from contfric.study.tasks.diagram_record import entries_of, lines_of
 from contfric.study.tasks.orbit import POINTS, points_text
 from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Found, Task, attempt
 from contfric.study.wanted import Want, row_name
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
 
     from contfric.atlas.diagram import Diagram
     from contfric.base.yaml_lines import LocatedYaml
-    from contfric.continuation.branch import Branch
-    from contfric.continuation.events import Proposal
     from contfric.models.definition import Model
     from contfric.response.sweep import Sweep
     from contfric.study.drawings import Drawing
@@ -130,54 +127,13 @@ class OneParameter(Task):
 
     def entries(self, found: Diagram) -> dict[str, Any]:
         """Return branches, bifurcations and what follows them."""
-        return {
-            "parameter": found.parameter,
-            "complete": found.complete,
-            "branches": [_branch_entry(i, b) for i, b in enumerate(found.branches, start=1)],
-            "bifurcations": [
-                {
-                    "kind": node.bifurcation.kind.value,
-                    "label": node.bifurcation.label,
-                    "branches": [i + 1 for i in node.branches],
-                    "params": node.bifurcation.params,
-                    "group": node.bifurcation.group,
-                    "contacts": list(node.bifurcation.contacts),
-                    "scenario": getattr(found.scenario(node), "value", None),
-                    "stable_before": node.bifurcation.stable_before,
-                    "stable_after": node.bifurcation.stable_after,
-                    "located": node.bifurcation.located,
-                    "proposals": [_proposal_entry(p) for p in node.bifurcation.proposals],
-                }
-                for node in found.events
-            ],
-            "loose_ends": [str(end) for end in found.loose_ends],
-            "notes": list(found.notes),
-            "verified": found.verified,
-            "verification": []
-            if found.verification is None
-            else str(found.verification).split("\n"),
-        }
+        return entries_of(found)
 
     @classmethod
     def summary(cls, record: dict[str, Any]) -> Iterator[str]:
         """Yield branches, bifurcations and loose ends as tables."""
-        if cls.name not in record["study"] or "branches" not in record:
-            return
-        name = record["parameter"]
-        yield ""
-        yield from aligned([["branch", "name", "points", name, "", "ends"], *_branch_rows(record)])
-        yield ""
-        yield from aligned([["event", name, "branches", ""], *_event_rows(record)])
-        yield ""
-        if record["loose_ends"]:
-            yield "unresolved branch ends (loose ends)"
-            yield from (f"  {text}" for text in record["loose_ends"])
-        else:
-            yield "no loose ends"
-        yield from (f"note: {text}" for text in record.get("notes", []))
-        yield from record.get("verification", [])
-        if not record["complete"]:
-            yield "incomplete: the exploration was stopped before it was done"
+        if cls.name in record["study"] and "branches" in record:
+            yield from lines_of(record)
 
 
 def _range_fault(model: Model, params: dict[str, float], task: OneParameter) -> str | None:
@@ -259,55 +215,3 @@ def _draw_equilibria(axes: list[Axes], rows: list[str], found: Found) -> None:
         if row in _STATES:
             rest.plot(ax=ax)
             ax.set_xlabel(ax.get_xlabel() if ax is axes[-1] else "")
-
-
-# ----------------------------------------------------------------------------------------- record
-
-
-def _proposal_entry(proposal: Proposal) -> dict[str, Any]:
-    return {
-        "verdict": proposal.verdict.value,
-        "reason": proposal.reason,
-        "branch": None if proposal.branch is None else proposal.branch + 1,
-        "why": proposal.why,
-    }
-
-
-def _branch_entry(number: int, branch: Branch) -> dict[str, Any]:
-    # a fold lies beyond the points on both sides of it
-    events = (b.params[branch.parameter] for b in branch.bifurcations)
-    values = [*chain((float(branch.values.min()), float(branch.values.max())), events)]
-    return {
-        "branch": number,
-        "signature": branch.name,
-        "mirrored": branch.mirrored,
-        "bridge": branch.bridge,
-        "points": len(branch),
-        "from": min(values),
-        "to": max(values),
-        "ends": [
-            f"at {value:.8g}: {end}"
-            for value, end in zip(branch.values[[0, -1]], branch.ends, strict=True)
-        ],
-    }
-
-
-def _branch_rows(record: dict[str, Any]) -> list[list[str]]:
-    rows: list[list[str]] = []
-    for branch in record["branches"]:
-        if branch["mirrored"]:
-            rows[-1][1] += " and mirror"
-            continue
-        label = branch["signature"] + (" (bridge)" if branch["bridge"] else "")
-        number, count = str(branch["branch"]), str(branch["points"])
-        low, high = f"{branch['from']:.8g}", f"{branch['to']:.8g}"
-        rows.append([number, label, count, low, high, "; ".join(branch["ends"])])
-    return rows
-
-
-def _event_rows(record: dict[str, Any]) -> Iterator[list[str]]:
-    name = record["parameter"]
-    names = {branch["branch"]: branch["signature"] for branch in record["branches"]}
-    for event in record["bifurcations"]:
-        joined = ", ".join(f"{names[i]} ({i})" for i in event["branches"])
-        yield [event["label"], f"{event['params'][name]:.13g}", joined, event.get("scenario") or ""]
