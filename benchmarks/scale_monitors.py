@@ -14,10 +14,9 @@ from measuring import Case, Row, measure
 from page import duration
 
 import contfric as cf
-from contfric.study.findings import Findings
-from contfric.study.paint import paint
+from contfric.study.drawings import draw as draw_figure
 from contfric.study.read import Study, read_study
-from contfric.study.tables import write_points
+from contfric.study.tables import points, write_table
 
 #: Rounds of points and quantities, of which multipliers are a few percent, and of figures: half a second.
 ROUNDS, OF_FIGURES = 25, 5
@@ -76,7 +75,7 @@ def counted(call: Callable[[], cf.Branch]) -> tuple[cf.Branch, str]:
 
 def wrote(path: Path, study: Study, branch: cf.Branch) -> tuple[None, str]:
     """The table of points of a branch."""
-    write_points(path, study, (replace(branch),))
+    write_table(path, *points(study, (replace(branch),)))
     return None, f"{path.stat().st_size / len(branch):.0f} bytes a point"
 
 
@@ -125,11 +124,11 @@ def figure_cases(folder: Path) -> list[Case]:
     def draw(index: int) -> tuple[None, str]:
         drawing = study.drawings[index]
         path = folder / drawing.file
-        paint(path, drawing, Findings(orbit, diagram=diagram), study.title)
+        draw_figure(path, drawing, {"orbit": orbit, "diagram": diagram}, study.title)
         return None, f"{path.stat().st_size / 1e3:.0f} kB"
 
     return [
-        _case("figure", f"{drawing.kind.value}.png", partial(draw, index), 1)
+        _case("figure", f"{drawing.kind}.png", partial(draw, index), 1)
         for index, drawing in enumerate(study.drawings)
     ]
 

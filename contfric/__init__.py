@@ -15,20 +15,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from contfric.atlas.adding import Window, period_adding
-    from contfric.atlas.census import census
-    from contfric.atlas.census_result import Census
     from contfric.atlas.diagram import Diagram
     from contfric.atlas.explore import explore
     from contfric.atlas.plane import Plane
     from contfric.atlas.plane_explore import explore_plane
     from contfric.atlas.seeds import Seeds
+    from contfric.censuses.census import census
+    from contfric.censuses.result import Census
     from contfric.certify.census import certify_census
     from contfric.certify.census_result import CensusCertificate
     from contfric.chaos.compute import lyapunov_map
     from contfric.chaos.exponents import LyapunovExponents, lyapunov_exponent
     from contfric.chaos.map import LyapunovMap
     from contfric.chaos.status import Motion
+    from contfric.continuation.adding import Window, period_adding
     from contfric.continuation.branch import Branch
     from contfric.continuation.events import Bifurcation, EndReason, Kind
     from contfric.continuation.trace import continue_orbit
@@ -88,7 +88,7 @@ _HOMES = {
     "Bifurcation": "contfric.continuation.events",
     "BoundaryPoint": "contfric.equilibria.events",
     "Branch": "contfric.continuation.branch",
-    "Census": "contfric.atlas.census_result",
+    "Census": "contfric.censuses.result",
     "CensusCertificate": "contfric.certify.census_result",
     "CodimTwo": "contfric.curves.special",
     "ContfricError": "contfric.errors",
@@ -133,9 +133,9 @@ _HOMES = {
     "StudyError": "contfric.errors",
     "Sweep": "contfric.response.sweep",
     "TwoFold": "contfric.models.two_folds",
-    "Window": "contfric.atlas.adding",
+    "Window": "contfric.continuation.adding",
     "basins": "contfric.response.basin_map",
-    "census": "contfric.atlas.census",
+    "census": "contfric.censuses.census",
     "certify_census": "contfric.certify.census",
     "check_model": "contfric.models.check",
     "continue_bifurcation": "contfric.curves.trace",
@@ -157,7 +157,7 @@ _HOMES = {
     "lyapunov_exponent": "contfric.chaos.exponents",
     "lyapunov_map": "contfric.chaos.compute",
     "model_names": "contfric.models",
-    "period_adding": "contfric.atlas.adding",
+    "period_adding": "contfric.continuation.adding",
     "poincare": "contfric.response.poincare",
     "quantity_names": "contfric.quantities.registry",
     "release_map": "contfric.response.poincare",
@@ -266,7 +266,7 @@ def __getattr__(name: str) -> Any:
 
         return version("contfric")
     if name in _HOMES:
-        from contfric.interrupts import held_back
+        from contfric.base.interrupts import held_back
 
         with held_back():
             home = import_module(_HOMES[name])

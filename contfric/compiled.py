@@ -15,7 +15,7 @@ Code comes with the wheel (``_data/kernels``), where the wheel was built with it
 compiled into the cache: ``$CONTFRIC_CACHE_DIR``, else ``$NUMBA_CACHE_DIR``, else the user's cache folder
 (``~/.cache/contfric``). Both have the same folders: one for a digest of all compiled sources, as a kernel
 changes with its helpers in other files; below it one for each kernel, with a file for each Python, numba,
-llvmlite and processor (:mod:`contfric.kept`). A damaged file is not used: the kernel is compiled again.
+llvmlite and processor (:mod:`contfric.compiling.kept`). A damaged file is not used: the kernel is made again.
 Where no folder is writable the kernels are compiled in every process: slower, never broken.
 
 What is compiled is said at level INFO of the logger ``contfric.compiled``, before and after.
@@ -39,12 +39,12 @@ import numba
 from numba import types
 from numba.core import config
 
-from contfric.announced import announced, time_of
-from contfric.inlined import part_options
-from contfric.kept import KernelFiles, file_name, writable
-from contfric.resources import SHIPPED_KERNELS, user_cache
-from contfric.sources import kernels_digest, kernels_folder
-from contfric.targets import shipped_target, target
+from contfric.base.resources import SHIPPED_KERNELS, user_cache
+from contfric.base.sources import kernels_digest, kernels_folder
+from contfric.compiling.announced import announced, time_of
+from contfric.compiling.inlined import part_options
+from contfric.compiling.kept import KernelFiles, file_name, writable
+from contfric.compiling.targets import shipped_target, target
 
 _log = logging.getLogger(__name__)
 

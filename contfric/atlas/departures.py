@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from itertools import chain
 
-from contfric.advance import foresee
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving_event import first_end, settings_for, went_somewhere
@@ -25,6 +24,7 @@ from contfric.continuation.switching import (
 from contfric.continuation.trace import trace_side
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
+from contfric.remember.advance import foresee
 
 #: A branch shorter than this (arclength) that comes back to its event has been nowhere.
 NO_WIDTH = 1e-3

@@ -8,11 +8,11 @@ from functools import cached_property
 from itertools import combinations
 from typing import TYPE_CHECKING
 
+from contfric.base.extras import need_flint, need_pandas
+from contfric.base.shown import Shown
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation, End, Kind, Proposal
-from contfric.extras import need_flint, need_pandas
 from contfric.models.definition import Model
-from contfric.shown import Shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable

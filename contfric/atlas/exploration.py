@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from contfric.atlas.collect import Event
 from contfric.atlas.matching import identity, on_branch, same_event, stops_distance
+from contfric.base.interrupts import held_back
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import (
     TERMINAL,
@@ -19,7 +20,6 @@ from contfric.continuation.events import (
     Verdict,
 )
 from contfric.continuation.points import Settings
-from contfric.interrupts import held_back
 from contfric.orbit.orbit import Orbit
 
 Progress = Callable[[str], None]

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.advance import in_advance
 from contfric.atlas.collect import collect
 from contfric.atlas.departures import foresee_departures
 from contfric.atlas.diagram import Asked, Diagram
@@ -28,6 +27,7 @@ from contfric.errors import ConvergenceError, function_of, truth, whole_number
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish
+from contfric.remember.advance import in_advance
 
 #: Longest orbits, in periods, that doublings are followed to by default: two doublings.
 MOST_PERIODS = 4

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.atlas.diagram import Diagram
+from contfric.base.extras import need_pandas
+from contfric.base.shown import Shown
 from contfric.continuation.events import Kind
 from contfric.curves.curve import Curve
 from contfric.curves.special import SpecialPoint
-from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
-from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -42,8 +42,8 @@ from contfric.errors import (
     shown,
     whole_number,
 )
-from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
+from contfric.remember.journal import remembered
 
 #: Kinds of curves that are followed by default: T changes labels, and nothing else.
 KINDS = ("SN", "BP", "PD", "CS", "SS", "AS", "GS")

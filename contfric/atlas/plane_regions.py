@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from contfric.atlas.diagram import Diagram
 from contfric.atlas.matching import identity
 from contfric.atlas.plane import Family, Region
+from contfric.base.interrupts import held_back
 from contfric.curves.curve import Curve
 from contfric.curves.problem import Box
-from contfric.interrupts import held_back
-from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import Word
+from contfric.remember.journal import remembered
 
 #: Cells along each side: a cell is finer than a line in a printed figure.
 CELLS = 400

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 from flint import arb
 
+from contfric.base.shown import Shown
 from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
 from contfric.certify.extended import Builder
@@ -29,7 +30,6 @@ from contfric.continuation.branch import Branch
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, working
-from contfric.shown import Shown
 
 #: Bits: rounding of 1e-24 is nothing to boxes that are 1e-7 long.
 _BITS = 80

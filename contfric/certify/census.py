@@ -21,8 +21,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from contfric.base.extras import need_flint
 from contfric.errors import ParameterError
-from contfric.extras import need_flint
 from contfric.models import ModelSource, Parameters
 from contfric.models.tied import tied
 

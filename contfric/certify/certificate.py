@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from contfric.base.shown import Shown
 from contfric.certify.verdict import Finding, Verdict, all_of
-from contfric.shown import Shown
 
 if TYPE_CHECKING:
     from flint import acb, arb

@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from contfric.base.files import replacing
+from contfric.base.shown import Shown
 from contfric.errors import ResultFileError, path_of
-from contfric.files import replacing
-from contfric.shown import Shown
 
 _KIND, _FORMAT = "diagram", 1
 

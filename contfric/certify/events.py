@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from flint import arb, arb_mat
 
+from contfric.base.shown import Shown
 from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
 from contfric.certify.extended import Builder, at_joint, rows_of, touched_within, with_multiplier
@@ -29,7 +30,6 @@ from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, row_norm, working
 from contfric.orbit.margins import Margin, Test
 from contfric.orbit.orbit import Orbit
-from contfric.shown import Shown
 
 #: Bits tried one after the other: 160 leave 30 digits where the condition is 1e10.
 _BITS = (160, 320)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from flint import acb, arb
 
+from contfric.base.files import replacing
 from contfric.certify.verdict import Verdict
 from contfric.continuation.events import Kind
 from contfric.errors import ParameterError, ResultFileError, path_of
-from contfric.files import replacing
 from contfric.models.balls.numbers import working
 from contfric.verify.file import CHECKED_MODELS, Answer, check_text
 

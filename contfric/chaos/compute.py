@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.memory import must_fit
 from contfric.chaos.exponents import checked_time, limits_of
 from contfric.chaos.map import LyapunovMap, points_of
 from contfric.chaos.rows import Limits
@@ -27,7 +28,6 @@ from contfric.chaos.tiles import (
     places,
 )
 from contfric.errors import ParameterError, function_of, mapping_of, shown, whole_number
-from contfric.memory import must_fit
 from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied

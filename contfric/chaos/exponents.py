@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.shown import Shown
 from contfric.chaos.rows import Limits, follow
 from contfric.chaos.starts import StateLike, default_states, given_states
 from contfric.chaos.status import Motion
@@ -14,7 +15,6 @@ from contfric.errors import ParameterError, real_number, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
-from contfric.shown import Shown
 
 
 @dataclass(frozen=True, eq=False)

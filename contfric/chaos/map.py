@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.extras import need_pandas, need_xarray
+from contfric.base.shown import Shown
 from contfric.chaos.exponents import lyapunov_dimension
 from contfric.chaos.status import Motion
 from contfric.chaos.tiles import TileRows
-from contfric.extras import need_pandas, need_xarray
 from contfric.models.definition import FloatArray, Model
-from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

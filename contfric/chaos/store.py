@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from contfric.base.files import replacing, unwritable
 from contfric.errors import ResultFileError
-from contfric.files import replacing, unwritable
 from contfric.models.definition import Model
 
 _RECORD = "map.json"
@@ -104,7 +104,7 @@ def versions(model: Model) -> dict[str, Any]:
     """Return what the last digits of a tile depend on, beyond its numbers: the program and the model."""
     from importlib.metadata import version
 
-    from contfric.sources import kernels_digest
+    from contfric.base.sources import kernels_digest
 
     return {
         "contfric": version("contfric"),

@@ -14,7 +14,7 @@ from contfric.errors import ResultFileError
 
 def certify(options: argparse.Namespace) -> int:
     """Write the certificate beside the results, a column into their table; the summary to stdout."""
-    from contfric.extras import need_flint
+    from contfric.base.extras import need_flint
 
     need_flint()  # before anything is read
     from contfric.study.certified import certify_folder

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from contfric.cli.exits import Exit
-from contfric.errors import ContfricError, NotationError, ParameterError, ResultFileError
+from contfric.errors import ParameterError, ResultFileError
 
 if TYPE_CHECKING:
     from contfric.models import Model, ModelSource
@@ -73,8 +73,9 @@ def explain(options: argparse.Namespace) -> int:
 
 def info(options: argparse.Namespace) -> int:
     """``contfric info DIR``."""
-    from contfric.cli.summary import findings, headline, proposals, work
+    from contfric.cli.summary import findings, headline, work
     from contfric.study.plan import RECORD
+    from contfric.study.tasks.diagram_record import proposals
 
     path: Path = options.folder / RECORD
     try:
@@ -102,62 +103,6 @@ def _check_files(folder: Path, names: list[str]) -> None:
             raise ResultFileError(f"{folder / name} is missing: run the study again")
         if name.endswith(".npz"):
             load(folder / name)
-
-
-# ------------------------------------------------------------------------------- signatures
-
-
-def list_signatures(options: argparse.Namespace) -> int:
-    """``contfric signatures list``."""
-    from contfric.cli.summary import table
-    from contfric.signature import load_signature, signature_names
-
-    rows = [["name", "model", "periods", "segments"]]
-    for name in signature_names(options.model):
-        try:
-            signature = load_signature(name, options.model)
-        except NotationError as error:
-            say(f"skipped: {error}")
-            continue
-        rows.append([name, signature.model.name, str(signature.periods), str(signature)])
-    print(*table(rows), sep="\n")
-    return Exit.DONE
-
-
-def show_signature(options: argparse.Namespace) -> int:
-    """``contfric signatures show NAME``."""
-    from contfric.signature import load_signature
-
-    signature = load_signature(options.name)
-    lines = [
-        f"name: {json.dumps(signature.name or str(signature), ensure_ascii=False)}",
-        f"model: {signature.model.name}",
-        f"periods: {signature.periods}",
-        f"segments: {signature}",
-    ]
-    if signature.symmetric is not None:
-        lines.append(f"symmetric: {str(signature.symmetric).lower()}")
-    if signature.example:
-        values = ", ".join(f"{name}: {value!r}" for name, value in signature.example.items())
-        lines.append(f"example: {{{values}}}")
-    print(*lines, sep="\n")
-    return Exit.DONE
-
-
-def check_signatures(options: argparse.Namespace) -> int:
-    """``contfric signatures check FILE...``: every file is checked, also behind a wrong one."""
-    from contfric.signature.schema import read_signature
-
-    wrong = 0
-    for path in options.files:
-        try:
-            signature = read_signature(path)
-        except ContfricError as error:
-            wrong += 1
-            print(f"contfric: error: {error}", file=sys.stderr)
-        else:
-            print(f"{path}: {signature.name}, {len(signature.segments)} segments: fine")
-    return Exit.BAD_INPUT if wrong else Exit.DONE
 
 
 # ------------------------------------------------------------------------ graph, simulation
@@ -247,7 +192,7 @@ def _say_what_settles(
 
 def census(options: argparse.Namespace) -> int:
     """``contfric census``: the orbits as a table, then what was tried and what bounds it."""
-    from contfric.atlas.census import census as take
+    from contfric.censuses.census import census as take
     from contfric.cli.progress import ProgressLine
     from contfric.study.checkpoint import checkpoint_of
 

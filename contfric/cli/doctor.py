@@ -15,11 +15,18 @@ def doctor(options: argparse.Namespace) -> int:
     import numba
 
     from contfric import __version__
-    from contfric.ahead import can_keep, compile_missing, duration, every_kernel, missing, waiting
-    from contfric.resources import SHIPPED_KERNELS
-    from contfric.shipped import describe
-    from contfric.sources import kernels_folder
-    from contfric.targets import target
+    from contfric.base.resources import SHIPPED_KERNELS
+    from contfric.base.sources import kernels_folder
+    from contfric.compiling.targets import target
+    from contfric.shipping.ahead import (
+        can_keep,
+        compile_missing,
+        duration,
+        every_kernel,
+        missing,
+        waiting,
+    )
+    from contfric.shipping.shipped import describe
 
     absent = missing()
     count = len(every_kernel())

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from contfric.cli import certify, commands, doctor, verify, view
+from contfric.cli import certify, commands, doctor, signatures, verify, view
 from contfric.errors import ContfricError, did_you_mean
 from contfric.models import DEFAULT_MODEL
 
@@ -83,7 +83,7 @@ def _parser() -> _Parser:
     _fill_run(add("run", commands.run, "compute what a study wants, and write the results"))
     _fill_explain(add("explain", commands.explain, "print the plan of a study; compute nothing"))
     _fill_info(add("info", commands.info, "print what a run folder holds"))
-    _fill_signatures(add("signatures", commands.list_signatures, "list, show or check signatures"))
+    _fill_signatures(add("signatures", signatures.list_all, "list, show or check signatures"))
     _fill_check(add("check", commands.check, "verify a model: derivatives, transitions, symmetry"))
     _fill_graph(add("graph", commands.graph, "print or draw the transitions of a model"))
     _fill_simulate(add("simulate", commands.simulate, "print the events of a trajectory as CSV"))
@@ -151,17 +151,17 @@ def _fill_signatures(parser: argparse.ArgumentParser) -> None:
     listing = actions.add_parser(
         "list", help="names, periods and segments of all signatures", allow_abbrev=False
     )
-    _described(listing, commands.list_signatures)
+    _described(listing, signatures.list_all)
     listing.add_argument("--model", help="those of this model only")
     showing = actions.add_parser(
         "show", help="one signature, as a signature file", allow_abbrev=False
     )
-    _described(showing, commands.show_signature)
+    _described(showing, signatures.show)
     showing.add_argument("name", metavar="NAME", help="a name, or the path of a file")
     checking = actions.add_parser(
         "check", help="read signature files and say what is wrong", allow_abbrev=False
     )
-    _described(checking, commands.check_signatures)
+    _described(checking, signatures.check)
     checking.add_argument("files", metavar="FILE", nargs="+", type=Path)
 
 

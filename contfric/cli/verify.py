@@ -9,7 +9,7 @@ from contfric.cli.exits import Exit
 
 def verify(options: argparse.Namespace) -> int:
     """Print yes or no, with what was checked or what does not hold; the exit code is 0 or 1."""
-    from contfric.extras import need_flint
+    from contfric.base.extras import need_flint
 
     need_flint()
     from contfric.certify.files import verify as check

@@ -14,9 +14,10 @@ def view(options: argparse.Namespace) -> int:
     import webbrowser
 
     from contfric.atlas.diagram import Diagram
-    from contfric.extras import need_bokeh
+    from contfric.base.extras import need_bokeh
     from contfric.results import load
-    from contfric.study.plan import DIAGRAM, VIEW
+    from contfric.study.plan import VIEW
+    from contfric.study.tasks.diagram import DIAGRAM
 
     need_bokeh()  # before anything is read
     source: Path = options.folder / DIAGRAM

@@ -20,12 +20,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.interrupts import held_back
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.gradients import carried, closing, gradient_of, surface_gradient
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.vertices import opening
 from contfric.continuation.zero_acceleration import joint_within, stationary_values
-from contfric.interrupts import held_back
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import linearised
 from contfric.orbit.orbit import Orbit

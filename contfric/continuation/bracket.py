@@ -16,6 +16,7 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import f8, helper, i8, indices, kernel, vector
+from contfric.compiling.references import by_reference
 from contfric.continuation.geometry import (
     PointsType,
     copy_to,
@@ -48,7 +49,6 @@ from contfric.orbit.monitor import (
 )
 from contfric.orbit.newton import ALONG, CHECKS, INTEGRATED, MULTIPLIERS
 from contfric.orbit.spectrum import multipliers
-from contfric.references import by_reference
 
 #: What locate() follows: a column of the tests, a label, or the parameter itself.
 BY_TEST, BY_LABEL, BY_PARAMETER = range(3)

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.extras import need_flint, need_pandas
+from contfric.base.shown import Shown
 from contfric.continuation.events import Bifurcation, End, Kind
 from contfric.errors import ParameterError
-from contfric.extras import need_flint, need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit, Status, of_two_halves
 from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
 from contfric.orbit.system import IntArray, System, build_system
 from contfric.orbit.words import decode, encode, mirror_pairs
-from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

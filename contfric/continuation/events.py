@@ -34,6 +34,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.base.extras import need_flint
 from contfric.continuation.measured_event import MeasuredEvent
 from contfric.continuation.touching import (
     begins_to_slide,
@@ -43,13 +44,12 @@ from contfric.continuation.touching import (
     touches_at_section,
 )
 from contfric.errors import ParameterError, did_you_mean
-from contfric.extras import need_flint
 from contfric.models.definition import Model
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import Outline, outline_of
 from contfric.orbit.system import Margin, System, Test, inside_sign
-from contfric.stored import made_of
+from contfric.remember.stored import made_of
 
 if TYPE_CHECKING:
     from contfric.certify.events import EventCertificate

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from contfric.base.tally import tally
 from contfric.continuation.points import Point, Rows, Settings
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
-from contfric.tally import tally
 
 
 def locate_change(

@@ -22,6 +22,7 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, vector
+from contfric.compiling.references import by_reference
 from contfric.continuation.dips import dips
 from contfric.continuation.geometry import (
     PointsType,
@@ -48,7 +49,6 @@ from contfric.flow.layouts import FlowType
 from contfric.orbit.equations import LayoutType
 from contfric.orbit.followed import count_followed
 from contfric.orbit.newton import ALONG, INTEGRATED, ON_THE_WAY
-from contfric.references import by_reference
 
 #: Why a march stopped.
 FULL, EVENT, OUTSIDE, STEP, CLOSED, BROKEN, UNBOUNDED, ENDLESS, MORE = range(9)

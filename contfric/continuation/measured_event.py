@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
-from contfric.shown import Shown
+from contfric.base.shown import Shown
 
 if TYPE_CHECKING:
     from contfric.continuation.events import Bifurcation

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.advance import heed
+from contfric.base.tally import tally
 from contfric.continuation.events import Bifurcation, End
 from contfric.continuation.points import SMALLEST_STEP, Point, Rows, Settings
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.pace import Pace
 from contfric.orbit.system import IntArray, System
-from contfric.tally import tally
+from contfric.remember.advance import heed
 
 #: Points that the rows hold at a time: enough to cost nothing.
 CHUNK = 512

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from contfric.advance import foresee, foreseeable
 from contfric.continuation.accuracy import not_critical
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
@@ -41,8 +40,9 @@ from contfric.continuation.vertex_ends import (
     overshoots_vertex,
 )
 from contfric.errors import ConvergenceError, function_of
-from contfric.journal import remembered
 from contfric.orbit.orbit import Orbit
+from contfric.remember.advance import foresee, foreseeable
+from contfric.remember.journal import remembered
 
 #: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).
 _AT_LIMIT = 1e-6

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.extras import need_pandas
+from contfric.base.shown import Shown
 from contfric.continuation.events import Kind, meaning_of
 from contfric.curves.special import CurveEnd, SpecialPoint
 from contfric.errors import either
-from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System, Test
-from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

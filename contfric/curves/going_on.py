@@ -21,11 +21,11 @@ from contfric.curves.points import first_curve_point, march_rows
 from contfric.curves.problem import Box, Problem, problem_of, tangency
 from contfric.curves.special import SpecialPoint
 from contfric.errors import ContfricError, ParameterError
-from contfric.journal import remembered
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import canonical, moved
 from contfric.orbit.system import IntArray, Margin, Test
+from contfric.remember.journal import remembered
 
 #: Times of a joint in two words for one motion agree to this (nondimensional): located events are good to
 #: 1e-9 where two of them meet.

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from contfric.base.tally import tally
 from contfric.continuation.points import Point, Rows
 from contfric.curves.points import solve_point
 from contfric.curves.problem import Problem
 from contfric.models.definition import FloatArray
-from contfric.tally import tally
 
 #: Share of a step to which a place is bracketed: the resolution of the arithmetic.
 _RESOLUTION = 4e-16

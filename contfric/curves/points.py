@@ -6,13 +6,13 @@ from time import perf_counter
 
 import numpy as np
 
+from contfric.base.tally import tally
 from contfric.continuation.points import SMALLEST_STEP, Point, Rows
 from contfric.curves.problem import Problem, border_of
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import assembled
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.pace import Pace
-from contfric.tally import tally
 
 #: Points that are marched at a time: limits of the parameters are looked at after each.
 CHUNK = 128

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.extras import need_pandas
+from contfric.base.shown import Shown
 from contfric.curves.special import CurveEnd
-from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import System
 from contfric.quantities.measure import of_orbits
 from contfric.quantities.registry import quantity_of
-from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

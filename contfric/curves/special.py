@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from contfric.base.shown import Shown
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Test
-from contfric.shown import Shown
 
 
 class CodimTwo(str, Enum):

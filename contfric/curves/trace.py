@@ -21,8 +21,8 @@ from contfric.curves.points import CHUNK, first_curve_point, march_rows
 from contfric.curves.problem import Problem, box_of, check_start, problem_of
 from contfric.curves.special import CurveEnd, CurveEndReason, SpecialPoint
 from contfric.errors import ConvergenceError, ParameterError, real_number, whole_number
-from contfric.journal import remembered
 from contfric.models.definition import FloatArray, Model
+from contfric.remember.journal import remembered
 
 #: A first point farther than this from the bifurcation (in widths of the ranges) is another one.
 _SAME_START = 1e-4

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.extras import need_pandas
+from contfric.base.shown import Shown
 from contfric.equilibria.events import EquilibriumEvent
 from contfric.equilibria.regions import Region
 from contfric.equilibria.result import Equilibrium, Location
 from contfric.errors import ParameterError, did_you_mean
-from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
-from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING
 
+from contfric.base.shown import Shown
 from contfric.equilibria.boundary import Unfolding
 from contfric.equilibria.hopf import Centre
 from contfric.equilibria.result import Equilibrium
-from contfric.shown import Shown
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contfric.base.extras import need_pandas
+from contfric.base.shown import Shown
 from contfric.equilibria.branch import EquilibriumBranch
 from contfric.equilibria.events import EquilibriumEvent, HopfPoint
 from contfric.equilibria.find import find_equilibria
@@ -16,11 +18,9 @@ from contfric.equilibria.regions import scale_of
 from contfric.equilibria.result import Equilibrium, EquilibriumSet
 from contfric.equilibria.trace import continue_equilibrium
 from contfric.errors import checked_range, function_of, whole_number
-from contfric.extras import need_pandas
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
-from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

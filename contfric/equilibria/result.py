@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.extras import need_pandas
+from contfric.base.extras import need_pandas
+from contfric.base.shown import Shown
 from contfric.models.definition import FloatArray, Model
-from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from contfric.base.shown import Shown
 from contfric.errors import ContfricError, ConvergenceError, ParameterError, items_of, shown
 from contfric.fitting.data import Measured, Series
 from contfric.fitting.predict import predicted, signal_of
@@ -27,7 +28,6 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
 from contfric.quantities.inside import Inside
 from contfric.quantities.registry import number_quantity
-from contfric.shown import Shown
 
 #: Residual, in standard deviations, of a trial without an orbit: so far off that the step is taken back.
 _NO_ORBIT = 1e6

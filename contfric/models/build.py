@@ -22,12 +22,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from contfric.checked import read_sealed, write_sealed
+from contfric.base.checked import read_sealed, write_sealed
+from contfric.base.resources import SHIPPED_KERNELS, user_cache
+from contfric.base.sources import kernels_digest
 from contfric.errors import ResultFileError
 from contfric.models.coded import forms_of
 from contfric.models.coded_flow import coded_flow
-from contfric.resources import SHIPPED_KERNELS, user_cache
-from contfric.sources import kernels_digest
 
 if TYPE_CHECKING:
     from contfric.compiled import Kernel

@@ -13,10 +13,10 @@ import ast
 from collections.abc import Mapping
 from typing import Any
 
+from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError
 from contfric.models.entries import EntryError, mapping_in
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope
-from contfric.yaml_lines import Address
 
 #: What the clock and its surface are called, and the function that stands for it.
 CLOCK, TICK, MOD = "clock", "tick", "mod"

@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contfric.base.shown import Shown
 from contfric.errors import ParameterError, did_you_mean, mapping_of, shown
 from contfric.models.parts import (
     Chatter,
@@ -48,8 +49,7 @@ from contfric.models.parts import (
     Symmetry,
 )
 from contfric.models.transition_maps import TransitionMaps
-from contfric.shown import Shown
-from contfric.stored import given
+from contfric.remember.stored import given
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow

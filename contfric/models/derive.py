@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError
 from contfric.models.build import GeneratedFlow
 from contfric.models.definition import (
@@ -31,7 +32,6 @@ from contfric.models.landing import reset_of
 from contfric.models.measuring import displacement_of, extrema_at_joints
 from contfric.models.regions import domains_of, is_possible, ordered_surfaces
 from contfric.models.sections import clear_surfaces, join_domains, joined_modes
-from contfric.yaml_lines import Address
 
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
 _SAME = 1e-9

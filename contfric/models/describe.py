@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
+from contfric.base.yaml_lines import comma_hint
 from contfric.errors import ModelError
 from contfric.models.contact_laws import KEY as LAWS
 from contfric.models.contact_laws import check_laws, read_laws
@@ -19,7 +20,6 @@ from contfric.models.parts import Chatter
 from contfric.models.quantity_entries import check_quantities, read_quantities
 from contfric.models.shorthand import expanded
 from contfric.models.units import APPLIED, KEY, read_units
-from contfric.yaml_lines import comma_hint
 
 KEYS = (
     *("name", "title", "references", "states", "parameters", "constraints", "period"),

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
+from contfric.base.yaml_lines import Address, as_truth, comma_hint
 from contfric.errors import ModelError, did_you_mean
-from contfric.yaml_lines import Address, as_truth, comma_hint
 
 #: How a side of a surface can be written.
 SIDES = {

@@ -15,7 +15,7 @@ from contfric.models.matrices import loaded
 from contfric.models.on_disk import derived
 
 if TYPE_CHECKING:
-    from contfric.yaml_lines import Address, LocatedYaml
+    from contfric.base.yaml_lines import Address, LocatedYaml
 
 SUFFIXES = (".yaml", ".yml")
 
@@ -46,11 +46,11 @@ def read_model(path: Path) -> Model:
 
     Examples
     --------
-    >>> from contfric.resources import bundled_dir
+    >>> from contfric.base.resources import bundled_dir
     >>> read_model(bundled_dir("models") / "belt.yaml").states
     ('x', 'v')
     """
-    from contfric.yaml_lines import read_yaml
+    from contfric.base.yaml_lines import read_yaml
 
     try:
         located = read_yaml(_file(path))

@@ -7,10 +7,10 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
+from contfric.base.resources import bundled_dir
 from contfric.errors import ContfricError, ModelError, ParameterError, did_you_mean
 from contfric.models.definition import Model
 from contfric.models.files import SUFFIXES, is_path, read_model
-from contfric.resources import bundled_dir
 
 ENTRY_POINTS = "contfric.models"
 

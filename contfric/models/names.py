@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
 
+from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError, did_you_mean
 from contfric.models.entries import EntryError
 from contfric.models.grammar import PERIOD, PI, TIME, Algebra, Scope, check_name, names_in, parse
-from contfric.yaml_lines import Address
 
 T = TypeVar("T")
 

@@ -13,10 +13,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
 
-from contfric.checked import read_checked, write_checked
+from contfric.base.checked import read_checked, write_checked
+from contfric.base.resources import SHIPPED_KERNELS, user_cache
+from contfric.base.sources import package_digest
 from contfric.errors import ResultFileError
-from contfric.resources import SHIPPED_KERNELS, user_cache
-from contfric.sources import package_digest
 
 T = TypeVar("T")
 

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError, did_you_mean
 from contfric.models.entries import EntryError, Part
 from contfric.models.grammar import PI, check_name
 from contfric.models.names import Names
 from contfric.models.quantity_texts import BUNDLED, FUNCTIONALS, LIST, WORK, no_contact, read
-from contfric.yaml_lines import Address
 
 KEY = "quantities"
 

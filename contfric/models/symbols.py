@@ -11,6 +11,7 @@ from typing import Any
 
 import sympy
 
+from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError
 from contfric.models.affine import AffineForm, affine_form
 from contfric.models.description import Description
@@ -19,7 +20,6 @@ from contfric.models.formulas import FORMULAS, formula, resolved
 from contfric.models.grammar import TIME, parse
 from contfric.models.not_affine import NotAffineError
 from contfric.models.regions import engine_order, known_sides
-from contfric.yaml_lines import Address
 
 
 class Formulas:

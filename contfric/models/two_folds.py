@@ -34,6 +34,7 @@ from typing import Any
 import numpy as np
 import sympy
 
+from contfric.base.shown import Shown
 from contfric.errors import ParameterError, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Domain, FloatArray, Model
@@ -41,7 +42,6 @@ from contfric.models.description import Description
 from contfric.models.numbers import function_of_numbers
 from contfric.models.symbols import Formulas
 from contfric.models.tied import tied
-from contfric.shown import Shown
 
 #: Newton's method: steps, and what is short, relative to the natural sizes.
 _STEPS, _SHORT = 60, 1e-12

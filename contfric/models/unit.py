@@ -22,8 +22,10 @@ from numba.core import config
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
 
-from contfric.announced import timed
-from contfric.checked import read_checked, read_sealed, write_checked
+from contfric.base.checked import read_checked, read_sealed, write_checked
+from contfric.base.interrupts import held_back
+from contfric.base.resources import SHIPPED_KERNELS, user_cache
+from contfric.base.sources import kernels_digest
 from contfric.compiled import (
     OPTIMISATION,
     F,
@@ -35,14 +37,12 @@ from contfric.compiled import (
     rate_signature,
     scale_signature,
 )
+from contfric.compiling.announced import timed
+from contfric.compiling.kept import SUFFIX
+from contfric.compiling.targets import Target, shipped_target, target
 from contfric.errors import ResultFileError
 from contfric.handle import Block, HandleType
-from contfric.interrupts import held_back
-from contfric.kept import SUFFIX
 from contfric.models.native import Function, translated
-from contfric.resources import SHIPPED_KERNELS, user_cache
-from contfric.sources import kernels_digest
-from contfric.targets import Target, shipped_target, target
 
 _log = logging.getLogger("contfric.compiled")
 #: What is loaded stays: a second copy of the same names would lie beside it.

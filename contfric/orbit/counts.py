@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from contfric.tally import tally
+from contfric.base.tally import tally
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.errors import AperiodicError, ConvergenceError, function_of, real_number, whole_number
-from contfric.journal import remembered
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
@@ -19,6 +18,7 @@ from contfric.orbit.sections import is_smooth, loops, without_sections
 from contfric.orbit.simulation import SimulationEnd, Trajectory, go_on, simulate
 from contfric.orbit.solve import settle
 from contfric.orbit.system import build_system
+from contfric.remember.journal import remembered
 from contfric.signature.cyclic import primitive_length
 
 #: Longest period that is looked for, in periods of the excitation.

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contfric.base.shown import Shown
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sensitivity import joint_sensitivities
 from contfric.quantities.measure import differentiated
 from contfric.quantities.motion import Directions
 from contfric.quantities.registry import number_quantity
-from contfric.shown import Shown
 
 #: A margin below this (nondimensional) vanishes: the orbit is at an event. Located events are good to 1e-12.
 _AT_EVENT = 1e-9

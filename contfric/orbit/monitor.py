@@ -14,6 +14,7 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import allocating_helper, helper, indices, kernel, matrix, vector
+from contfric.compiling.references import by_reference
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
 from contfric.orbit.after_reset import apply_reset
@@ -26,7 +27,6 @@ from contfric.orbit.equations import (
 from contfric.orbit.followed import followed_values, keep_end, keep_levels, keep_values
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN
 from contfric.orbit.newton import CHECKS
-from contfric.references import by_reference
 
 #: Most interior stationary points of one observable in one segment; beyond it the orbit is reported
 #: as not finite. A stick of 30 excitation periods has 180 of them with a third harmonic.

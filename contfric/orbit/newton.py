@@ -27,6 +27,7 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import blocks, f8, helper, indices, kernel, matrix, vector
+from contfric.compiling.references import by_reference
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import (
@@ -45,7 +46,6 @@ from contfric.orbit.equations import (
     mismatch,
     segment_rows,
 )
-from contfric.references import by_reference
 
 #: Places in the array of counts that kernels add to.
 SOLVES, MULTIPLIERS, CHECKS, EVENTS = range(4)

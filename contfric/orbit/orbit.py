@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.extras import need_flint, need_pandas
+from contfric.base.tally import tally
 from contfric.errors import ParameterError
-from contfric.extras import need_flint, need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.linear import pencil_of_turn
@@ -23,7 +24,6 @@ from contfric.orbit.stops import displacements, reach_of, stationary_points, sto
 from contfric.orbit.system import System, Word, build_system
 from contfric.orbit.words import half_of, mirror_pairs, whole_of
 from contfric.signature import Signature
-from contfric.tally import tally
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.shown import Shown
+from contfric.base.tally import tally
 from contfric.errors import function_of, real_number, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.composed import ComposedModel
@@ -21,8 +23,6 @@ from contfric.orbit.pace import Pace
 from contfric.orbit.starts import checked_state, start_of
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import surfaces_under, tables
-from contfric.shown import Shown
-from contfric.tally import tally
 
 #: Hears one line of text now and then.
 Progress = Callable[[str], None]

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from contfric.base.tally import tally
 from contfric.errors import ConvergenceError, ParameterError, function_of, whole_number
-from contfric.journal import SLOW, remembered
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray
 from contfric.models.tied import tied
@@ -18,8 +18,8 @@ from contfric.orbit.simulation import Trajectory, run
 from contfric.orbit.starts import start_of
 from contfric.orbit.system import System, build_system
 from contfric.orbit.words import half_of
+from contfric.remember.journal import SLOW, remembered
 from contfric.signature import Signature, reduced_word
-from contfric.tally import tally
 
 #: Starts drawn for one signature: enough for every bundled signature to be found from scratch in
 #: the tests (the rarest needs about 150), at about a tenth of a millisecond each.

@@ -42,8 +42,8 @@ from contfric.orbit.structure import (
     mode_bounds,
     mode_domains,
 )
+from contfric.remember.stored import made_of
 from contfric.signature.holds import is_hold
-from contfric.stored import made_of
 
 __all__ = [
     "IntArray",

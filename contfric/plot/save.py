@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from contfric.base.interrupts import held_back
 from contfric.errors import ParameterError, did_you_mean
-from contfric.interrupts import held_back
 from contfric.plot.style import SMALL, sized
 
 if TYPE_CHECKING:

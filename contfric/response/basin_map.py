@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.memory import must_fit
 from contfric.chaos.running import Progress, Timer, check_executor, compute_all
 from contfric.chaos.status import Motion
 from contfric.chaos.store import TileFolder, digest, open_tiles, versions
@@ -23,7 +24,6 @@ from contfric.errors import (
     shown,
     whole_number,
 )
-from contfric.memory import must_fit
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied

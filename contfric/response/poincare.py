@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.memory import must_fit
 from contfric.errors import (
     ParameterError,
     did_you_mean,
@@ -15,7 +16,6 @@ from contfric.errors import (
     shown,
     whole_number,
 )
-from contfric.memory import must_fit
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied

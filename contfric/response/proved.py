@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.extras import need_flint
+from contfric.base.extras import need_flint
 from contfric.response.poincare import _image_of, _release_of
 from contfric.response.returns import ReleaseMap
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.extras import need_pandas
+from contfric.base.shown import Shown
 from contfric.errors import ParameterError, shown, whole_number
-from contfric.extras import need_pandas
 from contfric.models.definition import FloatArray, Model
 from contfric.response.outcome import Outcome
-from contfric.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

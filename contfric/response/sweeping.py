@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.memory import must_fit
 from contfric.chaos.compute import ascending
 from contfric.chaos.running import Progress, Timer, check_executor, compute_chains
 from contfric.chaos.store import TileFolder, digest, open_tiles, versions
@@ -22,7 +23,6 @@ from contfric.errors import (
     real_number,
     shown,
 )
-from contfric.memory import must_fit
 from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from contfric.atlas.diagram import Diagram
 from contfric.atlas.plane import Plane
+from contfric.base.files import replacing
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
 from contfric.curves.curve import Curve
@@ -26,7 +27,6 @@ from contfric.ensembles.ensemble import Ensemble
 from contfric.equilibria.branch import EquilibriumBranch
 from contfric.equilibria.explore import EquilibriumDiagram
 from contfric.errors import ModelError, ParameterError, ResultFileError, path_of
-from contfric.files import replacing
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit

@@ -9,8 +9,8 @@ from typing import Any, get_args
 
 import numpy as np
 
+from contfric.base.files import replacing
 from contfric.errors import ParameterError, path_of
-from contfric.files import replacing
 from contfric.orbit.orbit import Orbit
 from contfric.results.columns import Columns, Exported, events_of, points_of
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from contfric.base.interrupts import held_back
 from contfric.errors import NotationError, did_you_mean
-from contfric.interrupts import held_back
 from contfric.models import Model, ModelSource, load_model
 
 if TYPE_CHECKING:

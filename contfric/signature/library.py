@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from importlib.metadata import entry_points
 from pathlib import Path
 
+from contfric.base.resources import bundled_dir
+from contfric.base.yaml_lines import read_yaml
 from contfric.errors import NotationError, ParameterError, did_you_mean, shown
 from contfric.models import Model
-from contfric.resources import bundled_dir
-from contfric.yaml_lines import read_yaml
 
 ENTRY_POINTS = "contfric.signatures"
 SUFFIXES = (".yaml", ".yml")

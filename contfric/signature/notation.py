@@ -14,9 +14,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from contfric.base.shown import Shown
 from contfric.errors import NotationError, shown
 from contfric.models import Model, load_model, model_names
-from contfric.shown import Shown
 from contfric.signature.cyclic import least_rotation, rotated
 from contfric.signature.graph import crossing, successors, unknown_domain
 from contfric.signature.holds import TOUCH, hold_at, hold_fault, is_hold, surface_into

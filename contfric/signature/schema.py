@@ -4,33 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, TypeAlias
+from typing import TypeAlias
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field
 
+from contfric.base.yaml_lines import LocatedYaml, read_yaml
+from contfric.base.yaml_schema import Part, Truth, validated
 from contfric.errors import NotationError, ParameterError, did_you_mean
 from contfric.models import Model, load_model
 from contfric.models.files import is_path, relative_model
 from contfric.signature.library import SUFFIXES, signature_path
 from contfric.signature.notation import Signature, split_segments, walk_fault
-from contfric.yaml_lines import Address, LocatedYaml, as_truth, comma_hint, read_yaml
 
-_Truth = Annotated[bool, BeforeValidator(as_truth)]
 SignatureLike: TypeAlias = str | Path | Signature
 
-#: What an entry must be, for messages; the keys are those of the schema.
-_WANTED = {
-    "name": "a text (quote it if YAML reads it as a number)",
-    "model": "the name of a model",
-    "periods": "a whole number >= 1",
-    "segments": "a text such as 'x0v+ -> stick -> x-v+' or a list of domains",
-    "symmetric": "true or false",
-    "example": "a mapping of parameters to numbers",
-    "description": "a text",
-}
 
-
-class SignatureFile(BaseModel):
+class SignatureFile(Part):
     """The content of a signature file.
 
     Examples
@@ -40,15 +29,17 @@ class SignatureFile(BaseModel):
     1
     """
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    model_config = ConfigDict(allow_inf_nan=True)  # the model says what its parameters may be
 
-    name: str = Field(min_length=1, description="what the signature is called")
-    model: str = Field(description="name of the model that the domains belong to")
-    periods: int = Field(1, ge=1, description="number of periods of the excitation")
-    segments: str | list[str] = Field(description="the domains in the order of the visit")
-    symmetric: _Truth | None = Field(None, description="whether the orbit is its own mirror image")
-    example: dict[str, float] | None = Field(None, description="where it is known to exist")
-    description: str | None = Field(None, description="free text")
+    name: str = Field(min_length=1, description="a text (quote it if YAML reads it as a number)")
+    model: str = Field(description="the name of a model")
+    periods: int = Field(1, ge=1, description="a whole number >= 1")
+    segments: str | list[str] = Field(
+        description="a text such as 'x0v+ -> stick -> x-v+' or a list of domains"
+    )
+    symmetric: Truth | None = Field(None, description="true or false")
+    example: dict[str, float] | None = Field(None, description="a mapping of parameters to numbers")
+    description: str | None = Field(None, description="a text")
 
 
 def load_signature(source: SignatureLike, model: str | Model | None = None) -> Signature:
@@ -85,7 +76,7 @@ def load_signature(source: SignatureLike, model: str | Model | None = None) -> S
 def read_signature(path: Path, model: str | Model | None = None) -> Signature:
     """Read one signature file; see :func:`load_signature`."""
     located = read_yaml(path)
-    content = _validated(located)
+    content = validated(located, SignatureFile)
     owner = _owner(located, content.model, model)
     segments = split_segments(content.segments, owner)
     fault = walk_fault(owner, segments)
@@ -149,31 +140,3 @@ def _check_example(located: LocatedYaml, model: Model, example: dict[str, float]
         model.check_params(example)
     except ParameterError as error:
         located.fail(("example",), str(error))
-
-
-def _validated(located: LocatedYaml) -> SignatureFile:
-    for key in located.data:
-        if key not in SignatureFile.model_fields:
-            hint = comma_hint(str(key), located.data[key])
-            hint = hint or did_you_mean(str(key), SignatureFile.model_fields)
-            located.fail((str(key),), f"unknown key '{key}'{hint}")
-    try:
-        return SignatureFile.model_validate(located.data)
-    except ValidationError as error:
-        address: Address = error.errors()[0]["loc"]
-        _explain(located, address)
-
-
-def _explain(located: LocatedYaml, address: Address) -> NoReturn:
-    """Raise the error for the entry that pydantic rejected."""
-    key = str(address[0])
-    if key not in located.data:
-        located.fail((), f"key '{key}' is missing; it must be {_WANTED[key]}")
-    value: Any = located.data[key]
-    if isinstance(value, dict) and len(address) > 1 and address[1] in value:
-        got = f"{address[1]}: {value[address[1]]!r}"
-        located.fail(address[:2], f"'{key}' must be {_WANTED[key]}, got {got}")
-    if isinstance(value, list) and key == "segments":
-        bad = next((i for i, item in enumerate(value) if not isinstance(item, str)), 0)
-        located.fail((key, bad), f"'{key}' must be {_WANTED[key]}, got {value!r}")
-    located.fail((key,), f"'{key}' must be {_WANTED[key]}, got {value!r}")

@@ -1,4 +1,4 @@
-"""Studies: a scene in YAML that names what it wants, the plan that computes only that, the results.
+"""Studies: a YAML file that names what it wants, the plan that computes only that, the results.
 
 Importing this package is cheap: YAML, pydantic and the engine are imported when they are used.
 """

@@ -1,4 +1,4 @@
-"""The proof of what a run has found: a file beside its results, and a column in its table of events."""
+"""The proof of what a run has found: a file next to its results, and a column in its table of events."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from contfric.atlas.diagram import Diagram
 from contfric.continuation.branch import Branch
 from contfric.errors import ResultFileError
 from contfric.results import load
-from contfric.study.compute import one_branch
-from contfric.study.plan import BIFURCATIONS, BRANCH, CERTIFICATE, DIAGRAM
+from contfric.study.plan import CERTIFICATE
 from contfric.study.tables import write_table
+from contfric.study.tasks.branch import BRANCH, one_branch
+from contfric.study.tasks.diagram import DIAGRAM
+from contfric.study.tasks.one_parameter import BIFURCATIONS
 
 if TYPE_CHECKING:
     from contfric.certify.diagram_certificate import DiagramCertificate

@@ -1,7 +1,7 @@
 """The checkpoint of a run: what was computed so far, in its folder, until the run has ended well.
 
-It is the journal of the run (:mod:`contfric.journal`), which belongs to one study and one version of the
-program: the same command goes on from it, and replaces what an interrupted run has written.
+It is the journal of the run (:mod:`contfric.remember.journal`), which belongs to one study and one version of
+the program: the same command goes on from it, and replaces what an interrupted run has written.
 """
 
 from __future__ import annotations
@@ -13,19 +13,17 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from contfric.base.resources import user_cache
 from contfric.errors import ContfricError, ResultFileError
-from contfric.journal import Journal, belongs, digest_of, keeping, program
-from contfric.resources import user_cache
-from contfric.stored import UnstorableError, Writer
+from contfric.remember.journal import Journal, belongs, digest_of, keeping, program
+from contfric.remember.stored import UnstorableError, Writer
 from contfric.study.read import Study
-from contfric.study.responses import KEYS
+from contfric.study.tasks import TASKS
 
 #: The journal, in the folder of the run.
 CHECKPOINT = "checkpoint"
-#: Folders of the finished tiles of a map, or of a simulated response, inside that of the run, until it is
-#: complete.
-TILES = "lyapunov-tiles"
-ALL_TILES = (TILES, *(f"{key}-tiles" for key in KEYS))
+#: Folders of finished parts of a task, inside that of the run, until its result is complete.
+ALL_TILES = tuple(f"{task.name}-tiles" for task in TASKS)
 #: Seconds after which a checkpoint in the user's cache is forgotten: a month.
 _FORGOTTEN = 30 * 86400
 

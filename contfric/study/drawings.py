@@ -1,58 +1,79 @@
-"""The figures of a study: what each shows, what it needs, and the file it goes to."""
+"""The figures of a study: what each shows, what it needs, and the file it goes to; and drawing one."""
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING
 
+from contfric.base.files import replacing
 from contfric.errors import did_you_mean
-from contfric.study.responses import KEYS
-from contfric.study.schema import Figure, FigureKind, Format, Journal, Row, StudyFile
+from contfric.study.schema import FIGURES, Figure, Format, Journal, StudyFile
+from contfric.study.wanted import Row
 
 if TYPE_CHECKING:
-    from contfric.yaml_lines import LocatedYaml
+    from contfric.base.yaml_lines import LocatedYaml
+    from contfric.study.tasks.task import Found, Task
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure to draw: its kind, the rows of a diagram, its file, its width, and whether it has insets."""
+    """A figure to draw.
 
-    kind: FigureKind
+    Attributes
+    ----------
+    kind : one of the kinds of figures
+    rows : rows of a diagram
+    file : name of its file
+    journal : its width, None for that of a screen
+    inset : whether a diagram has insets
+    task : the task that draws it
+    """
+
+    kind: str
     rows: tuple[Row | str, ...]
     file: str
-    journal: Journal | None = None
-    inset: bool = False
+    journal: Journal | None
+    inset: bool
+    task: Task
 
 
 def drawings_of(located: LocatedYaml, content: StudyFile) -> tuple[Drawing, ...]:
     """Return the figures of a study; what is impossible fails with its line."""
     drawings: list[Drawing] = []
     for index, figure in enumerate(content.figures):
+        task = _task(located, content, index)
         rows = _rows(located, content, index)
         file = _file_name(located, figure, index, [drawing.file for drawing in drawings])
-        drawings.append(Drawing(figure.kind, rows, file, figure.journal, figure.inset))
+        drawings.append(Drawing(figure.kind, rows, file, figure.journal, figure.inset, task))
     return tuple(drawings)
+
+
+def _task(located: LocatedYaml, content: StudyFile, index: int) -> Task:
+    """Return the task that draws a figure."""
+    kind = content.figures[index].kind
+    if kind not in FIGURES:
+        located.fail(
+            ("figures", index, "kind"), f"'kind' has no '{kind}'{did_you_mean(kind, FIGURES)}"
+        )
+    look, tasks = FIGURES[kind]
+    found = next((task for task in content.tasks if kind in task.figures), None)
+    if found is None:
+        keys = " or ".join(f"'{task.name}'" for task in tasks)
+        what = look.called or f"a figure of kind {kind}"
+        located.fail(("figures", index), f"{what} needs {keys}")
+    return found
 
 
 def _rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row | str, ...]:
     figure = content.figures[index]
-    if figure.kind is not FigureKind.DIAGRAM:
+    if not FIGURES[figure.kind][0].row_height:
         if figure.rows is not None:
             located.fail(("figures", index, "rows"), "only a diagram has rows")
         if figure.inset:
             located.fail(("figures", index, "inset"), "only a diagram has insets")
-        if figure.kind is FigureKind.BRANCHES:
-            _check_task(located, content, index, "a graph of branches")
-        if figure.kind is FigureKind.LYAPUNOV and content.lyapunov is None:
-            located.fail(("figures", index), "a map of Lyapunov exponents needs 'lyapunov'")
-        key = figure.kind.value
-        if key in KEYS and getattr(content, key) is None:
-            located.fail(("figures", index), f"a figure of kind {key} needs '{key}'")
-        if figure.kind is FigureKind.PLANE and content.plane is None:
-            located.fail(("figures", index), "a plane needs 'plane'")
         return ()
-    _check_task(located, content, index, "a diagram")
     if figure.rows is None:
         return _default_rows(located, content, index)
     for place, row in enumerate(figure.rows):
@@ -62,11 +83,6 @@ def _rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row | s
                 f"row '{row.value}' shows {row.needs.value}: add {row.needs.value} to 'want'",
             )
     return tuple(figure.rows)
-
-
-def _check_task(located: LocatedYaml, content: StudyFile, index: int, what: str) -> None:
-    if content.task is None:
-        located.fail(("figures", index), f"{what} needs 'explore' or 'continue'")
 
 
 def _default_rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row | str, ...]:
@@ -83,8 +99,8 @@ def _file_name(located: LocatedYaml, figure: Figure, index: int, taken: list[str
     address = ("figures", index, "file")
     if figure.file is None:
         suffix = (figure.format or Format.PNG).value
-        names = [f"{figure.kind.value}.{suffix}"]
-        names += [f"{figure.kind.value}-{k}.{suffix}" for k in range(2, len(taken) + 2)]
+        names = [f"{figure.kind}.{suffix}"]
+        names += [f"{figure.kind}-{k}.{suffix}" for k in range(2, len(taken) + 2)]
         return next(name for name in names if name not in taken)
     path = PurePath(figure.file)
     if path.name != figure.file or "\\" in figure.file or path.name.startswith("."):
@@ -99,3 +115,20 @@ def _file_name(located: LocatedYaml, figure: Figure, index: int, taken: list[str
     if name in taken:
         located.fail(address, f"two figures cannot be one file, '{name}'")
     return name
+
+
+def draw(path: Path, drawing: Drawing, found: Found, title: str) -> None:
+    """Draw a figure and write it; all but orbits and graphs carry the study's title.
+
+    Matplotlib is loaded here, and only when a figure is drawn.
+    """
+    from contfric.plot.save import journal, new_figure, save_figure
+
+    with nullcontext() if drawing.journal is None else journal(drawing.journal.value):
+        look = FIGURES[drawing.kind][0]
+        figure = new_figure(look.width, look.height + look.row_height * len(drawing.rows))
+        drawing.task.draw(figure, drawing, found, "" if drawing.journal else title)
+        # the layout is done, for the labels; a second time costs 0.1 s
+        figure.set_layout_engine("none")
+        with replacing(path) as temporary:
+            save_figure(figure, temporary)

@@ -9,8 +9,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from contfric.base.files import remove_leftovers, unwritable
 from contfric.errors import ResultFileError
-from contfric.files import remove_leftovers, unwritable
 from contfric.study.plan import RECORD, RESULT_FILES
 
 

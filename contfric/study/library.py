@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from contfric.base.resources import bundled_dir
 from contfric.errors import StudyError, did_you_mean, shown
-from contfric.resources import bundled_dir
 
 SUFFIXES = (".yaml", ".yml")
 

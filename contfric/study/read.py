@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
-
+from contfric.base.yaml_lines import Address, LocatedYaml, read_yaml
+from contfric.base.yaml_schema import validated
 from contfric.errors import (
     NotationError,
     ParameterError,
@@ -22,12 +22,14 @@ from contfric.models.tied import tied
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.registry import number_quantity, quantity_names
 from contfric.signature import Signature, load_signature
-from contfric.study import responses
 from contfric.study.drawings import Drawing, drawings_of
-from contfric.study.explain_error import fail_with
 from contfric.study.library import SUFFIXES, study_path
-from contfric.study.schema import ContinueTask, ExploreTask, Row, StudyFile, Want
-from contfric.yaml_lines import Address, LocatedYaml, read_yaml
+from contfric.study.schema import SCHEMA, StudyFile
+from contfric.study.wanted import Row, Want
+
+if TYPE_CHECKING:
+    from contfric.study.tasks.one_parameter import OneParameter
+    from contfric.study.tasks.task import Task
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,9 +72,14 @@ class Study:
         return self.content.title or self.name
 
     @property
-    def task(self) -> ExploreTask | ContinueTask | None:
-        """What is done with the first orbit."""
+    def task(self) -> OneParameter | None:
+        """What is done with the first orbit along one parameter."""
         return self.content.task
+
+    @property
+    def tasks(self) -> list[Task]:
+        """What is computed, in the order of the steps: the orbit of the start, if needed, and the tasks."""
+        return self.content.tasks
 
     def wants(self, quantity: Want) -> bool:
         """Return whether the study asks for a quantity."""
@@ -114,10 +121,7 @@ def _validated(located: LocatedYaml) -> StudyFile:
             ("start",),
             f"'start' is 'simulate' or a mapping such as {{signature: 1a}}, got '{start}'",
         )
-    try:
-        return StudyFile.model_validate(data)
-    except ValidationError as error:
-        fail_with(located, error)
+    return validated(located, SCHEMA, data)
 
 
 def _checked(located: LocatedYaml, content: StudyFile) -> Study:
@@ -130,12 +134,12 @@ def _checked(located: LocatedYaml, content: StudyFile) -> Study:
     orbit = _orbit(located, content, model)
     if orbit is not None:
         params = _same_params(located, content, orbit)
-    _check_start(located, content, model)
-    _check_task(located, content, model, params)
-    _check_grid(located, content, model)
-    _check_plane(located, content, model)
+    alike = [task.name for task in content.given if task.result == "diagram"]
+    if len(alike) > 1:
+        located.fail((alike[-1],), f"a study has one of {' and '.join(alike)}, not both")
+    for task in [content.start, *content.given]:
+        task.check(located, content, model, params)
     _check_quantities(located, content, model)
-    responses.check(located, content, model)
     return Study(
         located.path,
         whole,
@@ -184,21 +188,6 @@ def _violated(content: StudyFile, model: Model) -> list[str]:
     ][:1]
 
 
-def _check_start(located: LocatedYaml, content: StudyFile, model: Model) -> None:
-    start = content.start
-    given = [key for key in ("simulate", "signature", "orbit") if getattr(start, key) is not None]
-    if len(given) != 1:
-        got = " and ".join(given) or "none of them"
-        located.fail(("start",), f"'start' has one of simulate, signature, orbit; got {got}")
-    state = start.simulate.state if start.simulate else None
-    if state is not None and len(state) != len(model.states):
-        located.fail(
-            ("start", "simulate", "state"),
-            f"a state of '{model.name}' is {len(model.states)} numbers "
-            f"({', '.join(model.states)}), got {len(state)}",
-        )
-
-
 def _signature(located: LocatedYaml, content: StudyFile, model: Model) -> Signature | None:
     source = content.start.signature
     if source is None:
@@ -245,24 +234,6 @@ def _same_params(located: LocatedYaml, content: StudyFile, orbit: Orbit) -> dict
     return orbit.params
 
 
-def _check_task(
-    located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-) -> None:
-    if content.explore and content.continue_:
-        located.fail(("continue",), "a study has one of explore and continue, not both")
-    task = content.task
-    if task is None:
-        return
-    key = "explore" if content.explore else "continue"
-    try:
-        model.index_of(task.parameter)
-    except ParameterError as error:
-        located.fail((key, "parameter"), str(error))
-    fault = _range_fault(model, params, task)
-    if fault is not None:
-        located.fail((key, "range"), fault)
-
-
 def _check_quantities(located: LocatedYaml, content: StudyFile, model: Model) -> None:
     """Refuse columns, rows and values to stop at of quantities that the model does not have."""
     asked: list[tuple[Address, str, list[str]]] = [
@@ -278,9 +249,9 @@ def _check_quantities(located: LocatedYaml, content: StudyFile, model: Model) ->
             for k, row in enumerate(rows)
             if not isinstance(row, Row)
         ]
-    key = "explore" if content.explore else "continue"
-    stops = content.task.stop_at if content.task and content.task.stop_at else {}
-    asked += [((key, "stop_at", name), name, []) for name in stops]
+    if content.task is not None:
+        stops = content.task.stop_at or {}
+        asked += [((content.task.name, "stop_at", name), name, []) for name in stops]
     known = quantity_names(model)
     for address, name, others in asked:
         place = next(str(part) for part in reversed(address[:-1]) if isinstance(part, str))
@@ -291,88 +262,3 @@ def _check_quantities(located: LocatedYaml, content: StudyFile, model: Model) ->
             number_quantity(name, model, f"'{place}'")
         except ParameterError as error:
             located.fail(address, str(error))
-
-
-def _check_grid(located: LocatedYaml, content: StudyFile, model: Model) -> None:
-    task = content.lyapunov
-    if task is None:
-        return
-    if task.state is not None and len(task.state) != len(model.states):
-        located.fail(
-            ("lyapunov", "state"),
-            f"a state of '{model.name}' is {len(model.states)} numbers "
-            f"({', '.join(model.states)}), got {len(task.state)}",
-        )
-    for name, values in task.grid.items():
-        address = ("lyapunov", "grid", name)
-        try:
-            model.index_of(name)
-        except ParameterError as error:
-            located.fail(address, str(error))
-        responses.check_axis(located, address, name, values)
-    from contfric.chaos.compute import check_size
-
-    shape = tuple(int(values[2]) for values in task.grid.values())
-    try:
-        check_size(shape, task.starts or 1, len(model.states))
-    except ParameterError as error:
-        located.fail(("lyapunov", "grid"), str(error))
-
-
-def _check_plane(located: LocatedYaml, content: StudyFile, model: Model) -> None:
-    task = content.plane
-    if task is None:
-        return
-    from contfric.continuation.events import Kind
-    from contfric.curves.problem import box_of
-
-    one, other = task.parameters
-    ranges = {name: (pair[0], pair[-1]) for name, pair in task.range.items()}
-    wrong = next((name for name, pair in task.range.items() if len(pair) != 2), None)
-    if wrong is not None:
-        located.fail(
-            ("plane", "range", wrong), f"the range of '{wrong}' is two numbers [low, high]"
-        )
-    try:
-        box_of(model, (one, other), ranges)
-    except ParameterError as error:
-        located.fail(("plane",), str(error))
-    for name, values in (task.sections or {}).items():
-        if name not in ranges:
-            hint = did_you_mean(name, ranges)
-            located.fail(("plane", "sections"), f"'{name}' is not one of the two parameters{hint}")
-        low, high = ranges[name]
-        for value in values:
-            if not low <= value <= high:
-                text = f"the section {name} = {value:g} is outside of its range [{low:g}, {high:g}]"
-                located.fail(("plane", "sections", name), text)
-    known = [kind.value for kind in Kind if kind is not Kind.NS]
-    for kind in task.kinds or []:
-        if kind not in known:
-            located.fail(("plane", "kinds"), f"no curves of '{kind}'{did_you_mean(kind, known)}")
-
-
-def _range_fault(
-    model: Model, params: dict[str, float], task: ExploreTask | ContinueTask
-) -> str | None:
-    """Return what is wrong with a range, None if nothing is."""
-    name, (low, high) = task.parameter, task.range
-    if low > high:
-        return f"the range [{low:g}, {high:g}] is reversed: write [{high:g}, {low:g}]"
-    if low == high:
-        return (
-            f"the range [{low:g}, {high:g}] is empty: the lower end comes first, then a larger one"
-        )
-    bottom, top, why_bottom, why_top = model.limits(name, params)
-    if max(low, bottom) >= min(high, top):
-        why = " and ".join(text for text in (why_bottom, why_top) if text)
-        return (
-            f"no {name} in the range [{low:g}, {high:g}] is possible: model '{model.name}' needs "
-            f"{why}, which leaves {name} from {bottom:g} to {top:g}"
-        )
-    if not low <= params[name] <= high:
-        return (
-            f"the start, {name} = {params[name]:g}, is outside of the range [{low:g}, {high:g}]: "
-            f"give {name} a value inside in 'params', or widen the range"
-        )
-    return None

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
-from contfric.atlas.diagram import Diagram
-from contfric.continuation.branch import Branch
+from contfric.base.shown import Shown
 from contfric.errors import ResultFileError
-from contfric.orbit.orbit import Orbit
-from contfric.shown import Shown
 from contfric.study.read import Study
+from contfric.study.tasks.branch import ContinueTask
 
 if TYPE_CHECKING:
+    from contfric.atlas.diagram import Diagram
     from contfric.atlas.plane import Plane
     from contfric.chaos.map import LyapunovMap
+    from contfric.continuation.branch import Branch
     from contfric.ensembles.ensemble import Ensemble
     from contfric.equilibria.explore import EquilibriumDiagram
+    from contfric.orbit.orbit import Orbit
     from contfric.response.basins import Basins
     from contfric.response.returns import Returns
     from contfric.response.sweep import Sweep
-    from contfric.study.responses import Response
+    from contfric.study.tasks.task import Found
 
 
 class RunStatus(str, Enum):
@@ -43,68 +44,76 @@ class StudyResult(Shown):
     out : Path
         The folder of the results.
     status : RunStatus
-    orbit : Orbit or None
-        The orbit of the start; None if nothing needs it, or the run was interrupted before.
-    branch : Branch or None
-        The branch, if the study continues one.
-    diagram : Diagram or None
-        The diagram, if the study has a task.
-    plane : Plane or None
-        The curves of a plane, if the study has one.
-    lyapunov : LyapunovMap or None
-        The map of Lyapunov exponents, if the study asks for one.
     info : dict
         The content of ``run.json``.
     files : tuple of Path
         The files written.
     goes_on : bool
         Whether a checkpoint was left, from which the same call goes on.
-    responses : dict
-        Simulated responses by their keys in the study.
+    found : dict
+        What was found, by its name: ``orbit``, ``diagram``, ``plane``, ``lyapunov``, ``sweep``, ``poincare``,
+        ``basins``, ``equilibria``, ``ensemble``. Each is an attribute, too; None if it was not asked
+        for, or the run was interrupted before.
     """
 
     study: Study
     out: Path
     status: RunStatus
-    orbit: Orbit | None
-    branch: Branch | None
-    diagram: Diagram | None
-    plane: Plane | None
-    lyapunov: LyapunovMap | None
+    found: Found
     info: dict[str, Any]
     files: tuple[Path, ...]
     goes_on: bool = False
-    responses: dict[str, Response] = field(default_factory=dict)
+
+    @property
+    def orbit(self) -> Orbit | None:
+        """The orbit of the start."""
+        return self.found.get("orbit")
+
+    @property
+    def branch(self) -> Branch | None:
+        """The branch, if the study continues one."""
+        alone = isinstance(self.study.task, ContinueTask) and self.diagram is not None
+        return self.diagram.branches[0] if alone and self.diagram else None
+
+    @property
+    def diagram(self) -> Diagram | None:
+        """The diagram, if the study explores or continues."""
+        return self.found.get("diagram")
+
+    @property
+    def plane(self) -> Plane | None:
+        """The curves of a plane."""
+        return self.found.get("plane")
+
+    @property
+    def lyapunov(self) -> LyapunovMap | None:
+        """The map of Lyapunov exponents."""
+        return self.found.get("lyapunov")
 
     @property
     def sweep(self) -> Sweep | None:
-        """The sweep, if the study asks for one."""
-        found = self.responses.get("sweep")
-        return None if found is None else cast("Sweep", found)
+        """The sweep."""
+        return self.found.get("sweep")
 
     @property
     def poincare(self) -> Returns | None:
-        """The points of a section, if the study asks for them."""
-        found = self.responses.get("poincare")
-        return None if found is None else cast("Returns", found)
+        """The points of a section."""
+        return self.found.get("poincare")
 
     @property
     def basins(self) -> Basins | None:
-        """The basins, if the study asks for them."""
-        found = self.responses.get("basins")
-        return None if found is None else cast("Basins", found)
-
-    @property
-    def ensemble(self) -> Ensemble | None:
-        """The ensemble, if the study asks for one."""
-        found = self.responses.get("ensemble")
-        return None if found is None else cast("Ensemble", found)
+        """The basins."""
+        return self.found.get("basins")
 
     @property
     def equilibria(self) -> EquilibriumDiagram | None:
-        """The branches of equilibria, if the study asks for them."""
-        found = self.responses.get("equilibria")
-        return None if found is None else cast("EquilibriumDiagram", found)
+        """The branches of equilibria."""
+        return self.found.get("equilibria")
+
+    @property
+    def ensemble(self) -> Ensemble | None:
+        """The ensemble."""
+        return self.found.get("ensemble")
 
     def __repr__(self) -> str:
         return f"<StudyResult {self.study.name}: {self.status.value}, in {self.out}>"

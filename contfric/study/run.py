@@ -2,64 +2,31 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
-from contfric.atlas.diagram import Diagram
-from contfric.continuation.events import EndReason
 from contfric.errors import ContfricError, ResultFileError, path_of
 from contfric.orbit.counts import Counts, counts
-from contfric.orbit.orbit import Orbit
 from contfric.results import save
-from contfric.study import responses
 from contfric.study.checkpoint import (
-    TILES,
     Checkpoint,
     check_unfinished,
     checkpoint_in,
     goes_on,
     key_of,
 )
-from contfric.study.compute import (
-    compile_continuation,
-    continue_from,
-    explore_from,
-    find_start,
-    lyapunov_from,
-    one_branch,
-    plane_from,
-    was_interrupted,
-)
-from contfric.study.findings import Findings
+from contfric.study.drawings import draw
 from contfric.study.folder import Folder, open_folder
-from contfric.study.plan import (
-    BIFURCATIONS,
-    BRANCH,
-    CURVES,
-    DIAGRAM,
-    LYAPUNOV,
-    LYAPUNOV_TABLE,
-    ORBIT,
-    PLANE,
-    POINTS,
-    RECORD,
-    REGIONS,
-    SPECIAL,
-    Plan,
-    StepName,
-    make_plan,
-)
+from contfric.study.plan import RECORD, Plan, make_plan
 from contfric.study.read import Study, read_study
 from contfric.study.result import RunStatus, StudyResult, UnwrittenError
-from contfric.study.schema import ContinueTask, ExploreTask
-
-if TYPE_CHECKING:
-    from contfric.atlas.plane import Plane
-    from contfric.chaos.map import LyapunovMap
+from contfric.study.tables import write_table
+from contfric.study.tasks.task import Found, Job, Task
 
 Progress = Callable[[str], None]
 _T = TypeVar("_T")
@@ -125,7 +92,7 @@ class _Run:
     checkpoint: Checkpoint
     progress: Progress | None
     status: RunStatus = RunStatus.DONE
-    found: Findings = field(default_factory=Findings)
+    found: Found = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
     written: list[str] = field(default_factory=list)
     failures: list[Exception] = field(default_factory=list)
@@ -152,7 +119,7 @@ class _Run:
         except BaseException as error:
             self._rescue(error)
             raise
-        if self.found.empty:
+        if not self.found:
             self.goes_on = self.checkpoint.leave()
             self.folder.discard_if_empty()
             return self._result({})
@@ -169,76 +136,28 @@ class _Run:
         return result
 
     def _compute(self) -> None:
-        study = self.study
-        if study.task is not None:
-            compile_continuation()
-        if study.content.needs_orbit:
-            orbit = self._timed(StepName.ORBIT, lambda: find_start(study, self.say))
-            self.found.orbit = orbit
-            self.say(f"orbit: {orbit.name} over {orbit.periods} period(s)")
-            self._follow(orbit)
-        self._find_plane()
-        grid = study.content.lyapunov
-        if grid is not None:
-            tiles = self.folder.path / TILES
-            lmap = self._timed(
-                StepName.LYAPUNOV, lambda: lyapunov_from(study, grid, tiles, self.say)
-            )
-            self.found.lyapunov = lmap
-            if not lmap.complete:
-                self.status = RunStatus.INTERRUPTED
-                return
-        self._respond()
+        tasks = self.study.tasks
+        for task in tasks:
+            task.ahead()
+        for task in tasks:
+            tiles = self.folder.path / f"{task.name}-tiles"
+            job = Job(self.study, self.found, tiles, self.say)
+            found = self._timed(task.name, partial(task.compute, job))
+            self.found[task.result] = found
+            if task.cut_short(found):
+                raise KeyboardInterrupt
+            shutil.rmtree(tiles, ignore_errors=True)
 
-    def _respond(self) -> None:
-        """Compute the simulated responses; what an interrupt leaves of one is kept."""
-        for key, task in responses.tasks_of(self.study.content).items():
-            tiles = self.folder.path / f"{key}-tiles"
-            step = partial(responses.compute, self.study, key, task, tiles, self.say)
-            found = self._timed(StepName(key), step)
-            self.found.responses[key] = found
-            if not found.complete:
-                self.status = RunStatus.INTERRUPTED
-                return
-
-    def _find_plane(self) -> None:
-        study, orbit, task = self.study, self.found.orbit, self.study.content.plane
-        if task is None or orbit is None:
-            return
-        plane = self._timed(StepName.PLANE, lambda: plane_from(study, orbit, task, self.say))
-        self.found.plane = plane
-        if EndReason.INTERRUPTED.value in plane.notes:
-            raise KeyboardInterrupt
-
-    def _follow(self, orbit: Orbit) -> None:
-        study, task = self.study, self.study.task
-        if isinstance(task, ExploreTask):
-            found = self._timed(
-                StepName.EXPLORE, lambda: explore_from(study, orbit, task, self.say)
-            )
-            self._keep(found)
-        elif isinstance(task, ContinueTask):
-            branch = self._timed(
-                StepName.CONTINUE, lambda: continue_from(study, orbit, task, self.say)
-            )
-            self.found.branch = branch
-            self._keep(one_branch(branch, (task.range[0], task.range[1])))
-
-    def _keep(self, found: Diagram) -> None:
-        self.found.diagram = found if found.branches else None
-        if was_interrupted(found):
-            raise KeyboardInterrupt
-
-    def _timed(self, name: StepName, step: Callable[[], _T]) -> _T:
+    def _timed(self, name: str, step: Callable[[], _T]) -> _T:
         start = time.perf_counter()
         try:
             return step()
         finally:
-            self.timings[name.value] = time.perf_counter() - start
+            self.timings[name] = time.perf_counter() - start
 
     def _rescue(self, error: BaseException) -> None:
         """Save the orbit if there is one, and let the message say so."""
-        orbit = self.found.orbit
+        orbit = self.found.get("orbit")
         if orbit is None:
             self.folder.discard_if_empty()
             return
@@ -251,60 +170,33 @@ class _Run:
             error.args = (f"{error} (the orbit {orbit.name} found before is in {path})",)
 
     def _write_all(self) -> None:
-        found, unfinished = self.found, self.study.task is not None and self.found.diagram is None
-        self._timed(StepName.TABLES, lambda: self._write_tables(unfinished))
-        self._timed(StepName.DATA, self._write_data)
+        there = [task for task in self.study.tasks if task.result in self.found]
+        self._timed("tables", lambda: self._write_tables(there))
+        self._timed("data", lambda: self._write_data(there))
         if self.study.drawings:
-            self._timed(StepName.FIGURES, lambda: self._draw(found))
+            self._timed("figures", self._draw)
         self.say(f"written to {self.folder.path}")
 
-    def _write_tables(self, unfinished: bool) -> None:
-        from contfric.study.tables import write_bifurcations, write_points, write_table
+    def _write_tables(self, tasks: list[Task]) -> None:
+        for task in tasks:
+            for name in task.tables(self.study):
+                self._write(name, partial(self._write_table, task, name))
 
-        orbit, diagram = self.found.orbit, self.found.diagram
-        if orbit is not None and not unfinished:
-            sources = diagram.branches if diagram else (orbit,)
-            self._write(POINTS, lambda path: write_points(path, self.study, sources))
-        if diagram is not None:
-            self._write(BIFURCATIONS, lambda path: write_bifurcations(path, diagram))
-        self._write_plane_tables(self.found.plane, self.found.lyapunov)
-        if self.found.responses:
-            from contfric.study.tables_response import header_of, rows_of
-        for key, found in self.found.responses.items():
-            header, rows = header_of(found), rows_of(found)
-            self._write(responses.FILES[key].table, partial(write_table, header=header, rows=rows))
+    def _write_table(self, task: Task, name: str, path: Path) -> None:
+        header, rows = task.table(name, self.study, self.found[task.result])
+        write_table(path, header, rows)
 
-    def _write_plane_tables(self, plane: Plane | None, lmap: LyapunovMap | None) -> None:
-        from contfric.study import tables_plane
+    def _write_data(self, tasks: list[Task]) -> None:
+        for task in tasks:
+            self._write(task.saved_as, partial(save, task.saved(self.found[task.result])))
 
-        if plane is not None:
-            self._write(CURVES, lambda path: tables_plane.write_curves(path, plane))
-            self._write(SPECIAL, lambda path: tables_plane.write_special(path, plane))
-            self._write(REGIONS, lambda path: tables_plane.write_regions(path, plane))
-        if lmap is not None:
-            self._write(LYAPUNOV_TABLE, lambda path: tables_plane.write_motions(path, lmap))
-
-    def _write_data(self) -> None:
-        found = self.found
-        whole = None if found.branch is not None else found.diagram  # a branch is its own diagram
-        for name, result in (
-            (ORBIT, found.orbit),
-            (BRANCH, found.branch),
-            (DIAGRAM, whole),
-            (PLANE, found.plane),
-            (LYAPUNOV, found.lyapunov),
-            *((responses.FILES[key].data, x) for key, x in found.responses.items()),
-        ):
-            if result is not None:
-                self._write(name, partial(save, result))
-
-    def _draw(self, found: Findings) -> None:
-        from contfric.study.paint import can_be_drawn, paint
-
-        title = self.study.title
-        shown = (d for d in self.study.drawings if can_be_drawn(d.kind, found))
-        for drawing in shown:
-            self._write(drawing.file, partial(paint, drawing=drawing, found=found, title=title))
+    def _draw(self) -> None:
+        for drawing in self.study.drawings:
+            if drawing.task.result in self.found:
+                title = self.study.title
+                self._write(
+                    drawing.file, partial(draw, drawing=drawing, found=self.found, title=title)
+                )
 
     def _write(self, name: str, write: Callable[[Path], None]) -> None:
         """Write one file; one that fails does not keep the others from being written."""
@@ -342,15 +234,10 @@ class _Run:
             self.study,
             self.folder.path,
             self.status,
-            self.found.orbit,
-            self.found.branch,
-            self.found.diagram,
-            self.found.plane,
-            self.found.lyapunov,
+            self.found,
             record,
             tuple(self.folder.path / name for name in self.written),
             self.goes_on,
-            self.found.responses,
         )
 
 

@@ -1,31 +1,38 @@
-"""The tables of a run: points and bifurcations as CSV, every number to its last digit."""
+"""Tables of a run as CSV, every number to its last digit; and the table of points."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from contfric.atlas.diagram import Diagram, Node
-from contfric.continuation.branch import Branch
-from contfric.orbit.orbit import Orbit
-from contfric.quantities.inside import laws_of
-from contfric.results import replacing
-from contfric.study.read import Study
-from contfric.study.schema import Want
+from contfric.base.files import replacing
+from contfric.study.wanted import Want
+
+if TYPE_CHECKING:
+    from contfric.continuation.branch import Branch
+    from contfric.orbit.orbit import Orbit
+    from contfric.study.read import Study
 
 
-def write_points(path: Path, study: Study, sources: Sequence[Branch | Orbit]) -> None:
-    """Write one row for each point: branch, signature, parameters, and what the study wants.
+class Table(NamedTuple):
+    """A table to write: its columns and its rows."""
+
+    header: Sequence[str]
+    rows: Iterable[Sequence[Any]]
+
+
+def points(study: Study, sources: Sequence[Branch | Orbit]) -> Table:
+    """Return one row for each point: branch, signature, parameters, and what the study wants.
 
     Branches have different numbers of stops; the columns of those that a branch lacks stay empty.
     """
     tables = [_columns(study, source) for source in sources]
     names = list(dict.fromkeys(name for table in tables for name in table))
-    # stop_3 of one branch belongs behind stop_2 of another, before what follows the stops
+    # stop_3 of one branch comes after stop_2 of another, before what follows the stops
     stops = sorted((n for n in names if n.startswith("stop_")), key=lambda n: int(n[5:]))
     last = [n for n in names if n == "stable"]
     header = [n for n in names if n not in stops and n not in last] + stops + last
@@ -34,7 +41,7 @@ def write_points(path: Path, study: Study, sources: Sequence[Branch | Orbit]) ->
         for number, (source, table) in enumerate(zip(sources, tables, strict=True), start=1)
         for row in _rows(table, header)
     )
-    write_table(path, ["branch", "signature", *header], rows)
+    return Table(["branch", "signature", *header], rows)
 
 
 def _rows(table: dict[str, list[Any]], header: list[str]) -> Iterable[tuple[Any, ...]]:
@@ -60,40 +67,6 @@ def _columns(study: Study, source: Branch | Orbit) -> dict[str, list[Any]]:
     if study.wants(Want.STABILITY):
         columns["stable"] = np.atleast_1d(np.asarray(source.stable)).tolist()
     return columns
-
-
-def write_bifurcations(path: Path, diagram: Diagram) -> None:
-    """Write one row for each bifurcation, in the order of the parameter; mirror images are not."""
-    names, contacts = diagram.model.parameter_names, bool(laws_of(diagram.model))
-    rows = (
-        (
-            node.bifurcation.kind.value,
-            node.branches[0] + 1,
-            diagram.branches[node.branches[0]].name,
-            *(node.bifurcation.params[name] for name in names),
-            _known(node.bifurcation.stable_before),
-            _known(node.bifurcation.stable_after),
-            getattr(diagram.scenario(node), "value", ""),
-            node.bifurcation.label,
-            " ".join(str(k + 1) for k in node.branches),
-            node.bifurcation.orbit.period,
-            *([" ".join(node.bifurcation.contacts)] if contacts else []),
-        )
-        for node in listed_nodes(diagram)
-    )
-    header = ["kind", "branch", "signature", *names, "stable_before", "stable_after", "scenario"]
-    header += ["label", "branches", "period"]
-    write_table(path, [*header, *(["contacts"] if contacts else [])], rows)
-
-
-def listed_nodes(diagram: Diagram) -> list[Node]:
-    """Return every bifurcation once with its branches, in the order of the parameter."""
-    own = (node for node in diagram.nodes if not node.mirrored)
-    return sorted(own, key=lambda node: node.bifurcation.params[diagram.parameter])
-
-
-def _known(value: bool | None) -> str:
-    return "" if value is None else str(value)
 
 
 def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:

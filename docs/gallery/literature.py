@@ -11,7 +11,6 @@ import tempfile
 from pathlib import Path
 
 import contfric as cf
-from contfric.study.tables import listed_nodes
 
 HERE = Path(__file__).resolve().parent
 IMAGES = HERE.parent / "images" / "gallery"
@@ -33,7 +32,7 @@ DIGITS = 11
 def rows_of(diagram: cf.Diagram) -> list[tuple[str, float, str]]:
     """Return the events of a diagram, tangencies apart: name, value, branches that meet there."""
     rows = []
-    for node in listed_nodes(diagram):
+    for node in diagram.events:
         event = node.bifurcation
         if event.kind is not cf.Kind.T:
             names = sorted({diagram.branches[i].name for i in node.branches})

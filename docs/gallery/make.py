@@ -17,7 +17,6 @@ import yaml
 
 import contfric as cf
 from contfric.study import Study, read_study
-from contfric.study.tables import listed_nodes
 
 HERE = Path(__file__).resolve().parent
 IMAGES = HERE.parent / "images" / "gallery"
@@ -75,7 +74,7 @@ def rows_of(name: str, diagram: cf.Diagram) -> list[Row]:
     """Return the events of a diagram, tangencies apart, beside what was published."""
     low, high = diagram.range
     rows = []
-    for node in listed_nodes(diagram):
+    for node in diagram.events:
         event = node.bifurcation
         if event.kind is cf.Kind.T:
             continue

@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas.census_sections import exit_arcs
-from contfric.atlas.census_words import canonical_pair
 from contfric.atlas.matching import identity, stops_distance
+from contfric.censuses.sections import exit_arcs
+from contfric.censuses.words import canonical_pair
 from contfric.models.definition import FloatArray
 from contfric.signature.reduced import mirror_pair
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric import advance
-from contfric.advance import foresee, foreseeable, heed, in_advance
+from contfric.base.tally import tally
 from contfric.orbit.counts import Counts, counts
-from contfric.tally import tally
+from contfric.remember import advance
+from contfric.remember.advance import foresee, foreseeable, heed, in_advance
 
 CALLS: list[tuple[int, str]] = []
 

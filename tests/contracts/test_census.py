@@ -7,7 +7,7 @@ import json
 import pytest
 
 import contfric as cf
-from contfric.atlas.census_conditions import Fate
+from contfric.censuses.conditions import Fate
 from contfric.cli import main
 from contfric.cli.exits import Exit
 

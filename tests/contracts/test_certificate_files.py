@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.base.extras import MissingPackageError
 from contfric.certify.files import certificate_data, verify
 from contfric.certify.orbit import certify_orbit
 from contfric.cli import main
-from contfric.extras import MissingPackageError
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
 from contfric.verify.file import check_text

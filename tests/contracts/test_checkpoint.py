@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric import journal
 from contfric.cli import main
 from contfric.cli.exits import Exit
-from contfric.journal import Journal, keeping, remembered
-from contfric.stored import Reader, UnstorableError, Writer
+from contfric.remember import journal
+from contfric.remember.journal import Journal, keeping, remembered
+from contfric.remember.stored import Reader, UnstorableError, Writer
 from contfric.study import checkpoint
 
 HEAD = "model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\n"

@@ -15,13 +15,13 @@ import pytest
 import yaml
 from numba.core import config
 
-from contfric import announced
-from contfric.ahead import every_kernel
 from contfric.cli.progress import compiling_shown
 from contfric.compiled import allocating_helper, f8, helper, kernel
-from contfric.inlined import part_options
+from contfric.compiling import announced
+from contfric.compiling.inlined import part_options
 from contfric.models import build
 from contfric.models.describe import describe
+from contfric.shipping.ahead import every_kernel
 
 MODELS = Path(__file__).parents[1] / "models"
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import yaml
 
+from contfric.base.resources import bundled_dir
 from contfric.models import build, files
 from contfric.models.describe import describe
 from contfric.models.library import bundled, find
-from contfric.resources import bundled_dir
 
 
 @pytest.fixture

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contfric.ahead import every_kernel, missing
 from contfric.cli import main
 from contfric.compiled import f8, helper, i8, kernel, vector
 from contfric.flow.integrated import AffineModes, Functions
 from contfric.handle import ITSELF, TABLE, Block, Bound, HandleType, with_handle
 from contfric.models import build, load_model
+from contfric.shipping.ahead import every_kernel, missing
 
 LAYOUT = {"scaled": f8(f8), "table": TABLE, "count": i8, "factor": f8, "other": ITSELF}
 

@@ -15,7 +15,7 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.exploration import Exploration
-from contfric.interrupts import held_back
+from contfric.base.interrupts import held_back
 
 #: Time after the signal within which a call has returned (s); on an idle machine it is a tenth of that.
 AT_ONCE = 3.0
@@ -28,7 +28,7 @@ import faulthandler
 import sys
 import numpy as np
 import contfric as cf
-from contfric.atlas.census_sweep import sweep
+from contfric.censuses.sweep import sweep
 from contfric.chaos.cells import follow_cells
 from contfric.continuation.bracket import locate
 from contfric.continuation.march import march

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.base.extras import MissingPackageError
 from contfric.cli import main
-from contfric.extras import MissingPackageError
 from contfric.plot.live import page
 from contfric.plot.live.collect import Detail
 from contfric.plot.live.packed import floats, kept, local_sizes, quantised

@@ -245,11 +245,11 @@ def test_a_run_that_is_ended_goes_on(
 ) -> None:
     code, out = run_until_tiles(tmp_path, end)
     if end == signal.SIGKILL:
-        assert code == -signal.SIGKILL
+        assert code == -signal.SIGKILL  # half of a tile may be there, which nothing reads
     else:
         assert code == 0, out
         assert "complete False" in out
-    assert not list(tmp_path.glob("*.part*"))
+        assert not list(tmp_path.glob("*.part*"))
     finished = len(list(tmp_path.glob("tile-*.npz")))
     assert 3 <= finished < TILES
     said: list[str] = []

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.base.resources import bundled_dir
 from contfric.cli import main
 from contfric.models.check import ModelReport, Severity, Topic, check_model
 from contfric.models.check.hidden import check_hidden, hidden_symmetry
 from contfric.models.check.probe import Probe
-from contfric.resources import bundled_dir
 
 GOOD = """\
 name: checked

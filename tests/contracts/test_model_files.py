@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 import contfric as cf
+from contfric.base.resources import bundled_dir
 from contfric.continuation.events import meaning_of
 from contfric.continuation.points import LARGEST_STEP
 from contfric.curves.trace import largest_step
 from contfric.models.describe import from_text
-from contfric.resources import bundled_dir
 
 GOOD = """\
 name: spring

@@ -11,10 +11,10 @@ import pytest
 import yaml
 
 import contfric as cf
+from contfric.base.resources import bundled_dir
 from contfric.models.describe import describe, from_text
 from contfric.models.entries import EntryError
 from contfric.models.files import built
-from contfric.resources import bundled_dir
 from contfric.results import save
 
 

@@ -314,7 +314,7 @@ def test_a_study_asks_for_quantities(tmp_path: Path) -> None:
         ('"rms(v)"', '"rms(w)"', "6: in rms(w): model 'coulomb' has no 'w'"),
         ("rows: [energy", "rows: [power, y_max", "7: 'rows' has no 'y_max'; did you mean 'x_max'"),
         ("x_max: 1.43", "xmax: 1.43", "5: 'stop_at' has no 'xmax'"),
-        ("x_max: 1.43", "x_max: big", "5: 'stop_at': it must be a mapping of quantities"),
+        ("x_max: 1.43", "x_max: big", "5: 'stop_at' must be a mapping of quantities"),
     ],
 )
 def test_a_mistake_in_a_study_has_its_line(tmp_path: Path, old: str, new: str, words: str) -> None:

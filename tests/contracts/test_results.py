@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric import files
+from contfric.base import files
 from contfric.continuation.events import EndReason
 from contfric.orbit.system import build_system
 from contfric.results.archive import _digests

@@ -8,12 +8,14 @@ from dataclasses import asdict
 
 import pytest
 
-from contfric import compiled, shipped, targets
+from contfric import compiled
+from contfric.base.sources import kernels_digest
 from contfric.cli import main
 from contfric.compiled import f8, kernel
-from contfric.kept import file_name
-from contfric.sources import kernels_digest
-from contfric.targets import shipped_target
+from contfric.compiling import targets
+from contfric.compiling.kept import file_name
+from contfric.compiling.targets import shipped_target
+from contfric.shipping import shipped
 
 pytestmark = pytest.mark.skipif(
     shipped_target() is None, reason="this processor cannot run what a wheel carries"
@@ -135,10 +137,10 @@ class Heard:
 
 @pytest.mark.parametrize("without", ["the choice", "numba"])
 def test_a_wheel_without_kernels_is_a_pure_one_and_says_so(monkeypatch, tmp_path, without):
-    from contfric import build_hook
+    from contfric.shipping import build_hook
 
     if without == "numba":
-        monkeypatch.delitem(sys.modules, "contfric.targets")
+        monkeypatch.delitem(sys.modules, "contfric.compiling.targets")
         monkeypatch.setitem(sys.modules, "numba", None)
     else:
         monkeypatch.setenv("CONTFRIC_WHEEL_KERNELS", "none")

@@ -10,9 +10,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from contfric.base.resources import bundled_dir
 from contfric.errors import ContfricError, NotationError
 from contfric.models import load_model
-from contfric.resources import bundled_dir
 from contfric.signature import (
     Signature,
     library,

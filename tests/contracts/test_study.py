@@ -69,9 +69,9 @@ def run_python(code: str, *args: object) -> subprocess.CompletedProcess[str]:
         (
             "model: 7\n",
             1,
-            r"'model': it must be the name of a model, or the path of its YAML file, got 7 \(int\)",
+            r"'model' must be the name of a model, or the path of its YAML file, got 7 \(int\)",
         ),
-        ("model: coulomb\nparams: 3\n", 2, "'params': it must be a mapping of parameters"),
+        ("model: coulomb\nparams: 3\n", 2, "'params' must be a mapping of parameters"),
         (
             "model: coulomb\nparams: {S: yes}\n",
             2,
@@ -86,22 +86,22 @@ def run_python(code: str, *args: object) -> subprocess.CompletedProcess[str]:
         ("model: coulomb\nparams: {zeta: '1e-3'}\n", 2, "a number has no quotes"),
         ("model: coulomb\nparams: {S: .nan}\n", 2, "'S' must be a finite number, got nan"),
         ("model: coulomb\nparams: {S: .inf}\n", 2, "'S' must be a finite number, got inf"),
-        (HEAD + "want: stability\n", 3, "'want': it must be a list.*got 'stability'"),
-        (HEAD + "figures: {kind: orbit}\n", 3, "'figures': it must be a list of mappings"),
-        (HEAD + "explore: [Omega, 0.4, 0.6]\n", 3, "'explore': it must be a mapping"),
-        (HEAD + "explore: {parameter: Omega, range: 0.4}\n", 3, "'range': .*two finite numbers"),
-        (HEAD + "explore: {parameter: Omega, range: [0.4]}\n", 3, "'range': .*two finite numbers"),
-        (HEAD + "explore: {parameter: Omega, range: [0.4, b]}\n", 3, "'range': .*got 'b'"),
-        (HEAD + "explore: {parameter: Omega, range: [0.4, .nan]}\n", 3, "'range': .*got nan"),
-        (HEAD + EXPLORE.replace("}", ", max_step: 0}"), 3, r"'max_step': .*in \(0, 1\].*got 0"),
-        (HEAD + EXPLORE.replace("}", ", max_periods: 1.5}"), 3, "'max_periods': .*whole number"),
-        (HEAD + EXPLORE.replace("}", ", max_periods: 17}"), 3, "'max_periods': .*from 1 to 16"),
-        (HEAD + EXPLORE.replace("}", ", bridges: 0}"), 3, "'bridges': .*true or false.*got 0"),
+        (HEAD + "want: stability\n", 3, "'want' must be a list.*got 'stability'"),
+        (HEAD + "figures: {kind: orbit}\n", 3, "'figures' must be a list of mappings"),
+        (HEAD + "explore: [Omega, 0.4, 0.6]\n", 3, "'explore' must be a mapping"),
+        (HEAD + "explore: {parameter: Omega, range: 0.4}\n", 3, "'range' .*two finite numbers"),
+        (HEAD + "explore: {parameter: Omega, range: [0.4]}\n", 3, "'range' .*two finite numbers"),
+        (HEAD + "explore: {parameter: Omega, range: [0.4, b]}\n", 3, "'range' .*got 'b'"),
+        (HEAD + "explore: {parameter: Omega, range: [0.4, .nan]}\n", 3, "'range' .*got nan"),
+        (HEAD + EXPLORE.replace("}", ", max_step: 0}"), 3, r"'max_step' .*in \(0, 1\].*got 0"),
+        (HEAD + EXPLORE.replace("}", ", max_periods: 1.5}"), 3, "'max_periods' .*whole number"),
+        (HEAD + EXPLORE.replace("}", ", max_periods: 17}"), 3, "'max_periods' .*from 1 to 16"),
+        (HEAD + EXPLORE.replace("}", ", bridges: 0}"), 3, "'bridges' .*true or false.*got 0"),
         (HEAD + CONTINUE.replace("}", ", max_periods: 2}"), 3, "unknown key 'max_periods'"),
         (HEAD + CONTINUE.replace("}", ", bridges: true}"), 3, "unknown key 'bridges'"),
         (HEAD + "start: {simulate: {state: [1.0]}}\n", 3, r"is 2 numbers \(x, v\), got 1"),
-        (HEAD + "start: {simulate: {state: [a, 0]}}\n", 3, "'state': .*finite numbers.*got 'a'"),
-        (HEAD + "start: {simulate: {periods: 0}}\n", 3, "'periods': .*from 1 to 64"),
+        (HEAD + "start: {simulate: {state: [a, 0]}}\n", 3, "'state' .*finite numbers.*got 'a'"),
+        (HEAD + "start: {simulate: {periods: 0}}\n", 3, "'periods' .*from 1 to 64"),
         # values
         (
             "model: coulomb\nparams:\n  S: 0.5\n  S0: 0.4\n",
@@ -614,7 +614,7 @@ def test_interrupted_while_writing(tmp_path, write, monkeypatch) -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("contfric.study.tables.write_points", interrupt)
+    monkeypatch.setattr("contfric.study.tasks.one_parameter.points", interrupt)
     result = cf.run_study(write(HEAD + CONTINUE), tmp_path / "out")
     assert result.status is RunStatus.INTERRUPTED
     assert sorted(contents(result.out)) == [
@@ -627,7 +627,7 @@ def test_interrupted_while_writing(tmp_path, write, monkeypatch) -> None:
 
 
 def test_a_full_disk_loses_no_result(tmp_path, write, monkeypatch) -> None:
-    from contfric import files
+    from contfric.base import files
 
     synced: list[int] = []
 

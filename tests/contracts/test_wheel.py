@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from contfric.targets import shipped_target
+from contfric.compiling.targets import shipped_target
 
 ROOT = Path(__file__).parents[2]
 #: Kernels that come with the wheel of these tests: those of the models, and some of the engine.
@@ -97,8 +97,8 @@ def test_the_kernels_in_the_wheel_are_used_where_nothing_can_be_written(installe
     assert not wheel.name.endswith("-none-any.whl")  # it is for one Python and one platform
     code = f"""if True:
         import logging
-        from contfric.ahead import every_kernel, models_kernels
-        from contfric.shipped import describe
+        from contfric.shipping.ahead import every_kernel, models_kernels
+        from contfric.shipping.shipped import describe
         print(describe())
         said = []
         logging.getLogger("contfric.compiled").addFilter(said.append)

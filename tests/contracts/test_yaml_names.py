@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import contfric as cf
+from contfric.base.yaml_lines import read_yaml
 from contfric.models import load_model
 from contfric.study import read_study
-from contfric.yaml_lines import read_yaml
 
 WORDS = ["on", "off", "yes", "no", "On", "OFF", "Yes", "NO", "y", "n", "Y", "N"]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from contfric.yaml_lines import read_yaml
+from contfric.base.yaml_lines import read_yaml
 
 
 @pytest.mark.parametrize("text", ["1e-3", "1.0e6", "-2E5", "+.5e1", "3.e+2", "1.0e-12", "7e0"])

@@ -28,14 +28,14 @@ def test_output_is_that_of_the_command(capsys: pytest.CaptureFixture[str]) -> No
     assert shown is not None
     assert main(shlex.split(shown[1])) == Exit.DONE
     printed = capsys.readouterr().out
-    # how many starts the net takes may depend on the last bit of the flow; the rest may not
+    # how many starts the grid takes may depend on the last bit of the flow; the rest may not
     assert re.sub(r"\d+ (of \d+ )?starts", "N starts", printed) == re.sub(
         r"\d+ (of \d+ )?starts", "N starts", shown[2]
     )
 
 
 def test_numbers_of_words() -> None:
-    from contfric.atlas.census_words import closed_words
+    from contfric.censuses.words import closed_words
     from contfric.models import load_model
 
     found = re.search(r"pair: ([\d, ]+) of the oscillator for N = ([\d, ]+),", PAGE)

@@ -13,12 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import contfric as cf
-from contfric.atlas.census import _Census
-from contfric.atlas.census_conditions import Arcs, Fate, least_periods
-from contfric.atlas.census_net import Limits
-from contfric.atlas.census_sections import sections_of
-from contfric.atlas.census_words import canonical_pair, closed_words, letters_of, stops_of
 from contfric.atlas.matching import identity, stops_distance
+from contfric.censuses.census import _Census
+from contfric.censuses.conditions import Arcs, Fate, least_periods
+from contfric.censuses.grid import Limits
+from contfric.censuses.sections import sections_of
+from contfric.censuses.words import canonical_pair, closed_words, letters_of, stops_of
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish

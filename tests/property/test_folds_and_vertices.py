@@ -13,6 +13,7 @@ import contfric as cf
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.follow import _through
 from contfric.atlas.matching import same_kind, telling_kind
+from contfric.base.tally import tally
 from contfric.continuation import events, smooth
 from contfric.continuation.points import Point, settings_of
 from contfric.continuation.side import first_point
@@ -23,7 +24,6 @@ from contfric.continuation.vertex_between import left_at
 from contfric.continuation.vertices import moved, opening, passed_vertex, refined_opening
 from contfric.orbit.simulation import tables
 from contfric.orbit.system import Margin
-from contfric.tally import tally
 
 FIG05 = {"Omega": 0.5, "S": 0.32, "S0": 0.4, "h": 0.0}
 #: The branch point of 2s (docs/numerics.md, 40 digits).

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import contfric as cf
-from contfric.checked import write_sealed
+from contfric.base.checked import write_sealed
 from contfric.compiled import f8, i8, matrix, types, vector
 from contfric.models.build import GeneratedFlow, coded_flow, load_module
 from contfric.models.unit import Formula, Unit

@@ -10,10 +10,10 @@ import pytest
 import yaml
 
 import contfric as cf
+from contfric.base.resources import bundled_dir
 from contfric.models.definition import Model
 from contfric.models.describe import describe
 from contfric.models.files import built, loaded
-from contfric.resources import bundled_dir
 
 FRICTION = """
 name: block

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from contfric.shown import Shown
+from contfric.base.shown import Shown
 
 
 class Topic(str, Enum):

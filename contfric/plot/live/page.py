@@ -10,8 +10,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from contfric.extras import need_bokeh
-from contfric.files import replacing
+from contfric.base.extras import need_bokeh
+from contfric.base.files import replacing
 from contfric.plot.diagram import fixed_parameters
 from contfric.plot.live.collect import Detail, collect, symbol
 from contfric.plot.style import (

@@ -8,8 +8,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from contfric.base.extras import need_bokeh
 from contfric.errors import ContfricError
-from contfric.extras import need_bokeh
 from contfric.plot.live.collect import Detail, collect, lines_and_marks, symbol
 from contfric.plot.live.page import fill, fixed_text, resource
 from contfric.plot.style import ROWS

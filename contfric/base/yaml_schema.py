@@ -1,0 +1,176 @@
+"""Schemas of YAML files, and pydantic's report in one message: which key, what it must be, what was given."""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Mapping
+from enum import Enum
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+
+from contfric.base.yaml_lines import as_truth, comma_hint
+from contfric.errors import did_you_mean, shown
+
+if TYPE_CHECKING:
+    from pydantic.fields import FieldInfo
+    from pydantic_core import ErrorDetails
+
+    from contfric.base.yaml_lines import Address, LocatedYaml
+
+Truth = Annotated[bool, BeforeValidator(as_truth)]
+
+
+class Part(BaseModel):
+    """A mapping of a YAML file: no other keys than its own, and no types but these.
+
+    The description of a field is what its value must be: messages say "'key' must be {description}".
+    ``json_schema_extra`` may have "entry": what is said of one entry of a mapping, with {} for its key.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+#: What pydantic calls a key that a part does not have; the second is no text.
+_UNKNOWN = ("extra_forbidden", "invalid_key")
+
+_Schema = TypeVar("_Schema", bound=BaseModel)
+
+
+def validated(located: LocatedYaml, schema: type[_Schema], data: Any = None) -> _Schema:
+    """Return the content of a file, or raise the error ``file.yaml:LINE: ...`` for its first mistake.
+
+    Parameters
+    ----------
+    data : what to read in the place of the file's own content
+    """
+    given = located.data if data is None else data
+    try:
+        return schema.model_validate(given)
+    except ValidationError as error:
+        entry = _cause(error, given)
+        located.fail(_place(given, entry["loc"]), _message(entry, schema, given))
+
+
+def keys_of(schema: type[BaseModel]) -> str:
+    """Return what a mapping has, in words: the keys that it needs, then those that it may have.
+
+    Examples
+    --------
+    >>> class Range(Part):
+    ...     low: float
+    ...     high: float = 1.0
+    >>> keys_of(Range)
+    'a mapping with low; also high'
+    """
+    fields = _fields(schema)
+    needed = [key for key, info in fields.items() if info.is_required()]
+    others = ", ".join(key for key in fields if key not in needed)
+    if not needed:
+        return f"a mapping with any of {others}"
+    *most, last = needed
+    text = f"{', '.join(most)} and {last}" if most else last
+    return f"a mapping with {text}" + (f"; also {others}" if others else "")
+
+
+def _cause(error: ValidationError, data: Any) -> ErrorDetails:
+    """Return the mistake to report: a misspelled key, which makes another one missing, comes first.
+
+    Where a value may be a list or something else, the item at fault says more than the whole list.
+    """
+    details = error.errors()
+    unknown = [entry for entry in details if entry["type"] in _UNKNOWN]
+    first = (unknown or details)[0]
+    place = _place(data, first["loc"])
+    for entry in details:
+        more = _place(data, entry["loc"])
+        items = more[len(place) :]
+        if more[: len(place)] == place and items and all(isinstance(k, int) for k in items):
+            return entry
+    return first
+
+
+def _place(data: Any, address: Address) -> Address:
+    """Return those steps of pydantic's address that lead on in the data; the others name what was tried."""
+    found: list[str | int] = []
+    for step in address:
+        if isinstance(data, Mapping):
+            keys = {str(key): key for key in data}
+            if str(step) in keys:
+                found.append(str(step))
+                data = data[keys[str(step)]]
+        elif isinstance(data, list) and isinstance(step, int) and step < len(data):
+            found.append(step)
+            data = data[step]
+    return tuple(found)
+
+
+def _message(entry: ErrorDetails, schema: type[BaseModel], data: Any) -> str:
+    address, given = entry["loc"], entry["input"]
+    part, key, info = _described(schema, address)
+    if entry["type"] in _UNKNOWN:
+        unknown = str(address[-1])
+        hint = comma_hint(unknown, given) or did_you_mean(unknown, _fields(part))
+        return f"unknown key '{unknown}'{hint}"
+    wanted = info.description if info else "as the guide says"
+    if entry["type"] == "missing":
+        return f"key '{key}' is missing; it must be {wanted}"
+    if entry["type"] == "enum" and info is not None:
+        names = [str(member.value) for kind in _kinds(info.annotation, Enum) for member in kind]
+        return f"'{key}' has no '{given}'{did_you_mean(str(given), names)}"
+    last = next((k for k in reversed(_place(data, address)) if isinstance(k, str)), key)
+    extra = info.json_schema_extra if info else None
+    if last != key and isinstance(extra, dict) and "entry" in extra:
+        return f"{str(extra['entry']).format(last)}, got {_given(given)}"
+    return f"'{key}' must be {wanted}, got {'' if last == key else f'{last}: '}{_given(given)}"
+
+
+def _given(value: object) -> str:
+    """Return a value and, where YAML may surprise, why it is what it is."""
+    try:
+        text = f"{reprlib.repr(value)} ({type(value).__name__})"
+    except ValueError:  # a number of more digits than Python writes
+        return shown(value)
+    if isinstance(value, str):
+        try:
+            float(value)
+        except ValueError:
+            return text
+        return f"{text}; a number has no quotes"
+    return text
+
+
+def _fields(part: type[BaseModel]) -> dict[str, FieldInfo]:
+    return {info.alias or name: info for name, info in part.model_fields.items()}
+
+
+def _described(
+    schema: type[BaseModel], address: Address
+) -> tuple[type[BaseModel], str, FieldInfo | None]:
+    """Return the innermost part that an address leads through, its last known key, and the field."""
+    part, key, info = schema, str(address[0]) if address else "", None
+    for step in address:
+        found = _fields(part).get(str(step))
+        if found is not None:
+            key, info = str(step), found
+            below = _kinds(found.annotation, BaseModel)
+            if not below:
+                break
+            part = below[0]
+    return part, key, info
+
+
+_Kind = TypeVar("_Kind")
+
+
+def _kinds(annotation: Any, base: type[_Kind]) -> list[type[_Kind]]:
+    """Return the classes of one kind in an annotation: of a part, of names out of a list.
+
+    Examples
+    --------
+    >>> _kinds(list[int | None] | dict[str, str], int)
+    [<class 'int'>]
+    """
+    if isinstance(annotation, type) and not get_args(annotation):
+        return [annotation] if issubclass(annotation, base) else []
+    return [kind for part in get_args(annotation) for kind in _kinds(part, base)]

@@ -1,0 +1,1 @@
+"""Census: all periodic orbits at given parameters, by one search on each section that orbits meet."""

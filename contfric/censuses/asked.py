@@ -1,0 +1,69 @@
+"""What a search of the census is asked for, and what it leaves behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from contfric.censuses.conditions import Fate
+from contfric.censuses.orbits import Catalogue
+from contfric.censuses.words import canonical_pair
+from contfric.models.definition import Model
+from contfric.signature import ReducedWord
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Sizes of cells, as powers of two a unit of each axis.
+
+    Attributes
+    ----------
+    coarse : of the first cells
+    torn, near : of the smallest ones that are torn, or near
+    settled : a cell with an orbit in it is halved down to this (sections of dimension above one)
+    """
+
+    coarse: int
+    torn: int
+    near: int
+    settled: int
+
+    def refined(self, by: int) -> Mesh:
+        """Return the mesh with all cells halved a number of times."""
+        return Mesh(self.coarse + by, self.torn + by, self.near + by, self.settled + by)
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """Which walks may have an orbit: those within the limits that no necessary condition rules out."""
+
+    model: Model
+    fates: dict[tuple[ReducedWord, int], Fate | None]
+
+    def __call__(self, word: ReducedWord, periods: int) -> bool:
+        """Return whether a walk may have an orbit."""
+        walk = canonical_pair(self.model, word), periods
+        return walk in self.fates and self.fates[walk] is None
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """What a search has left behind.
+
+    Attributes
+    ----------
+    catalogue : the orbits known after it
+    walks : an example of each walk from the section back to it or to its mirror image
+    starts, held, cut, jumps, open, solves, complete : as of the grid and of the search
+    farthest : largest position of a fixed point, 0 without any
+    """
+
+    catalogue: Catalogue
+    walks: tuple[tuple[int, ...], ...]
+    starts: int
+    held: int
+    cut: int
+    jumps: int
+    open: int
+    solves: int
+    complete: bool
+    farthest: float

@@ -1,0 +1,231 @@
+"""Census: all periodic orbits at given parameters, stable or not, up to a number of periods and stops.
+
+What is asked for are closed words of the transition graph (:mod:`contfric.censuses.words`); what
+is done is one search on each section that orbits meet (:mod:`contfric.censuses.sections`), which
+tries all words at once: a grid of starts is simulated, and refined wherever a discontinuity or a
+near return is (:mod:`contfric.censuses.search`). Stability plays no part in it. ``docs/census.md`` says
+what follows from that for completeness, and what does not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from contfric.censuses.asked import Findings, Mesh, Wanted
+from contfric.censuses.conditions import Fate, Walk, fates_before
+from contfric.censuses.grid import Grid, Limits
+from contfric.censuses.limits import NEAR_ENOUGH, limits_of
+from contfric.censuses.orbits import Catalogue
+from contfric.censuses.result import Census, SectionSearch
+from contfric.censuses.search import Progress, Search, searched
+from contfric.censuses.sections import Section, exit_arcs, period_of, sections_of
+from contfric.censuses.words import canonical_pair, closed_words
+from contfric.errors import ParameterError, whole_number
+from contfric.models import ModelSource, Parameters
+from contfric.models.definition import FloatArray, Model
+from contfric.models.tied import tied
+from contfric.orbit.words import whole_of
+from contfric.signature import ReducedWord
+
+#: Cells of a curve: 4096 a period at first (0.02 s for walks of ten events), and where walks differ
+#: down to 1.5e-11 of a period, where both sides of a jump are the same to the accuracy of an event.
+_CURVE = Mesh(coarse=12, torn=36, near=36, settled=36)
+#: Cells of other sections, an axis: 64 at first, as the return maps of slides bend over about a tenth of
+#: it; boundaries down to 1/512, beyond which Newton from either side reaches across; near returns
+#: until Newton's disc is larger than the cell by far.
+_BOX = Mesh(coarse=6, torn=9, near=12, settled=9)
+#: Bits of the lattices: more than the smallest cells need.
+_BITS = 40
+#: Most halvings beyond these: a box then has 262,144 cells at first, and its events take 100 MB.
+_FINEST = 3
+#: In natural units a return map bends over lengths of the order of 1: a box larger than this (near a
+#: resonance) is searched in steps of this factor, from a small one on.
+_NATURAL, _FACTOR = 8.0, 8.0
+#: The box is doubled at most this often.
+_DOUBLINGS = 3
+
+
+def census(
+    model: ModelSource,
+    params: Parameters,
+    *,
+    periods: int = 2,
+    stops: int = 6,
+    finer: int = 0,
+    most_starts: int = 2_000_000,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Census:
+    """Find all periodic orbits at given parameters, stable or not, within limits.
+
+    Parameters
+    ----------
+    periods : int
+        Most excitation periods of an orbit.
+    stops : int
+        Most stops (slides that end at v = 0) of an orbit.
+    finer : int
+        Halvings of all cells beyond the default, 0 to 3, to see whether anything is added.
+    most_starts : int
+        Most trajectories on one section; if they are used up, ``complete`` is False.
+    seed : int
+        Shifts the grids; the same seed gives the same census.
+    progress : callable, optional
+        Takes one line of text now and then.
+
+    Returns
+    -------
+    Census
+        On Ctrl-C what was found so far, with ``complete`` False.
+
+    Raises
+    ------
+    ParameterError
+        If parameters or limits are not valid, or the model has no excitation.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> [o.name for o in cf.census("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, stops=4)]
+    ['1a', '2s']
+    """
+    model, params = tied(model, params)
+    vector = model.vector(params)
+    limits = Limits(
+        whole_number("periods", periods, least=1), whole_number("stops", stops, least=1)
+    )
+    whole_number("finer", finer, least=0, most=_FINEST)
+    whole_number("most_starts", most_starts, least=1)
+    whole_number("seed", seed, least=0)
+    if period_of(model, vector) == 0.0:
+        raise ParameterError(
+            f"model '{model.name}' has no excitation: the periods of its orbits are unknown, and a "
+            "census cannot be bounded by their number"
+        )
+    rests = sum(mode.sliding for mode in model.modes)
+    if model.resets or rests != 1 or sum(s.switching for s in model.surfaces) != 1:
+        raise ParameterError(
+            f"model '{model.name}': a census is offered for models with one switching surface, rest on "
+            "it, and no impacts: the walks of others cannot be bounded by their stops"
+        )
+    state = _Census(model, vector, limits, finer, most_starts, seed, progress)
+    try:
+        state.prepare()
+        for section in sections_of(model, vector):
+            state.search(section)
+    except KeyboardInterrupt:
+        state.interrupted = True
+    return state.result()
+
+
+@dataclass(eq=False)
+class _Census:
+    """State of one census."""
+
+    model: Model
+    vector: FloatArray
+    limits: Limits
+    finer: int
+    most_starts: int
+    seed: int
+    progress: Progress | None
+    catalogue: Catalogue = field(default_factory=Catalogue)
+    words: list[ReducedWord] = field(default_factory=list)
+    fates: dict[tuple[ReducedWord, int], Fate | None] = field(default_factory=dict)
+    walked: set[ReducedWord] = field(default_factory=set)
+    searches: list[SectionSearch] = field(default_factory=list)
+    interrupted: bool = False
+
+    def prepare(self) -> None:
+        """List the words, and what necessary conditions leave of them."""
+        if self.progress is not None:
+            self.progress("listing the walks")
+        self.words = closed_words(self.model, self.limits.stops)
+        arcs = exit_arcs(self.model, self.vector)
+        self.fates = fates_before(self.model, self.words, self.limits.periods, arcs)
+
+    def search(self, section: Section) -> None:
+        """Search one section, in boxes of several sizes if it has positions."""
+        largest = float(np.sum(self.model.spread(self.model.mapping(self.vector))))
+        if section.dimension == 1:
+            self._search(section, largest)
+            return
+        sizes = [largest]
+        while sizes[0] > _NATURAL:
+            sizes.insert(0, sizes[0] / _FACTOR)
+        sizes += [largest * 2.0**k for k in range(1, _DOUBLINGS + 1)]
+        for reach in sizes:
+            found = self._search(section, reach)
+            if found is None or (reach >= largest and found.farthest <= NEAR_ENOUGH * reach):
+                return
+
+    def _search(self, section: Section, reach: float) -> Findings | None:
+        """Search one section in one box; None if no word needs it."""
+        mesh = (_CURVE if section.dimension == 1 else _BOX).refined(self.finer)
+        shift = np.random.default_rng(self.seed).uniform(size=section.dimension) / 2.0**mesh.coarse
+        grid = Grid(section, self.vector, self.limits, shift, _BITS, reach)
+        if not grid.useful:
+            return None
+        wanted = Wanted(self.model, self.fates)
+        search = Search(grid, mesh, self.catalogue, wanted, self.most_starts)
+        try:
+            found = searched(search, self.progress)
+        except BaseException:
+            self._record(grid, mesh, search.findings())
+            raise
+        self._record(grid, mesh, found)
+        return found
+
+    def _record(self, grid: Grid, mesh: Mesh, found: Findings) -> None:
+        self.catalogue = found.catalogue
+        for codes in found.walks:
+            word = grid.word_of(codes)
+            half = codes[-1] != grid.own
+            self.walked.add(canonical_pair(self.model, whole_of(self.model, word, half)))
+        self.searches.append(
+            SectionSearch(
+                str(grid.section),
+                grid.section.dimension,
+                0.5**mesh.coarse,
+                0.5 ** max(mesh.torn, mesh.near),
+                grid.reach if grid.section.dimension > 1 else 0.0,
+                found.farthest,
+                found.starts,
+                found.solves,
+                found.held,
+                found.cut,
+                found.jumps,
+                found.open,
+                found.complete,
+            )
+        )
+
+    # ----------------------------------------------------------------------------------- result
+
+    def result(self) -> Census:
+        """Return what was found."""
+        complete = not self.interrupted and all(s.complete for s in self.searches)
+        return Census(
+            self.model,
+            self.model.mapping(self.vector),
+            self.limits.periods,
+            self.limits.stops,
+            self.catalogue.sorted(),
+            tuple(self._walk(word, n) for word, n in self.fates),
+            tuple(self.searches),
+            limits_of(self.limits, self.searches, self.catalogue, self.interrupted),
+            self.seed,
+            complete,
+            self.interrupted,
+        )
+
+    def _walk(self, word: ReducedWord, periods: int) -> Walk:
+        found = len(self.catalogue.orbits.get((word, periods), []))
+        fate = self.fates[word, periods]
+        if found:
+            fate = Fate.FOUND
+        elif fate is None:
+            fate = Fate.NOT_CLOSED if word in self.walked else Fate.NOT_WALKED
+        return Walk(word, periods, fate, found)

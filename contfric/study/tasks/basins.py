@@ -1,0 +1,123 @@
+"""``basins``: starts on a grid of two states, labelled by what they converge to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from contfric.base.shown import aligned
+from contfric.study.tables import Table
+from contfric.study.tasks.response import Response
+from contfric.study.tasks.task import (
+    FigureKind,
+    Job,
+    attempt,
+    axes_text,
+    check_axis,
+    grid_text,
+    incomplete,
+)
+
+if TYPE_CHECKING:
+    from contfric.base.yaml_lines import LocatedYaml
+    from contfric.models.definition import Model
+    from contfric.response.basins import Basins
+    from contfric.study.read import Study
+    from contfric.study.schema import StudyFile
+
+
+class BasinsTask(Response):
+    """Starts on a grid of two states, labelled by what they converge to."""
+
+    name = "basins"
+    result = "basins"
+    saved_as = "basins.npz"
+    row_text = "one row a start of the basins"
+    own = frozenset({"grid", "at"})
+    figures: ClassVar = {"basins": FigureKind(8.4, 6.0)}
+
+    grid: dict[str, list[float]] = Field(
+        min_length=2,
+        max_length=2,
+        description="a mapping of two states, each to [low, high, number of values]",
+    )
+    at: dict[str, float] = Field(
+        {}, description="a mapping of the other states, and of phase, to numbers"
+    )
+    periods: int | None = Field(
+        None, ge=1, description="a whole number >= 1: periods that a start is followed"
+    )
+
+    def check(
+        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
+    ) -> None:
+        """Check the axes, and that every state has a value."""
+        from contfric.response.basin_map import check_starts
+
+        for name, values in self.grid.items():
+            if name in model.states:
+                check_axis(located, (self.name, "grid", name), name, values)
+        attempt(located, (self.name,), lambda: check_starts(model, self._axes(), self.at))
+
+    def _axes(self) -> dict[str, Any]:
+        return {
+            name: np.linspace(values[0], values[1], int(values[2])) if len(values) == 3 else values
+            for name, values in self.grid.items()
+        }
+
+    def does(self, study: Study) -> str:
+        """Return the grid in words."""
+        return f"what starts converge to, {axes_text(self.grid)}"
+
+    def compute(self, job: Job) -> Basins:
+        """Follow the starts; a killed run goes on from its tiles."""
+        from contfric.response.basin_map import basins
+
+        study = job.study
+        return basins(
+            study.model,
+            study.params,
+            self._axes(),
+            self.at,
+            folder=job.tiles,
+            progress=job.say,
+            **self.options(),
+        )
+
+    def table(self, file: str, study: Study, found: Basins) -> Table:
+        """Return one row for each start."""
+        return Table([*found.axes, "orbit", "name", "motion"], _rows(found))
+
+    def entry(self, found: Basins) -> dict[str, Any]:
+        """Return the grid and the share of each orbit."""
+        return {
+            "grid": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in found.axes.items()},
+            "at": found.at,
+            "complete": found.complete,
+            "shares": [vars(share) for share in found.shares],
+        }
+
+    @classmethod
+    def lines(cls, entry: dict[str, Any]) -> Iterator[str]:
+        """Yield the shares as a table."""
+        yield f"basins at {grid_text(entry)}"
+        rows = [["", "starts", "share", "95 % interval"]]
+        for s in entry["shares"]:
+            interval = f"{s['low']:.2%} to {s['high']:.2%}"
+            rows.append([s["name"], str(s["count"]), f"{s['share']:.2%}", interval])
+        yield from aligned(rows)
+        yield from incomplete(entry)
+
+
+def _rows(found: Basins) -> Iterator[tuple[Any, ...]]:
+    from contfric.chaos.status import Motion
+
+    motions, names = [motion.name.lower() for motion in Motion], [*found.names, ""]
+    rows, columns = (values.tolist() for values in found.axes.values())
+    for i, a in enumerate(rows):
+        for j, b in enumerate(columns):
+            label = int(found.labels[i, j])
+            yield a, b, label, names[label], motions[found.motions[i, j]]

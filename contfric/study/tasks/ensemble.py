@@ -1,0 +1,200 @@
+"""``ensemble``: diagrams of random parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import nullcontext
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from pydantic import Field
+
+from contfric.base.shown import aligned
+from contfric.errors import ParameterError, checked_range, did_you_mean
+from contfric.study.tables import Table
+from contfric.study.tasks.response import Response
+from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Job, attempt, incomplete
+
+if TYPE_CHECKING:
+    from contfric.base.yaml_lines import LocatedYaml
+    from contfric.ensembles.ensemble import Ensemble
+    from contfric.models.definition import Model
+    from contfric.study.read import Study
+    from contfric.study.schema import StudyFile
+
+#: Events and classes that the summary lists; the record has all of them.
+_MOST = 12
+
+
+class EnsembleTask(Response):
+    """Diagrams of random parameters."""
+
+    name = "ensemble"
+    result = "ensemble"
+    saved_as = "ensemble.npz"
+    row_text = "one row an event of a sample"
+    own = frozenset({"parameter", "range", "distributions", "workers"})
+    figures: ClassVar = {"ensemble": FigureKind(9.6, 6.0)}
+
+    parameter: str = Field(description=PARAMETER)
+    range: list[float] = Field(min_length=2, max_length=2, description=RANGE)
+    distributions: dict[str, list[float] | dict[str, list[float]]] = Field(
+        description="a mapping of parameters to [low, high], or to a distribution of scipy.stats with its "
+        "arguments, such as {norm: [0.32, 0.01]}"
+    )
+    samples: int | None = Field(None, ge=1, description="a whole number >= 1: diagrams")
+    seed: int | None = Field(None, ge=0, description="a whole number >= 0")
+    row: str | None = Field(None, description="a quantity, of which bands are made")
+    values: int | None = Field(
+        None, ge=2, description="a whole number >= 2: values of the parameter for bands"
+    )
+    max_step: float | None = Field(None, gt=0.0, description="a number > 0")
+    bridges: bool | None = Field(None, description="true or false")
+    max_periods: int | None = Field(None, ge=1, description="a whole number >= 1")
+    copies: int | None = Field(None, ge=1, description="a whole number >= 1")
+    max_branches: int | None = Field(None, ge=1, description="a whole number >= 1")
+    max_points: int | None = Field(None, ge=1, description="a whole number >= 1")
+    workers: int | None = Field(None, ge=1, description="a whole number >= 1: processes")
+
+    def check(
+        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
+    ) -> None:
+        """Check the range, the distributions and the quantity."""
+        from contfric.ensembles.drawing import checked_distributions
+        from contfric.quantities.registry import number_quantity
+
+        steps = {
+            "parameter": lambda: model.index_of(self.parameter),
+            "range": lambda: checked_range(self.parameter, self.range),
+            "distributions": lambda: checked_distributions(
+                model, self._distributions(), self.parameter
+            ),
+            "row": lambda: self.row is None or number_quantity(self.row, model, "an ensemble"),
+        }
+        for key, step in steps.items():
+            attempt(located, (self.name, key), step)
+        low, high = self.range
+        start = content.params.get(self.parameter)
+        if isinstance(start, int | float) and not low <= start <= high:
+            located.fail(
+                (self.name, "range"),
+                f"an orbit to begin with is looked for at {self.parameter} = {start:g} of 'params', which is "
+                f"not between {low:g} and {high:g}",
+            )
+
+    def _distributions(self) -> dict[str, Any]:
+        """Return the distributions.
+
+        Raises
+        ------
+        ParameterError
+            If scipy.stats has no such distribution, or it does not take these arguments.
+        """
+        from scipy import stats
+
+        found: dict[str, Any] = {}
+        for name, given in self.distributions.items():
+            if isinstance(given, list):
+                found[name] = tuple(given)
+                continue
+            known = [n for n in dir(stats) if isinstance(getattr(stats, n), stats.rv_continuous)]
+            kind = next(iter(given), None)
+            if len(given) != 1 or kind not in known:
+                raise ParameterError(
+                    f"the distribution of '{name}' is [low, high], or one of scipy.stats with its arguments, "
+                    f"such as {{norm: [0.32, 0.01]}}; got {given}{did_you_mean(kind, known)}"
+                )
+            try:
+                found[name] = getattr(stats, kind)(*given[kind])
+            except (TypeError, ValueError) as error:
+                raise ParameterError(f"the distribution of '{name}', {kind}: {error}") from None
+        return found
+
+    def does(self, study: Study) -> str:
+        """Return what is varied, in words."""
+        low, high = self.range
+        varied = ", ".join(self.distributions)
+        return f"diagrams of random {varied}, {self.parameter} from {low:g} to {high:g}"
+
+    def compute(self, job: Job) -> Ensemble:
+        """Compute it, in processes if there are several; a killed run goes on from its tiles."""
+        from concurrent.futures import ProcessPoolExecutor
+        from multiprocessing import get_context
+
+        from contfric.ensembles.compute import ensemble
+
+        low, high = self.range
+        distributions = self._distributions()
+        params = {n: value for n, value in job.study.params.items() if n not in distributions}
+        if not low <= params[self.parameter] <= high:  # the model's default: nothing was asked for
+            params.pop(self.parameter)
+        workers = self.workers or 1
+        spawn = get_context("spawn")
+        pool = ProcessPoolExecutor(workers, mp_context=spawn) if workers > 1 else None
+        with pool or nullcontext():
+            return ensemble(
+                job.study.model,
+                self.parameter,
+                (low, high),
+                distributions,
+                params,
+                executor=pool,
+                folder=job.tiles,
+                progress=job.say,
+                **self.options(),
+            )
+
+    def table(self, file: str, study: Study, found: Ensemble) -> Table:
+        """Return one row for each event of each sample."""
+        places = found.rows
+        events = zip(places.event_label.tolist(), places.event_value.tolist(), strict=True)
+        rows = (
+            (sample, *found.samples[sample].tolist(), *event)
+            for sample, event in zip(places.event_sample.tolist(), events, strict=True)
+        )
+        return Table(["sample", *found.distributions, "event", found.parameter], rows)
+
+    def entry(self, found: Ensemble) -> dict[str, Any]:
+        """Return events and classes with their shares."""
+        return {
+            "parameter": found.parameter,
+            "range": list(found.range),
+            "distributions": found.distributions,
+            "seed": found.seed,
+            "samples": len(found),
+            "outcomes": found.counts(),
+            "complete": found.complete,
+            "events": [
+                {"label": e.label, "share": e.share, "low": e.low, "high": e.high, "count": e.count}
+                | {"quantiles": e.quantiles().tolist()}
+                for e in found.events
+            ],
+            "classes": [
+                {"events": list(c.events), "share": c.share, "low": c.low, "high": c.high}
+                | {"samples": len(c.samples)}
+                for c in found.classes
+            ],
+        }
+
+    @classmethod
+    def lines(cls, entry: dict[str, Any]) -> Iterator[str]:
+        """Yield the most frequent events and classes as tables."""
+        low, high = entry["range"]
+        varied = "; ".join(f"{name} {text}" for name, text in entry["distributions"].items())
+        found = ", ".join(f"{count} {outcome}" for outcome, count in entry["outcomes"].items())
+        name = entry["parameter"]
+        yield f"ensemble of {entry['samples']} diagrams, {name} from {low:g} to {high:g}: {found}"
+        yield f"random    {varied}"
+        events, classes = entry["events"], entry["classes"]
+        rows = [["event", "share", f"{name} (5 %)", "median", "95 %"]]
+        for e in events[:_MOST]:
+            rows.append([e["label"], f"{e['share']:.1%}", *(f"{q:.6g}" for q in e["quantiles"])])
+        yield from aligned(rows)
+        rows = [["share", "95 % interval", "list of events"]]
+        for c in classes[:_MOST]:
+            interval = f"{c['low']:.1%} to {c['high']:.1%}"
+            rows.append([f"{c['share']:.1%}", interval, ", ".join(c["events"]) or "none"])
+        yield from aligned(rows)
+        left = max(0, len(events) - _MOST), max(0, len(classes) - _MOST)
+        if any(left):
+            yield f"and {left[0]} rarer events, {left[1]} rarer classes, which run.json has"
+        yield from incomplete(entry)

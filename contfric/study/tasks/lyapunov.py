@@ -1,0 +1,156 @@
+"""``lyapunov``: Lyapunov exponents on a grid of two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from contfric.study.tables import Table
+from contfric.study.tasks.task import (
+    STATE,
+    FigureKind,
+    Found,
+    Job,
+    Task,
+    attempt,
+    axes_text,
+    check_axis,
+    check_state,
+    grid_text,
+    incomplete,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from contfric.base.yaml_lines import LocatedYaml
+    from contfric.chaos.map import LyapunovMap
+    from contfric.models.definition import Model
+    from contfric.study.drawings import Drawing
+    from contfric.study.read import Study
+    from contfric.study.schema import StudyFile
+
+
+class LyapunovTask(Task):
+    """Lyapunov exponents on a grid of two parameters."""
+
+    name = "lyapunov"
+    result = "lyapunov"
+    saved_as = "lyapunov.npz"
+    row_text = "one row a trajectory of the map"
+    own = frozenset({"grid"})
+    figures: ClassVar = {"lyapunov": FigureKind(8.0, 5.6, called="a map of Lyapunov exponents")}
+
+    grid: dict[str, list[float]] = Field(
+        min_length=2,
+        max_length=2,
+        description="a mapping of two parameters, each to [low, high, number of values]",
+    )
+    periods: int | None = Field(
+        None, ge=1, description="a whole number >= 1: most periods to average over"
+    )
+    transient: int | None = Field(
+        None, ge=0, description="a whole number >= 0: periods before averaging begins"
+    )
+    tolerance: float | None = Field(
+        None, gt=0.0, description="a number > 0: relative error at which averaging ends"
+    )
+    confirm: int | None = Field(
+        None, ge=0, description="a whole number >= 0: periods that chaos is followed further"
+    )
+    starts: int | None = Field(
+        None, ge=1, description="a whole number >= 1: initial conditions at each point"
+    )
+    state: list[float] | None = Field(None, description=f"{STATE}: where every trajectory starts")
+
+    def check(
+        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
+    ) -> None:
+        """Check the axes, the state, and whether the map fits into memory."""
+        from contfric.chaos.compute import check_size
+
+        check_state(located, (self.name, "state"), self.state, model)
+        for name, values in self.grid.items():
+            address = (self.name, "grid", name)
+            attempt(located, address, partial(model.index_of, name))
+            check_axis(located, address, name, values)
+        shape = tuple(int(values[2]) for values in self.grid.values())
+        size = partial(check_size, shape, self.starts or 1, len(model.states))
+        attempt(located, (self.name, "grid"), size)
+
+    def does(self, study: Study) -> str:
+        """Return the grid in words."""
+        return f"exponents of trajectories at {axes_text(self.grid)}"
+
+    def compute(self, job: Job) -> LyapunovMap:
+        """Compute a map; a killed run goes on from its tiles."""
+        from contfric.chaos.compute import lyapunov_map
+
+        study = job.study
+        return lyapunov_map(
+            study.model,
+            {name: np.linspace(low, high, int(n)) for name, (low, high, n) in self.grid.items()},
+            {name: value for name, value in study.params.items() if name not in self.grid},
+            folder=job.tiles,
+            progress=job.told(self.name),
+            **self.options(),
+        )
+
+    def table(self, file: str, study: Study, found: LyapunovMap) -> Table:
+        """Return one row for each trajectory."""
+        from contfric.chaos.status import Motion
+
+        (first, across), (second, up) = found.axes.items()
+        names = [motion.name.lower() for motion in Motion]
+        rows = (
+            (
+                across[i].item(),
+                up[j].item(),
+                k + 1,
+                *found.exponents[i, j, k].tolist(),
+                found.errors[i, j, k].item(),
+                names[found.motions[i, j, k]],
+                found.periods[i, j, k].item(),
+                found.followed[i, j, k].item(),
+            )
+            for i, j, k in np.ndindex(*found.motions.shape)
+        )
+        exponents = [f"exponent_{k + 1}" for k in range(found.exponents.shape[-1])]
+        tail = ["error", "motion", "periods", "followed"]
+        return Table([first, second, "start", *exponents, *tail], rows)
+
+    def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
+        """Draw the map."""
+        from contfric.plot.lyapunov import plot_lyapunov_map
+        from contfric.plot.style import TEXT, full_title, sized
+
+        lmap: LyapunovMap = found["lyapunov"]
+        axes = plot_lyapunov_map(lmap, ax=figure.add_subplot())
+        text = full_title(title, [*lmap.params, *lmap.axes], lmap.params)
+        axes.set_title(text, fontsize=sized(TEXT))
+
+    def entry(self, found: LyapunovMap) -> dict[str, Any]:
+        """Return what the trajectories of a map turned out to be."""
+        return {
+            "grid": {
+                name: [float(values[0]), float(values[-1]), len(values)]
+                for name, values in found.axes.items()
+            },
+            "params": found.params,
+            "starts": found.starts,
+            "complete": found.complete,
+            "motions": {motion.name.lower(): count for motion, count in found.counts().items()},
+            "largest": float(np.nanmax(found.values, initial=-np.inf)),
+        }
+
+    @classmethod
+    def lines(cls, entry: dict[str, Any]) -> Iterator[str]:
+        """Yield the kinds of motion and the largest exponent."""
+        found = ", ".join(f"{count} {motion}" for motion, count in entry["motions"].items())
+        yield f"exponents at {grid_text(entry)}, {entry['starts']} start(s) each: {found}"
+        yield f"largest   {entry['largest']:.6g}"
+        yield from incomplete(entry)

@@ -1,0 +1,66 @@
+"""``poincare``: points of one solution on a section."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from pydantic import Field
+
+from contfric.study.tables import Table
+from contfric.study.tasks.response import Section
+from contfric.study.tasks.task import FigureKind, Job
+
+if TYPE_CHECKING:
+    from contfric.response.returns import Returns
+    from contfric.study.read import Study
+
+
+class PoincareTask(Section):
+    """Points of one solution on a section."""
+
+    name = "poincare"
+    result = "poincare"
+    saved_as = "poincare.npz"
+    row_text = "one row a point of the section"
+    figures: ClassVar = {"poincare": FigureKind(6.4, 6.0)}
+
+    time: float | None = Field(None, description="a finite number: the initial time")
+
+    def does(self, study: Study) -> str:
+        """Return the section in words."""
+        return f"points of one solution at {self.section if self.section is not None else 'stops'}"
+
+    def compute(self, job: Job) -> Returns:
+        """Simulate one solution."""
+        from contfric.response.poincare import poincare
+
+        return poincare(job.study.model, job.study.params, **self.options())
+
+    def table(self, file: str, study: Study, found: Returns) -> Table:
+        """Return one row for each point."""
+        modes = [mode.name for mode in found.model.modes]
+        rows = (
+            (
+                found.cycles[k].item(),
+                found.times[k].item(),
+                modes[found.modes[k]],
+                *found.states[k].tolist(),
+            )
+            for k in range(len(found))
+        )
+        return Table(["cycle", "t", "mode", *found.model.states], rows)
+
+    def entry(self, found: Returns) -> dict[str, Any]:
+        """Return the section and how the solution ended."""
+        return {
+            "section": found.section,
+            "points": len(found),
+            "outcome": found.outcome.name.lower(),
+            "complete": found.complete,
+        }
+
+    @classmethod
+    def lines(cls, entry: dict[str, Any]) -> Iterator[str]:
+        """Yield the number of points."""
+        yield f"{entry['points']} points of a solution at {entry['section']}"

@@ -1,0 +1,69 @@
+"""What tasks share whose result plots itself: responses, equilibria, ensembles."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import Field
+
+from contfric.study.tasks.task import STATE, Found, Task, attempt, check_state
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from contfric.base.yaml_lines import LocatedYaml
+    from contfric.models.definition import Model
+    from contfric.study.drawings import Drawing
+    from contfric.study.schema import StudyFile
+
+
+class Sense(str, Enum):
+    """How a surface is crossed."""
+
+    EITHER = "either"
+    RISING = "rising"
+    FALLING = "falling"
+
+
+class Response(Task):
+    """A task whose result plots itself."""
+
+    def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
+        """Let the result draw itself, with the parameters that it keeps in the title."""
+        from contfric.plot.style import TEXT, full_title, sized
+
+        response = found[self.result]
+        fixed = dict(response.params)
+        fixed.pop(getattr(response, "parameter", ""), None)
+        text = full_title(title, response.model.parameter_names, fixed)
+        response.plot(ax=figure.add_subplot()).set_title(text, fontsize=sized(TEXT))
+
+
+class Section(Response):
+    """A task that collects points of solutions on a section."""
+
+    section: str | float | None = Field(
+        None, description="stops, releases, the name of a surface, or a phase from 0 to 1"
+    )
+    sense: Annotated[Sense, Field(strict=False)] | None = Field(
+        None, description="one of either, rising, falling"
+    )
+    state: list[float] | None = Field(None, description=STATE)
+    periods: float | None = Field(
+        None, gt=0.0, description="a number > 0: periods of which points are collected"
+    )
+    transient: float | None = Field(
+        None, ge=0.0, description="a number >= 0: periods before points are collected"
+    )
+
+    def check(
+        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
+    ) -> None:
+        """Check the state and the section."""
+        from contfric.response.sections import section_of
+
+        check_state(located, (self.name, "state"), self.state, model)
+        given: dict[str, Any] = self.options()
+        section, sense = given.get("section", "stops"), given.get("sense", "either")
+        attempt(located, (self.name, "section"), lambda: section_of(model, section, sense))

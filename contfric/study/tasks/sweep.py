@@ -1,0 +1,124 @@
+"""``sweep``: simulations over values of a parameter, each from where the last one ended."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import Enum
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from contfric.study.tables import Table
+from contfric.study.tasks.response import Section
+from contfric.study.tasks.task import PARAMETER, FigureKind, Job, attempt, check_axis, incomplete
+
+if TYPE_CHECKING:
+    from contfric.base.yaml_lines import LocatedYaml
+    from contfric.models.definition import Model
+    from contfric.response.sweep import Sweep
+    from contfric.study.read import Study
+    from contfric.study.schema import StudyFile
+
+
+class SweepDirection(str, Enum):
+    """Directions of a sweep."""
+
+    BOTH = "both"
+    UP = "up"
+    DOWN = "down"
+
+
+class SweepTask(Section):
+    """Simulations over values of a parameter."""
+
+    name = "sweep"
+    result = "sweep"
+    saved_as = "sweep.npz"
+    row_text = "one row a point of the sweep"
+    own = frozenset({"parameter", "values"})
+    figures: ClassVar = {"sweep": FigureKind(9.6, 5.0)}
+
+    parameter: str = Field(description=PARAMETER)
+    values: list[float] = Field(
+        min_length=3, max_length=3, description="[low, high, number of values]"
+    )
+    direction: Annotated[SweepDirection, Field(strict=False)] | None = Field(
+        None, description="one of both, up, down"
+    )
+
+    def check(
+        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
+    ) -> None:
+        """Check state, section, parameter and values."""
+        super().check(located, content, model, params)
+        attempt(located, (self.name, "parameter"), lambda: model.index_of(self.parameter))
+        check_axis(located, (self.name, "values"), self.parameter, self.values)
+
+    def does(self, study: Study) -> str:
+        """Return the sweep in words."""
+        low, high, count = self.values
+        where = f"{count:g} values of {self.parameter} from {low:g} to {high:g}"
+        direction = "both" if self.direction is None else self.direction.value
+        return f"simulations at {where}, {direction}"
+
+    def compute(self, job: Job) -> Sweep:
+        """Simulate; a killed run goes on from its tiles."""
+        from contfric.response.sweeping import sweep
+
+        low, high, count = self.values
+        others = {n: value for n, value in job.study.params.items() if n != self.parameter}
+        return sweep(
+            job.study.model,
+            self.parameter,
+            np.linspace(low, high, int(count)),
+            others,
+            folder=job.tiles,
+            progress=job.say,
+            **self.options(),
+        )
+
+    def table(self, file: str, study: Study, found: Sweep) -> Table:
+        """Return one row for each point."""
+        columns = ["direction", found.parameter, "outcome", "period", "mode", "t"]
+        return Table([*columns, *found.model.states], _rows(found))
+
+    def entry(self, found: Sweep) -> dict[str, Any]:
+        """Return the values and what the trajectory converged to at each."""
+        return {
+            "parameter": found.parameter,
+            "values": [float(found.values[0]), float(found.values[-1]), len(found.values)],
+            "params": found.params,
+            "section": found.section,
+            "complete": found.complete,
+            "points": {name: len(run) for name, run in found.runs.items()},
+            "outcomes": {outcome.name.lower(): n for outcome, n in found.counts().items()},
+        }
+
+    @classmethod
+    def lines(cls, entry: dict[str, Any]) -> Iterator[str]:
+        """Yield outcomes and numbers of points."""
+        low, high, count = entry["values"]
+        found = ", ".join(f"{number} {outcome}" for outcome, number in entry["outcomes"].items())
+        points = ", ".join(f"{number} {way}" for way, number in entry["points"].items())
+        yield f"sweep at {count} values of {entry['parameter']} from {low:g} to {high:g}: {found}"
+        yield f"points    {points}"
+        yield from incomplete(entry, "the same command goes on from what was found")
+
+
+def _rows(found: Sweep) -> Iterator[tuple[Any, ...]]:
+    from contfric.response.outcome import Outcome
+
+    outcomes = [outcome.name.lower() for outcome in Outcome]
+    modes = [mode.name for mode in found.model.modes]
+    for name, run in found.runs.items():
+        for i, value in enumerate(run.index.tolist()):
+            yield (
+                name,
+                found.values[value].item(),
+                outcomes[run.outcomes[value]],
+                run.periods[value].item(),
+                modes[run.modes[i]],
+                run.times[i].item(),
+                *run.states[i].tolist(),
+            )

@@ -1,0 +1,249 @@
+"""What every task of a study is: its schema, and what the steps of a run ask of it.
+
+A task is a pydantic class in a module of its own; an instance is what a study says under its key. What it
+needs to compute, to write or to draw is imported by the method that does it: reading a study loads none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
+
+from pydantic import Field
+
+from contfric.base.yaml_schema import Part, keys_of
+from contfric.errors import ContfricError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from contfric.base.yaml_lines import Address, LocatedYaml
+    from contfric.models.definition import Model
+    from contfric.study.drawings import Drawing
+    from contfric.study.read import Study
+    from contfric.study.schema import StudyFile
+    from contfric.study.tables import Table
+
+#: Results of a run by their names, as they come.
+Found: TypeAlias = dict[str, Any]
+Say: TypeAlias = Callable[[str], None]
+
+PARAMETER = "the name of a parameter of the model"
+RANGE = "two finite numbers [low, high]"
+STATE = "a list of finite numbers, one for each state of the model"
+
+
+class FigureKind(NamedTuple):
+    """A kind of figure: its size in inches, what each row adds, and what it is called in messages."""
+
+    width: float
+    height: float
+    row_height: float = 0.0
+    called: str = ""
+
+
+class Skipped(NamedTuple):
+    """Something that is not computed, loaded or written, and why."""
+
+    what: str
+    why: str
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.why}"
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a task has to compute with.
+
+    Attributes
+    ----------
+    study : the study that asks for it
+    found : results of the tasks before it
+    tiles : a folder for finished parts, from which a killed run goes on
+    say : takes a line of text now and then
+    """
+
+    study: Study
+    found: Found
+    tiles: Path
+    say: Say
+
+    def told(self, name: str) -> Say:
+        """Return a function that takes lines of text of one step."""
+        return lambda text: self.say(f"{name}: {text}")
+
+
+class Task(Part):
+    """One task; see the module.
+
+    Attributes
+    ----------
+    name : the step of the run, and the key of the study
+    result : what its result is called
+    saved_as : file of the result
+    row_text : what a row of its tables is
+    of_orbit : whether it begins with the orbit of the start
+    own : keys that :meth:`compute` hands over itself; the others are arguments by their names
+    figures : kinds of figures that show its result
+    """
+
+    name: ClassVar[str]
+    result: ClassVar[str]
+    saved_as: ClassVar[str]
+    row_text: ClassVar[str] = ""
+    of_orbit: ClassVar[bool] = False
+    own: ClassVar[frozenset[str]] = frozenset()
+    figures: ClassVar[Mapping[str, FigureKind]] = {}
+
+    @classmethod
+    def described(cls) -> str:
+        """Return what stands under its key, for messages."""
+        return keys_of(cls)
+
+    def options(self) -> dict[str, Any]:
+        """Return what is given beyond its own keys, as arguments."""
+        return self.model_dump(mode="json", exclude=set(self.own), exclude_none=True)
+
+    # ------------------------------------------------------------------------------ reading, plan
+
+    def check(
+        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
+    ) -> None:
+        """Check what the schema cannot know; a mistake fails with its line."""
+
+    def does(self, study: Study) -> str:
+        """Return what the step does, in words."""
+        raise NotImplementedError
+
+    def tables(self, study: Study) -> tuple[str, ...]:
+        """Return the names of its tables."""
+        return (f"{self.name}.csv",)
+
+    def rows_text(self, study: Study) -> str:
+        """Return what a row of its tables is."""
+        return self.row_text
+
+    def skipped(self, study: Study) -> Iterator[Skipped]:
+        """Yield what it leaves out."""
+        yield from ()
+
+    # ---------------------------------------------------------------------------------- computing
+
+    def ahead(self) -> None:
+        """Begin what it will need, before the first task."""
+
+    def compute(self, job: Job) -> Any:
+        """Return its result; on Ctrl-C what was found until then."""
+        raise NotImplementedError
+
+    def cut_short(self, found: Any) -> bool:
+        """Tell whether Ctrl-C ended the computation."""
+        return not found.complete
+
+    # -------------------------------------------------------------------------------------- files
+
+    def saved(self, found: Any) -> Any:
+        """Return what of its result is saved."""
+        return found
+
+    def table(self, file: str, study: Study, found: Any) -> Table:
+        """Return one of its tables."""
+        raise NotImplementedError
+
+    def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
+        """Draw a figure of one of its kinds."""
+        raise NotImplementedError
+
+    # ------------------------------------------------------------------------------------- record
+
+    def entries(self, found: Any) -> dict[str, Any]:
+        """Return what the record of the run says of the result."""
+        return {self.name: self.entry(found)}
+
+    def entry(self, found: Any) -> dict[str, Any]:
+        """Return the entry of the record under its name."""
+        raise NotImplementedError
+
+    @classmethod
+    def summary(cls, record: dict[str, Any]) -> Iterator[str]:
+        """Yield the record of its result as lines of text; nothing of a run without it."""
+        if cls.name in record:
+            yield ""
+            yield from cls.lines(record[cls.name])
+
+    @classmethod
+    def lines(cls, entry: dict[str, Any]) -> Iterator[str]:
+        """Yield its entry of the record as lines of text."""
+        yield from ()
+
+
+class Seeds(Part):
+    """Simulations whose attractors start branches that nothing else reaches."""
+
+    values: int = Field(20, ge=1, description="a whole number >= 1: values of the parameter")
+    states: int = Field(3, ge=1, description="a whole number >= 1: initial conditions at each")
+    seed: int = Field(0, ge=0, description="a whole number >= 0: seed of the random ones")
+
+    def argument(self) -> dict[str, Any]:
+        """Return the argument ``seeds`` of an exploration."""
+        from contfric.atlas.seeds import Seeds as Simulations
+
+        return {"seeds": Simulations(**self.model_dump())}
+
+
+# ----------------------------------------------------------------- checks that several tasks have
+
+
+def attempt(located: LocatedYaml, address: Address, step: Callable[[], object]) -> None:
+    """Take a step of which an error of the input belongs to an entry of the file."""
+    try:
+        step()
+    except ContfricError as error:
+        located.fail(address, str(error))
+
+
+def check_state(
+    located: LocatedYaml, address: Address, state: list[float] | None, model: Model
+) -> None:
+    """Check the number of states, if there are any."""
+    if state is not None and len(state) != len(model.states):
+        located.fail(
+            address,
+            f"a state of '{model.name}' is {len(model.states)} numbers "
+            f"({', '.join(model.states)}), got {len(state)}",
+        )
+
+
+def check_axis(located: LocatedYaml, address: Address, name: str, values: list[float]) -> None:
+    """Check the values [low, high, number] of a parameter or of a state."""
+    fits = len(values) == 3 and values[0] < values[1] and values[2] >= 2
+    if not fits or values[2] != int(values[2]):
+        located.fail(
+            address,
+            f"the values of {name} are [low, high, number of values], with low < high and a whole "
+            f"number of at least 2, got {values}",
+        )
+
+
+def axes_text(grid: Mapping[str, list[float]]) -> str:
+    """Return a grid in words."""
+    return " x ".join(f"{n} from {v[0]:g} to {v[1]:g} ({v[2]:g})" for n, v in grid.items())
+
+
+def grid_text(entry: dict[str, Any]) -> str:
+    """Return the grid of an entry of a record in words."""
+    sides = (f"{n} {low:g} to {high:g} ({k})" for n, (low, high, k) in entry["grid"].items())
+    return " x ".join(sides)
+
+
+#: What a result says that can be completed.
+GOES_ON = "the same command goes on from the finished tiles"
+
+
+def incomplete(entry: dict[str, Any], text: str = GOES_ON) -> Iterator[str]:
+    """Yield a line that says that the result is not complete, if it is not."""
+    if not entry["complete"]:
+        yield f"incomplete: {text}"
