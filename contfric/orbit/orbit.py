@@ -26,6 +26,8 @@ from contfric.signature import Signature
 from contfric.tally import tally
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import pandas as pd
     from matplotlib.axes import Axes
 
@@ -387,6 +389,12 @@ class Orbit(MeasuredOrbit):
         from contfric.plot.orbit import plot_orbit
 
         return plot_orbit(self, ax=ax)
+
+    def animate(self, path: str | Path, frames: int = 120, rate: int = 30) -> Path:
+        """Write one period in the phase plane as an animation (a gif), and return its path."""
+        from contfric.plot.trajectory import animate_orbit
+
+        return animate_orbit(self, path, frames, rate)
 
     def __repr__(self) -> str:
         values = ", ".join(f"{k}={v:.6g}" for k, v in self.params.items())

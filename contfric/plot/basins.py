@@ -34,7 +34,7 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     --------
     >>> import contfric as cf
     >>> grid = {"x": np.linspace(-2, 2, 8), "v": np.linspace(-1, 1, 8)}
-    >>> found = cf.basins("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, grid)
+    >>> found = cf.basins("coulomb", grid, {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     >>> plot_basins(found).get_xlabel()
     '$x$'
     """

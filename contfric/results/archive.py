@@ -30,6 +30,7 @@ from contfric.files import replacing
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.simulation import Trajectory
 from contfric.response.basins import Basins
 from contfric.response.returns import ReleaseMap, Returns
 from contfric.response.sweep import Sweep
@@ -48,15 +49,18 @@ from contfric.results.response import (
     pack_releases,
     pack_returns,
     pack_sweep,
+    pack_trajectory,
     unpack_basins,
     unpack_releases,
     unpack_returns,
     unpack_sweep,
+    unpack_trajectory,
 )
 from contfric.results.unpack import Unpacker
 
 Saveable: TypeAlias = (
     Orbit
+    | Trajectory
     | Branch
     | Diagram
     | Curve
@@ -183,6 +187,8 @@ def _content(x: Saveable, packer: Packer) -> Header:
         return {"kind": "plane", **pack_plane(x, packer)}
     if isinstance(x, LyapunovMap):
         return {"kind": "lyapunov map", **pack_map(x, packer.arrays)}
+    if isinstance(x, Trajectory):
+        return {"kind": "trajectory", **pack_trajectory(x, packer.arrays)}
     if isinstance(x, Sweep):
         return {"kind": "sweep", **pack_sweep(x, packer.arrays)}
     if isinstance(x, Returns):
@@ -255,6 +261,8 @@ def _restored(content: Header, pool: Unpacker) -> Saveable:
         return unpack_plane(content, pool)
     if kind == "lyapunov map":
         return unpack_map(pool.model, content, pool.arrays)
+    if kind == "trajectory":
+        return unpack_trajectory(pool.model, content, pool.arrays)
     if kind == "sweep":
         return unpack_sweep(pool.model, content, pool.arrays)
     if kind == "returns":

@@ -230,8 +230,8 @@ def _basins(study: Study, task: BasinsTask, tiles: Path, say: Say) -> Basins:
     options: dict[str, Any] = {} if task.periods is None else {"periods": task.periods}
     return basins(
         study.model,
-        study.params,
         _axes(task),
+        study.params,
         task.at,
         folder=tiles,
         progress=say,
