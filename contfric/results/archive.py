@@ -60,11 +60,11 @@ from contfric.results.unpack import Unpacker
 
 Saveable: TypeAlias = (
     Orbit
-    | Trajectory
     | Branch
     | Diagram
     | Curve
     | Plane
+    | Trajectory
     | LyapunovMap
     | Sweep
     | Returns
