@@ -52,7 +52,7 @@ class QuantityCurve(Shown):
 
     quantity: str
     value: float
-    parameters: tuple[str, str]
+    parameters: tuple[str, ...]
     system: System
     vector: FloatArray
     values: FloatArray
@@ -73,6 +73,11 @@ class QuantityCurve(Shown):
 
     def __iter__(self) -> Iterator[Orbit]:
         return (self[k] for k in range(len(self)))
+
+    @property
+    def label(self) -> str:
+        """What is held, for a legend."""
+        return f"{self.quantity} = {self.value:g}"
 
     @property
     def model(self) -> Model:
