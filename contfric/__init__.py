@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from contfric.continuation.events import Bifurcation, EndReason, Kind
     from contfric.continuation.trace import continue_orbit
     from contfric.curves.curve import Curve
+    from contfric.curves.extremum import ExtremumCurve, continue_extremum
     from contfric.curves.homoclinic import HomoclinicCurve, continue_homoclinic
     from contfric.curves.quantity_curve import QuantityCurve
     from contfric.curves.quantity_trace import continue_quantity
@@ -124,6 +125,7 @@ _HOMES = {
     "Outcome": "contfric.response.outcome",
     "ParameterError": "contfric.errors",
     "Plane": "contfric.atlas.plane",
+    "ExtremumCurve": "contfric.curves.extremum",
     "QuantityCurve": "contfric.curves.quantity_curve",
     "ReleaseMap": "contfric.response.returns",
     "ResultFileError": "contfric.errors",
@@ -143,6 +145,7 @@ _HOMES = {
     "continue_orbit": "contfric.continuation.trace",
     "explore_equilibria": "contfric.equilibria.explore",
     "HomoclinicCurve": "contfric.curves.homoclinic",
+    "continue_extremum": "contfric.curves.extremum",
     "continue_homoclinic": "contfric.curves.homoclinic",
     "continue_quantity": "contfric.curves.quantity_trace",
     "export": "contfric.results.export",
@@ -191,6 +194,7 @@ __all__ = [
     "EquilibriumDiagram",
     "EquilibriumEvent",
     "EquilibriumSet",
+    "ExtremumCurve",
     "Fit",
     "Gradient",
     "HomoclinicCurve",
@@ -228,6 +232,7 @@ __all__ = [
     "check_model",
     "continue_bifurcation",
     "continue_equilibrium",
+    "continue_extremum",
     "continue_homoclinic",
     "continue_orbit",
     "continue_quantity",

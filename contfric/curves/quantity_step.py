@@ -97,6 +97,9 @@ class Held:
         found = differentiated(self.quantity, orbit, self.directions(columns))
         return Conditions(np.array([found.value - self.value]), found.ahead[None])
 
+    def solved(self) -> None:
+        """Note that a point has been found."""
+
     def left(self, values: FloatArray) -> float:
         """Return the largest of the conditions, relative to what is held."""
         return float(np.max(np.abs(values))) / (1.0 + abs(self.value))
@@ -141,9 +144,7 @@ def solve_held(held: Held, guess: FloatArray, tangent: FloatArray | None) -> Sol
         plane = basis[:, rows:]
         values, slopes = held.conditions(orbit, np.column_stack([shortest, plane]))
         slopes, missing = slopes[:, 1:], -values - slopes[:, 0]
-        step = shortest + plane @ _in_plane(
-            slopes, missing, plane, tangent, x + shortest - guess
-        )
+        step = shortest + plane @ _in_plane(slopes, missing, plane, tangent, x + shortest - guess)
         size = float(np.linalg.norm(step))
         if not np.isfinite(size):
             return None

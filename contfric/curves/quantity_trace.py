@@ -104,10 +104,15 @@ def continue_quantity(
         raise ConvergenceError(
             f"the orbits with {quantity} = {value:g} have no unique direction at the start", start
         )
+    return both_sides(held, first, largest, max_points)
+
+
+def both_sides(held: Held, first: Solved, largest: float, max_points: int) -> QuantityCurve:
+    """Trace a curve from its first point both ways."""
     ahead = HeldSide(held, [first], largest)
     ahead.trace(max_points)
     behind = HeldSide(held, [Solved(first.x, -first.tangent, first.orbit)], largest)
-    if ahead.end.reason is CurveEndReason.CLOSED or ahead.end.reason is CurveEndReason.INTERRUPTED:
+    if ahead.end.reason in (CurveEndReason.CLOSED, CurveEndReason.INTERRUPTED):
         behind.end = ahead.end
     else:
         behind.trace(max_points)
@@ -182,6 +187,7 @@ class HeldSide:
             self._finish(last, found)
             return step, True
         self.points.append(found)
+        self.held.solved()
         self.arc.append(self.arc[-1] + taken * (1.0 + angle**2 / 24.0))
         if len(self.points) > 4 and self._returned(taken):
             self.end = CurveEnd(CurveEndReason.CLOSED)

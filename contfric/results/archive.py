@@ -22,6 +22,7 @@ from contfric.atlas.plane import Plane
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
 from contfric.curves.curve import Curve
+from contfric.curves.quantity_curve import QuantityCurve
 from contfric.ensembles.ensemble import Ensemble
 from contfric.equilibria.branch import EquilibriumBranch
 from contfric.equilibria.explore import EquilibriumDiagram
@@ -34,7 +35,14 @@ from contfric.orbit.simulation import Trajectory
 from contfric.response.basins import Basins
 from contfric.response.returns import ReleaseMap, Returns
 from contfric.response.sweep import Sweep
-from contfric.results.curves import pack_curve, pack_plane, unpack_curve, unpack_plane
+from contfric.results.curves import (
+    pack_curve,
+    pack_held,
+    pack_plane,
+    unpack_curve,
+    unpack_held,
+    unpack_plane,
+)
 from contfric.results.ensemble import pack_ensemble, unpack_ensemble
 from contfric.results.equilibria import (
     pack_equilibria,
@@ -63,6 +71,7 @@ Saveable: TypeAlias = (
     | Branch
     | Diagram
     | Curve
+    | QuantityCurve
     | Plane
     | Trajectory
     | LyapunovMap
@@ -183,6 +192,8 @@ def _content(x: Saveable, packer: Packer) -> Header:
         return {"kind": "branch", "index": packer.branch(x)}
     if isinstance(x, Curve):
         return {"kind": "curve", **pack_curve(x, packer, 0)}
+    if isinstance(x, QuantityCurve):
+        return {"kind": "curve of a quantity", **pack_held(x, packer)}
     if isinstance(x, Plane):
         return {"kind": "plane", **pack_plane(x, packer)}
     if isinstance(x, LyapunovMap):
@@ -257,6 +268,8 @@ def _restored(content: Header, pool: Unpacker) -> Saveable:
         return pool.diagram(content)
     if kind == "curve":
         return unpack_curve(content, pool, 0)
+    if kind == "curve of a quantity":
+        return unpack_held(content, pool)
     if kind == "plane":
         return unpack_plane(content, pool)
     if kind == "lyapunov map":
