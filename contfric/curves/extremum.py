@@ -5,8 +5,8 @@ With the parameters :math:`p_1, \dots, p_q` the conditions are
 .. math:: \frac{dQ}{dp_k} = 0, \qquad k = 1, \dots, q - 1 ,
 
 the total derivatives along the family of orbits (:mod:`contfric.orbit.gradient`). With q = 2 it is the place
-of a resonance peak as the last parameter varies, with q = 3 the place where that peak is stationary in a second
-parameter.
+of a resonance peak as the last parameter varies, with q = 3 the place where that peak is stationary in a
+second parameter.
 
 Values are exact. The slopes of the conditions are central differences at the start, and from then on
 secants (C. G. Broyden, Math. Comp. 19 (1965) 577-593): a point is as accurate as its gradient, and only the
