@@ -57,7 +57,7 @@ if TYPE_CHECKING:
         ResultFileError,
         StudyError,
     )
-    from contfric.fitting.data import Measured, Series
+    from contfric.fitting.data import Jump, Measured, Series
     from contfric.fitting.fit import Fit, fit
     from contfric.models import Model, load_model, model_names
     from contfric.models.check import ModelReport, check_model
@@ -99,6 +99,7 @@ _HOMES = {
     "Fit": "contfric.fitting.fit",
     "Measured": "contfric.fitting.data",
     "Series": "contfric.fitting.data",
+    "Jump": "contfric.fitting.data",
     "fit": "contfric.fitting.fit",
     "EndReason": "contfric.continuation.events",
     "Ensemble": "contfric.ensembles.ensemble",
@@ -199,6 +200,7 @@ __all__ = [
     "Gradient",
     "HomoclinicCurve",
     "HopfPoint",
+    "Jump",
     "Kind",
     "LyapunovExponents",
     "LyapunovMap",

@@ -22,7 +22,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "quantities.md"
 def scope() -> dict[str, Any]:
     found: dict[str, Any] = {}
     blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    assert len(blocks) == 8
+    assert len(blocks) == 9
     for block in blocks:
         exec(compile(block, str(PAGE), "exec"), found)
     return found
