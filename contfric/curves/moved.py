@@ -1,8 +1,8 @@
 """An event at other parameters: its equations solved again, with the parameter along which it lies free.
 
 The event is followed on the straight line from its own parameters to the others. Each step is predicted by
-the derivatives of its place (:mod:`contfric.curves.gradient`), solved by Newton's method, and halved where that
-fails.
+the derivatives of its place (:mod:`contfric.curves.gradient`), solved by Newton's method, and halved where
+that fails.
 """
 
 from __future__ import annotations

@@ -99,7 +99,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"data": []}, "data are a list of contfric.Measured and contfric.Series"),
+        ({"data": []}, "data are a list of contfric.Measured, contfric.Series and contfric.Jump"),
         ({"data": [1.4]}, "data are a list of contfric.Measured"),
         ({"free": []}, "free is a list of parameters"),
         ({"free": ["s"]}, "has no parameter 's'"),
