@@ -75,6 +75,7 @@ if TYPE_CHECKING:
     from contfric.response.outcome import Outcome
     from contfric.response.poincare import poincare, release_map
     from contfric.response.returns import ReleaseMap, Returns
+    from contfric.response.stable_set import StableSet, stable_set
     from contfric.response.sweep import Sweep
     from contfric.response.sweeping import sweep
     from contfric.results import load, save
@@ -100,6 +101,8 @@ _HOMES = {
     "Measured": "contfric.fitting.data",
     "Series": "contfric.fitting.data",
     "Jump": "contfric.fitting.data",
+    "StableSet": "contfric.response.stable_set",
+    "stable_set": "contfric.response.stable_set",
     "fit": "contfric.fitting.fit",
     "EndReason": "contfric.continuation.events",
     "Ensemble": "contfric.ensembles.ensemble",
@@ -223,6 +226,7 @@ __all__ = [
     "Seeds",
     "Series",
     "Signature",
+    "StableSet",
     "StudyError",
     "Sweep",
     "TwoFold",
@@ -262,6 +266,7 @@ __all__ = [
     "signature_names",
     "simulate",
     "solve_orbit",
+    "stable_set",
     "sweep",
     "transition_graph",
 ]

@@ -34,6 +34,7 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.simulation import Trajectory
 from contfric.response.basins import Basins
 from contfric.response.returns import ReleaseMap, Returns
+from contfric.response.stable_set import StableSet
 from contfric.response.sweep import Sweep
 from contfric.results.curves import (
     pack_curve,
@@ -56,11 +57,13 @@ from contfric.results.response import (
     pack_basins,
     pack_releases,
     pack_returns,
+    pack_stable_set,
     pack_sweep,
     pack_trajectory,
     unpack_basins,
     unpack_releases,
     unpack_returns,
+    unpack_stable_set,
     unpack_sweep,
     unpack_trajectory,
 )
@@ -79,6 +82,7 @@ Saveable: TypeAlias = (
     | Returns
     | ReleaseMap
     | Basins
+    | StableSet
     | EquilibriumBranch
     | EquilibriumDiagram
     | Ensemble
@@ -206,6 +210,8 @@ def _content(x: Saveable, packer: Packer) -> Header:
         return {"kind": "returns", **pack_returns(x, packer.arrays)}
     if isinstance(x, ReleaseMap):
         return {"kind": "release map", **pack_releases(x, packer.arrays)}
+    if isinstance(x, StableSet):
+        return {"kind": "stable set", **pack_stable_set(x, packer)}
     if isinstance(x, Basins):
         return {"kind": "basins", **pack_basins(x, packer)}
     if isinstance(x, EquilibriumBranch):
@@ -282,6 +288,8 @@ def _restored(content: Header, pool: Unpacker) -> Saveable:
         return unpack_returns(pool.model, content, pool.arrays)
     if kind == "release map":
         return unpack_releases(pool.model, content, pool.arrays)
+    if kind == "stable set":
+        return unpack_stable_set(content, pool.arrays, pool.orbits)
     if kind == "basins":
         return unpack_basins(pool.model, content, pool.arrays, pool.orbits)
     if kind == "equilibrium branch":

@@ -14,6 +14,7 @@ from contfric.orbit.simulation import SimulationEnd, Trajectory
 from contfric.response.basins import Basins
 from contfric.response.outcome import Outcome
 from contfric.response.returns import ReleaseMap, Returns
+from contfric.response.stable_set import StableEnd, StableSet
 from contfric.response.sweep import Sweep, SweepRun
 from contfric.results.pack import Arrays, Header, Packer
 
@@ -162,6 +163,26 @@ def unpack_basins(model: Model, header: Header, arrays: Arrays, orbits: list[Orb
     expect(int(labels.max(initial=-1)) < len(chosen))
     at = dict(zip(header["at"], arrays["at"].tolist(), strict=True))
     return Basins(model, axes, arrays["vector"], at, chosen, labels, motions)
+
+
+def pack_stable_set(found: StableSet, packer: Packer) -> Header:
+    """Return the header of a stable set; its arrays are added as they are."""
+    for k in range(2):
+        packer.arrays[f"half{k}"] = found.states[k]
+        packer.arrays[f"breaks{k}"] = found.breaks[k]
+    packer.arrays["phase"] = np.array([found.phase])
+    return {"orbit": packer.orbit(found.orbit), "ends": [end.name for end in found.ends]}
+
+
+def unpack_stable_set(header: Header, arrays: Arrays, orbits: list[Orbit]) -> StableSet:
+    """Return the stable set of a header; errors as for a sweep."""
+    halves, breaks = (arrays["half0"], arrays["half1"]), (arrays["breaks0"], arrays["breaks1"])
+    for half, gaps in zip(halves, breaks, strict=True):
+        expect(half.ndim == 2 and half.shape[1] == 2 and len(half) > 0)
+        expect(not len(gaps) or 0 < int(gaps.min()) <= int(gaps.max()) < len(half))
+    one, other = (StableEnd[name] for name in header["ends"])
+    phase = float(arrays["phase"][0])
+    return StableSet(orbits[header["orbit"]], phase, halves, breaks, (one, other))
 
 
 def check_points(model: Model, arrays: Iterable[NDArray[Any]]) -> None:
