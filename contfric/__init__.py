@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from contfric.continuation.events import Bifurcation, EndReason, Kind
     from contfric.continuation.trace import continue_orbit
     from contfric.curves.curve import Curve
+    from contfric.curves.extremum import ExtremumCurve, continue_extremum
     from contfric.curves.homoclinic import HomoclinicCurve, continue_homoclinic
     from contfric.curves.quantity_curve import QuantityCurve
     from contfric.curves.quantity_trace import continue_quantity
@@ -56,7 +57,7 @@ if TYPE_CHECKING:
         ResultFileError,
         StudyError,
     )
-    from contfric.fitting.data import Measured, Series
+    from contfric.fitting.data import Jump, Measured, Series
     from contfric.fitting.fit import Fit, fit
     from contfric.models import Model, load_model, model_names
     from contfric.models.check import ModelReport, check_model
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
     from contfric.response.outcome import Outcome
     from contfric.response.poincare import poincare, release_map
     from contfric.response.returns import ReleaseMap, Returns
+    from contfric.response.stable_set import StableSet, stable_set
     from contfric.response.sweep import Sweep
     from contfric.response.sweeping import sweep
     from contfric.results import load, save
@@ -98,6 +100,9 @@ _HOMES = {
     "Fit": "contfric.fitting.fit",
     "Measured": "contfric.fitting.data",
     "Series": "contfric.fitting.data",
+    "Jump": "contfric.fitting.data",
+    "StableSet": "contfric.response.stable_set",
+    "stable_set": "contfric.response.stable_set",
     "fit": "contfric.fitting.fit",
     "EndReason": "contfric.continuation.events",
     "Ensemble": "contfric.ensembles.ensemble",
@@ -124,6 +129,7 @@ _HOMES = {
     "Outcome": "contfric.response.outcome",
     "ParameterError": "contfric.errors",
     "Plane": "contfric.atlas.plane",
+    "ExtremumCurve": "contfric.curves.extremum",
     "QuantityCurve": "contfric.curves.quantity_curve",
     "ReleaseMap": "contfric.response.returns",
     "ResultFileError": "contfric.errors",
@@ -143,6 +149,7 @@ _HOMES = {
     "continue_orbit": "contfric.continuation.trace",
     "explore_equilibria": "contfric.equilibria.explore",
     "HomoclinicCurve": "contfric.curves.homoclinic",
+    "continue_extremum": "contfric.curves.extremum",
     "continue_homoclinic": "contfric.curves.homoclinic",
     "continue_quantity": "contfric.curves.quantity_trace",
     "export": "contfric.results.export",
@@ -191,10 +198,12 @@ __all__ = [
     "EquilibriumDiagram",
     "EquilibriumEvent",
     "EquilibriumSet",
+    "ExtremumCurve",
     "Fit",
     "Gradient",
     "HomoclinicCurve",
     "HopfPoint",
+    "Jump",
     "Kind",
     "LyapunovExponents",
     "LyapunovMap",
@@ -217,6 +226,7 @@ __all__ = [
     "Seeds",
     "Series",
     "Signature",
+    "StableSet",
     "StudyError",
     "Sweep",
     "TwoFold",
@@ -228,6 +238,7 @@ __all__ = [
     "check_model",
     "continue_bifurcation",
     "continue_equilibrium",
+    "continue_extremum",
     "continue_homoclinic",
     "continue_orbit",
     "continue_quantity",
@@ -255,6 +266,7 @@ __all__ = [
     "signature_names",
     "simulate",
     "solve_orbit",
+    "stable_set",
     "sweep",
     "transition_graph",
 ]

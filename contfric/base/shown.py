@@ -27,6 +27,7 @@ _FACTS = {
     "Sweep": "parameter section params counts complete",
     "Returns": "section params outcome cycles complete",
     "ReleaseMap": "mode surface period params branches complete",
+    "StableSet": "orbit phase breaks ends",
     "Basins": "shape shares orbits params complete",
     "Ensemble": "parameter range distributions counts classes events complete",
     "Equilibria": "points sets params complete",

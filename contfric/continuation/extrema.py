@@ -32,6 +32,9 @@ _HALVINGS = 4
 _SHORTEST = 1e-15
 #: A slope at an extremum above this share of those at the ends of the step: a kink, at which it jumps.
 _KINK = 1e-4
+#: A slope at an end of the branch below this share of that at the other end of its step is zero, and has no
+#: sign: where an orbit leaves an event like a square root, every slope by arclength starts with 0.
+_ZERO = 1e-9
 #: How near to zero a parabola has to come, as a share of the smaller slope at the ends, to be looked at.
 _NEAR = 0.5
 #: Values that differ by less than this, relative to 1 + their size, say nothing about slopes.
@@ -192,6 +195,8 @@ def extrema_of(branch: Branch, name: str) -> tuple[Extremum, ...]:
         if j != i + 1:
             continue  # no tangent at the point between them: an event
         step = _Step(before, after, measured[k], measured[k + 1])
+        if _flat_end(slopes[k : k + 4]):
+            continue
         steep = max(abs(float(m.ahead[0])) for m in (step.first, step.last))
         parts = search.dipping(step, slopes[k : k + 4])
         inside = (e for part in parts for e in search.extrema(part, _HALVINGS))
@@ -203,6 +208,12 @@ def extrema_of(branch: Branch, name: str) -> tuple[Extremum, ...]:
             kink = slope > _KINK * steep
             found.append(Extremum(name, largest, value, orbit.params, orbit, position, kink))
     return tuple(found)
+
+
+def _flat_end(slopes: FloatArray) -> bool:
+    """Tell whether a step has an end of the branch at which the slope is zero; slopes as for ``dipping``."""
+    before, p, q, behind = np.abs(slopes)
+    return bool((np.isnan(before) and p < _ZERO * q) or (np.isnan(behind) and q < _ZERO * p))
 
 
 def _settings(branch: Branch) -> Settings:

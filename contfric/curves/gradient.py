@@ -29,13 +29,13 @@ _STANDS = 1e-10
 def event_gradient(bifurcation: Bifurcation, parameter: str | None) -> Gradient:
     """Return the derivatives of an event's parameter; see :meth:`contfric.Bifurcation.gradient`."""
     model = bifurcation.orbit.model
-    name = _parameter_of(bifurcation) if parameter is None else parameter
+    name = parameter_of(bifurcation) if parameter is None else parameter
     model.index_of(name)
     slopes, notes = {}, []
     for other in model.parameter_names:
         if other == name:
             continue
-        slopes[other] = _slope(bifurcation, _plane(bifurcation, name, other))
+        slopes[other] = slope_of(bifurcation, name, other)
         if not math.isfinite(slopes[other]):
             notes.append(
                 f"'{other}' is stationary along the curve of the event: a cusp, or a fold of it"
@@ -49,7 +49,7 @@ def event_gradient(bifurcation: Bifurcation, parameter: str | None) -> Gradient:
     return Gradient(f"{name} of {bifurcation.label}", value, slopes, dict(slopes), tuple(notes))
 
 
-def _parameter_of(bifurcation: Bifurcation) -> str:
+def parameter_of(bifurcation: Bifurcation) -> str:
     """Return the parameter along which an event was located."""
     found = getattr(bifurcation.bound, "parameter", None)
     if not isinstance(found, str):
@@ -60,16 +60,16 @@ def _parameter_of(bifurcation: Bifurcation) -> str:
     return found
 
 
-def _plane(bifurcation: Bifurcation, one: str, other: str) -> Problem:
+def plane_of(bifurcation: Bifurcation, one: str, other: str) -> Problem:
     """Return the problem of the curve in the plane of two parameters, scaled by their sizes."""
     here = np.array([bifurcation.params[one], bifurcation.params[other]])
     size = 1.0 + np.abs(here)
     return problem_of(bifurcation, Box((one, other), here - size, here + size))
 
 
-def _slope(bifurcation: Bifurcation, problem: Problem) -> float:
-    """Return da/dp of the curve at the event; infinite where p stands still."""
-    orbit = bifurcation.orbit
+def slope_of(bifurcation: Bifurcation, one: str, other: str) -> float:
+    """Return the derivative of a parameter of an event by another one; infinite where that stands still."""
+    orbit, problem = bifurcation.orbit, plane_of(bifurcation, one, other)
     joints = orbit.joints if orbit.system is problem.system else orbit.as_half().joints
     found = first_curve_point(problem, problem.orbit(joints, orbit.vector[problem.which]))
     if found is None:

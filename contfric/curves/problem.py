@@ -30,16 +30,16 @@ _MULTIPLIER = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
-    """The plane: two parameters with their ranges.
+class Ranges:
+    """Parameters that vary, with their ranges.
 
     Attributes
     ----------
-    names : the two parameters
-    low, high : corners, shape (2,)
+    names : the q parameters
+    low, high : corners, shape (q,)
     """
 
-    names: tuple[str, str]
+    names: tuple[str, ...]
     low: FloatArray
     high: FloatArray
 
@@ -50,10 +50,9 @@ class Box:
 
     @property
     def edges(self) -> FloatArray:
-        """Its sides: rows (a, b, c) with ``a p + b q + c >= 0`` inside, in widths."""
+        """The sides: rows (a, c) with ``a . p + c >= 0`` inside, in widths, shape (2 q, q + 1)."""
         rows = []
-        for k in range(2):
-            side = np.eye(2)[k] / self.widths[k]
+        for k, side in enumerate(np.eye(len(self.names)) / self.widths[:, None]):
             rows += [
                 [*side, -self.low[k] / self.widths[k]],
                 [*-side, self.high[k] / self.widths[k]],
@@ -64,6 +63,13 @@ class Box:
         """Tell whether a point lies in the box."""
         margin = slack * self.widths
         return bool(np.all(w >= self.low - margin) and np.all(w <= self.high + margin))
+
+
+@dataclass(frozen=True, eq=False)
+class Box(Ranges):
+    """A plane: two parameters with their ranges."""
+
+    names: tuple[str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,19 +147,33 @@ def box_of(
             f"a curve needs a pair of parameters, such as {model.parameter_names[:2]}, got "
             f"{shown(parameters)}"
         )
-    one, other = parameters
-    for name in (one, other):
+    found = ranges_of(model, parameters, ranges)
+    return Box(parameters, found.low, found.high)
+
+
+def ranges_of(
+    model: Model, parameters: tuple[str, ...], ranges: Mapping[str, tuple[float, float]]
+) -> Ranges:
+    """Check parameters with their ranges.
+
+    Raises
+    ------
+    ParameterError
+        For anything but different parameters of the model with a finite range each.
+    """
+    for k, name in enumerate(parameters):
         model.index_of(name)
-    if one == other:
-        raise ParameterError(f"a curve needs two different parameters, got '{one}' twice")
-    for name in mapping_of("ranges", ranges, f"{{'{one}': (lower, upper), ..}}"):
-        if name not in (one, other):
+        if name in parameters[:k]:
+            raise ParameterError(f"a curve needs different parameters, got '{name}' twice")
+    for name in mapping_of("ranges", ranges, f"{{'{parameters[0]}': (lower, upper), ..}}"):
+        if name not in parameters:
             raise ParameterError(
-                f"'{name}' is not one of the two parameters{did_you_mean(str(name), (one, other))}"
+                f"'{name}' is not one of the parameters that vary, {', '.join(parameters)}"
+                f"{did_you_mean(str(name), parameters)}"
             )
-    corners = [_range_of(name, ranges) for name in (one, other)]
+    corners = [_range_of(name, ranges) for name in parameters]
     low, high = (np.array(side) for side in zip(*corners, strict=True))
-    return Box((one, other), low, high)
+    return Ranges(parameters, low, high)
 
 
 def _range_of(name: str, ranges: Mapping[str, tuple[float, float]]) -> tuple[float, float]:

@@ -52,7 +52,7 @@ class QuantityCurve(Shown):
 
     quantity: str
     value: float
-    parameters: tuple[str, str]
+    parameters: tuple[str, ...]
     system: System
     vector: FloatArray
     values: FloatArray
@@ -73,6 +73,11 @@ class QuantityCurve(Shown):
 
     def __iter__(self) -> Iterator[Orbit]:
         return (self[k] for k in range(len(self)))
+
+    @property
+    def label(self) -> str:
+        """What is held, for a legend."""
+        return f"{self.quantity} = {self.value:g}"
 
     @property
     def model(self) -> Model:
@@ -96,10 +101,15 @@ class QuantityCurve(Shown):
         import pandas as pd
 
         columns: dict[str, Any] = dict(self.params)
-        return pd.DataFrame({**columns, self.quantity: self.value, "stable": self.stable})
+        columns[self.quantity] = self._at_points()
+        return pd.DataFrame({**columns, "stable": self.stable})
+
+    def _at_points(self) -> FloatArray | float:
+        """Return the quantity at the points."""
+        return self.value
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the curve in its plane, dashed where orbits are unstable."""
+        """Draw the curve in the plane of the first two parameters, dashed where orbits are unstable."""
         from contfric.plot.held import plot_quantity_curve
 
         return plot_quantity_curve(self, ax=ax)

@@ -1,29 +1,31 @@
 r"""One orbit of a curve on which a quantity is held: the equations, their null space, Newton's method.
 
-The unknowns are the joints z and two parameters w; in the scaled product of
+The unknowns are the joints z and q parameters w (two for a quantity with one value); in the scaled product of
 :mod:`contfric.continuation.geometry` they are one vector x. The orbits F(x) = 0 form a surface. Its
-tangent plane, the null space of F', has two directions T, from a QR factorisation of the transpose. A
-correction is the shortest step to the surface and a step y in that plane,
+tangent plane, the null space of F', has q directions T, from a QR factorisation of the transpose. On the
+surface q - 1 conditions C(x) = 0 leave a curve. A correction is the shortest step to the surface and a step y
+in that plane,
 
 .. math:: \delta = \delta_0 + T y, \quad F'\delta_0 = -F, \qquad
-   Q'T\,y = c - Q - Q'\delta_0, \qquad t^T T\,y = -t^T (x + \delta_0 - x_0) ,
+   C'T\,y = -C - C'\delta_0, \qquad t^T T\,y = -t^T (x + \delta_0 - x_0) ,
 
-the last one Keller's plane normal to the tangent t through the prediction. So the quantity is
-differentiated in three directions only, and folds of the orbits in either parameter are ordinary points.
+the last one Keller's plane normal to the tangent t through the prediction. So conditions are differentiated
+in q + 1 directions only, and folds of the orbits in any parameter are ordinary points.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from contfric.curves.problem import Box
+from contfric.curves.problem import Ranges
 from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import equations_at
 from contfric.orbit.orbit import Orbit
-from contfric.quantities.measure import Measured, differentiated
+from contfric.quantities.measure import differentiated
 from contfric.quantities.motion import Directions
 from contfric.quantities.registry import Quantity
 
@@ -34,6 +36,13 @@ _MOST = 12
 _DONE, _UNITS, _AT_LAST = 1e-12, 10.0, 1e-9
 
 
+class Conditions(NamedTuple):
+    """What vanishes on the curve, shape (c,), and its slopes in D directions, shape (c, D)."""
+
+    values: FloatArray
+    slopes: FloatArray
+
+
 @dataclass(frozen=True, eq=False)
 class Held:
     """A quantity that is held at a value while two parameters vary.
@@ -41,23 +50,23 @@ class Held:
     Attributes
     ----------
     orbit : any orbit of the curve: its equations, and the parameters that do not vary
-    quantity, value : what is held, and at what; None where :meth:`measured` is another condition
-    box : the plane
+    quantity, value : what is held, and at what; None where :meth:`conditions` are others
+    box : the parameters that vary
     """
 
     orbit: Orbit
     quantity: Quantity | None
     value: float
-    box: Box
+    box: Ranges
 
     @property
     def which(self) -> list[int]:
-        """Indices of the two parameters."""
+        """Indices of the parameters that vary."""
         return [self.orbit.model.index_of(name) for name in self.box.names]
 
     @property
     def weights(self) -> FloatArray:
-        """What the unknowns are divided by to become the scaled vector, shape (N m + 2,)."""
+        """What the unknowns are divided by to become the scaled vector, shape (N m + q,)."""
         size = self.orbit.joints.size
         root = np.sqrt(len(self.orbit.joints))
         return np.concatenate([np.full(size, root), self.box.widths])
@@ -68,24 +77,32 @@ class Held:
 
     def at(self, x: FloatArray) -> Orbit:
         """Return a scaled vector as an orbit."""
-        plain = x * self.weights
+        plain, size = x * self.weights, self.orbit.joints.size
         vector = self.orbit.vector.copy()
-        vector[self.which] = plain[-2:]
+        vector[self.which] = plain[size:]
         return replace(
-            self.orbit, joints=plain[:-2].reshape(self.orbit.joints.shape), vector=vector
+            self.orbit, joints=plain[:size].reshape(self.orbit.joints.shape), vector=vector
         )
 
     def directions(self, columns: FloatArray) -> Directions:
-        """Return scaled directions, shape (N m + 2, D), as motions of joints and parameters."""
-        plain = columns * self.weights[:, None]
+        """Return scaled directions, shape (N m + q, D), as motions of joints and parameters."""
+        plain, size = columns * self.weights[:, None], self.orbit.joints.size
         vector = np.zeros((len(self.orbit.vector), columns.shape[1]))
-        vector[self.which] = plain[-2:]
-        return Directions(plain[:-2].reshape(*self.orbit.joints.shape, -1), vector)
+        vector[self.which] = plain[size:]
+        return Directions(plain[:size].reshape(*self.orbit.joints.shape, -1), vector)
 
-    def measured(self, orbit: Orbit, columns: FloatArray) -> Measured:
-        """Return what is held, with its slopes in scaled directions, shape (N m + 2, D)."""
+    def conditions(self, orbit: Orbit, columns: FloatArray) -> Conditions:
+        """Return what vanishes, with its slopes in scaled directions, shape (N m + q, D)."""
         assert self.quantity is not None
-        return differentiated(self.quantity, orbit, self.directions(columns))
+        found = differentiated(self.quantity, orbit, self.directions(columns))
+        return Conditions(np.array([found.value - self.value]), found.ahead[None])
+
+    def solved(self) -> None:
+        """Note that a point has been found."""
+
+    def left(self, values: FloatArray) -> float:
+        """Return the largest of the conditions, relative to what is held."""
+        return float(np.max(np.abs(values))) / (1.0 + abs(self.value))
 
     def bounds(self, orbit: Orbit) -> FloatArray:
         """Return what else has to be positive along the curve."""
@@ -125,18 +142,15 @@ def solve_held(held: Held, guess: FloatArray, tangent: FloatArray | None) -> Sol
         except np.linalg.LinAlgError:
             return None
         plane = basis[:, rows:]
-        measured = held.measured(orbit, np.column_stack([shortest, plane]))
-        slopes = measured.ahead[1:]
-        missing = held.value - measured.value
-        step = shortest + plane @ _in_plane(
-            slopes, missing - measured.ahead[0], plane, tangent, x + shortest - guess
-        )
+        values, slopes = held.conditions(orbit, np.column_stack([shortest, plane]))
+        slopes, missing = slopes[:, 1:], -values - slopes[:, 0]
+        step = shortest + plane @ _in_plane(slopes, missing, plane, tangent, x + shortest - guess)
         size = float(np.linalg.norm(step))
         if not np.isfinite(size):
             return None
         x = x + step
         found = Solved(x, _tangent(slopes, plane, tangent), held.at(x))
-        if max(size, abs(missing) / (1.0 + abs(held.value))) < done:
+        if max(size, held.left(values)) < done:
             return found
         last = size
     return found if last < _AT_LAST else None
@@ -144,23 +158,25 @@ def solve_held(held: Held, guess: FloatArray, tangent: FloatArray | None) -> Sol
 
 def _in_plane(
     slopes: FloatArray,
-    missing: float,
+    missing: FloatArray,
     plane: FloatArray,
     tangent: FloatArray | None,
     moved: FloatArray,
 ) -> FloatArray:
-    """Return the step y in the tangent plane, shape (2,)."""
-    if tangent is None:
-        return np.asarray(slopes * missing / (slopes @ slopes))
-    both = np.array([slopes, tangent @ plane])
+    """Return the step y in the tangent plane, shape (q,)."""
+    if not np.all(np.isfinite(slopes)):
+        return np.full(slopes.shape[1], np.nan)
     try:
-        return np.asarray(np.linalg.solve(both, np.array([missing, -tangent @ moved])))
+        if tangent is None:
+            return np.asarray(np.linalg.lstsq(slopes, missing)[0])
+        both = np.vstack([slopes, tangent @ plane])
+        return np.asarray(np.linalg.solve(both, np.array([*missing, -tangent @ moved])))
     except np.linalg.LinAlgError:
-        return np.full(2, np.nan)
+        return np.full(slopes.shape[1], np.nan)
 
 
 def _tangent(slopes: FloatArray, plane: FloatArray, before: FloatArray | None) -> FloatArray:
-    """Return the unit direction in the tangent plane along which the quantity stands still."""
-    found = plane @ np.array([-slopes[1], slopes[0]]) / np.linalg.norm(slopes)
+    """Return the unit direction in the tangent plane along which all conditions stand still."""
+    found = plane @ np.linalg.svd(slopes)[2][-1]
     sign = 1.0 if before is None or found @ before >= 0.0 else -1.0
     return np.asarray(sign * found)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -104,10 +104,15 @@ def continue_quantity(
         raise ConvergenceError(
             f"the orbits with {quantity} = {value:g} have no unique direction at the start", start
         )
+    return both_sides(held, first, largest, max_points)
+
+
+def both_sides(held: Held, first: Solved, largest: float, max_points: int) -> QuantityCurve:
+    """Trace a curve from its first point both ways."""
     ahead = HeldSide(held, [first], largest)
     ahead.trace(max_points)
     behind = HeldSide(held, [Solved(first.x, -first.tangent, first.orbit)], largest)
-    if ahead.end.reason is CurveEndReason.CLOSED or ahead.end.reason is CurveEndReason.INTERRUPTED:
+    if ahead.end.reason in (CurveEndReason.CLOSED, CurveEndReason.INTERRUPTED):
         behind.end = ahead.end
     else:
         behind.trace(max_points)
@@ -182,6 +187,7 @@ class HeldSide:
             self._finish(last, found)
             return step, True
         self.points.append(found)
+        self.held.solved()
         self.arc.append(self.arc[-1] + taken * (1.0 + angle**2 / 24.0))
         if len(self.points) > 4 and self._returned(taken):
             self.end = CurveEnd(CurveEndReason.CLOSED)
@@ -201,24 +207,30 @@ class HeldSide:
 
     def _returned(self, step: float) -> bool:
         """Tell whether the last step has passed the start again, in its direction."""
-        first, before, last = self.points[0], self.points[-2], self.points[-1]
-        shift = self._phase_shift()
-        if np.linalg.norm(last.x - shift - first.x) > 1.5 * step:
+        first, turns = self.points[0], self._turns()
+        before, last = (self._folded(point, turns) for point in self.points[-2:])
+        if np.linalg.norm(last - first.x) > 1.5 * step:
             return False
-        passed = [float(x @ first.tangent) for x in (before.x - shift, first.x, last.x - shift)]
+        passed = [float(x @ first.tangent) for x in (before, first.x, last)]
         return passed[0] < passed[1] <= passed[2]
 
-    def _phase_shift(self) -> FloatArray:
-        """Return the whole periods by which the last point is later than the first, as a scaled vector.
+    def _turns(self) -> int:
+        """Return the whole periods by which the last point is later than the first.
 
         Around a resonance the phase of the motion turns once, and the same orbit is met a period later.
         """
-        joints, first = self.points[-1].orbit.joints, self.points[0].orbit
-        shift = np.zeros_like(joints)
-        if not first.model.autonomous:
-            period = first.flow.period
-            shift[:, 0] = round(float(joints[0, 0] - first.joints[0, 0]) / period) * period
-        return np.asarray(np.concatenate([shift.ravel(), np.zeros(2)]) / self.held.weights)
+        first, last = self.points[0].orbit, self.points[-1].orbit
+        if first.model.autonomous:
+            return 0
+        return round(float(last.joints[0, 0] - first.joints[0, 0]) / first.flow.period)
+
+    def _folded(self, point: Solved, turns: int) -> FloatArray:
+        """Return a point so many of its own periods earlier: a period changes along the curve."""
+        if not turns:
+            return point.x
+        joints = point.orbit.joints.copy()
+        joints[:, 0] -= turns * point.orbit.flow.period
+        return self.held.scaled(replace(point.orbit, joints=joints))
 
     def _finish(self, before: Solved, after: Solved) -> None:
         """Locate where the orbits leave what is allowed, and end there."""
@@ -255,7 +267,7 @@ def _angle(one: Solved, other: Solved) -> float:
 def _bounds(held: Held, point: Solved) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return what has to be positive: distances to the edges, to the model's limits, and the margins."""
     w = point.orbit.vector[held.which]
-    edges = held.box.edges[:, :2] @ w + held.box.edges[:, 2]
+    edges = held.box.edges[:, :-1] @ w + held.box.edges[:, -1]
     params = point.orbit.params
     varying = set(held.box.names)
     constraints = held.orbit.model.constraints

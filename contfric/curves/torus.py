@@ -25,13 +25,12 @@ from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.points import MOST_POINTS
 from contfric.curves.curve import Curve, CurvePart
 from contfric.curves.problem import Box
-from contfric.curves.quantity_step import Held, Solved, solve_held
+from contfric.curves.quantity_step import Conditions, Held, Solved, solve_held
 from contfric.curves.quantity_trace import HeldSide, inside
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.errors import ConvergenceError, ParameterError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
-from contfric.quantities.measure import Measured
 
 #: Step of the central differences in scaled unknowns: the cube root of rounding balances both errors, 1e-10.
 _STEP = 6e-6
@@ -61,7 +60,9 @@ def critical_pair(mu: NDArray[np.complex128]) -> tuple[int, int]:
 class OnCircle(Held):
     """The condition of a curve of NS, in place of a quantity that is held."""
 
-    def measured(self, orbit: Orbit, columns: FloatArray) -> Measured:
+    box: Box
+
+    def conditions(self, orbit: Orbit, columns: FloatArray) -> Conditions:
         """Return log(mu_1 mu_2) and its slopes in scaled directions."""
         x = self.scaled(orbit)
         slopes = [
@@ -69,7 +70,7 @@ class OnCircle(Held):
             / (2.0 * _STEP)
             for c in columns.T
         ]
-        return Measured(self.defect(orbit), np.array(slopes), np.array(slopes))
+        return Conditions(np.array([self.defect(orbit)]), np.array([slopes]))
 
     def defect(self, orbit: Orbit) -> float:
         """Return log(mu_1 mu_2) of the critical pair."""

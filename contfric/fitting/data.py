@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contfric.errors import ParameterError, mapping_of, real_number, shown
 from contfric.models.definition import FloatArray
+
+if TYPE_CHECKING:
+    from contfric.continuation.events import Bifurcation
 
 
 def _positive(sigma: object) -> float:
@@ -46,6 +50,52 @@ class Measured:
         real_number("value", self.value)
         _positive(self.sigma)
         mapping_of("params", self.params, "{'Omega': 0.5}")
+
+
+@dataclass(frozen=True)
+class Jump:
+    """Where a jump was measured: the place of an event, such as a fold, along the parameter that it lies on.
+
+    Parameters
+    ----------
+    event : Bifurcation
+        The event of a diagram that the jump is taken for; the fit moves it with the free parameters.
+    value : float
+        Where it was measured: a value of the parameter along which the event was located.
+    sigma : float
+        Its standard deviation.
+    params : dict, optional
+        As for :class:`Measured`.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.54, "S": 0.32, "S0": 0.4})
+    >>> fold = cf.continue_orbit(orbit, "Omega", (0.53, 0.55)).bifurcations[-1]
+    >>> Jump(fold, 0.542, 0.001).parameter
+    'Omega'
+    """
+
+    event: Bifurcation
+    value: float
+    sigma: float
+    params: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        from contfric.continuation.events import Bifurcation
+
+        if not isinstance(self.event, Bifurcation):
+            raise ParameterError(f"a jump is taken for a Bifurcation, got {shown(self.event)}")
+        real_number("value", self.value)
+        _positive(self.sigma)
+        mapping_of("params", self.params, "{'S': 0.3}")
+
+    @property
+    def parameter(self) -> str:
+        """The parameter along which the event was located."""
+        from contfric.curves.gradient import parameter_of
+
+        return parameter_of(self.event)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,8 +18,11 @@ from typing import Any
 import numpy as np
 
 from contfric.base.shown import Shown
+from contfric.continuation.events import Bifurcation
+from contfric.curves.gradient import slope_of
+from contfric.curves.moved import moved_event
 from contfric.errors import ContfricError, ConvergenceError, ParameterError, items_of, shown
-from contfric.fitting.data import Measured, Series
+from contfric.fitting.data import Jump, Measured, Series
 from contfric.fitting.predict import predicted, signal_of
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
@@ -93,7 +96,7 @@ class Fit(Shown):
 
 def fit(
     model: ModelSource,
-    data: Sequence[Measured | Series],
+    data: Sequence[Measured | Series | Jump],
     params: Mapping[str, float],
     free: Sequence[str],
 ) -> Fit:
@@ -103,7 +106,7 @@ def fit(
     ----------
     model : str, path or Model
         As for :func:`contfric.load_model`.
-    data : sequence of Measured or Series
+    data : sequence of Measured, Series or Jump
         What was measured; each may have parameters of its own, such as the frequency.
     params : dict
         All other parameters, and where the free ones start.
@@ -177,9 +180,9 @@ def _checked(
 ) -> tuple[tuple[str, ...], FloatArray]:
     """Return the free parameters and where they start; refuse what cannot be fitted."""
     every = items_of(data)
-    if not every or not all(isinstance(d, (Measured, Series)) for d in every):
+    if not every or not all(isinstance(d, (Measured, Series, Jump)) for d in every):
         raise ParameterError(
-            f"data are a list of contfric.Measured and contfric.Series, got {shown(data)}"
+            f"data are a list of contfric.Measured, contfric.Series and contfric.Jump, got {shown(data)}"
         )
     names = items_of(free)
     if not names or len(set(names)) != len(names):
@@ -194,6 +197,11 @@ def _checked(
             model.index_of(name)
             if name in d.params:
                 raise ParameterError(f"'{name}' is free, and a measurement gives it a value")
+            if isinstance(d, Jump) and name == d.parameter:
+                raise ParameterError(f"'{name}' is free, and a jump is measured along it")
+        if isinstance(d, Jump):
+            _check_jump(model, d)
+            continue
         if isinstance(d, Series):
             if model.autonomous:
                 raise ParameterError(
@@ -205,19 +213,27 @@ def _checked(
     return tuple(names), np.array([values[name] for name in names])
 
 
+def _check_jump(model: Model, d: Jump) -> None:
+    if d.event.orbit.model.name != model.name:
+        raise ParameterError(
+            f"{d.event!r} is one of the model '{d.event.orbit.model.name}', not of '{model.name}'"
+        )
+
+
 class _Problem:
     """Residuals and derivatives as functions of the free parameters; orbits are kept between trials."""
 
     def __init__(
         self,
         model: Model,
-        data: tuple[Measured | Series, ...],
+        data: tuple[Measured | Series | Jump, ...],
         params: dict[str, Any],
         free: tuple[str, ...],
     ) -> None:
         self.model, self.data, self.params, self.free = model, data, params, free
         self.columns = [model.index_of(name) for name in free]
         self.near: dict[tuple[tuple[str, float], ...], Orbit] = {}
+        self.events = {k: d.event for k, d in enumerate(data) if isinstance(d, Jump)}
         self.last: tuple[bytes, FloatArray, FloatArray] | None = None
 
     def values(self, x: FloatArray) -> dict[str, float]:
@@ -257,7 +273,14 @@ class _Problem:
     def solve(self, x: FloatArray) -> tuple[FloatArray, FloatArray, tuple[Orbit, ...]]:
         """Return residuals, derivatives, and the orbit of each measurement."""
         parts, slopes, orbits = [], [], []
-        for d in self.data:
+        for k, d in enumerate(self.data):
+            if isinstance(d, Jump):
+                event = self._event(k, d, {**self.params, **d.params, **self.values(x)})
+                by_free = [slope_of(event, d.parameter, name) for name in self.free]
+                parts.append(np.array([event.params[d.parameter] - d.value]) / d.sigma)
+                slopes.append(np.array([by_free]) / d.sigma)
+                orbits.append(event.orbit)
+                continue
             orbit = self._orbit({**self.params, **d.params, **self.values(x)}, d)
             values, by_all = predicted(d, orbit)
             measured = d.values if isinstance(d, Series) else np.array([d.value])
@@ -265,6 +288,12 @@ class _Problem:
             slopes.append(by_all[:, self.columns] / d.sigma)
             orbits.append(orbit)
         return np.concatenate(parts), np.concatenate(slopes), tuple(orbits)
+
+    def _event(self, number: int, d: Jump, params: dict[str, Any]) -> Bifurcation:
+        """Return the event of a jump, moved from where it was last."""
+        values = self.model.mapping(self.model.vector({**params, d.parameter: d.value}))
+        self.events[number] = moved_event(self.events[number], values)
+        return self.events[number]
 
     def _orbit(self, params: dict[str, Any], d: Measured | Series) -> Orbit:
         """Return the orbit of a condition: refined from the last one, or found by simulation."""

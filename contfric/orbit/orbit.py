@@ -20,12 +20,14 @@ from contfric.orbit.measured import MeasuredOrbit
 from contfric.orbit.reading import read_signature
 from contfric.orbit.samples import samples, state_within
 from contfric.orbit.slack import margin_slack, no_time
-from contfric.orbit.stops import displacements, reach_of, stationary_points, stopping_segments
+from contfric.orbit.stops import reach_of, stops_of
 from contfric.orbit.system import System, Word, build_system
 from contfric.orbit.words import half_of, mirror_pairs, whole_of
 from contfric.signature import Signature
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import pandas as pd
     from matplotlib.axes import Axes
 
@@ -323,11 +325,7 @@ class Orbit(MeasuredOrbit):
     @cached_property
     def stops(self) -> FloatArray:
         """Displacements at the stops and impacts in the order of the orbit, shape (stops,)."""
-        if not self.model.stop_surface:
-            return stationary_points(self)
-        if not self.model.stops_at_joints:
-            return displacements(self, self.model.stop_surface)
-        return self.ends[stopping_segments(self.model, self.word), 1]
+        return stops_of(self)
 
     @cached_property
     def _reach(self) -> tuple[float, float]:
@@ -387,6 +385,12 @@ class Orbit(MeasuredOrbit):
         from contfric.plot.orbit import plot_orbit
 
         return plot_orbit(self, ax=ax)
+
+    def animate(self, path: str | Path, frames: int = 120, rate: int = 30) -> Path:
+        """Write one period in the phase plane as an animation (a gif), and return its path."""
+        from contfric.plot.trajectory import animate_orbit
+
+        return animate_orbit(self, path, frames, rate)
 
     def __repr__(self) -> str:
         values = ", ".join(f"{k}={v:.6g}" for k, v in self.params.items())

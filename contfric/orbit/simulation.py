@@ -6,11 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from time import perf_counter
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.extras import need_pandas
 from contfric.base.shown import Shown
 from contfric.base.tally import tally
 from contfric.errors import function_of, real_number, whole_number
@@ -18,11 +19,16 @@ from contfric.models import ModelSource, Parameters
 from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
+from contfric.orbit.dense import sample, table
 from contfric.orbit.growing_tables import UNVISITED, growing_tables
 from contfric.orbit.pace import Pace
 from contfric.orbit.starts import checked_state, start_of
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import surfaces_under, tables
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 #: Hears one line of text now and then.
 Progress = Callable[[str], None]
@@ -87,6 +93,14 @@ class Trajectory(Shown):
     states : state at each event, shape (events, n)
     end : how the simulation ended
     last : (periods completed, phase, state, mode) where it ended
+    begin : (time, state) where it began
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> found = cf.simulate("coulomb", {"Omega": 0.5}, state=[1.3, 0.0], periods=2)
+    >>> found.sample([0.0, 1.0]).shape
+    (2, 2)
     """
 
     model: Model
@@ -98,6 +112,7 @@ class Trajectory(Shown):
     states: FloatArray
     end: SimulationEnd
     last: tuple[int, float, FloatArray, str]
+    begin: tuple[float, FloatArray]
 
     def __len__(self) -> int:
         return len(self.modes)
@@ -111,6 +126,33 @@ class Trajectory(Shown):
         modes = [m.name for m in self.model.modes]
         surfaces = [s.name for s in self.model.surfaces]
         return tuple((modes[m], surfaces[k]) for m, k in zip(self.modes, self.exits, strict=True))
+
+    def sample(self, times: ArrayLike) -> FloatArray:
+        """Return the states at times between begin and end, shape (k, n): exact, nothing is interpolated.
+
+        Raises
+        ------
+        ParameterError
+            If a time is not within the trajectory.
+        """
+        return sample(self, times)
+
+    def to_dataframe(self, points: int = 1000) -> pd.DataFrame:
+        """Return t, states, mode and event, at all events and ``points`` times between (needs pandas)."""
+        need_pandas()
+        import pandas as pd
+
+        return pd.DataFrame(self.columns(points))
+
+    def columns(self, points: int = 1000) -> dict[str, Any]:
+        """Return the columns of :meth:`to_dataframe` without pandas."""
+        return table(self, points)
+
+    def plot(self, ax: Axes | None = None, points: int = 1000) -> Axes:
+        """Draw the trajectory in the plane of the first two states, coloured by mode."""
+        from contfric.plot.trajectory import plot_trajectory
+
+        return plot_trajectory(self, ax=ax, points=points)
 
 
 def simulate(
@@ -194,7 +236,7 @@ def run(
 
     composed = isinstance(model, ComposedModel)
     model_tables = growing_tables(model).tables() if composed else tables(model)
-    y = y.copy()
+    began_at, y = (time, y), y.copy()
     pieces: list[EventRows] = []
     done, carry, pace = 0, np.zeros(CARRIED), Pace(_FIRST_EVENTS)
     while True:  # between the calls Ctrl-C is heard
@@ -244,6 +286,7 @@ def run(
         found.states,
         list(SimulationEnd)[end],
         (cycle, float(phase), y, last_mode),
+        began_at,
     )
 
 

@@ -25,6 +25,16 @@ def stopping_segments(model: Model, word: Word) -> list[int]:
     return [i for i, (_, exit_) in enumerate(word) if exit_ in ends]
 
 
+def stops_of(orbit: Orbit) -> FloatArray:
+    """Return the displacements at the stops and impacts in the order of the orbit, shape (stops,)."""
+    model = orbit.model
+    if not model.stop_surface:
+        return stationary_points(orbit)
+    if not model.stops_at_joints:
+        return displacements(orbit, model.stop_surface)
+    return orbit.ends[stopping_segments(model, orbit.word), 1]
+
+
 def displacements(orbit: Orbit, surface: str) -> FloatArray:
     """Return the displacement wherever an orbit crosses a surface or kink, in order, shape (crossings,).
 

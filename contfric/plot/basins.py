@@ -15,6 +15,7 @@ from contfric.plot.style import BESIDE, GREY, SMALL, TEXT, branch_colours, light
 
 if TYPE_CHECKING:
     from contfric.response.basins import Basins
+    from contfric.response.stable_set import StableSet
 
 #: What converges to no orbit: from black (chaos) to white.
 _OTHERS = ("#222222", "#8A8A8A", "#C8C8C8", "#E6E6E6")
@@ -34,7 +35,7 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     --------
     >>> import contfric as cf
     >>> grid = {"x": np.linspace(-2, 2, 8), "v": np.linspace(-1, 1, 8)}
-    >>> found = cf.basins("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, grid)
+    >>> found = cf.basins("coulomb", grid, {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     >>> plot_basins(found).get_xlabel()
     '$x$'
     """
@@ -84,3 +85,24 @@ def _draw_orbits(ax: Axes, found: Basins, first: str, second: str) -> None:
         times = (found.at["phase"] + np.arange(orbit.periods)) * turn
         states = np.array([orbit.state(float(t)) for t in times])
         ax.plot(states[:, i], states[:, j], "o", color="white", mec="black", ms=5)
+
+
+def plot_stable_set(found: StableSet, ax: Axes | None = None) -> Axes:
+    """Draw a stable set and its orbit in the plane of the two states.
+
+    Parameters
+    ----------
+    found : StableSet
+    ax : Axes, optional
+        Where to draw, such as the axes of basins; new axes by default.
+    """
+    ax = axes_or_new(ax)
+    first, second = found.orbit.model.states
+    for half, breaks in zip(found.states, found.breaks, strict=True):
+        for part in np.split(half, breaks):
+            ax.plot(*part.T, color="black", lw=1.0, gid=f"stable set of {found.orbit.name}")
+    ax.plot(*found.states[0][0], "s", color="white", mec="black", ms=5)
+    if not ax.get_xlabel():
+        ax.set_xlabel(f"${first}$", fontsize=sized(TEXT + 1))
+        ax.set_ylabel(f"${second}$", fontsize=sized(TEXT + 1))
+    return ax

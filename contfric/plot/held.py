@@ -33,7 +33,7 @@ def plot_quantity_curve(curve: QuantityCurve, ax: Axes | None = None) -> Axes:
         Where to draw; new axes by default.
     """
     ax = axes_or_new(ax)
-    label: str | None = f"{curve.quantity} = {curve.value:g}"
+    label: str | None = curve.label
     for stable, group in groupby(range(len(curve)), key=lambda k: bool(curve.stable[k])):
         run = list(group)
         part = curve.values[run[0] : run[-1] + 2]  # to the first point of the next run

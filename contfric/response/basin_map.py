@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -68,8 +69,8 @@ class _Job:
 
 def basins(
     model: ModelSource,
-    params: Parameters | None = None,
     grid: Mapping[str, ArrayLike] | None = None,
+    params: Parameters | None = None,
     at: Mapping[str, float] | None = None,
     *,
     orbits: Any = None,
@@ -111,10 +112,11 @@ def basins(
     --------
     >>> import contfric as cf
     >>> grid = {"x": np.linspace(-2, 2, 10), "v": np.linspace(-1, 1, 10)}
-    >>> found = cf.basins("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, grid)
+    >>> found = cf.basins("coulomb", grid, {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     >>> sum(share.count for share in found.shares)
     100
     """
+    grid, params = _in_order(grid, params)
     model, params = tied(model, params)
     check_executor(executor)
     function_of("progress", progress)
@@ -144,6 +146,18 @@ def basins(
             progress("interrupted: what is labelled is kept")
     labels, motions = rows.labels.reshape(shape), rows.motions.reshape(shape)
     return Basins(model, axes, vector, fixed, tuple(attractors.orbits), labels, motions)
+
+
+def _in_order(grid: Any, params: Any) -> tuple[Any, Any]:
+    """Return grid and parameters, which came the other way round at first: a grid has sequences as values."""
+    if isinstance(params, Mapping) and params and all(np.ndim(v) == 1 for v in params.values()):
+        warnings.warn(
+            "basins(model, grid, params): the grid stands before the parameters",
+            DeprecationWarning,
+            stacklevel=3,
+        )
+        return params, grid
+    return grid, params
 
 
 def check_starts(model: Model, grid: object, at: object) -> None:

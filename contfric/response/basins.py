@@ -69,7 +69,7 @@ class Basins(Shown):
     --------
     >>> import contfric as cf
     >>> grid = {"x": np.linspace(-2, 2, 8), "v": np.linspace(-1, 1, 8)}
-    >>> cf.basins("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, grid).shares[0].name
+    >>> cf.basins("coulomb", grid, {"Omega": 0.5, "S": 0.32, "S0": 0.4}).shares[0].name
     '1a (1)'
     """
 
@@ -101,6 +101,13 @@ class Basins(Shown):
     def names(self) -> tuple[str, ...]:
         """Names of the orbits."""
         return tuple(named(self.orbits))
+
+    @property
+    def share(self) -> FloatArray:
+        """Share of all computed starts that converge to each of the orbits, shape (orbits,)."""
+        total = int(np.sum(self.motions != Motion.MISSING.code))
+        counts = np.bincount(self.labels[self.labels >= 0], minlength=len(self.orbits))
+        return np.asarray(counts / max(1, total))
 
     def where(self, what: int | Motion) -> NDArray[np.bool_]:
         """Tell which starts converge to an orbit by its number, or are solutions of a kind without one."""

@@ -43,10 +43,10 @@ _BYTES = 512
 def poincare(
     model: ModelSource,
     params: Parameters | None = None,
+    state: ArrayLike | None = None,
     *,
     section: SectionLike = STOPS,
     sense: str = "either",
-    state: ArrayLike | None = None,
     time: float = 0.0,
     periods: float = 1000.0,
     transient: float = 100.0,

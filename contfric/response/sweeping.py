@@ -89,6 +89,7 @@ def sweep(
     values: ArrayLike,
     params: Mapping[str, float] | None = None,
     *,
+    both: bool | None = None,
     direction: str = "both",
     periods: float = 100.0,
     transient: float = 100.0,
@@ -110,6 +111,7 @@ def sweep(
     ----------
     model, params : the model (or its name) and the other parameters; defaults fill in
     parameter, values : the parameter that varies, and its values, ascending
+    both : True for up and down, False for up alone: ``direction`` in one word
     direction : "both", "up" or "down"; each begins with ``state`` at its own end
     periods, transient : periods of the excitation (units of time without one) of which points are collected,
         and before that
@@ -146,6 +148,8 @@ def sweep(
         np.iinfo(np.int64).max,
         1,
     )
+    if both is not None:
+        direction = "both" if both else "up"
     if direction not in [*_DIRECTIONS]:
         raise ParameterError(
             f"direction is one of {', '.join(_DIRECTIONS)}, got {shown(direction)}"

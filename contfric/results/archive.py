@@ -23,6 +23,7 @@ from contfric.base.files import replacing
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
 from contfric.curves.curve import Curve
+from contfric.curves.quantity_curve import QuantityCurve
 from contfric.ensembles.ensemble import Ensemble
 from contfric.equilibria.branch import EquilibriumBranch
 from contfric.equilibria.explore import EquilibriumDiagram
@@ -30,10 +31,19 @@ from contfric.errors import ModelError, ParameterError, ResultFileError, path_of
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.simulation import Trajectory
 from contfric.response.basins import Basins
 from contfric.response.returns import ReleaseMap, Returns
+from contfric.response.stable_set import StableSet
 from contfric.response.sweep import Sweep
-from contfric.results.curves import pack_curve, pack_plane, unpack_curve, unpack_plane
+from contfric.results.curves import (
+    pack_curve,
+    pack_held,
+    pack_plane,
+    unpack_curve,
+    unpack_held,
+    unpack_plane,
+)
 from contfric.results.ensemble import pack_ensemble, unpack_ensemble
 from contfric.results.equilibria import (
     pack_equilibria,
@@ -47,11 +57,15 @@ from contfric.results.response import (
     pack_basins,
     pack_releases,
     pack_returns,
+    pack_stable_set,
     pack_sweep,
+    pack_trajectory,
     unpack_basins,
     unpack_releases,
     unpack_returns,
+    unpack_stable_set,
     unpack_sweep,
+    unpack_trajectory,
 )
 from contfric.results.unpack import Unpacker
 
@@ -60,12 +74,15 @@ Saveable: TypeAlias = (
     | Branch
     | Diagram
     | Curve
+    | QuantityCurve
     | Plane
+    | Trajectory
     | LyapunovMap
     | Sweep
     | Returns
     | ReleaseMap
     | Basins
+    | StableSet
     | EquilibriumBranch
     | EquilibriumDiagram
     | Ensemble
@@ -179,16 +196,22 @@ def _content(x: Saveable, packer: Packer) -> Header:
         return {"kind": "branch", "index": packer.branch(x)}
     if isinstance(x, Curve):
         return {"kind": "curve", **pack_curve(x, packer, 0)}
+    if isinstance(x, QuantityCurve):
+        return {"kind": "curve of a quantity", **pack_held(x, packer)}
     if isinstance(x, Plane):
         return {"kind": "plane", **pack_plane(x, packer)}
     if isinstance(x, LyapunovMap):
         return {"kind": "lyapunov map", **pack_map(x, packer.arrays)}
+    if isinstance(x, Trajectory):
+        return {"kind": "trajectory", **pack_trajectory(x, packer.arrays)}
     if isinstance(x, Sweep):
         return {"kind": "sweep", **pack_sweep(x, packer.arrays)}
     if isinstance(x, Returns):
         return {"kind": "returns", **pack_returns(x, packer.arrays)}
     if isinstance(x, ReleaseMap):
         return {"kind": "release map", **pack_releases(x, packer.arrays)}
+    if isinstance(x, StableSet):
+        return {"kind": "stable set", **pack_stable_set(x, packer)}
     if isinstance(x, Basins):
         return {"kind": "basins", **pack_basins(x, packer)}
     if isinstance(x, EquilibriumBranch):
@@ -251,16 +274,22 @@ def _restored(content: Header, pool: Unpacker) -> Saveable:
         return pool.diagram(content)
     if kind == "curve":
         return unpack_curve(content, pool, 0)
+    if kind == "curve of a quantity":
+        return unpack_held(content, pool)
     if kind == "plane":
         return unpack_plane(content, pool)
     if kind == "lyapunov map":
         return unpack_map(pool.model, content, pool.arrays)
+    if kind == "trajectory":
+        return unpack_trajectory(pool.model, content, pool.arrays)
     if kind == "sweep":
         return unpack_sweep(pool.model, content, pool.arrays)
     if kind == "returns":
         return unpack_returns(pool.model, content, pool.arrays)
     if kind == "release map":
         return unpack_releases(pool.model, content, pool.arrays)
+    if kind == "stable set":
+        return unpack_stable_set(content, pool.arrays, pool.orbits)
     if kind == "basins":
         return unpack_basins(pool.model, content, pool.arrays, pool.orbits)
     if kind == "equilibrium branch":

@@ -10,6 +10,9 @@ from contfric.atlas.diagram import Diagram
 from contfric.atlas.plane import Family, Plane, Region
 from contfric.continuation.events import Kind
 from contfric.curves.curve import Curve, CurvePart
+from contfric.curves.extremum import ExtremumCurve
+from contfric.curves.homoclinic import HomoclinicCurve
+from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.orbit.system import Margin, Test
 from contfric.results.pack import Header, Packer
@@ -39,6 +42,46 @@ def pack_curve(curve: Curve, packer: Packer, index: int) -> Header:
             for e in curve.ends
         ],
     }
+
+
+#: Curves on which a quantity is held, by the word for them in a file; and their arrays.
+_HELD = {"value": QuantityCurve, "period": HomoclinicCurve, "extremum": ExtremumCurve}
+_HELD_ARRAYS = ("vector", "values", "joints", "arc", "stable")
+
+
+def pack_held(curve: QuantityCurve, packer: Packer) -> Header:
+    """Return the header of a curve of a quantity; its arrays are added as they are."""
+    packer.arrays |= {f"held_{name}": getattr(curve, name) for name in _HELD_ARRAYS}
+    packer.arrays["held_at"] = np.array([curve.value])
+    return {
+        "held": next(word for word, kind in _HELD.items() if kind is type(curve)),
+        "quantity": curve.quantity,
+        "parameters": list(curve.parameters),
+        "system": packer.system(curve.system),
+        "ends": [[end.reason.name, end.message] for end in curve.ends],
+    }
+
+
+def unpack_held(header: Header, pool: Unpacker) -> QuantityCurve:
+    """Return the curve of a quantity of a header; errors as for a curve."""
+    arrays = {name: pool.arrays[f"held_{name}"] for name in _HELD_ARRAYS}
+    names, system = tuple(map(str, header["parameters"])), pool.systems[header["system"]]
+    for name in names:
+        pool.model.index_of(name)
+    count = len(arrays["arc"])
+    joints = (count, system.segments, 1 + len(pool.model.states))
+    fits = arrays["values"].shape == (count, len(names)) and arrays["joints"].shape == joints
+    if not fits or arrays["stable"].shape != (count,) or not count:
+        raise ValueError("arrays do not fit each other")
+    one, other = (CurveEnd(CurveEndReason[reason], message) for reason, message in header["ends"])
+    return _HELD[header["held"]](
+        quantity=str(header["quantity"]),
+        value=float(pool.arrays["held_at"][0]),
+        parameters=names,
+        system=system,
+        ends=(one, other),
+        **arrays,
+    )
 
 
 def _pack_part(part: CurvePart, packer: Packer, key: str) -> Header:

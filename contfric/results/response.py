@@ -1,4 +1,4 @@
-"""Sweeps, return maps and basins to a header and arrays, and back."""
+"""Trajectories, sweeps, return maps and basins to a header and arrays, and back."""
 
 from __future__ import annotations
 
@@ -10,11 +10,51 @@ from numpy.typing import NDArray
 
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.simulation import SimulationEnd, Trajectory
 from contfric.response.basins import Basins
 from contfric.response.outcome import Outcome
 from contfric.response.returns import ReleaseMap, Returns
+from contfric.response.stable_set import StableEnd, StableSet
 from contfric.response.sweep import Sweep, SweepRun
 from contfric.results.pack import Arrays, Header, Packer
+
+_EVENTS = ("exits", "cycles", "times", "states")
+
+
+def pack_trajectory(found: Trajectory, arrays: Arrays) -> Header:
+    """Return the header of a trajectory; its arrays are added as they are, but modes, which are named."""
+    names = [mode.name for mode in found.model.modes]
+    visited = np.unique(found.modes)
+    arrays |= {name: getattr(found, name) for name in _EVENTS}
+    arrays["modes"] = np.searchsorted(visited, found.modes)
+    arrays["vector"] = found.model.vector(found.params)
+    cycle, phase, state, mode = found.last
+    arrays["begin"] = np.array([found.begin[0], *found.begin[1]])
+    arrays["last"] = np.array([phase, *state])
+    named = [names[k] for k in visited]
+    return {"end": found.end.name, "cycle": int(cycle), "mode": mode, "modes": named}
+
+
+def unpack_trajectory(model: Model, header: Header, arrays: Arrays) -> Trajectory:
+    """Return the trajectory of a header; errors as for a sweep."""
+    check_points(model, [arrays[name] for name in ("cycles", "modes", "times", "states")])
+    begin, last, exits = arrays["begin"], arrays["last"], arrays["exits"]
+    expect(begin.shape == last.shape == (1 + len(model.states),))
+    expect(
+        arrays["vector"].shape == (len(model.parameters),) and len(exits) == len(arrays["times"])
+    )
+    expect(not len(exits) or 0 <= exits.min() <= exits.max() < len(model.surfaces))
+    numbers = np.array([model.mode_index[name] for name in header["modes"]], dtype=np.int64)
+    return Trajectory(
+        model,
+        model.mapping(arrays["vector"]),
+        numbers[arrays["modes"]],
+        **{name: arrays[name] for name in _EVENTS},
+        end=SimulationEnd[header["end"]],
+        last=(int(header["cycle"]), float(last[0]), last[1:], str(header["mode"])),
+        begin=(float(begin[0]), begin[1:]),
+    )
+
 
 _POINTS = ("index", "cycles", "modes", "times", "states")
 
@@ -123,6 +163,26 @@ def unpack_basins(model: Model, header: Header, arrays: Arrays, orbits: list[Orb
     expect(int(labels.max(initial=-1)) < len(chosen))
     at = dict(zip(header["at"], arrays["at"].tolist(), strict=True))
     return Basins(model, axes, arrays["vector"], at, chosen, labels, motions)
+
+
+def pack_stable_set(found: StableSet, packer: Packer) -> Header:
+    """Return the header of a stable set; its arrays are added as they are."""
+    for k in range(2):
+        packer.arrays[f"half{k}"] = found.states[k]
+        packer.arrays[f"breaks{k}"] = found.breaks[k]
+    packer.arrays["phase"] = np.array([found.phase])
+    return {"orbit": packer.orbit(found.orbit), "ends": [end.name for end in found.ends]}
+
+
+def unpack_stable_set(header: Header, arrays: Arrays, orbits: list[Orbit]) -> StableSet:
+    """Return the stable set of a header; errors as for a sweep."""
+    halves, breaks = (arrays["half0"], arrays["half1"]), (arrays["breaks0"], arrays["breaks1"])
+    for half, gaps in zip(halves, breaks, strict=True):
+        expect(half.ndim == 2 and half.shape[1] == 2 and len(half) > 0)
+        expect(not len(gaps) or 0 < int(gaps.min()) <= int(gaps.max()) < len(half))
+    one, other = (StableEnd[name] for name in header["ends"])
+    phase = float(arrays["phase"][0])
+    return StableSet(orbits[header["orbit"]], phase, halves, breaks, (one, other))
 
 
 def check_points(model: Model, arrays: Iterable[NDArray[Any]]) -> None:

@@ -99,7 +99,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"data": []}, "data are a list of contfric.Measured and contfric.Series"),
+        ({"data": []}, "data are a list of contfric.Measured, contfric.Series and contfric.Jump"),
         ({"data": [1.4]}, "data are a list of contfric.Measured"),
         ({"free": []}, "free is a list of parameters"),
         ({"free": ["s"]}, "has no parameter 's'"),
@@ -141,3 +141,34 @@ def test_what_is_no_measurement_is_said(make: Any, words: str) -> None:
     with pytest.raises(cf.ParameterError) as caught:
         make()
     assert words in str(caught.value)
+
+
+def places(params: dict[str, float]) -> dict[str, cf.Bifurcation]:
+    """Return the fold and the pitchfork of Fig. 5's diagram at other parameters."""
+    orbit = cf.find_orbit("coulomb", {**params, "Omega": 0.5})
+    diagram = cf.explore(orbit, "Omega", (0.44, 0.6))
+    return {b.kind.value: b for b in diagram.bifurcations if b.kind.value in ("SN", "BP", "CS")}
+
+
+def test_friction_is_found_from_where_the_response_jumps() -> None:
+    """From jumps of another diagram: what a fresh exploration finds there, to rounding."""
+    start, truth = places({"S": 0.31, "S0": 0.42}), places({"S": 0.32, "S0": 0.4})
+    data = [cf.Jump(start[kind], truth[kind].params["Omega"], 1e-3) for kind in ("SN", "CS")]
+    found = cf.fit("coulomb", data, {"S": 0.31, "S0": 0.42}, ["S", "S0"])
+    assert found.converged and found.chi_square < 1e-16
+    assert found.params["S"] == pytest.approx(0.32, abs=1e-9)
+    assert found.params["S0"] == pytest.approx(0.4, abs=1e-9)
+    slopes = np.array(
+        [[truth[kind].gradient()[name] for name in ("S", "S0")] for kind in ("SN", "CS")]
+    )
+    np.testing.assert_allclose(found.jacobian, slopes / 1e-3, rtol=1e-6)
+
+
+def test_jumps_that_cannot_be_fitted_say_why() -> None:
+    fold = places({"S": 0.32, "S0": 0.4})["SN"]
+    with pytest.raises(cf.ParameterError, match="a jump is measured along it"):
+        cf.fit("coulomb", [cf.Jump(fold, 0.54, 1e-3)], {"S": 0.32, "S0": 0.4}, ["Omega"])
+    with pytest.raises(cf.ParameterError, match=r"is one of the model 'coulomb', not of 'popp'"):
+        cf.fit("popp", [cf.Jump(fold, 0.54, 1e-3)], {}, ["F"])
+    with pytest.raises(cf.ParameterError, match=r"a jump is taken for a Bifurcation, got 0\.54"):
+        cf.Jump(0.54, 0.54, 1e-3)  # type: ignore[arg-type]

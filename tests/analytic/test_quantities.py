@@ -403,11 +403,24 @@ def test_a_pair_of_extrema_within_one_step_is_found() -> None:
 # ------------------------------------------------------------------- a quantity that is held
 
 
-@pytest.mark.parametrize("quantity", ["x_max", "amplitude(x, 1)"])
-def test_orbits_of_one_amplitude_lie_on_their_formula(quantity: str) -> None:
-    """(1 - w^2)^2 + (2 zeta w)^2 = 1/A^2 is a closed curve around the resonance, through negative damping."""
+@pytest.mark.parametrize(
+    ("quantity", "omega", "zeta"),
+    [
+        ("x_max", 0.7, 0.3),
+        ("x_max", 1.1, -0.2),
+        ("x_max", 0.52, 0.4),
+        ("amplitude(x, 1)", 0.7, 0.3),
+    ],
+)
+def test_orbits_of_one_amplitude_lie_on_their_formula(
+    quantity: str, omega: float, zeta: float
+) -> None:
+    """(1 - w^2)^2 + (2 zeta w)^2 = 1/A^2 is a closed curve around the resonance, through negative damping.
+
+    It is closed whichever way round it is followed, though joints are a period later then or earlier.
+    """
     size = 1.25
-    orbit = cf.find_orbit("coulomb", {"Omega": 0.7, "S": 0.0, "S0": 0.0, "zeta": 0.3})
+    orbit = cf.find_orbit("coulomb", {"Omega": omega, "S": 0.0, "S0": 0.0, "zeta": abs(zeta)})
     ranges = {"Omega": (0.2, 1.6), "zeta": (-0.9, 0.9)}
     curve = cf.continue_quantity(
         orbit, quantity, size, ("Omega", "zeta"), ranges, max_step=0.03, max_points=500
@@ -418,6 +431,57 @@ def test_orbits_of_one_amplitude_lie_on_their_formula(quantity: str) -> None:
     assert np.min(zeta) < -0.3 < 0.3 < np.max(zeta)
     assert np.array_equal(curve.stable, zeta > 0.0)
     assert np.max(np.abs(curve.measured("rms(x)") - size / np.sqrt(2))) < 1e-12
+
+
+SMOOTH = """
+name: smooth
+states: [x, v]
+parameters: {W: 0.9, zeta: 0.2, a: 0.2}
+period: 2*pi/W
+field: {x: v, v: cos(W*t) - x - 2*zeta*v}
+"""
+
+
+@pytest.fixture(scope="module")
+def smooth(tmp_path_factory: pytest.TempPathFactory) -> cf.Model:
+    path = tmp_path_factory.mktemp("models") / "smooth.yaml"
+    path.write_text(SMOOTH, encoding="utf-8")
+    return cf.load_model(path)
+
+
+def test_the_resonance_peak_of_a_linear_oscillator_is_a_formula(smooth: cf.Model) -> None:
+    """The amplitude 1/|1 - w^2 + 2 i zeta w| is largest at w^2 = 1 - 2 zeta^2."""
+    start = cf.find_orbit(smooth, {"W": 0.7, "zeta": 0.2})
+    ranges = {"W": (0.5, 1.2), "zeta": (0.05, 0.5)}
+    curve = cf.continue_extremum(start, "amplitude(x, 1)", ("W", "zeta"), ranges)
+    w, zeta = curve.values.T
+    assert [end.reason.name for end in curve.ends] == ["RANGE", "RANGE"] and len(curve) > 20
+    assert np.max(np.abs(w**2 - (1 - 2 * zeta**2))) < 1e-11
+    peak = 1 / (2 * zeta * np.sqrt(1 - zeta**2))
+    assert np.max(np.abs(curve.extrema / peak - 1)) < 1e-12
+
+
+def test_what_is_stationary_in_two_parameters_is_a_formula(smooth: cf.Model) -> None:
+    """The peak plus zeta / a is least where 1/a = (1 - 2 zeta^2) / (2 zeta^2 (1 - zeta^2)^(3/2))."""
+    start = cf.find_orbit(smooth, {"W": 0.9, "zeta": 0.25, "a": 0.12})
+    ranges = {"W": (0.5, 1.2), "zeta": (0.1, 0.5), "a": (0.05, 0.3)}
+    curve = cf.continue_extremum(start, "amplitude(x, 1) + zeta/a", ("W", "zeta", "a"), ranges)
+    w, zeta, a = curve.values.T
+    assert {end.reason.name for end in curve.ends} == {"RANGE"} and len(curve) > 10
+    assert np.max(np.abs(w**2 - (1 - 2 * zeta**2))) < 1e-10
+    known = 2 * zeta**2 * (1 - zeta**2) ** 1.5 / (1 - 2 * zeta**2)
+    assert np.max(np.abs(a - known)) < 1e-10
+
+
+def test_extrema_of_a_branch_that_starts_like_a_square_root_are_extrema() -> None:
+    """Where a Jenkins element begins to slip the branch leaves with slope zero by arclength."""
+    for limit in (1.2, 1.4, 1.6, 1.8):
+        branch = cf.continue_orbit(
+            cf.find_orbit("jenkins", {"muN": limit, "W": 1.45}), "W", (0.8, 2.2)
+        )
+        found = branch.extrema("x_max")
+        assert len([e for e in found if not e.kink]) == 1
+        assert all(abs(e.orbit.gradient("x_max")["W"]) < 1e-9 for e in found if not e.kink)
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ def nearest(orbit: cf.Orbit, others: Sequence[cf.Orbit]) -> int:
 
 @pytest.fixture(scope="module")
 def three() -> cf.Basins:
-    return cf.basins("coulomb", THREE, GRID)
+    return cf.basins("coulomb", GRID, THREE)
 
 
 def test_labels_are_the_orbits_that_starts_converge_to(three: cf.Basins) -> None:
@@ -54,7 +54,7 @@ def test_labels_are_the_orbits_that_starts_converge_to(three: cf.Basins) -> None
 
 
 def test_a_phase_moves_the_starts() -> None:
-    found = cf.basins("coulomb", THREE, GRID, {"phase": 0.3})
+    found = cf.basins("coulomb", GRID, THREE, {"phase": 0.3})
     period = 2.0 * np.pi / THREE["Omega"]
     draw = np.random.default_rng(6)
     for _ in range(8):
@@ -67,8 +67,8 @@ def test_a_phase_moves_the_starts() -> None:
 
 def test_the_symmetry_of_the_model_is_that_of_the_basins() -> None:
     """The image of a start is half a period later: its basin is that of the image of the orbit."""
-    one = cf.basins("coulomb", THREE, GRID)
-    other = cf.basins("coulomb", THREE, GRID, {"phase": 0.5})
+    one = cf.basins("coulomb", GRID, THREE)
+    other = cf.basins("coulomb", GRID, THREE, {"phase": 0.5})
     image = {k: nearest(orbit.mirror(), other.orbits) for k, orbit in enumerate(one.orbits)}
     mirrored = np.vectorize(image.get)(one.labels)[::-1, ::-1]
     np.testing.assert_array_equal(mirrored, other.labels)
@@ -78,28 +78,28 @@ def test_a_wide_radius_takes_no_start_of_another_basin(
     three: cf.Basins, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(targets, "NEAR", 1e-8)
-    np.testing.assert_array_equal(cf.basins("coulomb", THREE, GRID).labels, three.labels)
+    np.testing.assert_array_equal(cf.basins("coulomb", GRID, THREE).labels, three.labels)
 
 
 def test_given_orbits_and_a_diagram(three: cf.Basins) -> None:
-    given = cf.basins("coulomb", THREE, GRID, orbits=three.orbits[::-1])
+    given = cf.basins("coulomb", GRID, THREE, orbits=three.orbits[::-1])
     order = [nearest(orbit, given.orbits) for orbit in three.orbits]
     np.testing.assert_array_equal(np.array(order)[three.labels], given.labels)
     diagram = cf.explore(three.orbits[0], "Omega", (0.535, 0.545), max_periods=2)
-    known = cf.basins("coulomb", THREE, GRID, orbits=diagram)
+    known = cf.basins("coulomb", GRID, THREE, orbits=diagram)
     counts = sorted(share.count for share in known.shares)
     assert counts == sorted(share.count for share in three.shares)
     with pytest.raises(cf.ParameterError, match="other parameters"):
-        cf.basins("coulomb", {**THREE, "S": 0.3}, GRID, orbits=diagram)
+        cf.basins("coulomb", GRID, {**THREE, "S": 0.3}, orbits=diagram)
     with pytest.raises(cf.ParameterError, match="another model, or of other"):
-        cf.basins("coulomb", {**THREE, "S": 0.3}, GRID, orbits=[three.orbits[0]])
+        cf.basins("coulomb", GRID, {**THREE, "S": 0.3}, orbits=[three.orbits[0]])
     with pytest.raises(cf.ParameterError, match="a diagram or a list"):
-        cf.basins("coulomb", THREE, GRID, orbits=3)
+        cf.basins("coulomb", GRID, THREE, orbits=3)
 
 
 def test_chaos_is_named_and_shares_have_intervals() -> None:
     small = {"x": [-1.0, 0.0, 1.0], "v": [0.0, 0.5]}
-    found = cf.basins("coulomb", CHAOS, small, periods=150)
+    found = cf.basins("coulomb", small, CHAOS, periods=150)
     (share,) = found.shares
     assert (share.name, share.orbit, share.count, share.share) == ("chaotic", -1, 6, 1.0)
     assert 0.5 < share.low < 1.0 and share.high == 1.0
@@ -109,7 +109,7 @@ def test_chaos_is_named_and_shares_have_intervals() -> None:
 def test_escaping_starts_are_named() -> None:
     """Negative damping: what is large grows."""
     grid = {"x": [0.0, 4.0], "v": [0.0, 1.0]}
-    found = cf.basins("coulomb", {"Omega": 0.5, "S": 0.0, "S0": 0.0, "zeta": -0.1}, grid)
+    found = cf.basins("coulomb", grid, {"Omega": 0.5, "S": 0.0, "S0": 0.0, "zeta": -0.1})
     assert [share.name for share in found.shares] == ["unbounded"]
 
 
@@ -118,7 +118,7 @@ def test_without_excitation() -> None:
     first, second = belt.states[:2]
     width = belt.spread(belt.defaults)
     grid = {first: width[0] * np.linspace(0.4, 1, 3), second: width[1] * np.linspace(0.1, 0.9, 3)}
-    found = cf.basins(belt, None, grid)
+    found = cf.basins(belt, grid, None)
     for i, j in ((0, 0), (2, 1)):
         label = found.labels[i, j]
         start = [float(grid[first][i]), float(grid[second][j])]
@@ -128,17 +128,17 @@ def test_without_excitation() -> None:
         orbit = cf.find_orbit(belt, state=start)
         assert orbit.period == pytest.approx(found.orbits[label].period, abs=1e-9)
     with pytest.raises(cf.ParameterError, match="no phase"):
-        cf.basins(belt, None, grid, {"phase": 0.2})
+        cf.basins(belt, grid, None, {"phase": 0.2})
 
 
 def test_the_same_bits_for_any_number_of_workers(three: cf.Basins) -> None:
     for tile in (7, 100):
-        assert bits(cf.basins("coulomb", THREE, GRID, tile=tile)) == bits(three)
+        assert bits(cf.basins("coulomb", GRID, THREE, tile=tile)) == bits(three)
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        assert bits(cf.basins("coulomb", THREE, GRID, tile=100, executor=pool)) == bits(three)
+        assert bits(cf.basins("coulomb", GRID, THREE, tile=100, executor=pool)) == bits(three)
     with ThreadPoolExecutor(1) as pool:
         pool.shutdown()  # takes nothing: all is computed here
-        assert bits(cf.basins("coulomb", THREE, GRID, tile=100, executor=pool)) == bits(three)
+        assert bits(cf.basins("coulomb", GRID, THREE, tile=100, executor=pool)) == bits(three)
 
 
 def test_interrupted_and_gone_on(three: cf.Basins, tmp_path: Path) -> None:
@@ -147,13 +147,13 @@ def test_interrupted_and_gone_on(three: cf.Basins, tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     options: dict[str, Any] = {"tile": 100, "folder": tmp_path}
-    part = cf.basins("coulomb", THREE, GRID, progress=stop, **options)
+    part = cf.basins("coulomb", GRID, THREE, progress=stop, **options)
     assert not part.complete and np.any(part.labels >= 0)
     assert sum(share.count for share in part.shares) < part.labels.size
-    whole = cf.basins("coulomb", THREE, GRID, **options)
+    whole = cf.basins("coulomb", GRID, THREE, **options)
     assert whole.complete and bits(whole) == bits(three)
     with pytest.raises(cf.ResultFileError, match="another"):
-        cf.basins("coulomb", CHAOS, GRID, **options)
+        cf.basins("coulomb", GRID, CHAOS, **options)
 
 
 def test_saved_table_and_drawn(three: cf.Basins, tmp_path: Path) -> None:
@@ -186,7 +186,7 @@ def test_saved_table_and_drawn(three: cf.Basins, tmp_path: Path) -> None:
 )
 def test_bad_input(grid: Any, at: Any, options: dict[str, Any], message: str) -> None:
     with pytest.raises(cf.ParameterError, match=message) as caught:
-        cf.basins("coulomb", THREE, grid, at, **options)
+        cf.basins("coulomb", grid, THREE, at, **options)
     assert "\n" not in str(caught.value)
 
 
@@ -218,3 +218,16 @@ def test_bad_study(write, tmp_path: Path, text: str, message: str) -> None:
     path = write(HEAD + text)
     with pytest.raises(cf.StudyError, match=message):
         cf.run_study(path, tmp_path / "out")
+
+
+def test_shares_of_the_orbits_are_those_of_the_table(three: cf.Basins) -> None:
+    known = [share.share for share in three.shares if share.orbit >= 0]
+    np.testing.assert_array_equal(three.share[three.share > 0], known)
+    assert len(three.share) == len(three.orbits)
+
+
+def test_parameters_before_the_grid_are_understood_and_warned_of() -> None:
+    small = {name: values[::8] for name, values in GRID.items()}
+    with pytest.warns(DeprecationWarning, match="grid stands before the parameters"):
+        old = cf.basins("coulomb", THREE, small)
+    np.testing.assert_array_equal(old.labels, cf.basins("coulomb", small, THREE).labels)

@@ -46,7 +46,7 @@ def test_a_sweep(executor: Executor) -> None:
 def test_basins(executor: Executor) -> None:
     def compute(**options: Any) -> bytes:
         starts = {"x": np.linspace(-2.0, 2.0, 24), "v": np.linspace(-1.5, 1.5, 20)}
-        found = cf.basins("coulomb", PARAMS, starts, tile=60, **options)
+        found = cf.basins("coulomb", starts, PARAMS, tile=60, **options)
         assert found.complete
         return found.labels.tobytes() + found.motions.tobytes()
 

@@ -138,7 +138,7 @@ def test_maps_basins_and_sweeps_as_datasets() -> None:
     got = data["exponents"].sel(Omega=0.5, S=0.32).to_numpy()
     np.testing.assert_array_equal(got, lmap.exponents[1, 1])
     starts = {"x": np.linspace(-1, 1, 4), "v": np.linspace(-1, 1, 3)}
-    found = cf.basins("coulomb", PARAMS, starts)
+    found = cf.basins("coulomb", starts, PARAMS)
     labelled = found.to_xarray()
     np.testing.assert_array_equal(labelled["orbit"].sel(v=1.0), found.labels[:, 2])
     assert str(labelled["name"][0, 0].item()) == found.names[found.labels[0, 0]]

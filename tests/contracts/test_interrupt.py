@@ -82,7 +82,7 @@ calls = {
         lambda: cf.sweep(model, parameter, np.linspace(*bounds, 20000), other_params, transient=500),
         lambda s: not s.complete,
     ),
-    "basins": (lambda: cf.basins(model, start, plane), lambda b: not b.complete),
+    "basins": (lambda: cf.basins(model, plane, start), lambda b: not b.complete),
     "poincare": (lambda: cf.poincare(model, start, periods=1e7), None),
     "period_adding": (lambda: cf.period_adding(bridge, longest=8) if bridge else None, None),
 }

@@ -122,3 +122,9 @@ def test_study(write, tmp_path: Path) -> None:
     write(head + "poincare: {section: F}\n")
     with pytest.raises(cf.StudyError, match=r"scene.yaml:3: .*no section 'F'"):
         cf.run_study(path, tmp_path / "out2")
+
+
+def test_a_state_may_stand_behind_the_parameters() -> None:
+    one = cf.poincare("coulomb", START, [0.7, 0.2], section=0.25, periods=8, transient=0)
+    other = cf.poincare("coulomb", START, state=[0.7, 0.2], section=0.25, periods=8, transient=0)
+    np.testing.assert_array_equal(one.states, other.states)

@@ -367,3 +367,44 @@ def test_a_curve_that_cannot_be_says_why(orbit: cf.Orbit, change: Any, words: st
     with pytest.raises(cf.ContfricError) as caught:
         cf.continue_quantity(**{**asked, **change})
     assert words in str(caught.value)
+
+
+def test_curves_of_quantities_are_saved(orbit: cf.Orbit, tmp_path: Path) -> None:
+    ranges = {"Omega": (0.49, 0.51), "S": (0.31, 0.33)}
+    held = cf.continue_quantity(orbit, "x_max", orbit.x_max, ("Omega", "S"), ranges)
+    start = cf.find_orbit("jenkins", {"muN": 1.4, "W": 1.3})
+    peaks = cf.continue_extremum(
+        start, "x_max", ("W", "muN"), {"W": (1.2, 1.6), "muN": (1.35, 1.45)}
+    )
+    for curve in (held, peaks):
+        cf.save(curve, tmp_path / "curve.npz")
+        again = cf.load(tmp_path / "curve.npz")
+        assert type(again) is type(curve) and again.parameters == curve.parameters
+        assert [str(end) for end in again.ends] == [str(end) for end in curve.ends]
+        np.testing.assert_array_equal(again.joints, curve.joints)
+        np.testing.assert_array_equal(again.to_dataframe(), curve.to_dataframe())
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"parameters": ("Omega",)}, "a curve of extrema needs two parameters or more"),
+        (
+            {"parameters": ("Omega", "Omega")},
+            "a curve needs different parameters, got 'Omega' twice",
+        ),
+        ({"start": 3}, "starts from an Orbit or an Extremum, got int"),
+        (
+            {"ranges": {"Omega": (0.495, 0.505), "S": (0.3, 0.34)}},
+            "x_max has no extremum along Omega",
+        ),
+    ],
+)
+def test_a_curve_of_extrema_that_cannot_be_says_why(
+    orbit: cf.Orbit, change: Any, words: str
+) -> None:
+    asked = {"start": orbit, "quantity": "x_max", "parameters": ("Omega", "S")}
+    asked["ranges"] = {"Omega": (0.48, 0.52), "S": (0.3, 0.34)}
+    with pytest.raises(cf.ContfricError) as caught:
+        cf.continue_extremum(**{**asked, **change})
+    assert words in str(caught.value)

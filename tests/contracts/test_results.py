@@ -175,7 +175,7 @@ def test_loading_does_not_load_the_engine(branch, tmp_path) -> None:
 
 
 def test_other_objects_are_refused(tmp_path) -> None:
-    saved = r"only results can be saved \(Orbit, Branch, Diagram, Curve, Plane, LyapunovMap, .*\), got dict"
+    saved = r"only results can be saved \(Orbit, Branch, Diagram, Curve, QuantityCurve, Plane, .*\), got dict"
     with pytest.raises(cf.ResultFileError, match=saved):
         cf.save({}, tmp_path / "x.npz")  # type: ignore[arg-type]
 

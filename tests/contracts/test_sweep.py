@@ -268,3 +268,10 @@ def test_bad_study(write, tmp_path: Path, text: str, message: str) -> None:
     path = write(HEAD + text)
     with pytest.raises(cf.StudyError, match=message):
         cf.run_study(path, tmp_path / "out")
+
+
+def test_both_is_direction_in_one_word() -> None:
+    values, fixed = GRID[:6], {"S": 0.32, "S0": 0.4}
+    for both, direction in ((True, "both"), (False, "up")):
+        one = cf.sweep("coulomb", "Omega", values, fixed, both=both)
+        assert bits(one) == bits(cf.sweep("coulomb", "Omega", values, fixed, direction=direction))

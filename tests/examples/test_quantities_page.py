@@ -22,7 +22,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "quantities.md"
 def scope() -> dict[str, Any]:
     found: dict[str, Any] = {}
     blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    assert len(blocks) == 7
+    assert len(blocks) == 9
     for block in blocks:
         exec(compile(block, str(PAGE), "exec"), found)
     return found
@@ -53,3 +53,18 @@ def test_the_best_damper_is_the_best(scope: dict[str, Any]) -> None:
     vertex = 0.5 * step * (left - right) / (left - 2.0 * middle + right)
     assert abs(vertex) < 1e-5  # what the cubic term of the peaks moves it by
     assert abs(highest(best).orbit.gradient("x_max")["muN"]) < 1e-9
+
+
+def test_the_curve_of_the_best_damper_goes_through_it(scope: dict[str, Any]) -> None:
+    """At kt = 2, between two points of the curve, it is the zero of the gradient that brentq found."""
+    curve = scope["smallest"]
+    stiffness, limits = curve.params["kt"], curve.params["muN"]
+    k = int(
+        np.searchsorted(stiffness * (order := np.sign(stiffness[-1] - stiffness[0])), 2.0 * order)
+    )
+    near = slice(max(0, k - 3), k + 3)
+    between = np.polynomial.Polynomial.fit(stiffness[near], limits[near], len(stiffness[near]) - 1)
+    assert between(2.0) == pytest.approx(scope["best"], abs=1e-7)
+    for orbit in curve:
+        gradient = orbit.gradient("x_max")
+        assert max(abs(gradient["W"]), abs(gradient["muN"])) < 1e-10

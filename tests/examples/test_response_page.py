@@ -14,7 +14,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "response.md"
 def test_the_page_runs() -> None:
     scope: dict[str, object] = {}
     blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    assert len(blocks) == 3
+    assert len(blocks) == 5
     for block in blocks:
         exec(compile(block, str(PAGE), "exec"), scope)
     shares = [share.share for share in scope["found"].shares]  # type: ignore[attr-defined]

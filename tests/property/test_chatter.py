@@ -344,7 +344,7 @@ def test_exponents_and_basins_of_chatter() -> None:
     assert np.all(np.isneginf(found.exponents[2:]))
     ball_ = with_chatter(cf.load_model("bouncing-ball"))
     assert ball_ is not None
-    basins = cf.basins(ball_, {"a": 1.2, "e": 0.5}, {"x": [1.5, 2.0, 3.0], "v": [-1.0, 0.0, 1.0]})
+    basins = cf.basins(ball_, {"x": [1.5, 2.0, 3.0], "v": [-1.0, 0.0, 1.0]}, {"a": 1.2, "e": 0.5})
     assert "1a, 2seg, 1imp 100.0%" in repr(basins)
 
 

@@ -79,8 +79,8 @@ class BasinsTask(Response):
         study = job.study
         return basins(
             study.model,
-            study.params,
             self._axes(),
+            study.params,
             self.at,
             folder=job.tiles,
             progress=job.say,

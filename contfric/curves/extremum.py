@@ -1,0 +1,235 @@
+r"""Curves of extrema: orbits at which a quantity is stationary in some parameters, while one more varies.
+
+With the parameters :math:`p_1, \dots, p_q` the conditions are
+
+.. math:: \frac{dQ}{dp_k} = 0, \qquad k = 1, \dots, q - 1 ,
+
+the total derivatives along the family of orbits (:mod:`contfric.orbit.gradient`). With q = 2 it is the place
+of a resonance peak as the last parameter varies, with q = 3 the place where that peak is stationary in a
+second parameter.
+
+Values are exact. The slopes of the conditions are central differences at the start, and from then on
+secants (C. G. Broyden, Math. Comp. 19 (1965) 577-593): a point is as accurate as its gradient, and only the
+speed of Newton's method depends on the slopes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from contfric.continuation.extrema import Extremum
+from contfric.continuation.points import MOST_POINTS
+from contfric.continuation.trace import continue_orbit
+from contfric.curves.problem import Ranges, ranges_of
+from contfric.curves.quantity_curve import QuantityCurve
+from contfric.curves.quantity_step import Conditions, Held, Solved, solve_held
+from contfric.curves.quantity_trace import both_sides
+from contfric.curves.trace import largest_step
+from contfric.errors import ConvergenceError, ParameterError, items_of, shown, whole_number
+from contfric.models.definition import FloatArray
+from contfric.orbit.gradient import by_parameters
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.sections import canonical
+from contfric.quantities.measure import differentiated, of_orbit
+from contfric.quantities.registry import Quantity, number_quantity
+
+#: Step of the central differences in scaled unknowns: the cube root of rounding balances both errors, 1e-10.
+_STEP = 6e-6
+#: Calls for one point after which secants are given up for differences: three or four are enough.
+_SECANTS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class ExtremumCurve(QuantityCurve):
+    """Orbits at which a quantity is stationary in all parameters that vary but the last one."""
+
+    @property
+    def extrema(self) -> FloatArray:
+        """The quantity at every point, shape (k,)."""
+        return self.measured(self.quantity)
+
+    def _at_points(self) -> FloatArray | float:
+        return self.extrema
+
+    @property
+    def label(self) -> str:
+        """What is extreme, for a legend."""
+        return f"{self.quantity} extreme in {', '.join(self.parameters[:-1])}"
+
+    def __repr__(self) -> str:
+        ends = " and ".join(end.reason.name for end in self.ends)
+        return f"<ExtremumCurve, {self.label}: {len(self)} points, ends {ends}>"
+
+
+@dataclass
+class _Secants:
+    """Rows of the conditions' Jacobian, as the last points have them."""
+
+    x: FloatArray | None = None
+    values: FloatArray | None = None
+    rows: FloatArray | None = None
+    calls: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Stationary(Held):
+    """The conditions of a curve of extrema, in place of a quantity that is held."""
+
+    secants: _Secants = field(default_factory=_Secants)
+
+    def slopes(self, orbit: Orbit) -> FloatArray:
+        """Return the derivatives of the quantity by all parameters that vary but the last, per width."""
+        assert self.quantity is not None
+        found = differentiated(self.quantity, orbit, by_parameters(orbit)).ahead
+        return np.asarray(found[self.which[:-1]] * self.box.widths[:-1])
+
+    def conditions(self, orbit: Orbit, columns: FloatArray) -> Conditions:
+        """Return these derivatives, with their slopes in scaled directions by secants."""
+        x, values, known = self.scaled(orbit), self.slopes(orbit), self.secants
+        known.calls += 1
+        if known.rows is None or known.calls > _SECANTS:
+            known.rows, known.calls = self._differences(x, columns), 0
+        elif known.x is not None and known.values is not None and np.any(x != known.x):
+            step = x - known.x
+            missed = values - known.values - known.rows @ step
+            known.rows = known.rows + np.outer(missed, step) / (step @ step)
+        known.x, known.values = x, values
+        return Conditions(values, known.rows @ columns)
+
+    def solved(self) -> None:
+        """Note that a point has been found: the next one may use as many secants."""
+        self.secants.calls = 0
+
+    def _differences(self, x: FloatArray, columns: FloatArray) -> FloatArray:
+        """Return rows with the slopes of the conditions in the plane of some directions."""
+        basis = np.linalg.qr(columns[:, 1:])[0]
+        slopes = [
+            (self.slopes(self.at(x + _STEP * c)) - self.slopes(self.at(x - _STEP * c)))
+            / (2 * _STEP)
+            for c in basis.T
+        ]
+        return np.asarray(np.array(slopes).T @ basis.T)
+
+
+def continue_extremum(
+    start: Orbit | Extremum,
+    quantity: str,
+    parameters: tuple[str, ...],
+    ranges: Mapping[str, tuple[float, float]],
+    *,
+    max_step: float | None = None,
+    max_points: int = MOST_POINTS,
+) -> ExtremumCurve:
+    """Continue the orbits at which a quantity is extreme, as one more parameter varies.
+
+    With two parameters the quantity is stationary in the first, such as the peak of a resonance; with three
+    in the first two, such as the smallest peak that a damper can make.
+
+    Parameters
+    ----------
+    start : Orbit or Extremum
+        Where to start: an extremum of a branch, or any orbit. From an orbit the branch in the first
+        parameter is followed to its nearest extremum, then that extremum in the second parameter.
+    quantity : str
+        A quantity by its name or as an expression, such as ``"x_max"``.
+    parameters : (str, ...)
+        The parameters that vary; in all but the last one the quantity is stationary.
+    ranges : dict
+        Where each of them may go.
+    max_step : float, optional
+        Largest step, as for :func:`contfric.continue_bifurcation`.
+    max_points : int
+        Most points of each side.
+
+    Raises
+    ------
+    ParameterError
+        If the quantity, the parameters or the ranges are not valid.
+    ConvergenceError
+        If no extremum is found.
+
+    Notes
+    -----
+    The curve ends where the signature of its orbits does, with the reason MEETS. Where a maximum over the
+    orbit passes from one instant to another the gradient jumps, and the curve ends as well.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("jenkins", {"muN": 1.4, "W": 1.3})
+    >>> ranges = {"W": (1.0, 2.0), "muN": (1.2, 1.8)}
+    >>> peaks = cf.continue_extremum(orbit, "x_max", ("W", "muN"), ranges)
+    >>> bool(abs(peaks[3].gradient("x_max")["W"]) < 1e-10)
+    True
+    """
+    orbit = start.orbit if isinstance(start, Extremum) else start
+    if not isinstance(orbit, Orbit):
+        raise ParameterError(
+            f"a curve of extrema starts from an Orbit or an Extremum, got {type(start).__name__}"
+        )
+    measured = number_quantity(quantity, orbit.model, "a curve")
+    names = tuple(items_of(parameters))
+    if len(names) < 2:
+        raise ParameterError(
+            f"a curve of extrema needs two parameters or more, such as {orbit.model.parameter_names[:2]}, "
+            f"got {shown(parameters)}"
+        )
+    box = ranges_of(orbit.model, names, ranges)
+    largest = largest_step(max_step, orbit.model)
+    whole_number("max_points", max_points, least=2)
+    held, first = _start(orbit, measured, box)
+    found = both_sides(held, first, largest, max_points)
+    values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(found)}
+    return ExtremumCurve(**{**values, "value": float(of_orbit(measured, first.orbit))})
+
+
+def _start(orbit: Orbit, quantity: Quantity, box: Ranges) -> tuple[Stationary, Solved]:
+    """Return the problem and its first point: near the orbit, else by fewer parameters first."""
+    if not orbit.converged:
+        raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
+    here = np.array([orbit.params[name] for name in box.names])
+    if not box.contains(here):
+        where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(box.names, here, strict=True))
+        raise ParameterError(f"the orbit is at {where}, outside of the ranges")
+    near = _nearer(orbit, quantity, box)
+    held = Stationary(canonical(near).as_half(), quantity, 0.0, box)
+    first = solve_held(held, held.scaled(held.orbit), None)
+    if first is None:
+        raise ConvergenceError(
+            f"no orbit near the start at which {quantity.name} is extreme in "
+            f"{', '.join(box.names[:-1])} was found",
+            near,
+        )
+    return held, first
+
+
+def _nearer(orbit: Orbit, quantity: Quantity, box: Ranges) -> Orbit:
+    """Return an orbit next to a point at which the quantity is stationary in all but the last parameter."""
+    names, last = box.names[:-1], box.names[-2]
+    if len(names) == 1:
+        bounds = float(box.low[0]), float(box.high[0])
+        branch = continue_orbit(orbit, last, bounds, stability=False)
+        found = [e for e in branch.extrema(quantity.name) if not e.kink]
+        if not found:
+            raise ConvergenceError(
+                f"{quantity.name} has no extremum along {last} in {bounds}", orbit
+            )
+        start = orbit.params[last]
+        return min(found, key=lambda e: abs(e.params[last] - start)).orbit
+    inner = Ranges(names, box.low[:-1], box.high[:-1])
+    held, first = _start(orbit, quantity, inner)
+    curve = both_sides(held, first, largest_step(None, orbit.model), MOST_POINTS)
+    values = curve.measured(quantity.name)
+    turns = np.flatnonzero(np.diff(values[1:]) * np.diff(values[:-1]) <= 0.0) + 1
+    if not len(turns):
+        raise ConvergenceError(
+            f"{quantity.name}, extreme in {', '.join(names[:-1])}, has no extremum along {last}: it "
+            f"goes from {values[0]:.6g} to {values[-1]:.6g}",
+            first.orbit,
+        )
+    start = orbit.params[last]
+    return curve[int(min(turns, key=lambda k: abs(curve.params[last][k] - start)))]

@@ -1,0 +1,122 @@
+"""A simulated trajectory in the plane of two states, coloured by mode; and an orbit that moves."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+
+from contfric.errors import ParameterError, path_of, whole_number
+from contfric.models.definition import FloatArray
+from contfric.plot.save import axes_or_new, new_figure
+from contfric.plot.style import BESIDE, BLACK, SMALL, branch_colours, parameter_label, sized
+
+if TYPE_CHECKING:
+    from contfric.orbit.orbit import Orbit
+    from contfric.orbit.simulation import Trajectory
+
+#: Widths of lines; many turns over each other are told apart by thin ones.
+_THIN, _POINT = 0.8, 3.0
+#: Share of the period that the tail behind a moving point shows.
+_TAIL = 0.08
+#: Frames of an animation: minutes of film, and what a gif of some megabytes holds.
+_MOST_FRAMES = 2000
+
+
+def plot_trajectory(trajectory: Trajectory, ax: Axes | None = None, points: int = 1000) -> Axes:
+    """Draw a trajectory in the plane of the first two states (one alone: over time), coloured by mode.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    ax : Axes, optional
+        Where to draw; new axes by default.
+    points : int
+        About how many points to draw.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> found = cf.simulate("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4}, periods=3)
+    >>> plot_trajectory(found).get_xlabel()
+    '$x$'
+    """
+    columns = trajectory.columns(points)
+    states = trajectory.model.states
+    across, up = ("t", states[0]) if len(states) == 1 else states[:2]
+    ax = axes_or_new(ax)
+    colours = branch_colours(columns["mode"])
+    named: set[str] = set()
+    for mode, rows in groupby(range(len(columns["t"])), key=columns["mode"].__getitem__):
+        part = list(rows)
+        label = None if mode in named else mode
+        named.add(mode)
+        ax.plot(
+            columns[across][part], columns[up][part], color=colours[mode], lw=_THIN, label=label
+        )
+    ax.plot(columns[across][0], columns[up][0], "o", color=BLACK, ms=_POINT, label="start")
+    ax.set_xlabel(parameter_label(across))
+    ax.set_ylabel(parameter_label(up))
+    ax.legend(fontsize=sized(SMALL), frameon=False, **BESIDE)
+    return ax
+
+
+def animate_orbit(orbit: Orbit, path: str | Path, frames: int = 120, rate: int = 30) -> Path:
+    """Write one period of an orbit as a gif: the phase plane, and a point that moves along it.
+
+    Parameters
+    ----------
+    orbit : Orbit
+    path : str or Path
+        A file that ends in ``.gif``.
+    frames, rate : int
+        Number of frames, equally spaced in time, and frames a second.
+
+    Raises
+    ------
+    ParameterError
+        If the file is no gif, or its folder does not exist.
+    """
+    from matplotlib.animation import FuncAnimation, PillowWriter
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    from contfric.plot.orbit import plot_orbit
+
+    path = path_of("the file of an animation", path)
+    if path.suffix != ".gif" or not path.absolute().parent.is_dir():
+        raise ParameterError(
+            f"an animation is a file such as orbit.gif in a folder that is there, got {path}"
+        )
+    frames = whole_number("frames", frames, least=2, most=_MOST_FRAMES)
+    rate = whole_number("rate", rate, least=1, most=100)
+    fig = new_figure(5.6, 4.2)
+    ax = plot_orbit(orbit, fig.add_subplot())
+    times = float(orbit.cycle[0, 0]) + orbit.period * np.arange(frames) / frames
+    at = np.array([_place(orbit, time) for time in times])
+    trail = max(1, round(_TAIL * frames))
+    (tail,) = ax.plot([], [], color=BLACK, lw=1.5, alpha=0.5, zorder=6)
+    (point,) = ax.plot([], [], "o", color=BLACK, ms=7, zorder=7)
+    FigureCanvasAgg(fig).draw()  # type: ignore[no-untyped-call]
+    fig.set_layout_engine("none")  # laid out once: axes that move with the numbers would jump
+
+    def show(frame: int) -> list[Artist]:
+        rows = np.arange(frame - trail, frame + 1) % frames
+        tail.set_data(*at[rows].T)
+        point.set_data(*at[[frame]].T)
+        return [tail, point]
+
+    FuncAnimation(fig, show, frames=frames, blit=False).save(path, PillowWriter(fps=rate), dpi=100)
+    return path
+
+
+def _place(orbit: Orbit, time: float) -> FloatArray:
+    """Return where an orbit is in its phase plane; of one state, the share of the period and the state."""
+    state = orbit.state(time)
+    if len(state) > 1:
+        return state[:2]
+    share = (time - float(orbit.cycle[0, 0])) / orbit.period
+    return np.array([share, state[0]])

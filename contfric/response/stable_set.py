@@ -1,0 +1,384 @@
+r"""The stable set of an unstable orbit in the plane of two states: where basins of attraction meet.
+
+The section map f takes the state at a phase of the excitation to that one period of the orbit later. An
+unstable orbit is a saddle :math:`p_0` of f. With the left unstable eigenvector l,
+:math:`u = l^T (f^n(q) - p_0)` grows by the unstable multiplier with each return near the saddle. The stable
+set is where it vanishes; so it separates starts that leave the saddle along one direction from those that
+leave along the other.
+
+It is followed without the inverse of f, as a stick has none (J. P. England, B. Krauskopf, H. M. Osinga, SIAM
+J. Appl. Dyn. Syst. 3 (2004) 161-190). The next point lies on an arc around the last one, where u changes its
+sign. Where no start on the arc comes to the saddle f is discontinuous, and the set has a break. It is looked
+for on the other side, within a step, and ends where it is not found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contfric.base.extras import need_pandas
+from contfric.base.shown import Shown
+from contfric.errors import ParameterError, real_number, shown, whole_number
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.simulation import run
+from contfric.orbit.starts import start_of
+from contfric.orbit.system import IntArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+#: Step of the differences that make the derivative of f: the cube root of rounding, in sizes of the orbit.
+_DIFFERENCE = 6e-6
+#: One-sided slopes of f that differ by more than this, relative to their sum: f has a kink or a jump.
+_KINK = 0.1
+#: First distance from the saddle, in sizes of the orbit: its set is straight there to its square.
+_FIRST = 1e-3
+#: Distance, in sizes of the orbit, within which f is nearly linear and starts have come to the saddle.
+_NEAR = 0.02
+#: Stable component, relative to that distance, at which the unstable one decides.
+_ARRIVED = 1e-6
+#: Halves of the arc on which the next point is looked for (rad), and the turn that is accepted. Starts at the
+#: ends of a narrow arc come to the saddle from farther away.
+_ARCS, _TURN = (0.04, 0.12, 0.4), 0.3
+#: Shortest step, as a share of the longest: what is lost on it is a break.
+_SHORTEST = 1e-3
+#: Returns that a start may take to the saddle, and at it.
+_ARRIVALS, _RETURNS = 40, 400
+#: Behind a break the set is looked for at so many distances up to the longest step, at so many angles (rad).
+_GAPS, _FAN = 6, np.linspace(-1.0, 1.0, 21)
+
+
+class StableEnd(str, Enum):
+    """Why a stable set ends."""
+
+    RANGE = "end of the range asked for"
+    BREAK = (
+        "the section map jumps: solutions on one side stop, or touch a surface, where others do not"
+    )
+    POINTS = "the largest number of points was reached"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True, eq=False)
+class StableSet(Shown):
+    """The stable set of an unstable orbit; the result of :func:`contfric.stable_set`.
+
+    Attributes
+    ----------
+    orbit : Orbit
+    phase : float
+        The phase of the section, as a share of the period of the excitation.
+    states : tuple of ndarray, shape (k, 2) each
+        Both halves, each from the orbit on.
+    breaks : tuple of ndarray of int
+        Of both halves, the points that a break leads to: the set has a gap before them.
+    ends : (StableEnd, StableEnd)
+    """
+
+    orbit: Orbit
+    phase: float
+    states: tuple[FloatArray, FloatArray]
+    breaks: tuple[IntArray, IntArray]
+    ends: tuple[StableEnd, StableEnd]
+
+    @property
+    def model(self) -> Model:
+        """The model that moves."""
+        return self.orbit.model
+
+    @property
+    def points(self) -> FloatArray:
+        """All points in their order along the set, shape (k, 2)."""
+        one, other = self.states
+        return np.concatenate([one[:0:-1], other])
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the points as a table: both states, and the half (needs pandas)."""
+        need_pandas()
+        import pandas as pd
+
+        names = self.orbit.model.states
+        half = np.repeat([0, 1], [len(self.states[0]) - 1, len(self.states[1])])
+        return pd.DataFrame({**dict(zip(names, self.points.T, strict=True)), "half": half})
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the set in the plane of the two states, as over basins, with the orbit on it."""
+        from contfric.plot.basins import plot_stable_set
+
+        return plot_stable_set(self, ax=ax)
+
+    def __repr__(self) -> str:
+        ends = " and ".join(end.name for end in self.ends)
+        return f"<StableSet of {self.orbit.name}: {len(self.points)} points, ends {ends}>"
+
+
+def stable_set(
+    orbit: Orbit,
+    ranges: Mapping[str, tuple[float, float]],
+    *,
+    phase: float = 0.0,
+    max_step: float | None = None,
+    max_points: int = 2000,
+) -> StableSet:
+    """Follow the stable set of an unstable orbit in the plane of the two states.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        An unstable orbit with one multiplier outside of the unit circle, of a model of two states with
+        excitation.
+    ranges : mapping
+        Where each of the two states may go.
+    phase : float
+        Phase of the section, as a share of the period of the excitation; that of the starts of basins.
+    max_step : float, optional
+        Longest step along the set; by default a hundredth of the ranges.
+    max_points : int
+        Most points of each half.
+
+    Raises
+    ------
+    ParameterError
+        If the orbit is no saddle of that kind, or an argument is not valid.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> saddle = cf.solve_orbit("coulomb", "2s", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> found = cf.stable_set(saddle, {"x": (-2, 2), "v": (-1, 1)}, max_step=0.1)
+    >>> len(found.points) > 20
+    True
+    """
+    section = _Section(_checked(orbit), real_number("phase", phase))
+    low, high = _corners(orbit.model, ranges)
+    longest = (
+        0.01 * float(np.hypot(*(high - low)))
+        if max_step is None
+        else real_number("max_step", max_step, least=1e-9)
+    )
+    whole_number("max_points", max_points, least=2)
+    halves, ends, breaks = [], [], []
+    for sign in (1.0, -1.0):
+        half = _Half(section, [section.saddle], sign * section.stable, low, high)
+        ends.append(half.trace(min(_FIRST * section.size, longest), longest, max_points))
+        halves.append(np.array(half.points))
+        breaks.append(np.array(half.breaks, dtype=np.int64))
+    return StableSet(
+        orbit, section.phase, (halves[0], halves[1]), (breaks[0], breaks[1]), (ends[0], ends[1])
+    )
+
+
+def _checked(orbit: object) -> Orbit:
+    if not isinstance(orbit, Orbit):
+        raise ParameterError(f"a stable set is one of an Orbit, got {shown(orbit)}")
+    model = orbit.model
+    if model.autonomous or len(model.states) != 2:
+        raise ParameterError(
+            "a stable set is a curve in the section of a model with excitation and two states; "
+            f"'{model.name}' has {len(model.states)} states and {'no' if model.autonomous else 'an'} "
+            "excitation"
+        )
+    outside = [m for m in orbit.multipliers if abs(m) > 1.0]
+    if orbit.system.holds or len(outside) != 1:
+        raise ParameterError(
+            f"{orbit!r} has no stable set that separates: one multiplier has to be outside of the "
+            f"unit circle, and there are {len(outside)}"
+        )
+    return orbit
+
+
+def _corners(model: Model, ranges: object) -> tuple[FloatArray, FloatArray]:
+    wanted = (
+        f"ranges are {{'{model.states[0]}': (lower, upper), '{model.states[1]}': (lower, upper)}}"
+    )
+    if not isinstance(ranges, Mapping) or set(ranges) != set(model.states):
+        raise ParameterError(f"{wanted}, got {shown(ranges)}")
+    try:
+        found = np.array([ranges[name] for name in model.states], dtype=np.float64)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if (
+        found.shape != (2, 2)
+        or not np.all(np.isfinite(found))
+        or not np.all(found[:, 0] < found[:, 1])
+    ):
+        raise ParameterError(f"{wanted}, got {shown(ranges)}")
+    return found[:, 0], found[:, 1]
+
+
+class _Section:
+    """The section map at a phase, and its saddle with both directions."""
+
+    def __init__(self, orbit: Orbit, phase: float) -> None:
+        self.orbit, self.phase = orbit, phase % 1.0
+        self.time = self.phase * orbit.flow.period
+        self.periods = orbit.periods
+        self.saddle = orbit.state(self.time)
+        self.size = float(np.max(np.ptp(orbit.trajectory(100)[1], axis=0)))
+
+    def returned(self, state: FloatArray) -> FloatArray | None:
+        """Return f at a state; None where the solution does not come back."""
+        model, vector = self.orbit.model, self.orbit.vector
+        try:
+            mode, on = start_of(model, self.time, state, vector, None)
+        except ParameterError:
+            return None
+        ended = run(model, vector, mode, on, self.time, state, float(self.periods), 100_000)
+        if ended.end.name == "HELD":
+            return np.array(ended.last[2])
+        return np.array(ended.last[2]) if ended.end.name == "TIME" else None
+
+    @cached_property
+    def _eigen(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Stable unit vector; functionals that take the unstable and the stable component."""
+        step = _DIFFERENCE * self.size
+        columns = [self._slope(direction, step) for direction in np.eye(2)]
+        values, right = np.linalg.eig(np.array(columns).T)
+        values, right = np.real(values), np.real(right)
+        stable, left = np.argmin(np.abs(values)), np.linalg.inv(right)
+        return right[:, stable], left[1 - stable], left[stable]
+
+    def _slope(self, direction: FloatArray, step: float) -> FloatArray:
+        """Return the derivative of f at the saddle in a direction; that of one side where f jumps.
+
+        An orbit that sticks slides off where it is pushed against a load above kinetic friction.
+        """
+        sides = [self.returned(self.saddle + s * step * direction) for s in (1.0, -1.0)]
+        slopes = [
+            s * (found - self.saddle) / step
+            for s, found in zip((1.0, -1.0), sides, strict=True)
+            if found is not None
+        ]
+        if not slopes:
+            raise ParameterError(f"solutions near {self.orbit!r} do not return at this phase")
+        small, large = min(slopes, key=np.linalg.norm), max(slopes, key=np.linalg.norm)
+        apart = np.linalg.norm(large - small)
+        smooth = apart <= _KINK * (np.linalg.norm(large) + np.linalg.norm(small))
+        return np.asarray(0.5 * (small + large) if smooth else small)
+
+    @property
+    def stable(self) -> FloatArray:
+        """Unit vector along the stable set at the saddle."""
+        return self._eigen[0]
+
+    def departure(self, state: FloatArray) -> float | None:
+        """Return the unstable component with which a start has come to the saddle; None if it has not."""
+        _, growing, shrinking = self._eigen
+        came = False
+        for count in range(_RETURNS):
+            apart = state - self.saddle
+            unstable, stable = float(growing @ apart), abs(float(shrinking @ apart))
+            near = np.hypot(*apart) < _NEAR * self.size
+            came = came or bool(near)
+            if came and (
+                not near or stable < max(_ARRIVED * self.size * _NEAR, 1e-3 * abs(unstable))
+            ):
+                return unstable
+            if not came and count >= _ARRIVALS:
+                return None
+            following = self.returned(state)
+            if following is None:
+                return None
+            state = following
+        return None
+
+
+@dataclass
+class _Half:
+    """One half of a stable set while it grows."""
+
+    section: _Section
+    points: list[FloatArray]
+    direction: FloatArray
+    low: FloatArray
+    high: FloatArray
+    breaks: list[int] = field(default_factory=list)
+
+    def trace(self, step: float, longest: float, most: int) -> StableEnd:
+        """Follow it to its end."""
+        try:
+            while len(self.points) < most:
+                found = self._next(step)
+                if found is None:
+                    if step > _SHORTEST * longest:
+                        step *= 0.5
+                        continue
+                    found = self._behind_break(longest)
+                    if found is None:
+                        return StableEnd.BREAK
+                    self._go_on_behind(found, step)
+                    continue
+                turn = self._turn(found)
+                self.direction = (found - self.points[-1]) / np.hypot(*(found - self.points[-1]))
+                self.points.append(found)
+                if np.any(found < self.low) or np.any(found > self.high):
+                    return StableEnd.RANGE
+                step = min(longest, step * (2.0 if turn < 0.5 * _TURN else 1.0))
+        except KeyboardInterrupt:
+            return StableEnd.INTERRUPTED
+        return StableEnd.POINTS
+
+    def _turn(self, found: FloatArray) -> float:
+        chord = found - self.points[-1]
+        cosine = float(chord @ self.direction) / (np.hypot(*chord) * np.hypot(*self.direction))
+        return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+    def _next(self, step: float) -> FloatArray | None:
+        """Return the point of the set on an arc; None if there is none, or it turns too much."""
+        for arc in _ARCS:
+            angle = self._angle(step, -arc, arc)
+            if angle is not None:
+                return self._point(step, angle) if abs(angle) < _TURN else None
+        return None
+
+    def _behind_break(self, longest: float) -> FloatArray | None:
+        """Return the nearest point of the set across a break; None if there is none within a step."""
+        for step in np.geomspace(_SHORTEST * longest, longest, _GAPS):
+            for one, other in pairwise(_FAN):
+                angle = self._angle(float(step), float(one), float(other))
+                if angle is not None:
+                    return self._point(float(step), angle)
+        return None
+
+    def _go_on_behind(self, found: FloatArray, step: float) -> None:
+        """Take a point behind a break, and the direction of the set there: the one that leads away."""
+        self.direction = found - self.points[-1]
+        self.breaks.append(len(self.points))
+        self.points.append(found)
+        for one, other in sorted(pairwise(2.0 * _FAN), key=lambda pair: abs(sum(pair))):
+            angle = self._angle(step, one, other)
+            if angle is not None:
+                self.direction = self._point(step, angle) - found
+                return
+
+    def _point(self, step: float, angle: float) -> FloatArray:
+        ahead = np.arctan2(self.direction[1], self.direction[0]) + angle
+        return np.asarray(self.points[-1] + step * np.array([np.cos(ahead), np.sin(ahead)]))
+
+    def _angle(self, step: float, low: float, high: float) -> float | None:
+        """Return the angle between two at which u vanishes on an arc; None if it does not, or jumps."""
+        from scipy.optimize import brentq
+
+        def departure_at(angle: float) -> float:
+            found = self.section.departure(self._point(step, angle))
+            if found is None:
+                raise ArithmeticError
+            return found
+
+        try:
+            if not departure_at(low) * departure_at(high) < 0.0:
+                return None
+            angle = float(brentq(departure_at, low, high, xtol=1e-12, rtol=1e-12))
+            jump = abs(departure_at(angle)) > 1e-3 * _NEAR * self.section.size
+        except ArithmeticError:
+            return None
+        return None if jump else angle
