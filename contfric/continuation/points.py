@@ -220,6 +220,13 @@ class Rows:
             float(self.arc[k]),
         )
 
+    def points(self, start: int, stop: int) -> list[Point]:
+        """Return rows as points of their own, which share one copy of each array."""
+        arrays = (self.joints, self.w, self.tangents, self.directions, self.tests, self.labels)
+        copies = [array[start:stop].copy() for array in (*arrays, self.mu)]
+        arc = self.arc[start:stop].tolist()
+        return [Point(*row) for row in zip(*copies, arc, strict=True)]
+
     def put(self, k: int, point: Point) -> None:
         """Write a point to one row."""
         self.joints[k], self.w[k] = point.joints, point.w
