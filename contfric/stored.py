@@ -21,6 +21,8 @@ import numpy as np
 _PACKAGE = "contfric"
 #: Objects of one shape that are written as rows of arrays: for fewer it saves nothing.
 _MANY = 8
+#: What arrays of one shape, and of one order in memory, have in common.
+_LIKE = attrgetter("dtype", "shape", "strides")
 
 
 class UnstorableError(Exception):
@@ -139,8 +141,7 @@ class Writer:
             column = list(map(attrgetter(field.name), values))
             first, types = column[0], set(map(type, column))
             if types == {np.ndarray}:
-                like = first.dtype, first.shape, first.strides
-                if any((a.dtype, a.shape, a.strides) != like for a in column):
+                if list(map(_LIKE, column)).count(_LIKE(first)) < len(column):
                     return None
                 if first.dtype.hasobject or not first.flags.c_contiguous:
                     return None
