@@ -27,6 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "integrat
 
 import coulomb_integrated
 import lugre_integrated
+import lugre_period
 
 from contfric.compiled import f8, vector
 from contfric.flow import forced_oscillator
@@ -251,38 +252,9 @@ def stiffness() -> str:
 
 
 def period_of_lugre() -> str:
-    """One period with variational equations, after a settled simulation; segments between v = 0."""
-    flow, which, rows = kernel_of(lugre_integrated, "automatic", 1e-11), np.array([0]), []
-    for s in (0.2, 0.32, 0.38):
-        p = LUGRE.copy()
-        p[1] = s
-        segments = settled_period(p)
-        y1, jac = np.empty(3), np.empty((3, 6))
-
-        def run(segments: Any = segments, p: Any = p, y1: Any = y1, jac: Any = jac) -> None:
-            for mode, t, y, dt in segments:
-                flow(mode, t, y, dt, p, which, y1, jac)
-
-        rows.append((s, len(segments), f"{1e-3 * least(run, 1.0):.2f}"))
-    return table(("S", "segments", "ms a period, with derivatives"), rows)
-
-
-def settled_period(p: Any) -> list[tuple[Any, ...]]:
-    """The segments of one period of the motion that a simulation converges to."""
-    turn = 2.0 * math.pi / p[0]
-    t, y, mode, on, segments = 0.0, np.array([1.2, -0.01, 0.0]), 1, False, []
-    end = 21 * turn
-    while t < end:
-        y1 = np.empty(3)
-        tau = lugre_integrated.hit(mode, 0, 0.0, on, t, y, end - t, p, y1)
-        dt = tau if tau >= 0.0 else end - t
-        if t >= 20 * turn:
-            segments.append((mode, t, y.copy(), dt))
-        if tau < 0.0:
-            break
-        t, y, mode, on = t + tau, y1, 1 - mode, True
-        y[1] = 0.0
-    return segments
+    """One period with variational equations, beside heyoka."""
+    head = ("S", "method", "tolerance", "error", "error of derivatives", "ms a period")
+    return table(head, lugre_period.rows())
 
 
 def main() -> None:
@@ -325,8 +297,9 @@ A LuGre slide from rest over 2.2 units of time, with derivatives by t0, the thre
 
 ## One period of the LuGre oscillator
 
-Omega = 0.5, S0 = 0.4, sigma0 = 1000, vS = 0.05, at a tolerance of 1e-11, with derivatives by t0, the states
-and Omega; from one v = 0 to the next.
+Omega = 0.5, S0 = 0.4, sigma0 = 1000, vS = 0.05, with derivatives by the states (contfric: by t0 and the
+duration, too), stops found on the way; in turns, beside heyoka (Taylor series compiled by LLVM) where it is
+installed. Times are to be compared at one error: those in the bristles fade, so that a tolerance says little.
 
 {period}
 """

@@ -81,5 +81,11 @@ def whole_branch(orbit: Orbit, settings: Settings) -> Branch:
         settings.stability and not orbit.system.holds,
         settings.most_points,
     )
-    own = replace(own, copies=settings.copies, stop_at=settings.stop_at, up_to_mirror=True)
+    own = replace(
+        own,
+        grows=settings.grows,
+        copies=settings.copies,
+        stop_at=settings.stop_at,
+        up_to_mirror=True,
+    )
     return follow_orbit(orbit, own)

@@ -19,6 +19,7 @@ from contfric.errors import (
 )
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.sections import is_smooth
 from contfric.orbit.system import IntArray, System
 from contfric.quantities.registry import number_quantity
 
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
 #: Largest step of models that declare none, where the range of the parameter counts 1 (and grows with the
 #: size of the state): about 100 points over the range.
 LARGEST_STEP = 0.01
+#: That of orbits of one smooth field, on which only folds and multipliers are watched, where nobody asks for
+#: less: their steps follow the curvature, and this is for what a step might jump over.
+SMOOTH_STEP = 0.1
 #: First step, in largest steps: the curvature is not known yet.
 FIRST_STEP = 0.1
 #: Smallest step: at the resolution of a branch in double precision, far below any feature of one.
@@ -55,6 +59,7 @@ class Settings:
     low_reason, high_reason : the model's constraint that limits it there; empty for the range
     width : width of the range asked for; arclength counts it as 1
     largest : largest step
+    grows : whether smooth orbits may take longer ones, as neither the user nor the model limits them
     stability : whether multipliers are evaluated (and PD detected)
     most_points : most points of one side
     copies : most copies of its shortest period that an orbit of the diagram has at a sliding event
@@ -69,6 +74,7 @@ class Settings:
     high_reason: str
     width: float
     largest: float = LARGEST_STEP
+    grows: bool = False
     stability: bool = True
     most_points: int = MOST_POINTS
     copies: int = 1
@@ -79,6 +85,14 @@ class Settings:
     def scale(self) -> float:
         """Weight of the parameter in the scaled product."""
         return 1.0 / self.width**2
+
+    def largest_of(self, system: System) -> float:
+        """Return the largest step along a branch of a system's orbits."""
+        layout = system.layout
+        watched = any(len(rows) for rows in (layout.interior, layout.joint, layout.labels))
+        if not self.grows or watched or not is_smooth(system.model, system.word):
+            return self.largest
+        return max(self.largest, SMOOTH_STEP)
 
     @property
     def box(self) -> FloatArray:
@@ -206,6 +220,13 @@ class Rows:
             float(self.arc[k]),
         )
 
+    def points(self, start: int, stop: int) -> list[Point]:
+        """Return rows as points of their own, which share one copy of each array."""
+        arrays = (self.joints, self.w, self.tangents, self.directions, self.tests, self.labels)
+        copies = [array[start:stop].copy() for array in (*arrays, self.mu)]
+        arc = self.arc[start:stop].tolist()
+        return [Point(*row) for row in zip(*copies, arc, strict=True)]
+
     def put(self, k: int, point: Point) -> None:
         """Write a point to one row."""
         self.joints[k], self.w[k] = point.joints, point.w
@@ -271,6 +292,7 @@ def settings_of(
         why_top if top <= high else "",
         width,
         max_step or model.max_step or LARGEST_STEP,
+        max_step is None and model.max_step is None,
         stability and not orbit.system.holds,
         max_points,
         stop_at=_stops(orbit.model, stop_at),

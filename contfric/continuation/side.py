@@ -194,7 +194,8 @@ class Side:
         if self.last + 1 >= CHUNK:
             self._keep_full_rows()
         stop = min(CHUNK, self.last + 1 + settings.most_points - self.count)
-        options = march_options(settings, step, self.largest)
+        largest = min(self.largest, settings.largest_of(orbit.system))
+        options = march_options(step, largest)
         why, most = MORE, _MOST_SOLVES * settings.most_points
         while why == MORE and self.solves < most:  # between the calls Ctrl-C is heard
             heed()
@@ -238,9 +239,8 @@ class Side:
         return self._kept
 
 
-def march_options(settings: Settings, step: float, largest: float = np.inf) -> FloatArray:
+def march_options(step: float, largest: float) -> FloatArray:
     """Return the numbers that steer the march, with space for a single point in its budget."""
-    largest = min(largest, settings.largest)
     return np.array([min(step, largest), largest, SMALLEST_STEP, _GIVES_WAY, 1.0, 0.0])
 
 
@@ -269,7 +269,7 @@ def first_point(
         orbit.vector,
         np.array([active]),
         settings.stability,
-        march_options(settings, 0.0),
+        march_options(0.0, settings.largest),
         settings.box,
         -1,
         *rows.point(0).as_start(),

@@ -147,7 +147,7 @@ def _all_sought(orbit: Orbit, settings: Settings) -> Iterator[_Sought]:
 
 def _first_stop(sought: _Sought, side: Side, first: int, last: int) -> tuple[int, Stop] | None:
     """Return the first step between two rows in which the value is taken, by its first row."""
-    points = [side.rows.point(row) for row in range(first, last + 1)]
+    points = side.rows.points(first, last + 1)
     misses = [sought.miss(point) for point in points]
     if side.count - (side.last - first) == 1 and misses and _is_zero(misses[0], sought):
         points, misses, first = points[1:], misses[1:], first + 1  # it starts at the value

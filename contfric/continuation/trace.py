@@ -82,7 +82,8 @@ def continue_orbit(
         Where it may go; clipped to the model's limits.
     max_step : float, optional
         Largest step along the branch, as a share of the range (times 1 + the size of the
-        state); that of the model by default, 0.01 if it declares none.
+        state); that of the model by default. If it declares none 0.01, or 0.1 where orbits are smooth
+        all along and no surface is near, so that steps follow the curvature.
     stability : bool
         Whether multipliers are evaluated; without them PD is not detected, nor BP where no
         asymmetric branch turns.

@@ -283,7 +283,7 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
     why, k, step = march_rows(
         problem, rows, last - 1, side.points[0], len(side.points) - 1, border, step, largest, 3e-13
     )
-    fresh = [rows.point(j) for j in range(last, k + 1)]
+    fresh = rows.points(last, k + 1)
     located = 1 if why == codes.EVENT else 0  # the last point lies behind an event
     lasts = np.all(np.diff(rows.joints[last : k + 1 - located, :, 0]) > -_NO_TIME, axis=1)
     gone = _first(~lasts)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray
 from contfric.plot.style import GREY, SMALL, sized
@@ -18,10 +18,10 @@ from contfric.plot.style import GREY, SMALL, sized
 #: Distances from the point to the label that are tried, in points; leader lines beyond the first.
 _DISTANCES = (5.0, 12.0, 20.0, 30.0, 42.0, 56.0)
 _DIRECTIONS = 16
-#: Costs: a pixel of line beneath the label, a marker, another label, and beyond the axes.
+#: Costs: a sampled point of a line beneath the label, a marker, another label, and beyond the axes.
 _LINE, _MARKER, _LABEL, _BEYOND = 1.0, 15.0, 500.0, 500.0
-#: Spacing at which lines are sampled, and distance at which equal labels are one, in pixels.
-_SPACING, _ONE = 3.0, 14.0
+#: Spacing at which lines are sampled, and distance at which equal labels are one, in points.
+_SPACING, _ONE = 2.16, 10.0
 #: Of more labels than this equal ones are one within a greater distance (points), and none stands far away:
 #: leader lines that cross tell nothing. Nor does one of many hide more than this (a cost).
 _FEW, _ONE_OF_MANY, _NEAREST, _HIDES = 14, 60.0, 3, 30.0
@@ -46,7 +46,7 @@ def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
     of the axes are set and the layout has converged (:func:`settle`).
     """
     pixels = _point_size(ax)
-    todo = _merged(ax, sorted(anchors, key=lambda a: (a.x, a.y)), _ONE)
+    todo = _merged(ax, sorted(anchors, key=lambda a: (a.x, a.y)), _ONE * pixels)
     distances: Sequence[float] = _DISTANCES
     most = _LABEL
     if len(todo) > _FEW:
@@ -140,33 +140,30 @@ def _best_place(
     distances: Sequence[float],
 ) -> tuple[FloatArray, float, float]:
     """Return the centre of the cheapest place, in pixels, its distance in points, and its cost."""
-    best, place = math.inf, (at, _DISTANCES[0])
-    for distance in distances:
-        for k in range(_DIRECTIONS):
-            angle = 2.0 * math.pi * (k + 1) / _DIRECTIONS
-            towards = np.array([math.cos(angle), math.sin(angle)])
-            centre = at + towards * (distance * pixels) + 0.5 * size * np.clip(1.5 * towards, -1, 1)
-            box = _box(centre, size)
-            cost = 0.8 * distance + 1.5 * (1.0 - towards[1]) + _LINE * _inside(box, lines)
-            cost += _MARKER * _inside(box, markers)
-            cost += _LABEL * sum(box.overlaps(other) for other in taken)
-            cost += _BEYOND * (not _contains(ax.bbox, box))
-            if cost < best:
-                best, place = cost, (centre, distance)
-    return *place, best
+    angles = 2.0 * np.pi * (np.arange(_DIRECTIONS) + 1.0) / _DIRECTIONS
+    towards = np.tile(np.column_stack([np.cos(angles), np.sin(angles)]), (len(distances), 1))
+    away = np.repeat(distances, _DIRECTIONS)
+    centres = at + towards * (away * pixels)[:, None] + 0.5 * size * np.clip(1.5 * towards, -1, 1)
+    low, high = centres - 0.5 * size, centres + 0.5 * size
+    cost = 0.8 * away + 1.5 * (1.0 - towards[:, 1])
+    cost += _LINE * _inside(low, high, lines) + _MARKER * _inside(low, high, markers)
+    for other in taken:
+        cost += _LABEL * ((low <= other.max) & (other.min <= high)).all(axis=1)
+    cost += _BEYOND * ((low < ax.bbox.min) | (high > ax.bbox.max)).any(axis=1)
+    best = int(np.argmin(cost))
+    return centres[best], float(away[best]), float(cost[best])
 
 
 def _box(centre: FloatArray, size: FloatArray) -> Bbox:
     return Bbox([centre - 0.5 * size, centre + 0.5 * size])
 
 
-def _inside(box: Bbox, points: FloatArray) -> int:
-    within = (points > box.min) & (points < box.max)
-    return int(np.count_nonzero(within.all(axis=1)))
-
-
-def _contains(outer: Bbox, inner: Bbox) -> bool:
-    return bool(np.all(inner.min >= outer.min) and np.all(inner.max <= outer.max))
+def _inside(low: FloatArray, high: FloatArray, points: FloatArray) -> NDArray[np.int64]:
+    """Return how many of some points lie inside of each box."""
+    x, y = points.T
+    within = (x > low[:, :1]) & (x < high[:, :1]) & (y > low[:, 1:]) & (y < high[:, 1:])
+    counts: NDArray[np.int64] = within.sum(axis=1)
+    return counts
 
 
 def line_pixels(ax: Axes) -> FloatArray:
@@ -178,13 +175,13 @@ def line_pixels(ax: Axes) -> FloatArray:
         points = np.asarray(line.get_transform().transform(line.get_xydata()))
         points = points[np.isfinite(points).all(axis=1)]
         if len(points) > 1:
-            found.append(_sampled(points))
+            found.append(_sampled(points, _SPACING * _point_size(ax)))
     return np.vstack(found)
 
 
-def _sampled(points: FloatArray) -> FloatArray:
+def _sampled(points: FloatArray, spacing: float) -> FloatArray:
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    at = np.arange(0.0, along[-1] + _SPACING, _SPACING)
+    at = np.arange(0.0, along[-1] + spacing, spacing)
     return np.column_stack([np.interp(at, along, column) for column in points.T])
 
 

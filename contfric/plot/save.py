@@ -9,8 +9,11 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from matplotlib import rc_context
+import numpy as np
+from matplotlib import rc_context, rcParams, rcParamsDefault
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 from contfric.base.interrupts import held_back
 from contfric.errors import ParameterError, did_you_mean
@@ -109,7 +112,9 @@ def new_figure(width: float = 7.0, height: float = 4.3) -> Figure:
     >>> new_figure(6, 4).get_size_inches()
     array([6., 4.])
     """
-    return Figure(figsize=_size(width, height), layout="constrained")
+    figure = Figure(figsize=_size(width, height), layout="constrained", dpi=DPI)
+    FigureCanvasAgg(figure)  # texts are measured as they are saved, once
+    return figure
 
 
 def save_figure(fig: Figure, path: str | PathLike[str], dpi: float = DPI) -> Path:
@@ -128,10 +133,29 @@ def save_figure(fig: Figure, path: str | PathLike[str], dpi: float = DPI) -> Pat
         The file.
     """
     file = Path(path)
+    if file.suffix.lower() == ".png" and _as_drawn(fig, dpi):
+        return _save_pixels(fig, file)
     metadata = _ANONYMOUS.get(file.suffix.lower())
     # fonts of type 42: what is text stays text
     with rc_context({"svg.hashsalt": "contfric", "pdf.fonttype": 42}):
         fig.savefig(file, dpi=dpi, metadata=metadata)
+    return file
+
+
+def _as_drawn(fig: Figure, dpi: float) -> bool:
+    """Tell whether the pixels of a figure are those of its file: nobody asks matplotlib for more."""
+    usual = all(rcParams[k] == rcParamsDefault[k] for k in rcParams if k.startswith("savefig."))
+    return usual and type(fig.canvas) is FigureCanvasAgg and fig.dpi == dpi
+
+
+def _save_pixels(fig: Figure, file: Path) -> Path:
+    """Draw a figure once and write its pixels (``savefig`` lays it out and draws it twice)."""
+    canvas: Any = fig.canvas
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())
+    if pixels[..., 3].min() == 255:  # nothing to be seen through
+        pixels = np.ascontiguousarray(pixels[..., :3])
+    Image.fromarray(pixels).save(file, dpi=(fig.dpi, fig.dpi))
     return file
 
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from importlib import import_module
+from operator import attrgetter
 from typing import Any, Literal
 
 import numpy as np
@@ -20,6 +21,8 @@ import numpy as np
 _PACKAGE = "contfric"
 #: Objects of one shape that are written as rows of arrays: for fewer it saves nothing.
 _MANY = 8
+#: What arrays of one shape, and of one order in memory, have in common.
+_LIKE = attrgetter("dtype", "shape", "strides")
 
 
 class UnstorableError(Exception):
@@ -122,32 +125,34 @@ class Writer:
         for value in rest:
             self._places[id(value)] = ["seen", len(self.objects)]
             self.objects.append(value)
-        listed = ([name, plain, *self._array(column)] for name, plain, column in columns)
+        self._arrays += [content for _, content in columns]
+        listed = (node for node, _ in columns)
         return [*nodes, ["rows", _path(type(rest[0])), len(rest), *listed]]
 
-    def _columns(
-        self, values: list[Any]
-    ) -> list[tuple[str, str | None, np.ndarray[Any, Any]]] | None:
-        """Return what objects hold as one array a field; None if they are not all of one shape."""
+    def _columns(self, values: list[Any]) -> list[tuple[list[Any], bytes]] | None:
+        """Return what objects hold, one node and its array a field; None if they are not all of one shape."""
         kind = type(values[0])
         if not is_dataclass(kind) or kind in _PARTS or kind in _GIVEN:
             return None
         if any(type(v) is not kind or id(v) in self._places for v in values):
             return None
-        found: list[tuple[str, str | None, np.ndarray[Any, Any]]] = []
+        found = []
         for field in fields(kind):
-            column = [getattr(v, field.name) for v in values]
-            types = {type(item) for item in column}
+            column = list(map(attrgetter(field.name), values))
+            first, types = column[0], set(map(type, column))
             if types == {np.ndarray}:
-                if len({(a.dtype.str, a.shape, a.flags.c_contiguous) for a in column}) > 1:
+                if list(map(_LIKE, column)).count(_LIKE(first)) < len(column):
                     return None
-                if column[0].dtype.hasobject or not column[0].flags.c_contiguous:
+                if first.dtype.hasobject or not first.flags.c_contiguous:
                     return None
-                found.append((field.name, None, np.array(column)))
+                plain, shape, content = None, first.shape, b"".join(column)
             elif types in ({float}, {bool}):
-                found.append((field.name, types.pop().__name__, np.array(column)))
+                plain, shape, first = types.pop().__name__, (), np.array(column)
+                content = first.tobytes()
             else:
                 return None
+            node = [field.name, plain, first.dtype.str, [len(values), *shape], "C"]
+            found.append((node, content))
         return found
 
     def _array(self, array: np.ndarray[Any, Any]) -> list[Any]:

@@ -14,6 +14,7 @@ import pytest
 import contfric as cf
 from contfric.cli import main
 from contfric.cli.exits import Exit
+from contfric.continuation.points import Point
 from contfric.remember import journal
 from contfric.remember.journal import Journal, keeping, remembered
 from contfric.remember.stored import Reader, UnstorableError, Writer
@@ -253,6 +254,35 @@ def test_plain_values_come_back(value) -> None:
         assert found.tobytes() == value.tobytes()
     else:
         assert repr(found) == repr(value) or found == value
+
+
+@pytest.mark.parametrize("odd", ["none", "shape", "order", "strides", "kind"])
+def test_many_objects_of_one_class_come_back(odd: str) -> None:
+    """Whether they are of one shape, and written as rows, or one of them differs."""
+    draw = np.random.default_rng(4)
+
+    def point() -> Point:
+        states = draw.normal(size=(2, 3)), draw.normal(size=2)
+        mu, none = draw.normal(size=2) + 1j * draw.normal(size=2), np.empty(0, dtype=np.int64)
+        return Point(*states, *states, draw.normal(size=8), none, mu, draw.normal(), odd == "none")
+
+    points = [point() for _ in range(30)]
+    other = points[17]
+    if odd == "shape":
+        other.joints = np.ones((3, 3))
+    elif odd == "order":
+        other.joints = np.asfortranarray(other.joints)
+    elif odd == "strides":
+        other.tests = np.arange(16.0)[::2]
+    elif odd == "kind":
+        other.tests = np.arange(8)
+    found, again = Reader(Writer().bytes_of([points, points[3]])).value()
+    assert again is found[3] and len(found) == 30
+    for a, b in zip(found, points, strict=True):
+        for name in vars(b):
+            one, two = np.asarray(getattr(a, name)), np.asarray(getattr(b, name))
+            assert (one.dtype, one.shape, one.tobytes()) == (two.dtype, two.shape, two.tobytes())
+            assert type(getattr(a, name)) is type(getattr(b, name))
 
 
 @pytest.mark.parametrize(

@@ -529,6 +529,27 @@ def test_files_are_reproducible(branch: Any, tmp_path: Path, suffix: str) -> Non
     assert not any(word in content[0] for word in (b"CreationDate", b"dc:date", b"Software"))
 
 
+@pytest.mark.parametrize("facecolor", ["white", "none"])
+def test_pixels_are_those_of_matplotlib(branch: Any, tmp_path: Path, facecolor: str) -> None:
+    """A figure that is drawn once, as it is saved, against ``savefig``, which draws twice."""
+    with rc_context({"figure.facecolor": facecolor}):
+        fig = new_figure(4, 3)
+        plot_branches([branch], "psi", fig.add_subplot())
+        written = save_figure(fig, tmp_path / "a.png")
+        fig.savefig(tmp_path / "b.png", dpi="figure")
+    found, expected = (pyplot.imread(path) for path in (written, tmp_path / "b.png"))
+    assert np.array_equal(found, expected[:, :, : found.shape[2]])
+    assert found.shape[2] == (3 if facecolor == "white" else 4)
+
+
+def test_what_the_user_asks_matplotlib_for_is_saved(branch: Any, tmp_path: Path) -> None:
+    fig = new_figure(4, 3)
+    plot_branches([branch], "psi", fig.add_subplot())
+    with rc_context({"savefig.facecolor": "red"}):
+        red = pyplot.imread(save_figure(fig, tmp_path / "a.png"))
+    assert red[0, 0, :3].tolist() == [1.0, 0.0, 0.0]
+
+
 def test_saving_needs_no_pyplot() -> None:
     code = (
         "import sys, io, contfric as cf, contfric.plot\n"

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from importlib.util import cache_from_source
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from contfric.base.sources import package_files
 from contfric.cli import main
+from contfric.cli.bytecode import stale_bytecode, write_bytecode
 from contfric.compiled import f8, helper, i8, kernel, vector
 from contfric.flow.integrated import AffineModes, Functions
 from contfric.handle import ITSELF, TABLE, Block, Bound, HandleType, with_handle
@@ -119,6 +126,20 @@ def test_doctor_says_what_is_compiled(capsys, tmp_path, monkeypatch):
     assert main(["doctor"]) == 0
     assert f"0 of {count} compiled" in (out := capsys.readouterr().out)
     assert "contfric doctor --compile" in out
+
+
+def test_doctor_writes_bytecode_where_it_is_missing_or_old(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "pycache_prefix", str(tmp_path))  # a place without any
+    stale, count = stale_bytecode()
+    assert len(stale) == count > 300
+    package = [file for file in stale if file in package_files()]
+    write_bytecode(package)
+    left, again = stale_bytecode()
+    assert again == count and len(left) == count - len(package)
+    assert not set(left) & set(package_files())
+    kept = Path(cache_from_source(str(package[0])))
+    os.utime(kept, (0, 0))
+    assert package[0] in stale_bytecode()[0]
 
 
 def test_every_kernel_of_the_package_is_known():

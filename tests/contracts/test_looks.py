@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.text import Annotation, Text
 
 import contfric as cf
@@ -198,6 +199,20 @@ def test_insets_that_are_none(diagram: cf.Diagram, inset: Any) -> None:
 
 
 # ------------------------------------------------------------------------------------ labels
+
+
+@pytest.mark.parametrize("dpi", [50, 200, 300])
+def test_labels_stand_in_the_same_places_at_any_resolution(dpi: int) -> None:
+    """Places are chosen in points: the texts themselves are a little larger or smaller in whole pixels."""
+    offsets = []
+    for resolution in (100, dpi):
+        ax = Figure(figsize=(4, 3), dpi=resolution).add_subplot(xlim=(0, 1), ylim=(0, 1))
+        ax.plot([0, 1], [0.5, 0.5])
+        ax.plot([0.3, 0.8], [0.5, 1.0], marker="o")
+        placed = place_labels(ax, [Anchor(0.3, 0.5, "SN"), Anchor(0.32, 0.5, "CS")])
+        offsets.append([label.xyann for label in placed])
+    assert len(offsets[0]) == 2
+    np.testing.assert_allclose(offsets[1], offsets[0], atol=1.5)
 
 
 def test_many_labels_stand_near_their_points_and_are_not_repeated() -> None:

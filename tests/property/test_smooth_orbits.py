@@ -214,3 +214,34 @@ def test_a_mass_that_never_slips_while_another_one_moves() -> None:
     rest = orbit.state(0.0)[2]
     pull = 0.5 * (1.0 / abs(1.5 - 0.49 + 0.07j)) + abs(1.5 * rest - 0.25 * rest / 1.5)
     assert at.params["mu"] == pytest.approx(pull, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "params",
+    [
+        {"zeta": 0.05, "a": 1.0, "f": 0.5, "omega": 0.5},
+        {"zeta": 0.01, "a": 0.2, "f": 0.3, "omega": 0.6},  # superharmonic resonances with folds
+        {"zeta": 0.02, "a": -0.3, "f": 0.05, "omega": 1.5},  # a softening one
+        {"zeta": 0.1, "a": 1.0, "f": 4.0, "omega": 0.6},  # other pairs of folds and multipliers
+    ],
+    ids=str,
+)
+def test_long_steps_along_smooth_branches_miss_nothing(params: dict[str, float]) -> None:
+    orbit = cf.find_orbit(MODELS / "duffing.yaml", params)
+    short = cf.continue_orbit(orbit, "omega", (0.3, 3.0), max_step=0.01)
+    branch = cf.continue_orbit(orbit, "omega", (0.3, 3.0))
+    assert len(branch) < 0.4 * len(short)
+    assert [end.reason for end in branch.ends] == [end.reason for end in short.ends]
+    assert short.bifurcations
+    for found, known in zip(branch.bifurcations, short.bifurcations, strict=True):
+        assert found.kind is known.kind
+        assert found.params["omega"] == pytest.approx(known.params["omega"], abs=1e-9)
+
+
+def test_steps_next_to_a_surface_are_short_as_ever() -> None:
+    params = {"omega": 0.5, "zeta": 0.1, "k": 1.0, "A": 1.0}
+    size = amplitude(params)
+    orbit = cf.find_orbit(MODELS / "bilinear.yaml", {**params, "gap": 2.0 * size})
+    bounds = (1.5 * size, 2.5 * size)  # its stops are never met, and might be
+    found, same = (cf.continue_orbit(orbit, "gap", bounds, max_step=m) for m in (None, 0.01))
+    assert len(found) == len(same) > 30
