@@ -106,6 +106,12 @@ class TransitionMaps(SectionMaps):
         return frozenset(reset.surface for reset in self.resets if reset.wraps)
 
     @cached_property
+    def angles(self) -> tuple[int, ...]:
+        """Indices of the states that are the same a turn (2 pi) later."""
+        changed = {name for reset in self.resets if reset.wraps for name in reset.changes}
+        return tuple(i for i, state in enumerate(self.states) if state in changed)
+
+    @cached_property
     def transitions(self) -> dict[tuple[str, str], str]:
         """Next domain for each possible (domain, surface); what is absent cannot happen.
 
@@ -192,12 +198,29 @@ class TransitionMaps(SectionMaps):
         landed = {**reset.lands, **({reset.surface: own} if reset.stays else {})}
         asked = {**fixed, **landed}
         behind = self._domains_landed(reset).get(tuple(asked[name] for name in sorted(asked)), [])
+        behind = [*behind, *self._departed(asked)]
         for mode in (reset.leads, domain.own_mode):
             kept = [d.signs for d in behind if d.own_mode == mode]
             behind = [d for d in behind if d.own_mode == mode or d.signs not in kept]
         chatter = self.chatter_at.get((domain.mode, reset.surface))
         resting = self.domains_of(chatter.mode) if chatter else ()
         return tuple(d.name for d in (*behind, *resting))
+
+    def _departed(self, asked: Mapping[str, int]) -> list[Domain]:
+        """Return the domains in which motion leaves the surfaces that it slid on before a reset.
+
+        Sliding may hold for some images and end for others: what a reset changes has any side.
+        """
+        found = []
+        for departure in self.departures:
+            leaves = {**asked, **departure.leaves}
+            if any(asked.get(s) != 0 for s in departure.leaves):
+                continue
+            if any(asked.get(s, side) != side for s, side in departure.where.items()):
+                continue
+            wanted = {**departure.where, **leaves}
+            found += [d for d in self.domains if all(d.signs[s] == v for s, v in wanted.items())]
+        return found
 
     @cached_property
     def chatter_at(self) -> dict[tuple[str, str], Chatter]:

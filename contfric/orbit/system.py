@@ -306,7 +306,7 @@ def _margins(
         for surface in names:
             sign = ending[i].get(surface, 0)
             pinned = any(h.segment == i + 1 and h.pin == surface for h in holds)
-            if surface == exit_ or pinned or sign == 0 or surface in model.wraps:
+            if surface == exit_ or pinned or sign == 0:
                 continue
             joint.append((i, model.surface_index[surface], sign, 0))
     tests = (

@@ -146,8 +146,10 @@ def _rules(model: Model) -> tuple[IntArray, IntArray]:
             for after in targets:  # behind a reset the signs of the mapped state tell the domain
                 if model.domain_by_name[after].own_mode in model.chatter_by_mode:
                     continue  # found by following the impacts
-                signs = model.domain_by_name[after].signs
-                add(name, surface, signs, _landed(model, surface), after)
+                signs, before = model.domain_by_name[after].signs, model.domain_by_name[name].signs
+                reset = model.reset_by_surface[surface]
+                slid = {s for s, v in before.items() if v == 0 and not model.changed_by(reset, s)}
+                add(name, surface, signs, {*_landed(model, surface), *slid}, after)
     for own in model.chatters:
         for domain in model.domains_of(own.mode):
             found.pop((model.mode_index[own.mode], model.surface_index[own.lift]), None)
