@@ -72,8 +72,11 @@ class TransitionMaps(SectionMaps):
             found.setdefault(source, []).append((surface, target))
         for own in self.chatters:
             for domain in self.domains_of(own.mode):
-                behind = self.targets[domain.name, own.lift]
-                found[domain.name] = [(own.lift, target) for target in behind]
+                found[domain.name] = [
+                    (lift, target)
+                    for lift, _ in own.ways
+                    for target in self.targets[domain.name, lift]
+                ]
         return found
 
     def is_at_rest(self, mode: str) -> bool:
@@ -138,8 +141,8 @@ class TransitionMaps(SectionMaps):
                     found[domain.name, reset.surface] = behind
         for own in self.chatters:  # what is one mode may be left to on either side of its section
             for domain in self.domains_of(own.mode):
-                free = tuple(d.name for d in self.domains_of(own.flight))
-                found[domain.name, own.lift] = free
+                for lift, flight in own.ways:
+                    found[domain.name, lift] = tuple(d.name for d in self.domains_of(flight))
         return found
 
     def undecided(self) -> tuple[str, str, tuple[str, ...]] | None:
@@ -225,12 +228,16 @@ class TransitionMaps(SectionMaps):
     @cached_property
     def chatter_at(self) -> dict[tuple[str, str], Chatter]:
         """Chatter that impacts in a mode, at a surface, may lead to."""
-        return {(own.flight, own.surface): own for own in self.chatters}
+        return {(flight, own.surface): own for own in self.chatters for _, flight in own.ways}
 
     @cached_property
     def settled_sides(self) -> dict[str, int]:
         """The side of each surface that only ends chatter: all domains have that, on whichever they are."""
-        return {own.lift: self.domains_of(own.mode)[0].signs[own.lift] for own in self.chatters}
+        return {
+            lift: self.domains_of(own.mode)[0].signs[lift]
+            for own in self.chatters
+            for lift, _ in own.ways
+        }
 
     @cached_property
     def chatter_by_mode(self) -> dict[str, Chatter]:
@@ -262,9 +269,10 @@ class TransitionMaps(SectionMaps):
         mode = domain.own_mode
         through = {**domain.signs, surface.name: -sign}
         resting_at = self.chatter_by_mode.get(mode)
-        if resting_at is not None and resting_at.lift == surface.name:  # the wall lets go
-            side = self._side_of[resting_at.flight, resting_at.surface]
-            return self._domain_with({**domain.signs, resting_at.surface: side}, resting_at.flight)
+        flight = dict(resting_at.ways).get(surface.name) if resting_at is not None else None
+        if resting_at is not None and flight is not None:  # the wall lets go
+            side = self._side_of[flight, resting_at.surface]
+            return self._domain_with({**domain.signs, resting_at.surface: side}, flight)
         if not surface.switching:
             target = self.domain_at(through, mode)
             entered = "" if target is None else self.domain_by_name[target].own_mode

@@ -56,7 +56,7 @@ def boost_in_one_period(R: float, state, D=0.4, T=0.5, E=5.0):
 
 
 def test_boost_converter_in_discontinuous_conduction(tmp_path) -> None:
-    """The current dies before the tick from a resistance on at which it just does; T is the period's own name.
+    """The current dies before the tick from a resistance on at which it just does; T is the period.
 
     A reset that leads out of a sliding mode: at the tick the diode's mode, i = 0, is left.
     """
