@@ -148,8 +148,8 @@ def verify(diagram: Diagram, restarts: int = 6, step: float = STEP) -> Verificat
 
 #: Where a branch is looked for on another one, as shares of its length.
 _INSIDE = (0.5, 0.381966, 0.618034, 0.2, 0.8)
-#: Where a branch is restarted, as shares of its points: in its middle unless the equations are singular. Points
-#: crowd where a period grows without bound; last of all it is halfway between the values at the ends.
+#: Where a branch is restarted, as shares of its points: in its middle unless the equations are singular.
+#: Points crowd where a period grows without bound: last of all it is halfway between the values at its ends.
 _SHARES = (0.5, 0.25, 0.75)
 
 

@@ -203,3 +203,29 @@ def test_froude_pendulum_against_scipy(froude: cf.Diagram) -> None:
         slow, (0, 20), start, method="DOP853", events=back, rtol=1e-12, atol=1e-14, first_step=1e-3
     )
     assert run.y[0, -1] == pytest.approx(math.pi, abs=1e-5)
+
+
+GENES = """
+name: genes
+states: [x, y]
+parameters: {k: 2.0, th: 1.0}
+autonomous: true
+surfaces:
+  X: {observable: x, level: th}
+  Y: {observable: y, level: th}
+modes:
+  both: {in: {X: +, Y: +}, field: {x: -x, y: k - y}}
+  xo: {in: {X: +, Y: -}, field: {x: k - x, y: k - y}}
+  oy: {in: {X: -, Y: +}, field: {x: -x, y: -y}}
+  none: {in: {X: -, Y: -}, field: {x: k - x, y: -y}}
+spread: {x: 2, y: 2}
+"""
+
+
+def test_a_motion_that_winds_into_a_point_is_no_orbit(tmp_path) -> None:
+    """Two genes, one that represses the other and is switched on by it, come to their thresholds.
+
+    From x = th + d a round makes d/(1 + 4 d) of d: turns shrink like 1/n, and a small one repeats itself to 1e-9.
+    """
+    with pytest.raises(cf.ConvergenceError, match="comes to rest near x = 1.*, y = 1"):
+        cf.find_orbit(typed(tmp_path, GENES))
