@@ -225,7 +225,45 @@ spread: {x: 2, y: 2}
 def test_a_motion_that_winds_into_a_point_is_no_orbit(tmp_path) -> None:
     """Two genes, one that represses the other and is switched on by it, come to their thresholds.
 
-    From x = th + d a round makes d/(1 + 4 d) of d: turns shrink like 1/n, and a small one repeats itself to 1e-9.
+    From x = th + d a round makes d/(1 + 4 d) of d: turns shrink like 1/n, and small ones repeat themselves.
     """
-    with pytest.raises(cf.ConvergenceError, match="comes to rest near x = 1.*, y = 1"):
+    with pytest.raises(cf.ConvergenceError, match=r"comes to rest near x = 1.*, y = 1"):
         cf.find_orbit(typed(tmp_path, GENES))
+
+
+CLOCK = """
+name: clock
+states: [x, v]
+parameters: {f: 0.1, h: 1.0}
+autonomous: true
+surfaces:
+  middle: {observable: x}
+  stop: {observable: v, sliding: filippov}
+field: {x: v, v: -x - f*sign(v)}
+modes:
+  forth: {in: {stop: +}}
+  back: {in: {stop: -}}
+resets: {middle: {v: sqrt(v**2 + h**2), from: [forth]}}
+"""
+
+
+def test_a_clock_is_struck_on_its_way_up(tmp_path) -> None:
+    """Andronov's clock: dry friction, and an impulse of energy h^2/2 where its balance passes the middle.
+
+    With amplitude A to the right the next one is (A' + f)^2 = (A - 3 f)^2 + h^2, so that A = f + h^2/(8 f),
+    with the multiplier (A - 3 f)/(A + f); it passes the middle while A >= 4 f, f <= h/sqrt(24).
+    """
+    model = typed(tmp_path, CLOCK)
+    assert cf.check_model(model).ok
+    orbit = cf.find_orbit(model)
+    f = 0.1
+    amplitude = f + 1 / (8 * f)
+    assert orbit.x_max == pytest.approx(amplitude, abs=1e-12)
+    assert orbit.multipliers[0].real == pytest.approx(
+        (amplitude - 3 * f) / (amplitude + f), abs=1e-11
+    )
+    branch = cf.continue_orbit(orbit, "f", (0.02, 0.3))
+    assert branch.params["f"].max() == pytest.approx(1 / math.sqrt(24), abs=1e-9)
+    assert branch.ends[1].bifurcation.kind is cf.Kind.GS
+    with pytest.raises(cf.ModelError, match="acts in no mode"):
+        typed(tmp_path, CLOCK.replace(", from: [forth]", ""))

@@ -32,6 +32,7 @@ EXAMPLES = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re
 #: The words of their orbits: domains may be many, modes are few.
 WORDS = {
     "neuron": {("rest", "threshold")},
+    "clock": {("forth-", "middle"), ("forth+", "stop"), ("back", "stop")},
     "ball": {("flight", "table"), ("chatter", "table_lift")},
     "block": {
         *(("left", "upright"), ("right", "upright")),
