@@ -149,7 +149,6 @@ def verify(diagram: Diagram, restarts: int = 6, step: float = STEP) -> Verificat
 #: Where a branch is looked for on another one, as shares of its length.
 _INSIDE = (0.5, 0.381966, 0.618034, 0.2, 0.8)
 #: Where a branch is restarted, as shares of its points: in its middle unless the equations are singular.
-#: Points crowd where a period grows without bound: last of all it is halfway between the values at its ends.
 _SHARES = (0.5, 0.25, 0.75)
 
 
@@ -170,8 +169,8 @@ def _spread(places: list[int], most: int) -> list[int]:
 
 def _restart(diagram: Diagram, i: int, step: float) -> Restart:
     branch, refused = diagram.branches[i], ""
-    middle = int(np.argmin(np.abs(branch.values - np.mean(branch.values[[0, -1]]))))
-    for start in (*(_inside(branch, share) for share in _SHARES), branch[middle]):
+    for share in _SHARES:
+        start = _inside(branch, share)
         value = start.params[diagram.parameter]
         try:
             again = _explored(diagram, start, step)
