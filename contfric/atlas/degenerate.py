@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.atlas.matching import part_distance
+from contfric.atlas.matching import stops_apart
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
     for a, b in pairwise(values):
         gap = b.params[parameter] - a.params[parameter]
         known = max(ACCURACY, a.accuracy + b.accuracy) * width
-        if gap <= known and part_distance(a.orbit.stops, b.orbit.stops) < _ALIKE:
+        if gap <= known and stops_apart(a.orbit, b.orbit) < _ALIKE:
             yield f"{a.label} and {b.label} at {a.params[parameter]:.10g}: not to be told apart"
     for branch in diagram.branches:
         ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]

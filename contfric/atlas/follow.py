@@ -26,7 +26,7 @@ from contfric.atlas.leaving_event import (
     leave_singular,
     settings_for,
 )
-from contfric.atlas.matching import SAME_MOTION, part_distance, same_kind
+from contfric.atlas.matching import SAME_MOTION, same_kind, stops_apart
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, sequences_of
 from contfric.continuation.continuum import in_continuum
@@ -161,7 +161,7 @@ def _meets(end: End, event: Event, settings: Settings) -> bool:
     gap = abs(a.params[settings.parameter] - b.params[settings.parameter])
     if gap > max(a.accuracy, b.accuracy) * settings.width:
         return False
-    return part_distance(a.orbit.stops, b.orbit.stops) < SAME_MOTION
+    return stops_apart(a.orbit, b.orbit) < SAME_MOTION
 
 
 def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:

@@ -13,6 +13,7 @@ from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, Kind
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.slides import modulo
 from contfric.orbit.solve import polish
 from contfric.orbit.words import mirror_pairs
 from contfric.signature import ReducedWord, canonical_word
@@ -50,8 +51,10 @@ def distance(a: FloatArray, b: FloatArray) -> float:
     return float(max(gaps.min(axis=1).max(), gaps.min(axis=0).max()))
 
 
-def part_distance(a: FloatArray, b: FloatArray) -> float:
+def part_distance(a: FloatArray, b: FloatArray, cycle: float | None = None) -> float:
     """Return how far the one of two sets of numbers that is nearer to be a part of the other is from it.
+
+    With a ``cycle`` they are numbers on a circle.
 
     Examples
     --------
@@ -61,7 +64,14 @@ def part_distance(a: FloatArray, b: FloatArray) -> float:
     if not len(a) or not len(b):
         return 0.0
     gaps = np.abs(a[:, None] - b[None, :])
+    if cycle is not None:
+        gaps = modulo(gaps, cycle)
     return float(min(gaps.min(axis=1).max(), gaps.min(axis=0).max()))
+
+
+def stops_apart(a: Orbit, b: Orbit) -> float:
+    """Return the distance of the stops of two orbits, of which one may have more; angles modulo a turn."""
+    return part_distance(a.stops, b.stops, 2.0 * np.pi if 0 in a.model.angles else None)
 
 
 def stops_distance(a: FloatArray, b: FloatArray, mirror: bool) -> float:

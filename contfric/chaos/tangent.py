@@ -153,7 +153,7 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
         landed = tables.landed[surface]
         code = sign_code(functions, observables, landed, t, y, p, workspace.none, workspace.empty)
         if tables.flights[mode] >= 0:
-            code = code_ahead(functions, tables, mode, t, y, p, period, workspace)
+            code = code_ahead(functions, tables, mode, surface, t, y, p, period, workspace)
         following = mode_after(tables, mode, surface, code)
         if following >= 0:
             pressed = reset and is_pressed(

@@ -254,7 +254,10 @@ class Bifurcation(MeasuredEvent):
     @property
     def meaning(self) -> str:
         """What happens, in words: that of its kind, but only where something slides it is a sliding."""
-        return meaning_of(self.kind, self.orbit.model, {test.surface for test in self.tests})
+        model, word = self.orbit.model, self.orbit.system.word
+        if model.wraps & {s for t in self.tests for s in (t.surface, word[t.segment][1])}:
+            return "a joint where an angle begins a new turn"
+        return meaning_of(self.kind, model, {test.surface for test in self.tests})
 
     def certify(self, parameter: str = "") -> EventCertificate:
         """Prove the event to 30 digits in its parameter; which one must be said of a saved event.

@@ -13,7 +13,9 @@ also for durations d that end before ``t*``, so that Newton's method has a smoot
 across it; so all impacts of one chatter lie on one smooth curve ``(t, y) = z(v)`` that ends in
 ``z(0) = (t*, y*)`` [1]_. It is found by extrapolation of the polynomial through the impacts with speeds v_i
 (each at most half of the one before) to v = 0. The last two extrapolations differ by about their error. No
-impact is needed at which rounding counts, whose share in the time of a flight is eps / v.
+impact is needed at which rounding counts, whose share in the time of a flight is eps / v. Where impacts pass
+the surface (a block that rocks) flights lie on both sides of it in turn, by two fields: the map of two
+flights has that line of fixed points, with multiplier e^2, and every second impact is on its curve.
 
 *Derivatives* are those of the polynomial's value where its nodes move: ``sum_i w_i (dz_i - z'(v_i) dv_i)``
 with Lagrange's weights w_i at 0. Those of the nodes are products of the derivatives of flights and resets.
@@ -31,8 +33,9 @@ from contfric.flow.layouts import FLOW, SECOND
 from contfric.handle import TABLE, HandleType
 
 #: By modes: the flight between the impacts (-1: no mode of chatter), observable of the gap, surface of the
-#: wall, side of it on which flights are, observable of the acceleration that is positive where it is left.
-TABLES = ("flights", "gaps", "walls", "sides", "lifts")
+#: wall, side of it on which flights are, observable of the acceleration that is positive where it is left;
+#: the flight on the other side where impacts pass the surface (-1: they do not), and its acceleration.
+TABLES = ("flights", "gaps", "walls", "sides", "lifts", "others", "other_lifts")
 LAYOUT = {**FLOW, **SECOND, **dict.fromkeys(TABLES, TABLE)}
 CHATTERING = HandleType("chattering", LAYOUT)
 
@@ -95,15 +98,46 @@ def slope_at_node(speeds, nodes, count, i, k):  # type: ignore[no-untyped-def]
     return -total
 
 
+@helper
+def flight_at(motion, mode, t, y, p, none, empty):  # type: ignore[no-untyped-def]
+    """Return (flight, side) of a state behind an impact, or in flight just behind one."""
+    side = motion.sides[mode]
+    if (
+        motion.others[mode] < 0
+        or side * motion.rate(motion.flights[mode], motion.gaps[mode], t, y, p, none, empty) >= 0.0
+    ):
+        return motion.flights[mode], side
+    return motion.others[mode], -side
+
+
+@helper
+def lift_side(motion, mode, c):  # type: ignore[no-untyped-def]
+    """Return the side to which the wall is left where an observable is its acceleration; 0 of another one."""
+    if c == motion.lifts[mode]:
+        return motion.sides[mode]
+    return -motion.sides[mode] if c == motion.other_lifts[mode] else 0
+
+
+@helper
+def is_left(motion, mode, t, y, p, none, empty):  # type: ignore[no-untyped-def]
+    """Tell whether the wall does not press a state that rests on it."""
+    side = motion.sides[mode]
+    if side * motion.observe(motion.lifts[mode], t, y, p, none, empty) > 0.0:
+        return True
+    other = motion.other_lifts[mode]
+    return other >= 0 and -side * motion.observe(other, t, y, p, none, empty) > 0.0
+
+
 @allocating_helper
 def fly(motion, mode, t, y, p, which, slopes):  # type: ignore[no-untyped-def]
     """Advance (t, y) from behind an impact to behind the next; return the time between, -1 if there is none.
 
     ``slopes`` (1 + n, 1 + n + k), the derivatives of (t, y), are advanced as well, if there are any.
     """
-    n, k, flight = y.shape[0], which.shape[0], motion.flights[mode]
+    n, k = y.shape[0], which.shape[0]
     c, wall = motion.gaps[mode], motion.walls[mode]
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
+    flight, _ = flight_at(motion, mode, t, y, p, none, empty)
     level, before = motion.level(wall, p, none, empty), np.empty(n)
     unit = motion.period(p, none, empty)
     within = _LONGEST * (unit if unit > 0.0 else 1.0)
@@ -174,7 +208,8 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
     speeds, weights, nodes = np.empty(_NODES), np.empty(_NODES), np.empty((_NODES, 1 + n))
     speeds_by = np.zeros((_NODES, width))
     nodes_by = np.zeros((_NODES, 1 + n if width > 0 else 0, width))
-    flight, c, side = motion.flights[mode], motion.gaps[mode], motion.sides[mode]
+    none, empty = which[:0], grad[:0]
+    c, node_side = motion.gaps[mode], 0
     unit, longest = motion.period(p, which[:0], grad[:0]), np.inf
     if unit > 0.0:
         longest = _LONGEST * unit
@@ -182,6 +217,7 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
         unit = 1.0
     count, highest, last, found, before = 0, 0.0, np.inf, False, np.inf
     for _ in range(MOST_IMPACTS):
+        flight, side = flight_at(motion, mode, t, y, p, none, empty)
         v = side * motion.rate(flight, c, t, y, p, which, grad)
         thrown = v > FASTER * before and before < _SHARE * highest
         highest = max(highest, abs(v))
@@ -195,7 +231,9 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
         before = v
         if count > 0 and v > speeds[count - 1]:
             count, last = 0, np.inf  # the polynomial begins anew
-        if count == 0 or v <= _SHARE * speeds[count - 1]:
+        if count == 0:
+            node_side = side
+        if count == 0 or (side == node_side and v <= _SHARE * speeds[count - 1]):
             if count == _NODES:
                 for i in range(_NODES - 1):
                     speeds[i], nodes[i], speeds_by[i] = (

@@ -20,7 +20,17 @@ from contfric.compiled import (
     second_signature,
     stationary_signature,
 )
-from contfric.flow.chatter import CHATTERING, LAYOUT, MOST_IMPACTS, TABLES, fly, limit_of
+from contfric.flow.chatter import (
+    CHATTERING,
+    LAYOUT,
+    MOST_IMPACTS,
+    TABLES,
+    flight_at,
+    fly,
+    is_left,
+    lift_side,
+    limit_of,
+)
 from contfric.flow.layouts import FLOW
 from contfric.handle import Block, Bound, with_handle
 
@@ -36,17 +46,16 @@ _REST_OF_TIME = 1e-10
 @allocating_helper
 def bouncing(motion, mode, t0, y0, dt, p, y1):  # type: ignore[no-untyped-def]
     """Write the state a time after an impact, which is before the limit: in one of the flights."""
-    none, nothing = np.empty(0, dtype=np.int64), np.empty((0, 0))
+    none, nothing, empty = np.empty(0, dtype=np.int64), np.empty((0, 0)), np.empty(0)
     t, y, before = t0, y0.copy(), y0.copy()
     for _ in range(MOST_IMPACTS):
         from_t, before[:] = t, y
+        flight, _side = flight_at(motion, mode, t, y, p, none, empty)
         tau = fly(motion, mode, t, y, p, none, nothing)
         if not tau > 0.0:
             return
         if t + tau >= t0 + dt:
-            motion.flow(
-                motion.flights[mode], from_t, before, t0 + dt - from_t, p, none, y1, nothing
-            )
+            motion.flow(flight, from_t, before, t0 + dt - from_t, p, none, y1, nothing)
             return
         t += tau
         y1[:] = y
@@ -91,9 +100,10 @@ def flow(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untype
 @allocating_helper
 def hit_in_flights(motion, mode, c, target, t0, y0, within, p, y1):  # type: ignore[no-untyped-def]
     """Return the first time within which an observable takes a value between impacts; -1 if it does not."""
-    none, nothing = np.empty(0, dtype=np.int64), np.empty((0, 0))
-    t, y, before, flight = t0, y0.copy(), y0.copy(), motion.flights[mode]
+    none, nothing, empty = np.empty(0, dtype=np.int64), np.empty((0, 0)), np.empty(0)
+    t, y, before = t0, y0.copy(), y0.copy()
     for _ in range(MOST_IMPACTS):
+        flight, _side = flight_at(motion, mode, t, y, p, none, empty)
         if t >= t0 + within * (1.0 - _REST_OF_TIME):
             break
         before[:] = y
@@ -122,9 +132,8 @@ def hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-
     if limit_of(motion, mode, t0, y0, p, none, limit, nothing) < 0.0:
         return -1.0
     rests = limit[0] - t0
-    if c == motion.lifts[mode]:
-        pulled = motion.observe(c, limit[0], limit[1:], p, none, np.empty(0))
-        if motion.sides[mode] * (pulled - target) > 0.0:
+    if lift_side(motion, mode, c) != 0:
+        if is_left(motion, mode, limit[0], limit[1:], p, none, np.empty(0)):
             return -1.0  # it does not stay
     else:
         at = hit_in_flights(motion, mode, c, target, t0, y0, min(rests, dt_max), p, y1)
@@ -144,10 +153,12 @@ def turning_in_flights(motion, mode, c, t0, y0, within, p, times, values):  # ty
     two impacts: how high the others are, lower and lower, is no distance from another motion.
     """
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
-    t, y, before, flight = t0, y0.copy(), y0.copy(), motion.flights[mode]
-    found, most, gap, highest = 0, times.shape[0], c == motion.gaps[mode], -np.inf
+    t, y, before = t0, y0.copy(), y0.copy()
+    found, most, gap = 0, times.shape[0], c == motion.gaps[mode]
+    highest = np.full(2, -np.inf)  # by sides
     for _ in range(_LOOKED):
         before[:] = y
+        flight, side = flight_at(motion, mode, t, y, p, none, empty)
         tau = fly(motion, mode, t, y, p, none, nothing)
         if not tau > 0.0 or t + tau >= t0 + within:
             break
@@ -155,8 +166,8 @@ def turning_in_flights(motion, mode, c, t0, y0, within, p, times, values):  # ty
         if own < 0 or found + own + 1 > most:
             return -1
         if gap and own == 1:
-            if motion.sides[mode] * values[found] > highest:
-                highest = motion.sides[mode] * values[found]
+            if side * values[found] > highest[(1 + side) // 2]:
+                highest[(1 + side) // 2] = side * values[found]
             else:
                 own = 0
         for i in range(found, found + own):
@@ -182,7 +193,7 @@ def stationary(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[n
     if limit_of(motion, mode, t0, y0, p, none, limit, nothing) < 0.0 or times.shape[0] < 1:
         return -1
     rests = limit[0] - t0
-    if c == motion.lifts[mode]:
+    if lift_side(motion, mode, c) != 0:
         times[0], values[0] = rests, motion.observe(c, limit[0], limit[1:], p, none, empty)
         found = 1
     else:
@@ -224,6 +235,7 @@ class ChatterMode:
     gap, wall : observable of the gap, and its surface
     side : side of the wall on which flights are
     lift : observable whose sign changes where the wall's force vanishes
+    other, other_lift : the same on the other side where impacts pass the surface, else -1
     """
 
     mode: int
@@ -232,6 +244,8 @@ class ChatterMode:
     wall: int
     side: int
     lift: int
+    other: int = -1
+    other_lift: int = -1
 
 
 def with_chatter(flow: CompiledFlow, modes: int, chatters: Sequence[ChatterMode]) -> CompiledFlow:
@@ -246,7 +260,7 @@ def with_chatter(flow: CompiledFlow, modes: int, chatters: Sequence[ChatterMode]
 
     tables = {name: np.full(modes, -1) for name in TABLES}
     for own in chatters:
-        row = own.flight, own.gap, own.wall, own.side, own.lift
+        row = (own.flight, own.gap, own.wall, own.side, own.lift, own.other, own.other_lift)
         for name, value in zip(TABLES, row, strict=True):
             tables[name][own.mode] = value
     values: dict[str, Any] = {name: getattr(flow, name) for name in FLOW} | dict(tables)

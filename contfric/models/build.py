@@ -69,8 +69,9 @@ def _with_chatter(flow: CompiledFlow, definition: str) -> CompiledFlow:
         wall, gap = walls[own.surface]
         flight = modes.index(own.flight)
         side = description.modes[flight].sides[own.surface]
-        lift = observables.index(own.lift)
-        chatters.append(ChatterMode(modes.index(own.mode), flight, gap, wall, side, lift))
+        row = modes.index(own.mode), flight, gap, wall, side, observables.index(own.lift)
+        other = (modes.index(own.other), observables.index(own.other_lift)) if own.other else ()
+        chatters.append(ChatterMode(*row, *other))
     return with_chatter(flow, len(modes), chatters)
 
 

@@ -10,6 +10,11 @@ with d the direction of the change ``R(t, y) - y`` that the reset makes. The for
 does: there the mass leaves the wall. The mode, its field and the surface that ends it are put into the model
 as if they had been typed; its flow begins with the impacts (:mod:`contfric.flow.chatter`).
 
+Impacts may pass the surface, ``h' -> e h'``, with a flight on either side: a block that rocks from one foot
+to the other. It rests upright where it is pressed from both sides, ``h'' < 0`` above and ``h'' > 0`` below,
+and the contact is the same from both: ``f - h'' d`` of the one flight is that of the other. It is left to
+either side.
+
 This module imports sympy, and is loaded where a model asks for it.
 """
 
@@ -58,23 +63,29 @@ def chatter_parts(
     chatters = {}
     for surface in surfaces:
         name = CHATTER if len(surfaces) == 1 else f"{CHATTER}_{surface}"
-        own = _Wall(formulas, surface, _flight(description, surface))
-        lift = f"{surface}_lift"
-        for kind, taken in (("modes", name), ("surfaces", lift), ("observables", lift)):
+        ways = [_Wall(formulas, surface, flight) for flight in _flights(description, surface)]
+        lifts = [f"{surface}_lift", f"{surface}_lift_below"][: len(ways)]
+        named = [("modes", name), *((k, n) for n in lifts for k in ("surfaces", "observables"))]
+        for kind, taken in named:
             if taken in found[kind]:
                 raise EntryError(
                     (kind, taken), f"'{taken}' is a name of the chatter at '{surface}'"
                 )
-        found["observables"][lift] = own.text(own.lift)
-        found["surfaces"][lift] = {"observable": lift, "level": "0"}
-        pressed = "-" if own.side > 0 else "+"
-        sides = {s: side for s, side in own.flight.sides.items() if s != description.phase}
+        sides: dict[str, int | str] = {}
+        for lift, way in zip(lifts, ways, strict=True):
+            found["observables"][lift] = way.text(way.lift)
+            found["surfaces"][lift] = {"observable": lift, "level": "0"}
+            sides |= {s: side for s, side in way.flight.sides.items() if s != description.phase}
+            sides[lift] = "-" if way.side > 0 else "+"
+        ways[0].check_same(ways[-1])
         found["modes"][name] = {
-            "in": {**sides, surface: 0, lift: pressed},
-            "field": dict(zip(description.states, map(own.text, own.field), strict=True)),
+            "in": {**sides, surface: 0},
+            "field": dict(zip(description.states, map(ways[0].text, ways[0].field), strict=True)),
             "rank": len(description.states) - 2,
         }
-        chatters[surface] = {"mode": name, "flight": own.flight.name, "lift": lift}
+        chatters[surface] = {"mode": name, "flight": ways[0].flight.name, "lift": lifts[0]}
+        if len(ways) > 1:
+            chatters[surface] |= {"other": ways[1].flight.name, "other_lift": lifts[1]}
     return {**found, "chatters": chatters}
 
 
@@ -86,7 +97,7 @@ def with_chatter(model: Model) -> Model | None:
     if not model.definition or model.composed or model.chatters:
         return None
     data = from_text(model.definition).data()
-    walls = [r.surface for r in model.resets if r.lands.get(r.surface, 0) > 0]
+    walls = [r.surface for r in model.resets if r.lands.get(r.surface, 0) != 0]
     for surface in walls:
         asked = {**data["resets"], surface: {**data["resets"][surface], CHATTER: True}}
         with suppress(EntryError):
@@ -96,8 +107,8 @@ def with_chatter(model: Model) -> Model | None:
     return model_from(found) if found.chatters else None
 
 
-def _flight(description: Description, surface: str) -> ModeText:
-    """Return the one mode that the impacts at a wall are in; of those that are one, the first."""
+def _flights(description: Description, surface: str) -> list[ModeText]:
+    """Return the modes that the impacts at a wall are in, at most one above and one below."""
     named = description.acts.get(surface, ())
     found = [
         mode
@@ -105,12 +116,18 @@ def _flight(description: Description, surface: str) -> ModeText:
         if mode.sides.get(surface, 0) != 0 and (not named or mode.name in named)
     ]
     first = joined_modes(description)
-    if len({first[mode.name] for mode in found}) == 1 and 0 not in found[0].sides.values():
-        return next(mode for mode in found if mode.name == first[mode.name])
+    wholes = {
+        side: {first[mode.name] for mode in found if mode.sides[surface] == side}
+        for side in (1, -1)
+    }
+    slides = any(0 in mode.sides.values() for mode in found)
+    if found and not slides and all(len(names) <= 1 for names in wholes.values()):
+        names = [name for own in wholes.values() for name in own]
+        return [mode for name in names for mode in description.modes if mode.name == name]
     raise EntryError(
         ("resets", surface, CHATTER),
-        f"chatter at '{surface}' is derived where its impacts are all in one mode that does not slide, and "
-        f"they are in {', '.join(mode.name for mode in found) or 'none'}",
+        f"chatter at '{surface}' is derived where its impacts are in one mode on a side of it, which does "
+        f"not slide, and they are in {', '.join(mode.name for mode in found) or 'none'}",
     )
 
 
@@ -148,6 +165,11 @@ class _Wall:
         known = dict(zip(formulas.y, description.states, strict=True))
         known |= dict(zip(formulas.p, (p.name for p in description.parameters), strict=True))
         self._named = {symbol: sympy.Symbol(name) for symbol, name in known.items()}
+
+    def check_same(self, other: _Wall) -> None:
+        """Refuse flights on both sides whose contacts are not the same."""
+        if any(sympy.simplify(a - b) != 0 for a, b in zip(self.field, other.field, strict=True)):
+            raise self._refused("at rest on it the fields of both sides do not agree")
 
     def _along(self, formula: Any, field: list[Any]) -> Any:
         states = zip(self._formulas.y, field, strict=True)

@@ -80,7 +80,7 @@ def model_from(description: Description) -> Model:
     departures = description.departures or _departures(sampler, surfaces, declared)
     resting = {own.mode for own in description.chatters}
     flights = tuple(d for d in declared if d.mode not in resting)
-    ends = {own.lift for own in description.chatters}
+    ends = {lift for own in description.chatters for lift, _ in own.ways}
     asked = [s for s in surfaces if s.name not in ends]
     domains = join_domains(declared, joined_modes(description))
     surfaces = clear_surfaces(surfaces, domains)
@@ -275,7 +275,7 @@ def symmetry_of(sampler: Sampler, surfaces: list[Surface]) -> Symmetry | None:
             for at in (points, moved)
         )
         images = {s.name: _image(s, heights, beyond) for s in surfaces}
-        lifts = {own.surface: own.lift for own in description.chatters}
+        lifts = {own.surface: own.lift for own in description.chatters if not own.other}
         for wall, lift in lifts.items():  # of two walls they may be levels of one observable
             images[lift] = lifts.get(images[wall], images[lift])
     except ModelError as error:

@@ -9,6 +9,7 @@ from typing import Any
 
 from contfric.base.yaml_lines import comma_hint
 from contfric.errors import ModelError
+from contfric.models.clocks import TICK
 from contfric.models.contact_laws import KEY as LAWS
 from contfric.models.contact_laws import check_laws, read_laws
 from contfric.models.definition import Departure, Observable, Parameter, Surface
@@ -376,7 +377,8 @@ def _is_number(value: object) -> bool:
 
 def _check_expressions(found: Description, names: Names) -> None:
     """Read every expression and look every name up, in its place."""
-    names.check_names()
+    ticks = (surface.level for surface in found.surfaces if surface.name == TICK)
+    names.check_names(found.period or next(ticks, ""))
     timed = not found.period
     for name, text in found.define:
         names.check(("define", name), text, timed)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -141,7 +141,7 @@ class Description:
         found.update({"period": self.period} if self.period else {"autonomous": True})
         if self.chatters:
             found["chatters"] = {
-                c.surface: {"mode": c.mode, "flight": c.flight, "lift": c.lift}
+                c.surface: {k: v for k, v in asdict(c).items() if v and k != "surface"}
                 for c in self.chatters
             }
         if self.symmetry is not None:

@@ -32,7 +32,11 @@ FUNCTIONS = (*UNARY, "min", "max", "where")
 #: Names with a fixed meaning: time, and the period of the excitation (in a symmetry only).
 TIME, PERIOD, PI = "t", "T", "pi"
 RESERVED = (TIME, PERIOD, PI, *FUNCTIONS)
-_MEANINGS = {TIME: "the time", PERIOD: "the period of the excitation", PI: "the number pi"}
+_MEANINGS = {
+    TIME: "the time",
+    PERIOD: "the period of the excitation (it is a parameter only where 'period: T')",
+    PI: "the number pi",
+}
 
 #: A formula is a line or two; a longer text is a mistake, and Python's parser has limits of its own.
 _LONGEST, _DEEPEST = 5000, 60

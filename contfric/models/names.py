@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +15,8 @@ from contfric.models.entries import EntryError
 from contfric.models.grammar import PERIOD, PI, TIME, Algebra, Scope, check_name, names_in, parse
 
 T = TypeVar("T")
+#: A period that is the parameter T itself, or that in another unit of time.
+_IS_T = re.compile(rf"\s*({PERIOD}|\({PERIOD}\)/[\d.e+-]+)\s*")
 
 
 @dataclass(frozen=True)
@@ -42,8 +45,12 @@ class Names:
         named = {**self.define, **self.observables}
         return {name: text for name, text in named.items() if name not in self.states}
 
-    def check_names(self) -> None:
-        """Refuse names that expressions cannot use, or that mean two things."""
+    def check_names(self, period: str) -> None:
+        """Refuse names that expressions cannot use, or that mean two things.
+
+        A parameter T is welcome where it is the period, whatever unit of time that is counted in.
+        """
+        own_period = _IS_T.fullmatch(period) is not None
         taken: dict[str, str] = {}
         groups: tuple[tuple[str, tuple[str, ...], str], ...] = (
             ("states", self.states, "state"),
@@ -55,7 +62,8 @@ class Names:
             for index, name in enumerate(names):
                 address: Address = (key, index if key == "states" else name)
                 try:
-                    check_name(name, what)
+                    if not (name == PERIOD and what == "parameter" and own_period):
+                        check_name(name, what)
                 except ModelError as error:
                     raise EntryError(address, str(error)) from None
                 itself = what == "observable" and self.observables[name].strip() == name
@@ -90,7 +98,7 @@ class Names:
                 "t stands in an expression of an autonomous model: give the 'period' of the "
                 "excitation in place of 'autonomous'",
             )
-        if PERIOD in found:
+        if PERIOD in found and PERIOD not in self.parameters:
             raise EntryError(address, "the period T can only stand in the symmetry")
 
     def leaves(self, tree: ast.expr, above: tuple[str, ...]) -> set[str]:

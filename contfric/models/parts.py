@@ -142,12 +142,21 @@ class Chatter:
     surface : the wall, which has a reset
     mode, flight : the mode, and that in which the impacts are
     lift : surface (and observable) of the gap's acceleration in flight, which vanishes where the wall lets go
+    other, other_lift : the same on the other side of a surface that impacts pass, as a block that rocks
     """
 
     surface: str
     mode: str
     flight: str
     lift: str
+    other: str = ""
+    other_lift: str = ""
+
+    @property
+    def ways(self) -> tuple[tuple[str, str], ...]:
+        """The ways out of the contact: (surface that is met, flight that follows)."""
+        both = (self.lift, self.flight), (self.other_lift, self.other)
+        return both if self.other else both[:1]
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,9 @@ def domains_of(description: Description, surfaces: list[Surface]) -> tuple[Domai
     found: list[Domain] = []
     order, led = [s.name for s in surfaces], {*description.leads.values()}
     by_mode = {mode.name: mode.sides for mode in description.modes}
-    settled = {own.lift: by_mode[own.mode][own.lift] for own in description.chatters}
+    settled = {
+        lift: by_mode[own.mode][lift] for own in description.chatters for lift, _ in own.ways
+    }
     for mode in description.modes:
         regions = combinations(surfaces, {**mode.sides, **settled})
         if not regions:

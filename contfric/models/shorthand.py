@@ -14,7 +14,7 @@ from contfric.models.angles import with_angles
 from contfric.models.clocks import with_clock
 from contfric.models.contact_modes import with_contacts
 from contfric.models.description import Description
-from contfric.models.entries import EntryError, Part
+from contfric.models.entries import EntryError, Part, mapping_in
 from contfric.models.tied import with_ties_put_in
 from contfric.models.units import in_units
 
@@ -36,7 +36,7 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
         return read(data)  # which says what is wrong, and where
     if not data.get("surfaces") and "modes" not in data and "field" in data:
         data = {**data, "modes": {"smooth": {}}}
-    data = _with_observables(with_ties_put_in(data))
+    data = _divided_by_resets(_with_observables(with_ties_put_in(data)))
     walls, data = _chattering(data)
     surfaces, plain = _derived_sliding(with_angles(with_clock(data)))
     plain = in_units(plain, read)
@@ -112,6 +112,36 @@ def _with_observables(data: dict[str, Any]) -> dict[str, Any]:
         observables[own] = text
         named[name] = {**entry, "observable": own}
     return {**data, "surfaces": named, "observables": observables} if observables else data
+
+
+def _divided_by_resets(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a model in which a reset acts in modes that lie on both sides of its surface.
+
+    A clock is struck as its balance passes the middle on the way up: ``from: [up]`` at ``x = 0``. Each mode
+    that a reset names, and that says no side of its surface, is two: ``up-`` below it and ``up+`` above.
+    """
+    modes, resets = dict(data.get("modes") or {}), dict(data.get("resets") or {})
+    others = (
+        *(data.get("domains") or {}).values(),
+        *({"mode": r.get("to")} for r in resets.values()),
+    )
+    named = {other.get("mode") for other in others if isinstance(other, Mapping)}
+    for surface, entry in resets.items():
+        asked = entry.get("from")
+        if not isinstance(asked, (list, tuple)):
+            continue
+        acts: list[str] = []
+        for name in map(str, asked):
+            sides = mapping_in(modes[name], "in") if name in modes else {surface: 0}
+            parts = {f"{name}{side}": side for side in "-+"}
+            if surface in sides or name in named or parts.keys() & modes.keys():
+                acts.append(name)
+                continue
+            whole = modes.pop(name)
+            modes |= {n: {**whole, "in": {**sides, surface: side}} for n, side in parts.items()}
+            acts += parts
+        resets[surface] = {**entry, "from": acts}
+    return {**data, "modes": modes, "resets": resets} if resets else data
 
 
 def _derived_sliding(data: dict[str, Any]) -> tuple[tuple[str, ...], dict[str, Any]]:

@@ -72,8 +72,11 @@ class TransitionMaps(SectionMaps):
             found.setdefault(source, []).append((surface, target))
         for own in self.chatters:
             for domain in self.domains_of(own.mode):
-                behind = self.targets[domain.name, own.lift]
-                found[domain.name] = [(own.lift, target) for target in behind]
+                found[domain.name] = [
+                    (lift, target)
+                    for lift, _ in own.ways
+                    for target in self.targets[domain.name, lift]
+                ]
         return found
 
     def is_at_rest(self, mode: str) -> bool:
@@ -106,6 +109,12 @@ class TransitionMaps(SectionMaps):
         return frozenset(reset.surface for reset in self.resets if reset.wraps)
 
     @cached_property
+    def angles(self) -> tuple[int, ...]:
+        """Indices of the states that are the same a turn (2 pi) later."""
+        changed = {name for reset in self.resets if reset.wraps for name in reset.changes}
+        return tuple(i for i, state in enumerate(self.states) if state in changed)
+
+    @cached_property
     def transitions(self) -> dict[tuple[str, str], str]:
         """Next domain for each possible (domain, surface); what is absent cannot happen.
 
@@ -132,8 +141,8 @@ class TransitionMaps(SectionMaps):
                     found[domain.name, reset.surface] = behind
         for own in self.chatters:  # what is one mode may be left to on either side of its section
             for domain in self.domains_of(own.mode):
-                free = tuple(d.name for d in self.domains_of(own.flight))
-                found[domain.name, own.lift] = free
+                for lift, flight in own.ways:
+                    found[domain.name, lift] = tuple(d.name for d in self.domains_of(flight))
         return found
 
     def undecided(self) -> tuple[str, str, tuple[str, ...]] | None:
@@ -192,6 +201,7 @@ class TransitionMaps(SectionMaps):
         landed = {**reset.lands, **({reset.surface: own} if reset.stays else {})}
         asked = {**fixed, **landed}
         behind = self._domains_landed(reset).get(tuple(asked[name] for name in sorted(asked)), [])
+        behind = [*behind, *self._departed(asked)]
         for mode in (reset.leads, domain.own_mode):
             kept = [d.signs for d in behind if d.own_mode == mode]
             behind = [d for d in behind if d.own_mode == mode or d.signs not in kept]
@@ -199,15 +209,35 @@ class TransitionMaps(SectionMaps):
         resting = self.domains_of(chatter.mode) if chatter else ()
         return tuple(d.name for d in (*behind, *resting))
 
+    def _departed(self, asked: Mapping[str, int]) -> list[Domain]:
+        """Return the domains in which motion leaves the surfaces that it slid on before a reset.
+
+        Sliding may hold for some images and end for others: what a reset changes has any side.
+        """
+        found = []
+        for departure in self.departures:
+            leaves = {**asked, **departure.leaves}
+            if any(asked.get(s) != 0 for s in departure.leaves):
+                continue
+            if any(asked.get(s, side) != side for s, side in departure.where.items()):
+                continue
+            wanted = {**departure.where, **leaves}
+            found += [d for d in self.domains if all(d.signs[s] == v for s, v in wanted.items())]
+        return found
+
     @cached_property
     def chatter_at(self) -> dict[tuple[str, str], Chatter]:
         """Chatter that impacts in a mode, at a surface, may lead to."""
-        return {(own.flight, own.surface): own for own in self.chatters}
+        return {(flight, own.surface): own for own in self.chatters for _, flight in own.ways}
 
     @cached_property
     def settled_sides(self) -> dict[str, int]:
         """The side of each surface that only ends chatter: all domains have that, on whichever they are."""
-        return {own.lift: self.domains_of(own.mode)[0].signs[own.lift] for own in self.chatters}
+        return {
+            lift: self.domains_of(own.mode)[0].signs[lift]
+            for own in self.chatters
+            for lift, _ in own.ways
+        }
 
     @cached_property
     def chatter_by_mode(self) -> dict[str, Chatter]:
@@ -239,9 +269,10 @@ class TransitionMaps(SectionMaps):
         mode = domain.own_mode
         through = {**domain.signs, surface.name: -sign}
         resting_at = self.chatter_by_mode.get(mode)
-        if resting_at is not None and resting_at.lift == surface.name:  # the wall lets go
-            side = self._side_of[resting_at.flight, resting_at.surface]
-            return self._domain_with({**domain.signs, resting_at.surface: side}, resting_at.flight)
+        flight = dict(resting_at.ways).get(surface.name) if resting_at is not None else None
+        if resting_at is not None and flight is not None:  # the wall lets go
+            side = self._side_of[flight, resting_at.surface]
+            return self._domain_with({**domain.signs, resting_at.surface: side}, flight)
         if not surface.switching:
             target = self.domain_at(through, mode)
             entered = "" if target is None else self.domain_by_name[target].own_mode

@@ -38,6 +38,8 @@ _CREEPING = 1e-5
 _FIRST, _LONGER = 200, 4
 #: Growth over the last stretch (three quarters of the whole simulation) that no settling motion has.
 _GROWTH = 2.0
+#: Turns smaller than this (relative to 1 + the states) are none: the motion has come to rest.
+_NO_SIZE = 1e-6
 #: An orbit that a motion converges to attracts; beyond rounding its multipliers cannot exceed 1.
 _ATTRACTS = 1.0 + 1e-6
 
@@ -115,6 +117,8 @@ def _settled(
         _check_motion(trajectory)
         done += span
         orbit = _read_off(trajectory, final=done >= longest)
+        if orbit is not None and model.autonomous and _is_point(orbit):
+            raise ConvergenceError(_comes_to_rest(trajectory), trajectory)
         if orbit is not None:
             return orbit
         if done >= longest:
@@ -127,6 +131,21 @@ def _settled(
         span = min(span * _LONGER, longest - done)
         heard(f"{span} more")
         trajectory = go_on(trajectory, span, heard)
+
+
+def _is_point(orbit: Orbit) -> bool:
+    """Tell whether an orbit has no size: a motion that turns about the place where its surfaces meet."""
+    states = np.concatenate([orbit.begins[:, 1:], orbit.ends[:, 1:]])
+    return bool(np.max(np.ptp(states, axis=0)) < _NO_SIZE * (1.0 + np.max(np.abs(states))))
+
+
+def _comes_to_rest(trajectory: Trajectory) -> str:
+    state = trajectory.states[-1]
+    where = ", ".join(f"{s} = {v:.4g}" for s, v in zip(trajectory.model.states, state, strict=True))
+    return (
+        f"no periodic orbit: the motion comes to rest near {where}, where surfaces meet: it crosses them in "
+        "smaller and smaller turns. Choose other parameters or another start"
+    )
 
 
 def _wanted(orbit: Orbit, periods: int | None) -> Orbit:

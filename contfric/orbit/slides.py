@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contfric.models.definition import FloatArray
+from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 
 #: Parts of a cycle that agree to this (nondimensional) are the same motion: the root of rounding.
@@ -95,23 +95,28 @@ class Outline:
         Time and state at the start of each slide; times are those of the excitation, zero without one.
     images : ndarray, shape (k, 1 + n)
         The same for the symmetry image; ``starts`` if the model has no symmetry.
+    angles : columns of angles, the same a turn later
     """
 
     periods: int
     cycle: float
     starts: FloatArray
     images: FloatArray
+    angles: tuple[int, ...] = ()
 
     def apart(self, other: Outline) -> float:
         """Return how far two motions are apart, up to symmetry; infinite if they are of another kind."""
         if self.periods != other.periods or len(self.starts) != len(other.starts):
             return np.inf
-        return min(_apart(self.starts, there, self.cycle) for there in (other.starts, other.images))
+        return min(
+            _apart(self.starts, there, self.cycle, self.angles)
+            for there in (other.starts, other.images)
+        )
 
     @property
     def apart_from_image(self) -> float:
         """How far the motion is from its symmetry image."""
-        return _apart(self.starts, self.images, self.cycle)
+        return _apart(self.starts, self.images, self.cycle, self.angles)
 
 
 def outline_of(orbit: Orbit) -> Outline:
@@ -130,7 +135,7 @@ def outline_of(orbit: Orbit) -> Outline:
         images[:, 1:] = starts[:, 1:] @ model.symmetry.array().T
         if not model.autonomous:
             images[:, 0] += model.symmetry.fraction * cycle
-    return Outline(whole.periods // turns, cycle, starts, images)
+    return Outline(whole.periods // turns, cycle, starts, images, _columns(model))
 
 
 def _at_one_phase(whole: Orbit) -> Outline:
@@ -158,7 +163,7 @@ def _at_one_phase(whole: Orbit) -> Outline:
         images = np.column_stack([np.zeros(periods), others @ mirror.T])
         turned = np.column_stack([(impacts[:, 0] + back) % cycle, impacts[:, 1:] @ mirror.T])
         images = np.vstack([images, turned])
-    return Outline(periods, cycle, starts, images)
+    return Outline(periods, cycle, starts, images, _columns(model))
 
 
 def _impacts(whole: Orbit) -> FloatArray:
@@ -169,10 +174,21 @@ def _impacts(whole: Orbit) -> FloatArray:
     return np.array(whole.ends[jumps & np.array(struck)])
 
 
-def _apart(one: FloatArray, other: FloatArray, cycle: float) -> float:
-    """Return the Hausdorff distance of two sets of joints, times modulo a cycle."""
+def _columns(model: Model) -> tuple[int, ...]:
+    return tuple(1 + i for i in model.angles)
+
+
+def modulo(gaps: FloatArray, cycle: float) -> FloatArray:
+    """Return distances on a circle of circumference ``cycle``."""
+    return np.asarray(np.abs((gaps + 0.5 * cycle) % cycle - 0.5 * cycle))
+
+
+def _apart(one: FloatArray, other: FloatArray, cycle: float, angles: tuple[int, ...] = ()) -> float:
+    """Return the Hausdorff distance of two sets of joints, times modulo a cycle, angles modulo a turn."""
     gaps = np.abs(one[:, None, :] - other[None, :, :])
     if np.isfinite(cycle):
-        gaps[:, :, 0] = np.abs((gaps[:, :, 0] + 0.5 * cycle) % cycle - 0.5 * cycle)
+        gaps[:, :, 0] = modulo(gaps[:, :, 0], cycle)
+    for k in angles:
+        gaps[:, :, k] = modulo(gaps[:, :, k], 2.0 * np.pi)
     distance = np.max(gaps, axis=2)
     return float(max(distance.min(axis=0).max(), distance.min(axis=1).max()))

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from contfric.errors import ParameterError, did_you_mean, shown
 from contfric.models.definition import Domain, FloatArray, Model, Surface
+from contfric.models.parts import Chatter
 from contfric.orbit.structure import cut_bounds
 
 #: Displacements that a start is looked for at, in half-widths of the model: where the first is in no
@@ -42,14 +43,22 @@ def start_of(
         raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
     mode = model.domain_by_name[name].own_mode
     rest = model.chatter_by_mode.get(mode) if domain is None else None
-    if rest and model.view(vector).height(rest.lift, t, y) * model.settled_sides[rest.lift] < 0.0:
-        side = model.domains_of(rest.flight)[0].signs[
-            rest.surface
-        ]  # the wall does not press: it is left
-        flight = model.domain_at({**signs, rest.surface: side}, rest.flight)
-        mode = model.domain_by_name[flight].own_mode if flight else mode
+    if rest is not None:
+        mode = _let_go(model, rest, t, y, vector, signs) or mode
     on = sum(1 << model.surface_index[k] for k in cut_bounds(model)[mode] if signs[k] == 0)
     return model.mode_index[mode], on
+
+
+def _let_go(
+    model: Model, rest: Chatter, t: float, y: FloatArray, vector: FloatArray, signs: dict[str, int]
+) -> str:
+    """Return the mode of a state on a wall that does not press it; nothing if it does."""
+    for lift, flight in rest.ways:
+        if model.view(vector).height(lift, t, y) * model.settled_sides[lift] < 0.0:
+            side = model.domains_of(flight)[0].signs[rest.surface]
+            domain = model.domain_at({**signs, rest.surface: side}, flight)
+            return model.domain_by_name[domain].own_mode if domain else ""
+    return ""
 
 
 def _side_of_rates(

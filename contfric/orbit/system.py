@@ -292,7 +292,8 @@ def _margins(
     interior: list[tuple[int, ...]] = []
     joint: list[tuple[int, ...]] = []
     for i, (mode, exit_) in enumerate(word):
-        if own := model.chatter_by_mode.get(mode):  # its flights stay on their side of the wall
+        own = model.chatter_by_mode.get(mode)
+        if own is not None and not own.other:  # its flights stay on their side of the wall
             side = inside_sign(model, own.flight, own.surface)
             interior.append((i, model.surface_index[own.surface], side))
         for surface in names if full else mode_bounds(model)[mode]:
@@ -306,7 +307,7 @@ def _margins(
         for surface in names:
             sign = ending[i].get(surface, 0)
             pinned = any(h.segment == i + 1 and h.pin == surface for h in holds)
-            if surface == exit_ or pinned or sign == 0 or surface in model.wraps:
+            if surface == exit_ or pinned or sign == 0:
                 continue
             joint.append((i, model.surface_index[surface], sign, 0))
     tests = (

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from functools import cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -38,7 +39,8 @@ class Tables(NamedTuple):
     kept : surfaces that the state stays on where a surface is met, as bits: a reset takes it off others
     chatters : mode that infinitely many impacts lead to, by (mode behind an impact, surface); -1 if none,
         shape (modes, surfaces)
-    flights : mode that a mode of chatter is left for, -1 of others
+    flights : mode that a mode of chatter is left for, -1 of others; behind these, where impacts pass their
+        surface, that which it is left for below it
     landed : surfaces that the state is on where motion goes on, as bits: the one met, but for a reset
     walls : surfaces at which a reset sends motion back, as bits
     """
@@ -115,17 +117,18 @@ def chatter_table(model: Model, modes: int) -> IntArray:
     found = np.full((modes, len(model.surfaces)), -1, dtype=np.int64)
     for own in model.chatters:
         for k, mode in enumerate(model.modes[:modes]):
-            if model.whole_mode(mode.name) == own.flight:
+            if any(model.whole_mode(mode.name) == flight for _, flight in own.ways):
                 found[k, model.surface_index[own.surface]] = model.mode_index[own.mode]
     return found
 
 
 def flight_table(model: Model, modes: int) -> IntArray:
-    """Return the mode that each mode of chatter is left for, -1 of others."""
-    found = np.full(modes, -1, dtype=np.int64)
+    """Return the mode that each mode of chatter is left for, -1 of others; then those below a surface."""
+    found = np.full((2, modes), -1, dtype=np.int64)
     for own in model.chatters:
-        found[model.mode_index[own.mode]] = model.mode_index[own.flight]
-    return found
+        for row, (_, flight) in zip(found, own.ways, strict=False):
+            row[model.mode_index[own.mode]] = model.mode_index[flight]
+    return found.ravel()
 
 
 def _rules(model: Model) -> tuple[IntArray, IntArray]:
@@ -146,14 +149,16 @@ def _rules(model: Model) -> tuple[IntArray, IntArray]:
             for after in targets:  # behind a reset the signs of the mapped state tell the domain
                 if model.domain_by_name[after].own_mode in model.chatter_by_mode:
                     continue  # found by following the impacts
-                signs = model.domain_by_name[after].signs
-                add(name, surface, signs, _landed(model, surface), after)
+                signs, before = model.domain_by_name[after].signs, model.domain_by_name[name].signs
+                reset = model.reset_by_surface[surface]
+                slid = {s for s, v in before.items() if v == 0 and not model.changed_by(reset, s)}
+                add(name, surface, signs, {*_landed(model, surface), *slid}, after)
     for own in model.chatters:
-        for domain in model.domains_of(own.mode):
-            found.pop((model.mode_index[own.mode], model.surface_index[own.lift]), None)
-            for after in model.targets[domain.name, own.lift]:
+        for domain, (lift, _) in product(model.domains_of(own.mode), own.ways):
+            found.pop((model.mode_index[own.mode], model.surface_index[lift]), None)
+            for after in model.targets[domain.name, lift]:
                 signs = model.domain_by_name[after].signs
-                add(domain.name, own.lift, signs, {own.surface}, after)
+                add(domain.name, lift, signs, {own.surface}, after)
     first, rules = [0], []
     for mode in range(len(model.modes)):
         for k in range(len(model.surfaces)):

@@ -192,25 +192,40 @@ def shortest_flight(tables, mode):  # type: ignore[no-untyped-def]
 
 
 @helper
-def flight_of(functions, tables, mode, t, y, p, workspace):  # type: ignore[no-untyped-def]
+def flight_of(functions, tables, mode, wall, t, y, p, workspace):  # type: ignore[no-untyped-def]
     """Return the mode of a state between the impacts of a chatter: the part of the flight that it is in."""
     none, empty = workspace.none, workspace.empty
     code = sign_code(functions, tables.observables, 0, t, y, p, none, empty)
+    flight, below = tables.flights[mode], tables.flights[tables.flights.shape[0] // 2 + mode]
+    if below >= 0 and code >> wall & 1 == 0:
+        flight = below
     for k in range(tables.observables.shape[0]):
-        if (
-            tables.bounds[mode, k] == 1
-        ):  # left by it, a mode of chatter is followed by one of these parts
+        if tables.bounds[mode, k] == 1 and leads_to(tables, mode, k, flight):
+            # left by it, a mode of chatter is followed by one of these parts
             following = mode_after(tables, mode, k, code)
             if following >= 0 and tables.flights[following] < 0:
                 return following
-    return tables.flights[mode]
+    return flight
 
 
 @helper
-def code_ahead(functions, tables, mode, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
+def leads_to(tables, mode, surface, target):  # type: ignore[no-untyped-def]
+    """Tell whether a mode may be left for another one where it meets a surface."""
+    place = mode * tables.observables.shape[0] + surface
+    for k in range(tables.first[place], tables.first[place + 1]):
+        if tables.rules[k, 2] == target:
+            return True
+    return False
+
+
+@helper
+def code_ahead(functions, tables, mode, surface, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
     """Return the sides of all surfaces a little after a wall has let go: at once rounding decides."""
-    none, ahead = workspace.none, _AHEAD * unit
-    functions.flow(tables.flights[mode], t, y, ahead, p, none, workspace.trial, workspace.nothing)
+    none, ahead, flight = workspace.none, _AHEAD * unit, tables.flights[mode]
+    below = tables.flights[tables.flights.shape[0] // 2 + mode]
+    if below >= 0 and leads_to(tables, mode, surface, below):
+        flight = below
+    functions.flow(flight, t, y, ahead, p, none, workspace.trial, workspace.nothing)
     return sign_code(
         functions, tables.observables, 0, t + ahead, workspace.trial, p, none, workspace.empty
     )
@@ -278,7 +293,8 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
                 and bounced > 0
                 and in_flight(functions, tables, mode, bounced - 1, t, y, p, workspace)
             ):
-                mode, bounced = flight_of(functions, tables, mode, t, y, p, workspace), 0
+                wall, bounced = bounced - 1, 0
+                mode = flight_of(functions, tables, mode, wall, t, y, p, workspace)
             if left > stretch:
                 continue
             return ALL_TIME, event, mode, cycle, t
@@ -292,7 +308,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         on = tables.landed[surface]
         code = sign_code(functions, tables.observables, on, t, y, p, none, workspace.empty)
         if tables.flights[mode] >= 0:
-            code = code_ahead(functions, tables, mode, t, y, p, unit, workspace)
+            code = code_ahead(functions, tables, mode, surface, t, y, p, unit, workspace)
         target = mode_after(tables, mode, surface, code)
         at_once = at_once + 1 if tau <= at_most * unit else 0
         struck = reset or (struck and at_once > 0)

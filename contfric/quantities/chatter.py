@@ -34,29 +34,32 @@ def pieces(segment: Segment, own: Chatter) -> Iterator[Segment]:
     gap = model.surface_by_name[own.surface].observable
     level, longest = view.level(own.surface), _LONGEST * (view.period or 1.0)
     first, part = 0.0, segment
+    side = model.domains_of(own.flight)[0].signs[own.surface]
     while True:
-        speed = abs(view.rate(own.flight, gap, part.start, part.state))
+        speed = view.rate(own.flight, gap, part.start, part.state)
+        flight = own.flight if not own.other or speed * side > 0.0 else own.other
+        speed = abs(speed)
         first = max(first, speed)
         if speed <= _SLOWEST * first:
             break
-        hit = view.first(own.flight, gap, level, part.start, part.state, longest, on=True)
+        hit = view.first(flight, gap, level, part.start, part.state, longest, on=True)
         if hit is None:
             raise ContfricError(f"the impacts at '{own.surface}' do not come to rest")
-        flight, following = _flight(part, own, gap, hit[0])
-        yield flight
-        part = following
+        flown, part = _flight(part, flight, own.surface, hit[0])
+        yield flown
     yield _contact(part, segment)
 
 
-def _flight(part: Segment, own: Chatter, gap: str, lasts: float) -> tuple[Segment, Segment]:
+def _flight(part: Segment, mode: str, wall: str, lasts: float) -> tuple[Segment, Segment]:
     """Return one flight, and what follows from behind the impact that ends it."""
     model, vector, n = part.model, part.vector, len(part.state)
-    k, end = model.surface_index[own.surface], part.start + lasts
+    k, end = model.surface_index[wall], part.start + lasts
+    gap = model.surface_by_name[wall].observable
     if not part.exact:
-        state = model.view(vector).state(own.flight, part.start, part.state, lasts)
-        behind = model.view(vector).reset(own.surface, end, state)
-        return replace(part, mode=own.flight, lasts=lasts), replace(part, start=end, state=behind)
-    before, moved, by_time = _moved(part, own.flight, lasts)
+        state = model.view(vector).state(mode, part.start, part.state, lasts)
+        behind = model.view(vector).reset(wall, end, state)
+        return replace(part, mode=mode, lasts=lasts), replace(part, start=end, state=behind)
+    before, moved, by_time = _moved(part, mode, lasts)
     every = np.arange(len(vector))
     grad, slope = np.empty(1 + n + len(every)), np.empty(len(every))
     model.flow.observe(model.observable_index[gap], end, before, vector, every, grad)
@@ -70,7 +73,7 @@ def _flight(part: Segment, own: Chatter, gap: str, lasts: float) -> tuple[Segmen
     behind, jac = np.empty(n), np.empty((n, 1 + n + len(every)))
     model.flow.reset(k, end, before, vector, every, behind, jac)
     d_behind = jac[:, : 1 + n] @ joint + jac[:, 1 + n :] @ part.d_vector
-    flight = replace(part, mode=own.flight, lasts=lasts, d_lasts=d_lasts)
+    flight = replace(part, mode=mode, lasts=lasts, d_lasts=d_lasts)
     following = replace(part, start=end, state=behind, d_start=joint[0], d_state=d_behind)
     return flight, following
 

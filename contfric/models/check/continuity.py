@@ -20,8 +20,8 @@ from contfric.models.check.report import ModelReport, Topic
 from contfric.models.check.structure import arrivals
 from contfric.models.definition import Domain, FloatArray, Reset
 
-#: States of each mode from which lines are followed, and samples of a line.
-_STATES, _SAMPLES = 2, 160
+#: States that are tried, those of each mode from which lines are followed, and samples of a line.
+_TRIED, _STATES, _SAMPLES = 100, 2, 160
 #: Intervals of a line that are looked into: those of the largest changes.
 _INTERVALS = 3
 #: Change (relative to the values) that is looked into, and what is left of it at a jump: steep functions of
@@ -37,7 +37,7 @@ Sides = frozenset[tuple[str, int]]
 
 def check_continuity(report: ModelReport, probe: Probe) -> None:
     """Check that no field and no observable jumps inside of a mode."""
-    pole = False
+    pole = _without_values(report, probe)
     for mode in probe.model.modes:
         for name, line, low, high in _lines(probe, mode.name):
             report.count(Topic.CONTINUITY)
@@ -67,11 +67,34 @@ def check_continuity(report: ModelReport, probe: Probe) -> None:
             return
 
 
+def _without_values(report: ModelReport, probe: Probe) -> bool:
+    """Say in which mode a formula has no value at some states (a root of a negative level), if in any."""
+    for mode in probe.model.modes:
+        tried = (probe.in_region(mode.name, t, y) for t, y in probe.states(_TRIED))
+        places = [place for place in tried if place is not None]
+        without = [place for place in places if not probe.is_defined(mode.name, *place)]
+        if not without:
+            continue
+        _, y = without[0]
+        where = ", ".join(f"{s} = {v:.6g}" for s, v in zip(probe.model.states, y, strict=True))
+        text = f"the formulas of mode '{mode.name}' have no value at {where}"
+        if len(without) == len(places):
+            report.error(Topic.CONTINUITY, f"{text}, nor at any other state that was tried")
+        else:
+            report.warn(
+                Topic.CONTINUITY,
+                f"{text} (one of {len(without)} such among {len(places)}): motion that comes there cannot be "
+                "followed. If none does, this is no fault",
+            )
+        return True
+    return False
+
+
 def _lines(probe: Probe, mode: str) -> Iterator[tuple[str, Line, float, float]]:
     """Yield (what changes, line, first place, last place) through a few states of a mode."""
     widths = 2.0 * np.abs(probe.model.spread(probe.model.mapping(probe.vector)))
     seen = 0
-    for t, y in probe.states(100):
+    for t, y in probe.states(_TRIED):
         place = probe.inside(mode, t, y)
         if place is None:
             continue

@@ -63,8 +63,16 @@ def check_derivatives(report: ModelReport, probe: Probe) -> None:
     points = cache(lambda mode: list(_points(near, mode)))  # looked for among many states
     _rates_along(report, near, points)
     for case in _described(near) if model.definition else _closed(near):
-        for point in points(case.mode):
+        has_value = [
             _compare(report, model, case, point, bool(model.definition))
+            for point in points(case.mode)
+        ]
+        if not all(has_value):
+            report.warn(
+                Topic.DERIVATIVES,
+                f"{case.what} has no real value at {has_value.count(False)} of {len(has_value)} states: "
+                "keep the formula defined in the whole region, or make 'spread' smaller",
+            )
 
 
 def _rates_along(report: ModelReport, probe: Probe, points: Points) -> None:
@@ -114,7 +122,8 @@ def _points(probe: Probe, mode: str | None) -> Iterator[FloatArray]:
 
 def _compare(
     report: ModelReport, model: Model, case: Case, point: FloatArray, described: bool
-) -> None:
+) -> bool:
+    """Compare at one point; return whether the formula has a value there."""
     names = ["t", *model.states, *model.parameter_names]
     values, jac = case.compiled(point)
     if described:
@@ -124,12 +133,7 @@ def _compare(
                 exact = np.array([float(v) for v in case.formula(place)])
                 slope = np.array(slopes(case.formula, place, case.step), dtype=np.float64)
             except (TypeError, ValueError, ArithmeticError):
-                report.warn(
-                    Topic.DERIVATIVES,
-                    f"{case.what} has no real value at {_shown(names, point)}: keep the formula "
-                    "defined in the whole region, or make 'spread' smaller",
-                )
-                return
+                return False
     else:
         exact = values
         slope = np.array(slopes(lambda p: list(case.compiled(np.array(p))[0]), list(point), 6e-6))
@@ -143,7 +147,7 @@ def _compare(
             f"{case.what}: compiled {values.tolist()}, the formula gives {exact.tolist()} at "
             f"{_shown(names, point)}",
         )
-        return
+        return True
     off = ~(np.abs(jac - slope) <= tolerance * scale)
     if off.any():
         row, column = (int(i) for i in np.argwhere(off)[0])
@@ -152,6 +156,7 @@ def _compare(
             f"{case.what}: its derivative by {names[column]} is compiled as {jac[row, column]:.12g}, "
             f"differences give {slope[row, column]:.12g} at {_shown(names, point)}",
         )
+    return True
 
 
 def _shown(names: list[str], point: FloatArray) -> str:

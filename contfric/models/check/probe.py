@@ -114,13 +114,26 @@ class Probe:
                 yield landed
 
     def inside(self, mode: str, t: float, y: FloatArray) -> tuple[float, FloatArray] | None:
-        """Return a state of a mode near a state: on the surfaces that it moves on; None if outside."""
+        """Return a state of a mode near a state: on the surfaces that it moves on; None if outside.
+
+        None as well where a formula has no value, such as a root of a negative level.
+        """
+        place = self.in_region(mode, t, y)
+        return place if place is not None and self.is_defined(mode, *place) else None
+
+    def in_region(self, mode: str, t: float, y: FloatArray) -> tuple[float, FloatArray] | None:
+        """Return a state of a mode near a state, whether its field has a value there or not."""
         on, _ = self._regions[mode]
         place = self.landed(on, t, y) if on else (t, y)
         if place is None:
             return None
         signs = {**self.signs(*place), **dict.fromkeys(on, 0)}
         return place if self.is_in(mode, signs) else None
+
+    def is_defined(self, mode: str, t: float, y: FloatArray) -> bool:
+        """Tell whether the field of a mode and all observables have values at a state."""
+        observed = [self.flow.observe(name, t, y) for name in self.model.observable_index]
+        return bool(np.all(np.isfinite(self.field(mode, t, y))) and np.all(np.isfinite(observed)))
 
     def landed(
         self, surfaces: tuple[str, ...], t: float, y: FloatArray

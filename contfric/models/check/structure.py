@@ -53,6 +53,21 @@ def check_transitions(report: ModelReport, probe: Probe) -> None:
             _check_crossings(report, probe, surface)
 
 
+def entered_domains(model: Model) -> set[str]:
+    """Return the domains that motion comes to from others, again and again: all that cycles may visit."""
+    found = {domain.name for domain in model.domains}
+    while True:
+        entered = {
+            target
+            for (source, _), targets in model.targets.items()
+            for target in targets
+            if source in found and source != target
+        }
+        if not found - entered:
+            return found
+        found &= entered
+
+
 def _behind_wall(probe: Probe, signs: dict[str, int]) -> bool:
     """Return whether a region lies on the side of a wall that motion never comes to."""
     for reset in probe.model.reset_by_surface:
@@ -69,7 +84,7 @@ def _crossed_limits(signs: dict[str, int]) -> str:
 
 
 def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> None:
-    model = probe.model
+    model, entered = probe.model, entered_domains(probe.model)
     for t, y in probe.on(surface.name, _ON_SURFACE):
         signs = {**probe.signs(t, y), surface.name: 0}
         if list(signs.values()).count(0) != 1 or _behind_wall(probe, {**signs}):
@@ -90,6 +105,13 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
                     "negative. Where motion comes there (a normal force vanishes) the model does not hold",
                 )
                 continue
+            if following is None and name not in entered:
+                report.note(
+                    Topic.TRANSITIONS,
+                    f"motion that starts in '{name}' meets '{surface.name}' and no domain follows: "
+                    f"{_sides(signs)}. Nothing else leads there",
+                )
+                return
             if following is None:
                 report.error(
                     Topic.TRANSITIONS,
