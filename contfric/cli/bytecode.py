@@ -18,7 +18,7 @@ from contfric.base.sources import package_files
 #: What runs and their figures begin with, each loading what it needs.
 _LOADED = (
     "contfric.study.run",
-    "contfric.study.paint",
+    "contfric.study.drawings",
     "contfric.plot.diagram",
     "contfric.plot.orbit",
 )
