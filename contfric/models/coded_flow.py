@@ -12,6 +12,7 @@ from contfric.models.coded import Forms, Tables, forms_of
 from contfric.models.columns import Column
 from contfric.models.description import ModeText
 from contfric.models.not_affine import NotAffineError
+from contfric.models.parts import Surface
 
 if TYPE_CHECKING:
     from contfric.flow.integrated import Functions
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
 class CodedFlow:
     """The compiled functions of affine forms.
 
-    Observables and resets are the first groups of the tables, the modes follow: one that is added is the
-    last, and what is there stays where it is.
+    Observables and resets are the first groups of the tables, the modes follow: a mode or a surface that is
+    added is the last, and what is there stays where it is.
     """
 
     def __init__(self, forms: Forms) -> None:
@@ -41,40 +42,65 @@ class CodedFlow:
         data["scale_at"] = Column([tables.value(scale) for scale in forms.scales])
         data["seen_at"] = Column([order[s.observable] for s in forms.surfaces])
         data["surface_at"], data["surfaces"] = Column([0]), Column()
-        data["returns"] = Column(whole=False)
+        data["returns"], data["group_of"] = Column(whole=False), Column()
         self._period = tables.value(forms.period)
-        self._first = len(data["places"]) - 1
-        self._most = tables.most(range(self._first))
-        self._of_modes = {name: Column() for name in ("closed", "slides", "idle", "sides")}
-        self._none = Column()
+        self._most = tables.most(range(len(data["places"]) - 1))
+        self._slides: list[bool] = []
+        self._idle: list[set[int]] = []
         for mode in range(len(forms.fields)):
             self._write(mode)
 
     def _write(self, m: int) -> None:
         """Write the rates in a mode, the surfaces that it slides on, and the way back to these."""
-        self._tables.group(self._forms.fields[m])
         sides, data = self._forms.modes[m].sides, self._tables.data
+        data["group_of"].append(self._tables.group(self._forms.fields[m]))
         held = [k for k, s in enumerate(self._forms.surfaces) if sides.get(s.name) == 0]
         data["surfaces"] += held
         data["returns"] += _returns(self._forms, held)
         data["surface_at"].append(len(data["surfaces"]))
-        self._most = max(self._most, self._tables.most([self._first + m]))
-        idle, count = {c for _, c in self._forms.idle(m)}, len(self._forms.observables)
-        self._of_modes["closed"].append(1)
-        self._of_modes["slides"].append(int(bool(held)))
-        self._of_modes["idle"] += [int(c in idle) for c in range(count)]
-        self._of_modes["sides"] += [0] * count
-        self._none += [0] * count
+        self._most = max(self._most, self._tables.most([data["group_of"][m]]))
+        self._slides.append(bool(held))
+        self._idle.append({c for _, c in self._forms.idle(m)})
 
     def add(self, mode: ModeText) -> None:
         """Add a mode. The functions and their addresses stay the same."""
         self._forms.add(mode)
         self._write(len(self._forms.fields) - 1)
+        self._renew()
+
+    def see(self, surface: Surface, formula: str) -> None:
+        """Add a surface, and its observable where that is new."""
+        forms, data, tables = self._forms, self._tables.data, self._tables
+        if forms.see(surface, formula):
+            c, group = len(forms.observables) - 1, tables.group([forms.observables[-1]])
+            data["observable_of"].append(group)
+            self._most = max(self._most, tables.most([group]))
+            for m, idle in enumerate(self._idle):
+                idle |= {c} if forms.is_idle(m, c) else set()
+        data["seen_at"].append([o.name for o in forms.seen].index(surface.observable))
+        data["level_at"].append(tables.value(forms.levels[-1]))
+        data["reset_at"].append(0)
+        self._renew()
+
+    def _renew(self) -> None:
+        """Hand grown tables over to the compiled functions."""
         if "_functions" in self.__dict__:
             self._block.renew(self._values())
-            own = {name: column.array for name, column in self._of_modes.items()}
-            none = dict.fromkeys(own, self._none.array)
-            self._functions.grow({**own, "entries_count": self._most}, none)
+            modes, count = len(self._idle), len(self._forms.observables)
+            idle = [int(c in own) for own in self._idle for c in range(count)]
+            no_modes, no_pairs, none = [0] * modes, [0] * len(idle), [0] * count
+            still = {"closed": no_modes, "slides": no_modes, "idle": no_pairs, "sides": no_pairs}
+            still |= {"seen": none, "timed": none, "observables": count}
+            moving = {
+                **still,
+                "closed": [1] * modes,
+                "slides": self._slides,
+                "idle": idle,
+                "seen": [1] * count,
+                "timed": [int(c in self._timed) for c in range(count)],
+                "entries_count": self._most,
+            }
+            self._functions.grow(moving, still)
 
     def _values(self) -> dict[str, Any]:
         tables, data = self._tables, self._tables.data
@@ -88,7 +114,6 @@ class CodedFlow:
             "parameters": len(tables.names),
             "coefficients": self._most,
             "period_at": self._period,
-            "first_mode": self._first,
         }
 
     @cached_property
@@ -112,7 +137,6 @@ class CodedFlow:
 
         forms, bound = self._forms, self._bound
         count, modes = len(forms.observables), len(forms.fields)
-        states_in = [{key[0] for key in o.parts} for o in forms.observables]
         return Functions(
             field=bound["field"],
             observe=bound["observe"],
@@ -122,9 +146,9 @@ class CodedFlow:
             onto=bound["onto"],
             modes=modes,
             observables=count,
-            slides=[m for m in range(modes) if self._of_modes["slides"][m]],
-            idle={pair for m in range(modes) for pair in forms.idle(m)},
-            timed=[c for c, kinds in enumerate(states_in) if "y" not in kinds],
+            slides=[m for m in range(modes) if self._slides[m]],
+            idle={(m, c) for m in range(modes) for c in self._idle[m]},
+            timed=self._timed,
             affine=AffineModes(
                 {name: bound[name] for name in HELPERS},
                 entries=self._most,
@@ -133,6 +157,12 @@ class CodedFlow:
                 seen=range(count),
             ),
         )
+
+    @cached_property
+    def _timed(self) -> list[int]:
+        """The observables of time alone, of those that were there first: others are not told apart."""
+        states_in = [{key[0] for key in o.parts} for o in self._forms.observables]
+        return [c for c, kinds in enumerate(states_in) if "y" not in kinds]
 
     @property
     def field(self) -> Bound:
@@ -156,7 +186,7 @@ def _returns(forms: Forms, held: Sequence[int]) -> list[float]:
     if not held:
         return []
     gradients = np.zeros((len(held), len(forms.description.states)))
-    names = [o.name for o in forms.description.observables]
+    names = [o.name for o in forms.seen]
     for row, k in enumerate(held):
         for key, slope in forms.observables[
             names.index(forms.surfaces[k].observable)
