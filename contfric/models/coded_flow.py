@@ -76,7 +76,7 @@ class CodedFlow:
             data["observable_of"].append(group)
             self._most = max(self._most, tables.most([group]))
             for m, idle in enumerate(self._idle):
-                idle |= {c} if forms.is_idle(m, c) else set()
+                idle.update([c] if forms.is_idle(m, c) else [])
         data["seen_at"].append([o.name for o in forms.seen].index(surface.observable))
         data["level_at"].append(tables.value(forms.levels[-1]))
         data["reset_at"].append(0)
@@ -89,7 +89,12 @@ class CodedFlow:
             modes, count = len(self._idle), len(self._forms.observables)
             idle = [int(c in own) for own in self._idle for c in range(count)]
             no_modes, no_pairs, none = [0] * modes, [0] * len(idle), [0] * count
-            still = {"closed": no_modes, "slides": no_modes, "idle": no_pairs, "sides": no_pairs}
+            still: dict[str, Any] = {
+                "closed": no_modes,
+                "slides": no_modes,
+                "idle": no_pairs,
+                "sides": no_pairs,
+            }
             still |= {"seen": none, "timed": none, "observables": count}
             moving = {
                 **still,

@@ -52,7 +52,8 @@ class Rest:
 
     def forces(self, letters: str) -> FloatArray:
         """Return the forces if the contacts have some states."""
-        found = np.where([a == "p" for a in letters], self.pulls[0], self.pulls[1])
+        up, down = self.pulls
+        found: FloatArray = np.where([a == "p" for a in letters], up, down)
         stuck = np.array([a == "s" for a in letters])
         if stuck.any():
             apart = self.free + self.mobility[:, ~stuck] @ found[~stuck]

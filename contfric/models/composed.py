@@ -107,7 +107,7 @@ class ComposedModel(Model):
             images = cast("dict[str, str]", self.symmetry.surfaces)
             image = self.composition.image_of(limit, images).name
             images[name], images[image] = image, name
-            self.surface_index[image]  # noqa: B018  (it is made)
+            self.surface_index[image]
         return place
 
     def mode_order(self, name: str) -> int:
@@ -141,7 +141,7 @@ class ComposedModel(Model):
         def has(key: object) -> bool:
             if not self._leads(key):
                 return False
-            name, surface = key  # type: ignore[misc]
+            name, surface = cast("Exit", key)
             alone = len(self.composition.ways(name)[surface]) == 1
             return alone or self.composition.limit(surface) is not None  # others may let go with it
 
@@ -169,7 +169,7 @@ class ComposedModel(Model):
         way = self.composition.way(mode, surface, after)
         found = own | (dict(way.where) if way else {})
         for name in found:  # made, if it was not yet
-            self.surface_index[name]  # noqa: B018
+            self.surface_index[name]
         return found
 
     def follows(self, mode: str, surface: str, after: str) -> bool:

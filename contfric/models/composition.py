@@ -19,7 +19,6 @@ first visit; words and signatures have the names.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -33,7 +32,7 @@ from contfric.models.description import ModeText
 from contfric.models.entries import SIDES, Part
 from contfric.models.made import Made
 from contfric.models.parts import Domain, Mode, Surface
-from contfric.models.shared_loads import Limit, Setting, load_name
+from contfric.models.shared_loads import Limit, Setting, load_name, suffix
 from contfric.models.shared_ways import Place, SharedWays
 from contfric.models.structure import Structure
 
@@ -150,18 +149,21 @@ class Composition:
         return tuple(map(self._laws_of, self.structure.contacts))
 
     def _laws_of(self, contact: Contact) -> ContactLaws:
-        springs = [s.name for s in self.structure.springs.get(contact.name, ())]
-        texts: dict[str, str] = {}
-        for letters in itertools.product(contact.states, *["oc"] * len(springs)):
-            states = dict(zip((contact.name, *springs), letters, strict=True))
-            force, power = law_of(self.structure, contact, states)
-            key = "".join(letters)
-            texts |= {f"force {key}": force, f"power {key}": power}
+        known: dict[str, Mapping[str, str]] = {}  # states of contacts by what a law depends on
 
         def key_of(name: str) -> str:
             states = self.states_in(name)
-            return "".join(states[own] for own in (contact.name, *springs))
+            key = states[contact.name]
+            if contact.kind is ContactKind.FRICTION and key == "s":
+                key += suffix(self.structure.loads.setting(contact, states))
+            known.setdefault(key, states)
+            return key
 
+        def text_of(asked: str) -> str:
+            what, key = asked.split(" ")
+            return law_of(self.structure, contact, known[key])[what == "power"]
+
+        texts = Made(text_of, lambda asked: asked.partition(" ")[2] in known)
         return ContactLaws(contact.name, Made(key_of, self.is_mode), texts)
 
     def check(self) -> None:
@@ -207,7 +209,10 @@ class Composition:
         upper, lower = limit.name, limit.other.name
         if self.shares(contact):
             found = [
-                (after, Way("".join(after.values()), self.shared.conditions(contact, states, after)))
+                (
+                    after,
+                    Way("".join(after.values()), self.shared.conditions(contact, states, after)),
+                )
                 for after in self.shared.listed(contact, states)
             ]
             if state != "s":
@@ -224,7 +229,9 @@ class Composition:
         limit = self.limit(surface)
         of = limit.contact.name if limit else surface
         states = self.states_in(name)
-        return next((c for c in self.acting if c.name == of and self.shares(c) and of in states), None)
+        return next(
+            (c for c in self.acting if c.name == of and self.shares(c) and of in states), None
+        )
 
     def way(self, name: str, surface: str, after: str) -> Way | None:
         """Return the way from a mode through a surface into another one, listed or not; None if there is none."""

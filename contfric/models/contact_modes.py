@@ -401,4 +401,3 @@ def _with_meanings(given: Any) -> dict[str, str]:
 
 def _subsets(items: Sequence[_T]) -> list[tuple[_T, ...]]:
     return [s for k in range(len(items) + 1) for s in itertools.combinations(items, k)]
-

@@ -101,11 +101,12 @@ class SharedLoads:
         cluster = self.cluster(contact, states)
         near = {b.name for c in cluster for b in self.beside[c.name]} - {contact.name}
         near |= {
-            s.name for c in cluster for s in self._structure.springs[c.name] if states[s.name] == "c"
+            s.name
+            for c in cluster
+            for s in self._structure.springs[c.name]
+            if states[s.name] == "c"
         }
-        return tuple(
-            (c, states[c.name]) for c in self._structure.contacts if c.name in near
-        )
+        return tuple((c, states[c.name]) for c in self._structure.contacts if c.name in near)
 
     def limit(self, name: str) -> Limit | None:
         """Return the limit that a surface is, of contacts that act on each other; None if it is none."""

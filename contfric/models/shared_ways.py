@@ -32,6 +32,11 @@ if TYPE_CHECKING:
 
 #: Contacts that decide together of which all combinations are listed.
 _ALL = 3
+#: States in which contacts have a force that is given; that of Jenkins elements is a state of the model.
+_ACTS = dict.fromkeys(ContactKind, ()) | {
+    ContactKind.FRICTION: ("p", "n"),
+    ContactKind.SPRING: ("c",),
+}
 States = Mapping[str, str]
 #: Parameters, time and state.
 Place = tuple[Mapping[str, float], float, Sequence[float]]
@@ -43,7 +48,7 @@ class SharedWays:
     def __init__(self, structure: Structure, description: Description) -> None:
         self._structure, self._loads = structure, structure.loads
         self._names = description.names
-        self._functions: dict[str, Function] = {}
+        self._functions: dict[tuple[str, ...], Function | None] = {}
 
     def listed(self, contact: Contact, states: States) -> Iterator[dict[str, str]]:
         """Yield states that may follow where a contact changes its own, the simplest first."""
@@ -126,33 +131,43 @@ class SharedWays:
         states: States,
         place: Place,
     ) -> Rest:
-        structure, names = self._structure, {c.name for c in resting}
+        names = {c.name for c in resting}
         acting = [
-            (c, letter)
-            for c in structure.contacts
-            if (letter := states.get(c.name, "")) in ("c", "p", "n")
-            and c.name not in names
-            and c.kind is not ContactKind.JENKINS
+            (c.name, letter)
+            for c in self._structure.contacts
+            if (letter := states.get(c.name, "")) in _ACTS[c.kind] and c.name not in names
         ]
 
-        def value(text: str) -> float:
-            if text not in self._functions:
-                self._functions[text] = function_of(self._names, text)
-            return self._functions[text](*place)
+        def value(*key: str) -> float:
+            if key not in self._functions:
+                text = self._text(*key)
+                self._functions[key] = None if is_zero(text) else function_of(self._names, text)
+            function = self._functions[key]
+            return 0.0 if function is None else function(*place)
 
-        def free(c: Contact) -> float:
-            found = value(structure.free(c)) - value(drift(c))
-            for other, letter in acting:
-                by = structure.mobility(c, other)
-                found += 0.0 if is_zero(by) else value(times(by, other.pull(letter)))
-            return found
+        def free(name: str) -> float:
+            return value("free", name) + sum(value("push", name, *other) for other in acting)
 
+        own = [c.name for c in resting]
         return Rest(
-            np.array([[value(structure.mobility(a, b)) for b in resting] for a in resting]),
-            np.array([free(c) for c in resting]),
-            np.array([[value(c.pull(letter)) for c in resting] for letter in "pn"]),
-            np.array([value(c.texts.get("static", c.texts["kinetic"])) for c in resting]),
+            np.array([[value("mobility", a, b) for b in own] for a in own]),
+            np.array([free(name) for name in own]),
+            np.array([[value("pull", name, letter) for name in own] for letter in "pn"]),
+            np.array([value("static", name) for name in own]),
         )
+
+    def _text(self, what: str, name: str, other: str = "", letter: str = "") -> str:
+        """Return a number of the problem as an expression."""
+        structure, by_name = self._structure, {c.name: c for c in self._structure.contacts}
+        c = by_name[name]
+        if what == "free":
+            return f"{structure.free(c)} - ({drift(c)})"
+        if what == "pull":
+            return c.pull(other)
+        if what == "static":
+            return c.texts.get("static", c.texts["kinetic"])
+        by = structure.mobility(c, by_name[other])
+        return by if what == "mobility" or is_zero(by) else times(by, by_name[other].pull(letter))
 
 
 def jumps(contact: Contact) -> bool:

@@ -86,7 +86,9 @@ class GrowingTables:
         ]
         every = bits_of(model, (s.name for s in declared_surfaces(model)))
         return Tables(
-            np.array([model.observable_index[s.observable] for s in model.surfaces], dtype=np.int64),
+            np.array(
+                [model.observable_index[s.observable] for s in model.surfaces], dtype=np.int64
+            ),
             bounds,
             np.concatenate([[0], np.cumsum(counts)]),
             np.array(written, dtype=np.int64).reshape(-1, 3),

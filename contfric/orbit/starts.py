@@ -38,7 +38,9 @@ def start_of(
         raise ParameterError(
             f"unknown domain {shown(given)}{did_you_mean(given, model.domain_by_name)}"
         )
-    name = domain or model.domain_of(signs, t, y, vector) or _side_of_rates(model, t, y, vector, signs)
+    name = (
+        domain or model.domain_of(signs, t, y, vector) or _side_of_rates(model, t, y, vector, signs)
+    )
     if name is None:
         raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
     mode = model.domain_by_name[name].own_mode
@@ -109,7 +111,9 @@ def displaced(model: Model, vector: FloatArray) -> FloatArray:
 def _is_start(model: Model, y: FloatArray, vector: FloatArray) -> bool:
     """Tell whether a state at time 0 is in a domain, or leads into one."""
     signs = signs_at(model, 0.0, y, vector)
-    return bool(model.domain_of(signs, 0.0, y, vector) or _side_of_rates(model, 0.0, y, vector, signs))
+    return bool(
+        model.domain_of(signs, 0.0, y, vector) or _side_of_rates(model, 0.0, y, vector, signs)
+    )
 
 
 def checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> FloatArray:
