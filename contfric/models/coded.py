@@ -128,10 +128,6 @@ class Forms:
                 found = found + self.fields[mode][key[1]].scaled(slope)
         return found
 
-    def idle(self, mode: int) -> list[tuple[int, int]]:
-        """Return pairs (mode, observable) for which the observable never changes along a mode."""
-        return [(mode, c) for c in range(len(self.observables)) if self.is_idle(mode, c)]
-
     def is_idle(self, mode: int, c: int) -> bool:
         """Tell whether an observable never changes along a mode."""
         quiet = {key[0] for key in self.observables[c].parts} <= {"y", "1"}

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
     from contfric.handle import Block, Bound
 
+#: Modes and observables that there is room for at first; both are doubled where they are more.
+_ROOM = 64
+
 
 class CodedFlow:
     """The compiled functions of affine forms.
@@ -28,7 +31,7 @@ class CodedFlow:
     """
 
     def __init__(self, forms: Forms) -> None:
-        self._forms = forms
+        self._forms, self._declared = forms, len(forms.observables)
         description = forms.description
         self._tables = Tables([p.name for p in description.parameters], len(description.states))
         tables, data = self._tables, self._tables.data
@@ -46,7 +49,7 @@ class CodedFlow:
         self._period = tables.value(forms.period)
         self._most = tables.most(range(len(data["places"]) - 1))
         self._slides: list[bool] = []
-        self._idle: list[set[int]] = []
+        self._idle = np.zeros((_ROOM, _ROOM), dtype=np.int64)  # modes, observables
         for mode in range(len(forms.fields)):
             self._write(mode)
 
@@ -60,7 +63,17 @@ class CodedFlow:
         data["surface_at"].append(len(data["surfaces"]))
         self._most = max(self._most, self._tables.most([data["group_of"][m]]))
         self._slides.append(bool(held))
-        self._idle.append({c for _, c in self._forms.idle(m)})
+        bounds = {s.observable for s in self._forms.surfaces if s.name in sides}
+        for c, observable in enumerate(self._forms.seen):
+            self._note(m, c, asked=c < self._declared or observable.name in bounds)
+
+    def _note(self, m: int, c: int, asked: bool) -> None:
+        """Write whether an observable never changes along a mode; of those that bound no mode none asks."""
+        rows, columns = self._idle.shape
+        if m >= rows or c >= columns:
+            more = ((0, rows * (m >= rows)), (0, columns * (c >= columns)))
+            self._idle = np.pad(self._idle, more)
+        self._idle[m, c] = asked and self._forms.is_idle(m, c)
 
     def add(self, mode: ModeText) -> None:
         """Add a mode. The functions and their addresses stay the same."""
@@ -75,8 +88,8 @@ class CodedFlow:
             c, group = len(forms.observables) - 1, tables.group([forms.observables[-1]])
             data["observable_of"].append(group)
             self._most = max(self._most, tables.most([group]))
-            for m, idle in enumerate(self._idle):
-                idle.update([c] if forms.is_idle(m, c) else [])
+            for m, mode in enumerate(forms.modes):
+                self._note(m, c, asked=surface.name in mode.sides)
         data["seen_at"].append([o.name for o in forms.seen].index(surface.observable))
         data["level_at"].append(tables.value(forms.levels[-1]))
         data["reset_at"].append(0)
@@ -86,25 +99,16 @@ class CodedFlow:
         """Hand grown tables over to the compiled functions."""
         if "_functions" in self.__dict__:
             self._block.renew(self._values())
-            modes, count = len(self._idle), len(self._forms.observables)
-            idle = [int(c in own) for own in self._idle for c in range(count)]
-            no_modes, no_pairs, none = [0] * modes, [0] * len(idle), [0] * count
-            still: dict[str, Any] = {
-                "closed": no_modes,
-                "slides": no_modes,
-                "idle": no_pairs,
-                "sides": no_pairs,
-            }
-            still |= {"seen": none, "timed": none, "observables": count}
-            moving = {
-                **still,
-                "closed": [1] * modes,
-                "slides": self._slides,
-                "idle": idle,
-                "seen": [1] * count,
-                "timed": [int(c in self._timed) for c in range(count)],
-                "entries_count": self._most,
-            }
+            modes, stride = self._idle.shape
+            none, one = (np.full(max(modes, stride), k, dtype=np.int64) for k in (0, 1))
+            no_pairs = np.zeros(modes * stride, dtype=np.int64)
+            still: dict[str, Any] = {"closed": none, "slides": none, "seen": none, "timed": none}
+            still |= {"idle": no_pairs, "sides": no_pairs, "observables": stride}
+            timed, slides = none.copy(), none.copy()
+            timed[self._timed] = 1
+            slides[: len(self._slides)] = self._slides
+            moving = {**still, "closed": one, "seen": one, "timed": timed, "slides": slides}
+            moving |= {"idle": self._idle.ravel(), "entries_count": self._most}
             self._functions.grow(moving, still)
 
     def _values(self) -> dict[str, Any]:
@@ -152,7 +156,7 @@ class CodedFlow:
             modes=modes,
             observables=count,
             slides=[m for m in range(modes) if self._slides[m]],
-            idle={(m, c) for m in range(modes) for c in self._idle[m]},
+            idle={(m, c) for m in range(modes) for c in range(count) if self._idle[m, c]},
             timed=self._timed,
             affine=AffineModes(
                 {name: bound[name] for name in HELPERS},

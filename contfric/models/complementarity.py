@@ -3,18 +3,20 @@
 Contacts at rest have accelerations ``a = b + G lambda`` (G positive definite). Each
 
 * sticks (s): ``a_j = 0`` and ``|lambda_j| <= S0_j``, or
-* slides up (p): ``a_j >= 0`` with the force ``lambda_j = -S_j``, or down (n): ``a_j <= 0``, ``lambda_j = S_j``.
+* slides up (p): ``a_j >= 0`` with the force ``lambda_j = -S_j``, or
+* slides down (n): ``a_j <= 0`` with ``lambda_j = S_j``.
 
 For S0 = S the force is the minimum of ``lambda . G lambda / 2 + b . lambda`` over a box: there is exactly one
 solution [1]_. It is found by exchanging one contact a time, from all that stick: the one that violates its
 condition most, and the first of these (Murty's rule [2]_, which ends for such G) where that does not end.
 
-For S0 > S several solutions are possible, or none in which each contact that slides would have to break loose.
-*What sticks stays stuck* while forces within S0 exist, which is the first state that is looked at; then what
-is beyond S0 lets go, the worst first, and what slides against its acceleration sticks again.
+For S0 > S several solutions are possible. *What sticks stays stuck* while forces within S0 exist, which is
+the first state that is looked at; then what is beyond S0 lets go, the worst first, and what slides against
+its acceleration sticks again.
 
 .. [1] R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, SIAM (2009), section 3.1.
-.. [2] K. G. Murty, Note on a Bard-type scheme for solving the complementarity problem, Opsearch 11 (1974) 123.
+.. [2] K. G. Murty, Note on a Bard-type scheme for solving the complementarity problem, Opsearch 11 (1974)
+   123-130.
 """
 
 from __future__ import annotations

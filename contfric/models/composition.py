@@ -164,6 +164,10 @@ class Composition:
             return law_of(self.structure, contact, known[key])[what == "power"]
 
         texts = Made(text_of, lambda asked: asked.partition(" ")[2] in known)
+        for letter in contact.states:  # what slides dissipates: that is asked of all laws at once
+            if contact.kind is not ContactKind.FRICTION or letter != "s":
+                known[letter] = {contact.name: letter}
+                texts.get(f"power {letter}")
         return ContactLaws(contact.name, Made(key_of, self.is_mode), texts)
 
     def check(self) -> None:
@@ -234,7 +238,7 @@ class Composition:
         )
 
     def way(self, name: str, surface: str, after: str) -> Way | None:
-        """Return the way from a mode through a surface into another one, listed or not; None if there is none."""
+        """Return the way from a mode through a surface into another one, listed or not; else None."""
         ways = self.ways(name).get(surface, ())
         found = next((w for w in ways if w.mode == after), None)
         contact = self.changing(name, surface)

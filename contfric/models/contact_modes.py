@@ -239,7 +239,12 @@ class Combinations:
         states = {c.name: c.states[0] for c in self.contacts if c.states}
         name = "".join(states.values())
         self.states[name] = states
-        return {name: {"in": self.sides(states), "field": self.field(states)}}
+        return {name: {"in": self.sides(states), "field": self.field(states, self._listed_load)}}
+
+    def _listed_load(self, c: Contact, setting: Setting) -> str:
+        """Return the load of a contact: the observable that it is, if its limit is a number."""
+        named = self.structure.loads.couples(c) and self.is_fixed(c)
+        return load_name(c, setting) if named else self.structure.load(c, setting)
 
     def _modes(self) -> dict[str, Any]:
         found = {}

@@ -8,12 +8,12 @@ with forces ``lambda_B``, all velocities of A keep the value 0, so that
 
 and the load of a contact in A is ``-lambda``. It depends on those that stick and can be reached from the
 contact over others that stick (its *cluster*), on those that slide next to these, and on no others: what is
-beyond a sliding contact is felt through a force that is given. These, with the springs that act on the cluster
-and are closed, are the *setting* of a load. Each setting has a load, and surfaces, of its own.
+beyond a sliding contact is felt through a force that is given. These, with the springs that act on the
+cluster and are closed, are the *setting* of a load. Each setting has a load, and surfaces, of its own.
 
-In a mode in which a contact slides, its load is that which it would have if it stuck while all others do what
-they do. As ``1 / (G_AA^-1)_jj > 0`` the sign of the acceleration of a contact j with the slip force ``-s S`` is
-that of ``load - s S``: a contact at rest begins to slide where its load is beyond the limit.
+In a mode in which a contact slides, its load is that which it would have if it stuck while all others do
+what they do. As ``1 / (G_AA^-1)_jj > 0`` the sign of the acceleration of a contact j with the slip force
+``-s S`` is that of ``load - s S``: a contact at rest begins to slide where its load is beyond the limit.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class SharedLoads:
         return bool(self.beside.get(contact.name))
 
     def cluster(self, contact: Contact, states: Mapping[str, str]) -> list[Contact]:
-        """Return a contact and those that stick and are reached from it over others that do, far ones last."""
+        """Return a contact, and those that stick and are reached over others that do; far ones last."""
         found = [contact]
         for c in found:
             found += [b for b in self.beside[c.name] if states[b.name] == "s" and b not in found]

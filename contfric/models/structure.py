@@ -128,7 +128,8 @@ class Structure:
         if self._combinations > _MOST_MODES:
             raise EntryError(
                 ("contacts",),
-                f"these contacts have {self._combinations} combinations of states, and with {self._why_listed} each is "
+                f"these contacts have {self._combinations} combinations of states, and with "
+                f"{self._why_listed} each is "
                 f"listed as a mode: at most {_MOST_MODES} (five contacts of three states)",
             )
 

@@ -20,8 +20,8 @@ from contfric.orbit.tables import (
     surfaces_under,
 )
 
-#: In a rule, the number that stands for a mode which is solved for, from the state at the joint; numbers below
-#: are those of modes that were not visited yet.
+#: In a rule, the number that stands for a mode which is solved for, from the state at the joint; numbers
+#: below are those of modes that were not visited yet.
 SOLVED = -2
 
 
@@ -104,9 +104,11 @@ class GrowingTables:
     def _write(self, name: str) -> None:
         model, mode, found = self._model, self._model.mode_by_name[name], {}
         for surface, ways in model.composition.ways(name).items():
-            rules = [(sides_of(model, way.where, ()), way.mode) for way in ways]
-            solved = model.composition.is_solved(name, surface)
-            found[model.surface_index[surface]] = [((0, 0), "")] if solved else rules
+            if model.composition.is_solved(name, surface):
+                rules = [((0, 0), "")]
+            else:
+                rules = [(sides_of(model, way.where, ()), way.mode) for way in ways]
+            found[model.surface_index[surface]] = rules
         self._rules.append(found)
         self._sliding.append(int(mode.sliding) * (1 + int(moves_on(model, mode))))
         self._under.append(surfaces_under(model, name))
