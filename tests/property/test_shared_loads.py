@@ -220,3 +220,36 @@ def test_what_cannot_be_told_apart_is_refused() -> None:
     bent = {"kind": "friction", "velocity": "v2 - v1", "kinetic": "S*(1 + (v2 - v1)**2)"}
     with pytest.raises(ModelError, match="affine"):
         chain(others={"brace": bent})
+
+
+def test_with_springs_jenkins_elements_and_a_normal_force_of_time() -> None:
+    stiffness = np.array([[3.0, -1.0, 0.0], [-1.0, 3.0, -1.0], [0.0, -1.0, 2.0]])
+    grip = {"kind": "friction", "velocity": "v1", "kinetic": "S*(1 + 0.3*cos(Omega*t))"}
+    model = cf.Mechanism(
+        ["m", 1.0, 0.7],
+        0.04 * stiffness,
+        stiffness,
+        contacts={
+            "grip": grip,
+            "brace": {"kind": "friction", "velocity": "v2 - v1 - 0.1", "kinetic": "R"},
+            "pad": {"kind": "jenkins", "displacement": "q3", "stiffness": "kd", "limit": "L"},
+            "stop": {"kind": "spring", "gap": "0.5 - q2", "stiffness": "ks"},
+        },
+        force={"q1": "F*cos(Omega*t)", "q3": "F*sin(Omega*t)"},
+        parameters={
+            **{"m": 1.2, "Omega": 1.1, "F": 1.0, "S": 0.3},
+            **{"R": 0.2, "kd": 1.5, "L": 0.3, "ks": 8.0},
+        },
+        period="2*pi/Omega",
+        name="mixed",
+    )
+    diagram = cf.explore(cf.find_orbit(model), "Omega", (1.0, 1.2), max_periods=1)
+    assert not diagram.loose_ends and len(diagram.bifurcations) >= 8
+    orbit = cf.find_orbit(model)
+    times = np.linspace(0.0, orbit.period, 8001)
+    v = np.array([orbit.state(float(t))[3:6] for t in times])
+    push = v[:, 0] * np.cos(1.1 * times) + v[:, 2] * np.sin(1.1 * times)
+    given = np.trapezoid(push - np.sum(v * (v @ (0.04 * stiffness)), axis=1), times)
+    given += 0.1 * orbit.period * orbit.quantity("mean(force(brace))")  # the belt drives, too
+    lost = sum(orbit.quantity(f"work({c})") for c in ("grip", "brace", "pad", "stop"))
+    assert abs(lost - given) < 1e-6
