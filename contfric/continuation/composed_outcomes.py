@@ -22,8 +22,10 @@ limit begins a slide at ``-w``, with an acceleration that is zero at ``w``: its 
 
 from __future__ import annotations
 
+from contfric.continuation.shared_outcomes import in_other_order, limit_behind, with_other_state
 from contfric.continuation.zero_acceleration import touch_of
 from contfric.errors import NotationError
+from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test
@@ -63,6 +65,8 @@ def _two_at_once(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Spee
     model, word = orbit.model, orbit.word
     (mode, first), (_, second) = word[i], word[(i + 1) % len(word)]
     joints: Joints = {(i, 0): orbit.ends[i]}
+    if isinstance(model, ComposedModel) and model.composition.structure.coupled:
+        return _sharing(orbit, model, i, surface)
     if not any(through == surface for through, _ in model.exits_of(mode)):
         edit = swap_edit(word, {i: surface}, model)
         return edit, joints, {}, f"swap stick and reversal at stop {i + 1}, at {surface}"
@@ -75,6 +79,25 @@ def _two_at_once(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Spee
         )
     edit = Edit(frozenset({(i + 1) % len(word)}), {i: surface}, {i: ((ways[0], first),)})
     return edit, joints, {}, f"{surface} is met before {first} at the end of segment {i + 1}"
+
+
+def _sharing(
+    orbit: Orbit, model: ComposedModel, i: int, surface: str
+) -> tuple[Edit, Joints, Speeds, str]:
+    """Return the edit where two surfaces are met at once, of contacts that share loads or of others."""
+    word, joints = orbit.word, {(i, k): orbit.ends[i] for k in range(2)}
+    short = [not _lasts(orbit, (i + 1 + k) % len(word)) for k in range(min(2, len(word) - 2))]
+    limit = limit_behind(model, word, i, surface)
+    if limit is not None:
+        edit, reason = with_other_state(model, word, i, limit, vanishes=any(short[:1]))
+    else:
+        count = next((k for k, is_short in enumerate(short) if not is_short), len(short))
+        edit = in_other_order(model, word, i, surface, count)
+        reason = f"{surface} is met before {word[i][1]} at the end of segment {i + 1}"
+    if edit.inserted and not edit.dropped and not _lasts(orbit, i):
+        raise NotationError(f"segment {i + 1} has no length: nothing comes in behind it")
+    used = len(edit.inserted.get(i, ()))
+    return edit, {key: joint for key, joint in joints.items() if key[1] < used}, {}, reason
 
 
 def _touched(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, str]:

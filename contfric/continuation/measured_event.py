@@ -41,7 +41,14 @@ class MeasuredEvent(Shown):
             s.name for s in model.surfaces if s.observable in met
         }  # a tangency has one
         names = [law.name for law in laws_of(model)]
-        return tuple(name for name in names if surfaces & {name, f"{name}+", f"{name}-"})
+        ends = [
+            (name, (f"{name}+", f"{name}-")) for name in names
+        ]  # limits have more behind the sign
+        return tuple(
+            name
+            for name, own in ends
+            if name in surfaces or any(s.startswith(own) for s in surfaces)
+        )
 
     def gradient(self, parameter: str | None = None) -> Gradient:
         """Return the derivatives of the parameter at which the event happens by every other parameter.

@@ -29,6 +29,7 @@ from contfric.models.columns import Column
 from contfric.models.description import Description, ModeText
 from contfric.models.grammar import parse
 from contfric.models.not_affine import NotAffineError
+from contfric.models.parts import Observable, Surface
 from contfric.models.regions import engine_order, known_sides
 
 Form = list[Affine]
@@ -55,7 +56,7 @@ class Forms:
         self._scope = description.names.scope(AFFINE, self._symbols)
         self._read: dict[str, Affine] = {}
         states, surfaces = description.states, engine_order(description)
-        self.surfaces = surfaces
+        self.surfaces, self.seen = surfaces, list(description.observables)
         self.observables = [self.form(o.formula) for o in description.observables]
         self.levels = [self._constant(s.level) for s in surfaces]
         self.modes: list[ModeText] = []
@@ -75,6 +76,21 @@ class Forms:
         self.modes.append(mode)
         self.fields.append(self._field(mode))
 
+    def name(self, name: str, text: str) -> None:
+        """Give an expression a name, that others can use."""
+        self._scope.values[name] = self.form(text)
+
+    def see(self, surface: Surface, formula: str) -> bool:
+        """Read a surface that comes behind those that are known; tell whether its observable is new."""
+        names = [o.name for o in self.seen]
+        self.surfaces.append(surface)
+        self.levels.append(self._constant(surface.level))
+        if surface.observable in names:
+            return False
+        self.seen.append(Observable(surface.observable, formula))
+        self.observables.append(self.form(formula))
+        return True
+
     def form(self, text: str) -> Affine:
         """Return an expression as an affine form; the same text is read once."""
         if text not in self._read:
@@ -90,7 +106,7 @@ class Forms:
             return [checked(scope.evaluate(parse(rate))) for rate in mode.field]
 
     def _sides(self, mode: ModeText) -> dict[Affine, int]:
-        names = [o.name for o in self.description.observables]
+        names = [o.name for o in self.seen]
         known, found = known_sides(mode, self.surfaces), {}
         for surface, level in zip(self.surfaces, self.levels, strict=True):
             above = self.observables[names.index(surface.observable)] - constant(level)
@@ -112,12 +128,10 @@ class Forms:
                 found = found + self.fields[mode][key[1]].scaled(slope)
         return found
 
-    def idle(self, mode: int) -> list[tuple[int, int]]:
-        """Return pairs (mode, observable) for which the observable never changes along a mode."""
-        still = [{key[0] for key in o.parts} <= {"y", "1"} for o in self.observables]
-        return [
-            (mode, c) for c, quiet in enumerate(still) if quiet and not self.rate(mode, c).parts
-        ]
+    def is_idle(self, mode: int, c: int) -> bool:
+        """Tell whether an observable never changes along a mode."""
+        quiet = {key[0] for key in self.observables[c].parts} <= {"y", "1"}
+        return quiet and not self.rate(mode, c).parts
 
 
 @dataclass

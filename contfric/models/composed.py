@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from contfric.models.composition import Composition, composition_of
 from contfric.models.definition import Model
 from contfric.models.made import Made
-from contfric.models.parts import Domain, FloatArray, Mode
+from contfric.models.parts import Domain, FloatArray, Mode, Observable, Surface
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
@@ -71,6 +71,45 @@ class ComposedModel(Model):
             self._growing.add(name)
         return len(self.modes) - 1
 
+    @cached_property
+    def surface_by_name(self) -> dict[str, Surface]:
+        """Surfaces by their names; the limits of shared loads are made when they are asked for."""
+        found = Made(lambda name: self.surfaces[self.surface_index[name]], self._is_surface)
+        found.update({s.name: s for s in self.surfaces})
+        return found
+
+    @cached_property
+    def surface_index(self) -> dict[str, int]:
+        """Positions of the surfaces, by their names."""
+        found = Made(self._see, self._is_surface)
+        found.update({s.name: k for k, s in enumerate(self.surfaces)})
+        return found
+
+    def _is_surface(self, name: object) -> bool:
+        if name in self.composition.declared:
+            return True
+        return isinstance(name, str) and self.composition.limit(name) is not None
+
+    def _see(self, name: str) -> int:
+        """Make a surface; its image under the symmetry comes with it."""
+        surface, formula = self.composition.surface(name)
+        object.__setattr__(self, "surfaces", (*self.surfaces, surface))
+        if surface.observable not in self.observable_index:
+            seen = Observable(surface.observable, formula)
+            object.__setattr__(self, "observables", (*self.observables, seen))
+            self.observable_index[seen.name] = len(self.observables) - 1
+        if "_growing" in self.__dict__:
+            self._growing.see(name)
+        place = len(self.surfaces) - 1
+        self.surface_index[name], self.surface_by_name[name] = place, surface
+        limit = self.composition.limit(name)
+        if self.symmetry is not None and limit is not None:
+            images = cast("dict[str, str]", self.symmetry.surfaces)
+            image = self.composition.image_of(limit, images).name
+            images[name], images[image] = image, name
+            self.surface_index[image]
+        return place
+
     def mode_order(self, name: str) -> int:
         """Return the place of a mode in words that are compared: the same whatever was visited."""
         return self.composition.order(name)
@@ -100,7 +139,11 @@ class ComposedModel(Model):
         """What follows each (domain, surface) where that is one domain, whatever else holds there."""
 
         def has(key: object) -> bool:
-            return self._leads(key) and len(self.composition.ways(key[0])[key[1]]) == 1  # type: ignore[index]
+            if not self._leads(key):
+                return False
+            name, surface = cast("Exit", key)
+            alone = len(self.composition.ways(name)[surface]) == 1
+            return alone or self.composition.limit(surface) is not None  # others may let go with it
 
         return Made(lambda key: self.composition.ways(key[0])[key[1]][0].mode, has)
 
@@ -123,8 +166,15 @@ class ComposedModel(Model):
     def exit_sides(self, mode: str, surface: str, after: str) -> dict[str, int]:
         """Return the sides of other surfaces where a mode is left through one into the following mode."""
         own = {s: side for s, side in self.composition.sides(mode).items() if s != surface}
-        ways = self.composition.ways(mode).get(surface, ())
-        return own | next((dict(w.where) for w in ways if w.mode == after), {})
+        way = self.composition.way(mode, surface, after)
+        found = own | (dict(way.where) if way else {})
+        for name in found:  # made, if it was not yet
+            self.surface_index[name]
+        return found
+
+    def follows(self, mode: str, surface: str, after: str) -> bool:
+        """Return whether a mode can follow another one through a surface."""
+        return self.composition.way(mode, surface, after) is not None
 
     def rests_on(self, surface: str) -> bool:
         """Return whether some mode moves on a surface."""
@@ -133,11 +183,17 @@ class ComposedModel(Model):
     def bounds_of(self, mode: str) -> tuple[str, ...]:
         """Return the surfaces that bound a mode, in their order."""
         ways = self.composition.ways(mode)
-        return tuple(s.name for s in self.surfaces if s.name in ways)
+        return tuple(sorted(ways, key=self.surface_index.__getitem__))
 
     def domain_at(self, signs: Mapping[str, int], mode: str = "") -> str | None:
         """Return the domain that a state with these signs is in, or leaves to from rest."""
         return self.composition.mode_at(signs)
+
+    def domain_of(
+        self, signs: Mapping[str, int], t: float, y: FloatArray, vector: FloatArray
+    ) -> str | None:
+        """Return the domain that a state is in, or leaves to from rest."""
+        return self.composition.mode_at(signs, (self.mapping(vector), t, y.tolist()))
 
     @cached_property
     def mirror_domain(self) -> dict[str, str]:
@@ -153,7 +209,8 @@ class ComposedModel(Model):
     def _growing(self) -> GrowingFlow:
         from contfric.models.growing import GrowingFlow
 
-        return GrowingFlow(self.definition, [mode.name for mode in self.modes])
+        made = [s.name for s in self.surfaces[len(self.composition.declared) :]]
+        return GrowingFlow(self.definition, [mode.name for mode in self.modes], made)
 
     @cached_property
     def flow(self) -> CompiledFlow:

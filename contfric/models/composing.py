@@ -36,8 +36,9 @@ def composed_from(description: Description) -> ComposedModel:
     except (NotAffineError, ArithmeticError) as reason:
         raise EntryError(
             ("contacts",),
-            f"this many contacts need affine forces, and here is {reason}. Four friction contacts (five "
-            "contacts of three states) or fewer may have any law",
+            "contacts that share their loads, and more than can be listed, need affine forces, and "
+            f"here is {reason}. Four friction contacts (five contacts of three states) or fewer on masses "
+            "of their own may have any law",
         ) from None
     params, evaluator = defaults(description), floats(description)
     sampler = Sampler(evaluator, params)

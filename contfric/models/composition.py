@@ -19,7 +19,6 @@ first visit; words and signatures have the names.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -27,12 +26,14 @@ from typing import TYPE_CHECKING
 
 from contfric.models.coded import Forms
 from contfric.models.contact_laws import ContactLaws, law_of
-from contfric.models.contact_modes import Combinations, limit_of
+from contfric.models.contact_modes import Combinations
 from contfric.models.contacts import Contact, ContactKind
 from contfric.models.description import ModeText
 from contfric.models.entries import SIDES, Part
 from contfric.models.made import Made
-from contfric.models.parts import Domain, Mode
+from contfric.models.parts import Domain, Mode, Surface
+from contfric.models.shared_loads import Limit, Setting, load_name, suffix
+from contfric.models.shared_ways import Place, SharedWays
 from contfric.models.structure import Structure
 
 if TYPE_CHECKING:
@@ -64,6 +65,9 @@ class Composition:
         self._sides: dict[str, dict[str, int]] = {}
         self._places: dict[str, int] = {}
         self._ways: dict[str, dict[str, tuple[Way, ...]]] = {}
+        self._limits: dict[str, Limit | None] = {}
+        self.declared = frozenset(s.name for s in description.surfaces)
+        self.shared = SharedWays(structure, description)
 
     def is_mode(self, name: object) -> bool:
         """Tell whether a name is that of a mode."""
@@ -102,9 +106,42 @@ class Composition:
         return Domain(name, name, self.sides(name), name)
 
     def text(self, name: str) -> ModeText:
-        """Return the rates in a mode, and its sides."""
-        field = self._parts.field(self.states_in(name))
+        """Return the rates in a mode, and its sides; shared loads have names (:meth:`loads_in`)."""
+
+        def load(c: Contact, setting: Setting) -> str:
+            return load_name(c, setting) if self.shares(c) else self.structure.load(c, setting)
+
+        field = self._parts.field(self.states_in(name), load)
         return ModeText(name, tuple(field[state] for state in self.states), self.sides(name))
+
+    def loads_in(self, name: str) -> dict[str, str]:
+        """Return the shared loads of the contacts that stick in a mode, by their names."""
+        states, found = self.states_in(name), {}
+        for c in self.structure.loads.rubbing:
+            if states[c.name] == "s" and self.shares(c):
+                setting = self.structure.loads.setting(c, states)
+                found[load_name(c, setting)] = self.structure.load(c, setting)
+        return found
+
+    def shares(self, contact: Contact) -> bool:
+        """Tell whether a contact shares its load with others."""
+        return self.structure.loads.couples(contact)
+
+    def limit(self, surface: str) -> Limit | None:
+        """Return the limit of a shared load that a surface is; None if it is none."""
+        if surface not in self._limits:
+            self._limits[surface] = self.structure.loads.limit(surface)
+        return self._limits[surface]
+
+    def surface(self, name: str) -> tuple[Surface, str]:
+        """Return a surface that is the limit of a shared load, and the formula of its observable."""
+        limit = self.limit(name)
+        if limit is None:
+            raise KeyError(name)
+        fixed = self._parts.is_fixed(limit.contact)
+        texts = self._parts.load_texts(limit.contact, limit.setting, fixed)
+        observable, formula, level = texts[limit.sign]
+        return Surface(name, observable, level), formula
 
     @cached_property
     def laws(self) -> tuple[ContactLaws, ...]:
@@ -112,18 +149,25 @@ class Composition:
         return tuple(map(self._laws_of, self.structure.contacts))
 
     def _laws_of(self, contact: Contact) -> ContactLaws:
-        springs = [s.name for s in self.structure.springs.get(contact.name, ())]
-        texts: dict[str, str] = {}
-        for letters in itertools.product(contact.states, *["oc"] * len(springs)):
-            states = dict(zip((contact.name, *springs), letters, strict=True))
-            force, power = law_of(self.structure, contact, states)
-            key = "".join(letters)
-            texts |= {f"force {key}": force, f"power {key}": power}
+        known: dict[str, Mapping[str, str]] = {}  # states of contacts by what a law depends on
 
         def key_of(name: str) -> str:
             states = self.states_in(name)
-            return "".join(states[own] for own in (contact.name, *springs))
+            key = states[contact.name]
+            if contact.kind is ContactKind.FRICTION and key == "s":
+                key += suffix(self.structure.loads.setting(contact, states))
+            known.setdefault(key, states)
+            return key
 
+        def text_of(asked: str) -> str:
+            what, key = asked.split(" ")
+            return law_of(self.structure, contact, known[key])[what == "power"]
+
+        texts = Made(text_of, lambda asked: asked.partition(" ")[2] in known)
+        for letter in contact.states:  # what slides dissipates: that is asked of all laws at once
+            if contact.kind is not ContactKind.FRICTION or letter != "s":
+                known[letter] = {contact.name: letter}
+                texts.get(f"power {letter}")
         return ContactLaws(contact.name, Made(key_of, self.is_mode), texts)
 
     def check(self) -> None:
@@ -136,9 +180,10 @@ class Composition:
         """
         forms = Forms(self._description)
         for letter in range(max(len(c.states) for c in self.acting)):
-            forms.add(
-                self.text("".join(c.states[min(letter, len(c.states) - 1)] for c in self.acting))
-            )
+            name = "".join(c.states[min(letter, len(c.states) - 1)] for c in self.acting)
+            for load, text in self.loads_in(name).items():
+                forms.name(load, text)
+            forms.add(self.text(name))
 
     # --------------------------------------------------------------------------- what follows
 
@@ -164,12 +209,68 @@ class Composition:
             if state == "s":
                 return {f"{name}+": (way("p"),), f"{name}-": (way("n"),)}
             return self._stop(contact, states)
-        closed = self.structure.closed(contact, states)
-        upper, lower = (limit_of(contact, closed, sign) for sign in "+-")
+        limit = Limit(contact, "+", self.structure.loads.setting(contact, states))
+        upper, lower = limit.name, limit.other.name
+        if self.shares(contact):
+            found = [
+                (
+                    after,
+                    Way("".join(after.values()), self.shared.conditions(contact, states, after)),
+                )
+                for after in self.shared.listed(contact, states)
+            ]
+            if state != "s":
+                return {name: tuple(w for _, w in found)}
+            up, down = ([w for after, w in found if after[name] == a] for a in "pn")
+            return {upper: tuple(up), lower: tuple(down)}
         if state == "s":
             return {upper: (way("p"),), lower: (way("n"),)}
         beyond = way("n", {lower: -1}) if state == "p" else way("p", {upper: 1})
         return {name: (way("s", {upper: -1, lower: 1}), beyond)}
+
+    def changing(self, name: str, surface: str) -> Contact | None:
+        """Return the contact with a shared load that changes its state where a mode meets a surface."""
+        limit = self.limit(surface)
+        of = limit.contact.name if limit else surface
+        states = self.states_in(name)
+        return next(
+            (c for c in self.acting if c.name == of and self.shares(c) and of in states), None
+        )
+
+    def way(self, name: str, surface: str, after: str) -> Way | None:
+        """Return the way from a mode through a surface into another one, listed or not; else None."""
+        ways = self.ways(name).get(surface, ())
+        found = next((w for w in ways if w.mode == after), None)
+        contact = self.changing(name, surface)
+        if found is not None or contact is None or not ways or not self.is_mode(after):
+            return found
+        states, others = self.states_in(name), self.states_in(after)
+        own = {self.states_in(w.mode)[contact.name] for w in ways}
+        if others[contact.name] not in own or not self.shared.may_follow(contact, states, others):
+            return None
+        found = Way(after, self.shared.conditions(contact, states, others))
+        self._ways[name][surface] = (*ways, found)  # known from now on
+        return found
+
+    def is_solved(self, name: str, surface: str) -> bool:
+        """Tell whether what follows a mode at a surface is solved for, from the state there."""
+        ways = self.ways(name).get(surface, ())
+        return len(ways) > 1 and self.changing(name, surface) is not None
+
+    def after(self, name: str, surface: str, place: Place) -> str:
+        """Return the mode that follows where a mode meets a surface, by the forces there."""
+        contact, states = self.changing(name, surface), self.states_in(name)
+        assert contact is not None
+        given = {}
+        if states[contact.name] == "s":
+            limit = self.limit(surface)
+            assert limit is not None
+            given = {contact.name: "p" if limit.sign == "+" else "n"}
+        resting = self.structure.loads.cluster(contact, states)
+        found = self.shared.solved(resting, states, place, given)
+        mode = "".join({**states, **found}.values())
+        self.way(name, surface, mode)
+        return mode
 
     def _stop(self, contact: Contact, states: Mapping[str, str]) -> dict[str, tuple[Way, ...]]:
         """Return what follows where a sliding element stops: all that slide along its direction do."""
@@ -208,8 +309,13 @@ class Composition:
         texts = [c.texts for c in slides if c.kind is ContactKind.FRICTION]
         return bool(slides) and all(t.get("static", t["kinetic"]) == t["kinetic"] for t in texts)
 
-    def mode_at(self, signs: Mapping[str, int]) -> str:
-        """Return the mode of a state from the sides of all surfaces; on one, where it leaves to."""
+    def mode_at(self, signs: Mapping[str, int], place: Place | None = None) -> str:
+        """Return the mode of a state from the sides of all surfaces; on one, where it leaves to.
+
+        Parameters
+        ----------
+        place : parameters, time and state, for contacts at rest that share loads
+        """
         states: dict[str, str] = {}
         for c in self.acting:
             if c.kind is ContactKind.SPRING:
@@ -221,10 +327,16 @@ class Composition:
                 going = [a for a in "pn" if out[a] and signs[stop] == SIDES[ways[a]]]
                 states[c.name] = going[0] if going else "s"
             elif c.kind is ContactKind.FRICTION:
-                closed = self.structure.closed(c, states)
-                upper, lower = (signs[limit_of(c, closed, sign)] for sign in "+-")
-                pushed = 1 if upper > 0 else -1 if lower < 0 else 0
-                states[c.name] = {1: "p", -1: "n", 0: "s"}[signs[c.name] or pushed]
+                states[c.name] = {1: "p", -1: "n", 0: "s"}[signs[c.name]]
+        resting = [c for c in self.structure.loads.rubbing if signs[c.name] == 0]
+        sharing = [c for c in resting if self.shares(c)]
+        for c in resting:
+            if c not in sharing:
+                limit = Limit(c, "+", self.structure.loads.setting(c, states))
+                pushed = signs[limit.name] > 0, signs[limit.other.name] < 0
+                states[c.name] = "p" if pushed[0] else "n" if pushed[1] else "s"
+        if sharing and place is not None:
+            states |= self.shared.solved(sharing, states, place, {})
         return "".join(states[c.name] for c in self.acting)
 
     def image(self, name: str, images: Mapping[str, str]) -> str:
@@ -245,6 +357,14 @@ class Composition:
             else:
                 letters.append("o" if sides[c.name] > 0 else "c")
         return "".join(letters)
+
+    def image_of(self, limit: Limit, images: Mapping[str, str]) -> Limit:
+        """Return the image under a symmetry of the limit of a shared load."""
+        by_name = {c.name: c for c in self.acting}
+        turned = {"p": "n", "n": "p", "+": "-", "-": "+"}
+        states = {images[c.name]: turned.get(letter, letter) for c, letter in limit.setting}
+        setting = tuple((c, states[c.name]) for c in self.acting if c.name in states)
+        return Limit(by_name[images[limit.contact.name]], turned[limit.sign], setting)
 
 
 @lru_cache(maxsize=16)

@@ -92,7 +92,7 @@ def law_of(structure: Structure, contact: Contact, states: Mapping[str, str]) ->
     """Return force and dissipated power of a contact in a mode."""
     state = states.get(contact.name, "")
     if contact.kind is ContactKind.FRICTION and state == "s":
-        return f"-({structure.load(contact, structure.closed(contact, states))})", "0"
+        return f"-({structure.load(contact, structure.loads.setting(contact, states))})", "0"
     force = contact.pull(state)
     if state not in ("p", "n"):
         return force, "0"

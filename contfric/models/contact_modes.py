@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -24,6 +24,7 @@ from contfric.models.entries import EntryError, Part, mapping_in
 from contfric.models.grammar import Scope, names_in, number_of, parse
 from contfric.models.matrices import summed, times
 from contfric.models.not_affine import NotAffineError
+from contfric.models.shared_loads import Limit, Setting, load_name
 from contfric.models.structure import COORDINATES, Structure, defaults_of
 from contfric.models.units import read_units
 
@@ -177,20 +178,42 @@ class Combinations:
         return observables, surfaces
 
     def _limits(self, c: Contact, add: Any) -> None:
+        fixed = self.is_fixed(c)
+        for setting in self._settings(c):
+            texts = self.load_texts(c, setting, fixed)
+            for limit in (Limit(c, "+", setting), Limit(c, "-", setting)):
+                add(limit.name, *texts[limit.sign])
+
+    def _settings(self, c: Contact) -> list[Setting]:
+        """Return the settings of a load that are listed: of contacts that share it, that where all stick."""
+        if self.structure.loads.couples(c):
+            quiet = {other.name: other.states[0] for other in self.contacts if other.states}
+            return [self.structure.loads.setting(c, quiet)]
+        springs = self.structure.springs[c.name]
+        return [tuple((s, "c") for s in closed) for closed in _subsets(springs)]
+
+    def load_texts(
+        self, c: Contact, setting: Setting, fixed: bool
+    ) -> dict[str, tuple[str, str, str]]:
+        """Return (observable, its formula, level) of both limits of a load.
+
+        Parameters
+        ----------
+        fixed : whether the limit is a number, else the level is 0
+        """
+        static, load = c.texts.get("static", c.texts["kinetic"]), self.structure.load(c, setting)
+        name = load_name(c, setting)
+        if fixed:
+            return {sign: (name, load, f"{sign}({static})") for sign in "+-"}
+        return {
+            "+": (f"{name}_high", f"{load} - ({static})", "0"),
+            "-": (f"{name}_low", f"{load} + ({static})", "0"),
+        }
+
+    def is_fixed(self, c: Contact) -> bool:
+        """Tell whether the static limit of a contact depends on parameters only."""
         static = c.texts.get("static", c.texts["kinetic"])
-        fixed = names_in(parse(static)) <= {*defaults_of(self.top), "pi"}
-        for closed in _subsets(self.structure.springs[c.name]):
-            name, load = (
-                "_".join([f"u_{c.name}", *(s.name for s in closed)]),
-                self.structure.load(c, closed),
-            )
-            for sign, other in ("+", "-"), ("-", "+"):
-                surface = limit_of(c, closed, sign)
-                if fixed:
-                    add(surface, name, load, f"{sign}({static})")
-                else:  # a limit that moves
-                    side = "high" if sign == "+" else "low"
-                    add(surface, f"{name}_{side}", f"{load} {other} ({static})", "0")
+        return names_in(parse(static)) <= {*defaults_of(self.top), "pi"}
 
     def stop_of(self, c: Contact) -> tuple[str, Mapping[str, str]]:
         """Return the surface on which the velocity of an element vanishes, and its sides where it slides.
@@ -216,7 +239,12 @@ class Combinations:
         states = {c.name: c.states[0] for c in self.contacts if c.states}
         name = "".join(states.values())
         self.states[name] = states
-        return {name: {"in": self.sides(states), "field": self.field(states)}}
+        return {name: {"in": self.sides(states), "field": self.field(states, self._listed_load)}}
+
+    def _listed_load(self, c: Contact, setting: Setting) -> str:
+        """Return the load of a contact: the observable that it is, if its limit is a number."""
+        named = self.structure.loads.couples(c) and self.is_fixed(c)
+        return load_name(c, setting) if named else self.structure.load(c, setting)
 
     def _modes(self) -> dict[str, Any]:
         found = {}
@@ -266,22 +294,26 @@ class Combinations:
                     stop, ways = self.stop_of(c)
                     sides[stop] = ways[state]
             elif state == "s":
-                closed = self.structure.closed(c, states)
-                sides |= {c.name: "0", limit_of(c, closed, "+"): "-", limit_of(c, closed, "-"): "+"}
+                upper = Limit(c, "+", self.structure.loads.setting(c, states))
+                sides |= {c.name: "0", upper.name: "-", upper.other.name: "+"}
             else:
                 sides[c.name] = "+" if state == "p" else "-"
         return sides
 
-    def field(self, states: Mapping[str, str]) -> dict[str, str]:
-        """Return the rates of all states of the model while the contacts are in some states."""
+    def field(
+        self, states: Mapping[str, str], load: Callable[[Contact, Setting], str] | None = None
+    ) -> dict[str, str]:
+        """Return the rates of all states of the model while the contacts are in some states.
+
+        Parameters
+        ----------
+        load : what stands for the load of a contact, itself by default
+        """
         pulls: dict[int, list[str]] = {i: [f"f_{q}"] for i, q in enumerate(self.coordinates)}
         for c in self.contacts:
-            stuck = c.kind is ContactKind.FRICTION and states[c.name] == "s"
-            pull = (
-                f"-({self.structure.load(c, self.structure.closed(c, states))})"
-                if stuck
-                else c.pull(states.get(c.name, ""))
-            )
+            pull = c.pull(states.get(c.name, ""))
+            if c.kind is ContactKind.FRICTION and states[c.name] == "s":
+                pull = f"-({(load or self.structure.load)(c, self.structure.loads.setting(c, states))})"
             for i, w in c.direction.items():
                 pulls[i].append(times(repr(w), pull))
         moved = self.mass.of({i: summed(parts) for i, parts in pulls.items()})
@@ -319,7 +351,8 @@ class Combinations:
         for closed in _subsets(self.structure.springs[c.name]):
             gaps = {s.name: "-" if s in closed else "+" for s in self.structure.springs[c.name]}
             for sign in "+-":  # friction that has reached its limit slides
-                where = {c.name: "0", limit_of(c, closed, sign): sign, **gaps}
+                limit = Limit(c, sign, tuple((s, "c") for s in closed))
+                where = {c.name: "0", limit.name: sign, **gaps}
                 found.append({"where": where, "leaves": {c.name: sign}})
         return found
 
@@ -373,8 +406,3 @@ def _with_meanings(given: Any) -> dict[str, str]:
 
 def _subsets(items: Sequence[_T]) -> list[tuple[_T, ...]]:
     return [s for k in range(len(items) + 1) for s in itertools.combinations(items, k)]
-
-
-def limit_of(contact: Contact, closed: tuple[Contact, ...], sign: str) -> str:
-    """Return the name of a surface: a load's limit, with the springs that are closed."""
-    return "".join([contact.name, sign, *(s.name for s in closed)])

@@ -14,7 +14,7 @@ A contact acts along a direction W of the coordinates: the gradient of its veloc
 the mass matrix M, the forces f and the relative velocity ``w = W . v - w0(t)`` a friction contact that sticks
 carries the load ``u = (W . M^-1 f - w0') / (W . M^-1 W)``: it slides when that is the static limit
 (Lagrange's multiplier of the constraint w = 0 [1]_). Where ``W_i . M^-1 W_j = 0`` for any two of them, the
-load of each is a function of time and state alone; others are refused.
+load of each is a function of time and state alone; others share it (:mod:`contfric.models.shared_loads`).
 
 .. [1] F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral Contacts, Wiley (1996), chapters 3 and 5.
 """

@@ -23,17 +23,27 @@ class GrowingFlow:
     ----------
     definition : of the structure; its first mode is the one in which no contact acts
     modes : the names of those that were visited, that mode first
+    surfaces : the names of those that came with them
     """
 
-    def __init__(self, definition: str, modes: Sequence[str]) -> None:
+    def __init__(self, definition: str, modes: Sequence[str], surfaces: Sequence[str]) -> None:
         self._composition = composition_of(definition)
-        self._coded = CodedFlow(Forms(from_text(definition)))
+        self._forms = Forms(from_text(definition))
+        self._coded = CodedFlow(self._forms)
+        for name in surfaces:
+            self.see(name)
         for name in modes[1:]:
             self.add(name)
 
     def add(self, name: str) -> None:
         """Add a mode."""
+        for load, text in self._composition.loads_in(name).items():
+            self._forms.name(load, text)
         self._coded.add(self._composition.text(name))
+
+    def see(self, name: str) -> None:
+        """Add a surface."""
+        self._coded.see(*self._composition.surface(name))
 
     @property
     def field(self) -> Bound:

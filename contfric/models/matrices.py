@@ -217,6 +217,16 @@ def times(first: str, second: str) -> str:
     return f"({first})*({second})"
 
 
+def folded(parts: Sequence[str]) -> str:
+    """Return a sum as an expression; as one number where its parts are, 0 where these cancel."""
+    try:
+        numbers = [number_of(part, {}) for part in parts]
+    except ModelError:  # parameters
+        return summed(parts)
+    total = sum(numbers)
+    return repr(total) if abs(total) > _ROUNDING * sum(map(abs, numbers)) else "0"
+
+
 def summed(parts: Sequence[str]) -> str:
     """Return a sum as an expression."""
     kept = [part for part in parts if not is_zero(part)]

@@ -15,7 +15,17 @@ from contfric.models.contact_ranges import check_ranges
 from contfric.models.contacts import Contact, ContactKind, drift, factor_of, read_contacts
 from contfric.models.entries import EntryError, Part, mapping_in
 from contfric.models.grammar import names_in, parse
-from contfric.models.matrices import Mass, Texts, is_zero, mass_of, matrix_of, summed, times
+from contfric.models.matrices import (
+    Mass,
+    Texts,
+    folded,
+    is_zero,
+    mass_of,
+    matrix_of,
+    summed,
+    times,
+)
+from contfric.models.shared_loads import Setting, SharedLoads
 
 COORDINATES = "coordinates"
 #: Most combinations of states of contacts that are listed, each a mode with regions of its own.
@@ -82,11 +92,24 @@ class Structure:
     @property
     def composes(self) -> bool:
         """Whether modes are made when a solution visits them, and not listed (:mod:`..composition`)."""
-        rubbing = sum(c.kind is ContactKind.FRICTION for c in self.contacts)
-        if rubbing < _MANY_FRICTION and self._combinations <= _MOST_MODES:
-            return False
+        few = len(self.loads.rubbing) < _MANY_FRICTION and self._combinations <= _MOST_MODES
+        return (self.coupled or not few) and self._made_when_visited
+
+    @property
+    def _made_when_visited(self) -> bool:
+        """Whether modes can be made when a solution visits them."""
         numbers = set(defaults_of(self.top)) == set(mapping_in(self.top.data, "parameters"))
         return numbers and "units" not in self.top.data and not self._has_impacts
+
+    @cached_property
+    def loads(self) -> SharedLoads:
+        """What the loads of friction contacts depend on."""
+        return SharedLoads(self)
+
+    @cached_property
+    def coupled(self) -> bool:
+        """Whether the load of a friction contact depends on what other ones do."""
+        return any(map(self.loads.couples, self.loads.rubbing))
 
     @property
     def _has_impacts(self) -> bool:
@@ -96,13 +119,17 @@ class Structure:
     def _combinations(self) -> int:
         return math.prod(max(1, len(c.states)) for c in self.contacts)
 
+    @property
+    def _why_listed(self) -> str:
+        return "impacts" if self._has_impacts else "units, or parameters that follow others"
+
     def check_count(self) -> None:
         """Refuse more modes than can be listed."""
         if self._combinations > _MOST_MODES:
-            why = "impacts" if self._has_impacts else "units, or parameters that follow others"
             raise EntryError(
                 ("contacts",),
-                f"these contacts have {self._combinations} combinations of states, and with {why} each is "
+                f"these contacts have {self._combinations} combinations of states, and with "
+                f"{self._why_listed} each is "
                 f"listed as a mode: at most {_MOST_MODES} (five contacts of three states)",
             )
 
@@ -110,14 +137,15 @@ class Structure:
         """Refuse what cannot be written out."""
         rubbing = [c for c in self.contacts if c.kind is ContactKind.FRICTION]
         self._check_locks(rubbing)
-        for one, other in itertools.combinations(rubbing, 2):
-            if not is_zero(self.mobility(one, other)):
-                raise EntryError(
-                    ("contacts", other.name),
-                    f"the loads of '{one.name}' and '{other.name}' depend on each other (W . M^-1 W' is not "
-                    "0): friction contacts have to act on masses of their own. A Jenkins element, whose "
-                    "force is a state, can be put anywhere",
-                )
+        if self.coupled and not self._made_when_visited:
+            pair = next(c for c in rubbing if self.loads.couples(c))
+            other = self.loads.beside[pair.name][0]
+            raise EntryError(
+                ("contacts", other.name),
+                f"the loads of '{pair.name}' and '{other.name}' depend on each other (W . M^-1 W' is not 0); "
+                f"that is for models without impacts, units, and parameters that follow others, and here are "
+                f"{self._why_listed}. Friction on masses of their own, or Jenkins elements, are for all",
+            )
 
     def _check_locks(self, rubbing: list[Contact]) -> None:
         """Refuse contacts whose forces are not determined, and those that act at one place."""
@@ -148,24 +176,26 @@ class Structure:
     def mobility(self, one: Contact, other: Contact) -> str:
         """Return ``W . M^-1 W'`` of two contacts, an expression."""
         moved = self.mass.of({i: repr(w) for i, w in other.direction.items()})
-        return summed([times(repr(w), moved[i]) for i, w in one.direction.items() if i in moved])
+        parts = [times(repr(w), moved[i]) for i, w in one.direction.items() if i in moved]
+        return folded(parts)
 
     # ---------------------------------------------------------------------------- expressions
 
-    def load(self, contact: Contact, closed: tuple[Contact, ...]) -> str:
-        """Return the load that friction carries where it sticks, with some springs closed."""
+    def free(self, contact: Contact) -> str:
+        """Return the rate of a contact's velocity by the forces and Jenkins elements, an expression."""
         pulls: dict[int, list[str]] = {i: [f"f_{q}"] for i, q in enumerate(self.coordinates)}
         for other in self.contacts:
-            if other.kind is ContactKind.JENKINS or other in closed:
+            if other.kind is ContactKind.JENKINS:
                 for i, w in other.direction.items():
-                    pulls[i].append(times(repr(w), other.pull("c")))
+                    pulls[i].append(times(repr(w), other.pull("s")))
         moved = self.mass.of({i: summed(parts) for i, parts in pulls.items()})
-        along = summed(
+        return summed(
             [times(repr(w), moved[i]) for i, w in contact.direction.items() if i in moved]
         )
-        apart = drift(contact)
-        free = along if is_zero(apart) else f"{along} - ({apart})"
-        return f"({free})/({self.mobility(contact, contact)})"
+
+    def load(self, contact: Contact, setting: Setting) -> str:
+        """Return the load that friction carries where it sticks."""
+        return self.loads.load(contact, setting)
 
     def speed(self, contact: Contact) -> str:
         """Return the velocity along a direction of coordinates."""
@@ -186,10 +216,6 @@ class Structure:
             for c in self.contacts
             if c.kind is ContactKind.FRICTION
         }
-
-    def closed(self, contact: Contact, states: Mapping[str, str]) -> tuple[Contact, ...]:
-        """Return the springs that are closed in a mode, of those that a load depends on."""
-        return tuple(s for s in self.springs[contact.name] if states[s.name] == "c")
 
 
 def _coordinates(top: Part) -> tuple[str, ...]:

@@ -14,7 +14,15 @@ from contfric.errors import ParameterError
 from contfric.models.section_maps import SectionMaps
 
 if TYPE_CHECKING:
-    from contfric.models.parts import Chatter, Departure, Domain, Reset, Surface, Symmetry
+    from contfric.models.parts import (
+        Chatter,
+        Departure,
+        Domain,
+        FloatArray,
+        Reset,
+        Surface,
+        Symmetry,
+    )
 
 
 class TransitionMaps(SectionMaps):
@@ -299,6 +307,12 @@ class TransitionMaps(SectionMaps):
         if any(signs[s.name] == 0 for s in self.surfaces if s.switching):
             return self._resolve_at_rest(signs, mode)
         return self._domain_with(signs, mode)
+
+    def domain_of(
+        self, signs: Mapping[str, int], t: float, y: FloatArray, vector: FloatArray
+    ) -> str | None:
+        """Return the domain that a state with these signs is in, or leaves to from rest."""
+        return self.domain_at(signs)
 
     def _domain_with(self, signs: Mapping[str, int], mode: str = "") -> str | None:
         fits = self._domains_by_signs.get(tuple(signs[s.name] for s in self.surfaces), ())

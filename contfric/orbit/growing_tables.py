@@ -6,21 +6,23 @@ from functools import cache
 
 import numpy as np
 
-from contfric.models.columns import Column
 from contfric.models.composed import ComposedModel
+from contfric.models.definition import FloatArray
 from contfric.orbit.tables import (
     Tables,
     bits_of,
     chatter_table,
     check_surfaces,
+    declared_surfaces,
     flight_table,
     moves_on,
     sides_of,
     surfaces_under,
 )
 
-#: In a rule, the first number that stands for a mode which was not visited yet; others are below.
-UNVISITED = -2
+#: In a rule, the number that stands for a mode which is solved for, from the state at the joint; numbers
+#: below are those of modes that were not visited yet.
+SOLVED = -2
 
 
 class GrowingTables:
@@ -31,65 +33,94 @@ class GrowingTables:
 
     def __init__(self, model: ComposedModel) -> None:
         check_surfaces(model)
-        self._model, self._done = model, 0
-        self._bounds, self._first, self._sliding, self._under = (
-            Column(),
-            Column([0]),
-            Column(),
-            Column(),
-        )
-        self._rules = Column()
-        self._waiting: dict[str, int] = {}
-        self._names: list[str] = []
+        self._model = model
+        # of each mode, by surface: sides (mask, value) of others, and what follows; "" where it is solved for
+        self._rules: list[dict[int, list[tuple[tuple[int, int], str]]]] = []
+        self._sliding: list[int] = []
+        self._under: list[int] = []
+        self._waiting: list[str] = []
+        self._tables: Tables | None = None
+        self._size = 0, 0
 
-    def visit(self, number: int) -> int:
-        """Return the number of a mode that had one below zero: it is visited now."""
-        return self._model.mode_index[self._names[UNVISITED - number]]
+    def visit(
+        self, number: int, last: tuple[int, int], t: float, y: FloatArray, vector: FloatArray
+    ) -> int:
+        """Return the number of a mode that had one below zero: it is visited now.
+
+        Parameters
+        ----------
+        last : mode and surface of the last event
+        t, y, vector : time, state and parameters there
+        """
+        model = self._model
+        if number < SOLVED:
+            return model.mode_index[self._waiting[SOLVED - 1 - number]]
+        mode, surface = model.modes[last[0]].name, model.surfaces[last[1]].name
+        place = model.mapping(vector), t, y.tolist()
+        return model.mode_index[model.composition.after(mode, surface, place)]
 
     def tables(self) -> Tables:
         """Return the tables, with a row for each mode that was visited."""
         model = self._model
-        for mode in model.modes[self._done :]:
+        size = len(model.modes), len(model.surfaces)
+        if self._tables is None or self._size != size:
+            self._tables, self._size = self._written(), size
+        return self._tables
+
+    def _written(self) -> Tables:
+        model = self._model
+        for mode in model.modes[len(self._rules) :]:
             self._write(mode.name)
-        surfaces = len(model.surfaces)
-        observables = [model.observable_index[s.observable] for s in model.surfaces]
-        every = bits_of(model, model.surface_by_name)
+        done, surfaces = len(self._rules), len(model.surfaces)
+        bounds = np.zeros((done, surfaces), dtype=np.int64)
+        counts = np.zeros(done * surfaces, dtype=np.int64)
+        for k, rules in enumerate(self._rules):
+            for surface, own in rules.items():
+                bounds[k, surface] = 1
+                counts[k * surfaces + surface] = len(own)
+        written = [
+            (*sides, self._number(to))
+            for rules in self._rules
+            for _, own in sorted(rules.items())
+            for sides, to in own
+        ]
+        every = bits_of(model, (s.name for s in declared_surfaces(model)))
         return Tables(
-            np.array(observables, dtype=np.int64),
-            self._bounds.array[: self._done * surfaces].reshape(-1, surfaces),
-            self._first.array,
-            self._rules.array[: len(self._rules)].reshape(-1, 3),
-            self._sliding.array,
-            self._under.array,
+            np.array(
+                [model.observable_index[s.observable] for s in model.surfaces], dtype=np.int64
+            ),
+            bounds,
+            np.concatenate([[0], np.cumsum(counts)]),
+            np.array(written, dtype=np.int64).reshape(-1, 3),
+            np.array(self._sliding, dtype=np.int64),
+            np.array(self._under, dtype=np.int64),
             np.full(surfaces, every, dtype=np.int64),
-            np.array([bits_of(model, {s}) for s in model.surface_by_name], dtype=np.int64),
+            np.array([bits_of(model, {s.name}) for s in model.surfaces], dtype=np.int64),
             0,
-            chatter_table(model, self._done),
-            flight_table(model, self._done),
+            chatter_table(model, done),
+            flight_table(model, done),
         )
 
     def _write(self, name: str) -> None:
-        model = self._model
-        ways, mode = model.composition.ways(name), model.mode_by_name[name]
-        for surface in model.surface_by_name:
-            self._bounds.append(int(surface in ways))
-            for way in ways.get(surface, ()):
-                self._rules += (*sides_of(model, way.where, ()), self._number(way.mode))
-            self._first.append(len(self._rules) // 3)
+        model, mode, found = self._model, self._model.mode_by_name[name], {}
+        for surface, ways in model.composition.ways(name).items():
+            if model.composition.is_solved(name, surface):
+                rules = [((0, 0), "")]
+            else:
+                rules = [(sides_of(model, way.where, ()), way.mode) for way in ways]
+            found[model.surface_index[surface]] = rules
+        self._rules.append(found)
         self._sliding.append(int(mode.sliding) * (1 + int(moves_on(model, mode))))
         self._under.append(surfaces_under(model, name))
-        if name in self._waiting:
-            targets = self._rules.array[: len(self._rules)].reshape(-1, 3)[:, 2]
-            targets[targets == self._waiting.pop(name)] = self._done
-        self._done += 1
 
     def _number(self, name: str) -> int:
+        if not name:
+            return SOLVED
         if self._model.was_visited(name):
             return self._model.mode_index[name]
         if name not in self._waiting:
-            self._waiting[name] = UNVISITED - len(self._names)
-            self._names.append(name)
-        return self._waiting[name]
+            self._waiting.append(name)
+        return SOLVED - 1 - self._waiting.index(name)
 
 
 @cache

@@ -20,7 +20,7 @@ from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
 from contfric.orbit.dense import sample, table
-from contfric.orbit.growing_tables import UNVISITED, growing_tables
+from contfric.orbit.growing_tables import SOLVED, growing_tables
 from contfric.orbit.pace import Pace
 from contfric.orbit.starts import checked_state, start_of
 from contfric.orbit.system import IntArray
@@ -263,10 +263,11 @@ def run(
         tally()[3] += count
         pieces.append(written.first(count))
         done += count
-        grown = mode <= UNVISITED
+        grown = mode <= SOLVED
         if grown and isinstance(model, ComposedModel):
             growing = growing_tables(model)
-            mode = growing.visit(mode)
+            last = int(written.joints[count - 1, 0]), int(written.joints[count - 1, 1])
+            mode = growing.visit(mode, last, phase, y, vector)
             model_tables = growing.tables()
         if end != ALL_EVENTS or done >= events:
             break

@@ -9,6 +9,7 @@ from contfric.errors import ParameterError, did_you_mean, shown
 from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.models.parts import Chatter
 from contfric.orbit.structure import cut_bounds
+from contfric.orbit.tables import bits_of
 
 #: Displacements that a start is looked for at, in half-widths of the model: where the first is in no
 #: domain (behind a wall, or on a surface that motion does not leave), the next.
@@ -38,14 +39,16 @@ def start_of(
         raise ParameterError(
             f"unknown domain {shown(given)}{did_you_mean(given, model.domain_by_name)}"
         )
-    name = domain or model.domain_at(signs) or _side_of_rates(model, t, y, vector, signs)
+    name = (
+        domain or model.domain_of(signs, t, y, vector) or _side_of_rates(model, t, y, vector, signs)
+    )
     if name is None:
         raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
     mode = model.domain_by_name[name].own_mode
     rest = model.chatter_by_mode.get(mode) if domain is None else None
     if rest is not None:
         mode = _let_go(model, rest, t, y, vector, signs) or mode
-    on = sum(1 << model.surface_index[k] for k in cut_bounds(model)[mode] if signs[k] == 0)
+    on = bits_of(model, (k for k in cut_bounds(model)[mode] if signs.get(k, 1) == 0))
     return model.mode_index[mode], on
 
 
@@ -117,7 +120,9 @@ def displaced(model: Model, vector: FloatArray) -> FloatArray:
 def _is_start(model: Model, y: FloatArray, vector: FloatArray) -> bool:
     """Tell whether a state at time 0 is in a domain, or leads into one."""
     signs = signs_at(model, 0.0, y, vector)
-    return bool(model.domain_at(signs) or _side_of_rates(model, 0.0, y, vector, signs))
+    return bool(
+        model.domain_of(signs, 0.0, y, vector) or _side_of_rates(model, 0.0, y, vector, signs)
+    )
 
 
 def checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> FloatArray:

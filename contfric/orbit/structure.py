@@ -82,6 +82,8 @@ def is_section(model: Model, mode: str, surface: str) -> bool:
 
 def exit_domains(model: Model, mode: str, surface: str, following: str) -> list[str]:
     """Return the domains of a mode from which a surface leads into the following mode."""
+    if isinstance(model, ComposedModel):
+        return [mode] if model.follows(mode, surface, following) else []
     side = model.section_sides.get((mode, surface), 0)
     whole = model.whole_mode(mode if side else following)
     return [

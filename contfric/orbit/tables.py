@@ -7,7 +7,7 @@ combinations of sides doubles with each surface.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 from itertools import product
 from typing import NamedTuple
@@ -15,12 +15,14 @@ from typing import NamedTuple
 import numpy as np
 
 from contfric.errors import ModelError, ParameterError
-from contfric.models.definition import Mode, Model
+from contfric.models.composed import ComposedModel
+from contfric.models.definition import Mode, Model, Surface
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.system import IntArray
 
-#: Sides are the bits of one signed number of 64.
-_MOST_SURFACES = 62
+#: Sides are the bits of one signed number of 64. Surfaces behind these, which come as solutions visit their
+#: modes, have none: no rule asks for their sides, and nothing lies on them.
+MOST_SURFACES = 62
 #: A rule for the sides of surfaces as bits: (mask, value, mode that follows).
 Rule = tuple[int, int, int]
 
@@ -58,6 +60,13 @@ class Tables(NamedTuple):
     flights: IntArray
 
 
+def declared_surfaces(model: Model) -> Sequence[Surface]:
+    """Return the surfaces that are there before a solution visits any mode."""
+    if not isinstance(model, ComposedModel):
+        return model.surfaces
+    return model.surfaces[: len(model.composition.declared)]
+
+
 def check_surfaces(model: Model) -> None:
     """Refuse a model that a simulation cannot take.
 
@@ -66,9 +75,9 @@ def check_surfaces(model: Model) -> None:
     ModelError
         If it has more surfaces than can be told apart.
     """
-    if len(model.surfaces) > _MOST_SURFACES:
+    if len(declared_surfaces(model)) > MOST_SURFACES:
         raise ModelError(
-            f"model '{model.name}' has {len(model.surfaces)} surfaces, a simulation takes {_MOST_SURFACES}: "
+            f"model '{model.name}' has {len(model.surfaces)} surfaces, a simulation takes {MOST_SURFACES}: "
             "leave out those at which nothing changes"
         )
 
@@ -230,7 +239,8 @@ def _landed(model: Model, met: str) -> Collection[str]:
 
 def bits_of(model: Model, surfaces: Iterable[str]) -> int:
     """Return surfaces as bits of a number."""
-    return sum(1 << model.surface_index[name] for name in surfaces)
+    places = (model.surface_index[name] for name in surfaces)
+    return sum(1 << k for k in places if k < MOST_SURFACES)
 
 
 def moves_on(model: Model, mode: Mode) -> bool:

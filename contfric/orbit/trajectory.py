@@ -20,7 +20,7 @@ from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
-from contfric.orbit.tables import Tables
+from contfric.orbit.tables import MOST_SURFACES, Tables
 from contfric.orbit.walls import MOST_AT_ONCE, NO_FLIGHT, NO_TIME, in_flight, is_pressed, lying_on
 
 #: Types of the model's tables and of the rows of events, as kernels take them.
@@ -76,7 +76,7 @@ def copy_state(source, target):  # type: ignore[no-untyped-def]
 def sign_code(functions, observables, landed, t, y, p, none, empty):  # type: ignore[no-untyped-def]
     """Return the sides of all surfaces but those that the state is on, as bits."""
     code, observed, value = 0, -1, 0.0
-    for k in range(observables.shape[0]):
+    for k in range(min(observables.shape[0], MOST_SURFACES)):
         if landed >> k & 1:
             continue
         if observables[k] != observed:  # surfaces of one observable stand together
@@ -136,7 +136,7 @@ def hit_within(functions, tables, mode, on, t, y, p, longest, workspace):  # typ
         if bounds[mode, k] == 0:
             continue
         target = functions.level(k, p, none, empty)
-        started = (on >> k) & 1 == 1
+        started = k < MOST_SURFACES and (on >> k) & 1 == 1
         tau = functions.hit(mode, observables[k], target, started, t, y, best, p, workspace.trial)
         if tau >= 0.0 and (which < 0 or tau < best):
             best, which = tau, k

@@ -22,6 +22,7 @@ from functools import cache
 
 from contfric.errors import NotationError, did_you_mean
 from contfric.models import Model
+from contfric.models.composed import ComposedModel
 from contfric.signature.holds import is_hold, without_holds
 from contfric.signature.reduced import NEVER, ReducedPair, ReducedWord, fuses
 
@@ -230,7 +231,7 @@ def is_closed_walk(word: Sequence[ReducedPair], model: Model) -> bool:
     surfaces = {surface for _, surface in word}
     if not word or not all(mode in model.mode_by_name for mode in modes):
         return False
-    if not (model.surface_by_name.keys() >= surfaces):
+    if not all(surface in model.surface_by_name for surface in surfaces):
         return False
     first = model.whole_mode(modes[0])
     for entry in (domain.name for domain in model.domains_of(first)):
@@ -251,6 +252,8 @@ def entered(
     entries: Iterable[str], surface: str, model: Model, mode: str, next_mode: str
 ) -> set[str]:
     """Return the domains of the next mode that a segment can lead to from its entries."""
+    if isinstance(model, ComposedModel):
+        return {next_mode} if any(model.follows(d, surface, next_mode) for d in entries) else set()
     inside = _within(entries, model, mode)
     side = model.section_sides.get((mode, surface), 0)
     inside = {d for d in inside if side in (0, model.domain_by_name[d].signs.get(surface, 0))}

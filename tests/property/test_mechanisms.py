@@ -337,10 +337,12 @@ def test_contacts_that_share_their_load_and_too_many_are_refused() -> None:
         return {"kind": "friction", "velocity": velocity, "kinetic": "0.2"}
 
     eye = np.eye(7)
+    wall = {"kind": "impact", "gap": "1 - q7", "restitution": "0.5"}
     with pytest.raises(ModelError, match="the loads of 'a' and 'b' depend on each other"):
-        cf.Mechanism(eye, eye, eye, contacts={"a": rubs("v1"), "b": rubs("v1 - v2")})
+        contacts = {"a": rubs("v1"), "b": rubs("v1 - v2"), "wall": wall}
+        cf.Mechanism(eye, eye, eye, contacts=contacts)
     many = {f"c{i}": rubs(f"v{i}") for i in range(1, 7)}
-    many["wall"] = {"kind": "impact", "gap": "1 - q7", "restitution": "0.5"}
+    many["wall"] = wall
     with pytest.raises(
         ModelError, match="729 combinations of states, and with impacts each is listed"
     ):

@@ -19,7 +19,7 @@ def group_entries(model, group, p, which, co, jac):  # type: ignore[no-untyped-d
 
 def entries(model, piece, p, which, co, jac):  # type: ignore[no-untyped-def]
     """Write the coefficients of a piece."""
-    group_entries(model, model.first_mode + piece, p, which, co, jac)
+    group_entries(model, model.group_of[piece], p, which, co, jac)
 
 
 def entries_seen(model, c, p, which, co, jac):  # type: ignore[no-untyped-def]
@@ -49,7 +49,7 @@ def group_audible(model, group, co, on):  # type: ignore[no-untyped-def]
 
 def audible(model, piece, co, on):  # type: ignore[no-untyped-def]
     """Mark the harmonics of a piece."""
-    group_audible(model, model.first_mode + piece, co, on)
+    group_audible(model, model.group_of[piece], co, on)
 
 
 def audible_seen(model, c, co, on):  # type: ignore[no-untyped-def]
@@ -75,7 +75,7 @@ def group_rows(model, group, co, y, c, s, out):  # type: ignore[no-untyped-def]
 
 def rates(model, piece, co, y, c, s, out):  # type: ignore[no-untyped-def]
     """Write the rates of a piece."""
-    group_rows(model, model.first_mode + piece, co, y, c, s, out)
+    group_rows(model, model.group_of[piece], co, y, c, s, out)
 
 
 @helper
@@ -95,7 +95,7 @@ def add_waves(model, row, count, shift, co, c, s, w, h, terms, series):  # type:
 
 def expand(model, piece, co, y, c, s, w, h, terms, series):  # type: ignore[no-untyped-def]
     """Write the Taylor terms of the state along a step."""
-    n, group = y.shape[0], model.first_mode + piece
+    n, group = y.shape[0], model.group_of[piece]
     row, shift = model.row_of[group], wave_shift(model, group)
     first = model.slope_at[row]
     for i in range(n):
@@ -115,7 +115,7 @@ def expand(model, piece, co, y, c, s, w, h, terms, series):  # type: ignore[no-u
 def carry(model, piece, co, h, terms, columns):  # type: ignore[no-untyped-def]
     """Multiply columns (rows of an array) by exp(A h): ``v + h A (v + h A / 2 (v + ...))``."""
     count, n = columns.shape
-    row = model.row_of[model.first_mode + piece]
+    row = model.row_of[model.group_of[piece]]
     first = model.slope_at[row]
     start, sums, other = np.empty((n, count)), np.empty((n, count)), np.empty((n, count))
     for i in range(n):
@@ -153,7 +153,7 @@ def add_varied_waves(model, row, n, shift, co, by, waves, w, dw, h, terms, out):
 
 def vary(model, piece, co, by, z, waves, w, dw, h, terms, series, out):  # type: ignore[no-untyped-def]
     """Write the derivatives of the Taylor terms by a parameter."""
-    n, group = z.shape[0], model.first_mode + piece
+    n, group = z.shape[0], model.group_of[piece]
     row, shift = model.row_of[group], wave_shift(model, group)
     first = model.slope_at[row]
     for i in range(n):
@@ -173,7 +173,7 @@ def vary(model, piece, co, by, z, waves, w, dw, h, terms, series, out):  # type:
 
 def sums(model, piece, co, d, row, column, own):  # type: ignore[no-untyped-def]
     """Add up the sizes of the matrix in units ``d``."""
-    begin = model.row_of[model.first_mode + piece]
+    begin = model.row_of[model.group_of[piece]]
     first = model.slope_at[begin]
     for i in range(d.shape[0]):
         for k in range(model.slope_at[begin + i], model.slope_at[begin + i + 1]):

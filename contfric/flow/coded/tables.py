@@ -10,7 +10,7 @@ affine form lists its coefficients of states and of harmonics. Forms come in *gr
     columns[s], harmonics[s]   state of a slope, frequency of a wave
     term_at[k]                 first term of a coefficient;  operands[j], weights[j] of a term
     places[g]                  first coefficient of a group: its slopes, then cosine and sine of each wave
-    first_mode                 the group of the first mode; those of the others follow, and nothing else
+    group_of[m]                the group of a mode;  observable_of[c] that of an observable
 """
 
 from __future__ import annotations
@@ -23,12 +23,9 @@ from contfric.handle import TABLE, WEIGHTS, HandleType
 _TABLES = (
     *("operations", "row_of", "slope_at", "wave_at", "columns", "harmonics", "term_at", "operands"),
     *("places", "frequency_at", "level_at", "scale_at", "reset_at", "surface_at", "surfaces"),
-    *("observable_of", "seen_at"),
+    *("observable_of", "seen_at", "group_of"),
 )
-_NUMBERS = (
-    *("values", "states", "waves", "parameters", "coefficients", "period_at"),
-    "first_mode",
-)
+_NUMBERS = ("values", "states", "waves", "parameters", "coefficients", "period_at")
 #: What is behind a handle of a model whose formulas are data.
 LAYOUT = {
     **dict.fromkeys(_TABLES, TABLE),

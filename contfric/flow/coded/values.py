@@ -89,7 +89,7 @@ def map_of(model, group, t, y, p, which, out, jac):  # type: ignore[no-untyped-d
 
 def field(model, piece, t, y, p, which, out, jac):  # type: ignore[no-untyped-def]
     """Write the rates of a piece (``field_signature``)."""
-    map_of(model, model.first_mode + piece, t, y, p, which, out, jac)
+    map_of(model, model.group_of[piece], t, y, p, which, out, jac)
 
 
 def reset(model, k, t, y, p, which, y1, jac):  # type: ignore[no-untyped-def]
@@ -123,7 +123,7 @@ def rate(model, mode, c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
     n, free, group = y.shape[0], which.shape[0] if grad.shape[0] > 0 else 0, model.observable_of[c]
     values, by, w, dw = numbers_at(model, p, which[:free])
     co, slopes = group_at(model, group, values, by)
-    moved = model.first_mode + mode
+    moved = model.group_of[mode]
     own, owns = group_at(model, moved, values, by)
     weights, row = np.empty(n), np.empty(n)
     _, total, second = row_at(model, group, 0, co, t, y, w, weights)
