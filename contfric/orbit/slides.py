@@ -7,6 +7,7 @@ inside of a slide. The slides of some length, joined over such touches, are the 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -106,12 +107,17 @@ class Outline:
         """Return how far two motions are apart, up to symmetry; infinite if they are of another kind."""
         if self.periods != other.periods or len(self.starts) != len(other.starts):
             return np.inf
-        return min(_apart(self.starts, there, self.cycle) for there in (other.starts, other.images))
+        from contfric.orbit.apart import farthest_apart
 
-    @property
+        images = (other.starts, other.images)
+        return min(float(farthest_apart(self.starts, there, self.cycle)) for there in images)
+
+    @cached_property
     def apart_from_image(self) -> float:
         """How far the motion is from its symmetry image."""
-        return _apart(self.starts, self.images, self.cycle)
+        from contfric.orbit.apart import farthest_apart
+
+        return float(farthest_apart(self.starts, self.images, self.cycle))
 
 
 def outline_of(orbit: Orbit) -> Outline:
@@ -167,12 +173,3 @@ def _impacts(whole: Orbit) -> FloatArray:
     jumps = np.max(np.abs(behind - whole.ends[:, 1:]), axis=1) >= SAME_MOTION
     struck = [exit_ in whole.model.reset_by_surface for _, exit_ in whole.word]
     return np.array(whole.ends[jumps & np.array(struck)])
-
-
-def _apart(one: FloatArray, other: FloatArray, cycle: float) -> float:
-    """Return the Hausdorff distance of two sets of joints, times modulo a cycle."""
-    gaps = np.abs(one[:, None, :] - other[None, :, :])
-    if np.isfinite(cycle):
-        gaps[:, :, 0] = np.abs((gaps[:, :, 0] + 0.5 * cycle) % cycle - 0.5 * cycle)
-    distance = np.max(gaps, axis=2)
-    return float(max(distance.min(axis=0).max(), distance.min(axis=1).max()))
