@@ -134,7 +134,10 @@ def _with_proposals(model: Model, computed: list[Branch], events: list[Event]) -
         )
         kind = telling_kind([*event.kinds, *(member.kind for member in event.members)])
         for member in event.members:
-            changed[id(member)] = replace(member, kind=kind, proposals=proposals)
+            same = kind is member.kind and proposals == member.proposals
+            changed[id(member)] = (
+                member if same else replace(member, kind=kind, proposals=proposals)
+            )
         event.bifurcation = changed[id(event.bifurcation)]
         event.members = [changed[id(member)] for member in event.members]
     return [_renewed(branch, changed, final) for branch in computed]

@@ -52,11 +52,6 @@ class Exploration:
     notes: list[str] = field(default_factory=list)
     complete: bool = True
 
-    def say(self, text: str) -> None:
-        """Report progress."""
-        if self.progress is not None:
-            self.progress(text)
-
     def add(self, branch: Branch) -> None:
         """Register a branch and the events that it meets: all of it, whenever Ctrl-C comes."""
         with held_back():
@@ -65,7 +60,8 @@ class Exploration:
     def _register(self, branch: Branch) -> None:
         index = len(self.branches)
         self.branches.append(branch)
-        self.say(f"branch {index + 1}: {branch.name}, {len(branch)} points")
+        if self.progress is not None:  # the name costs
+            self.progress(f"branch {index + 1}: {branch.name}, {len(branch)} points")
         if any(end.reason is EndReason.INTERRUPTED for end in branch.ends):
             raise KeyboardInterrupt
         for bifurcation in branch.bifurcations:

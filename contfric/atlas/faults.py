@@ -28,8 +28,11 @@ def fault_of(branch: Branch) -> str | None:
 
 def _longest(branch: Branch, asked: Iterable[int]) -> FloatArray:
     """Return the longest duration of each segment at some points of a branch, shape (segments,)."""
-    lasts = [(o := branch[k]).ends[:, 0] - o.cycle[:, 0] for k in asked]
-    found: FloatArray = np.max(lasts, axis=0)
+    at = list(asked)
+    times = branch.joints[at, :, 0]
+    turns = branch.period[at] / (2.0 if branch.system.half else 1.0)
+    lasts: FloatArray = np.diff(times, append=times[:, :1] + turns[:, None], axis=1)
+    found: FloatArray = lasts.max(axis=0)
     return found
 
 

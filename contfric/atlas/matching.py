@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -11,10 +12,11 @@ import numpy as np
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, Kind
-from contfric.models.definition import FloatArray
+from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import modulo
 from contfric.orbit.solve import polish
+from contfric.orbit.system import Word
 from contfric.orbit.words import mirror_pairs
 from contfric.signature import ReducedWord, canonical_word
 
@@ -36,7 +38,11 @@ _APART = 0.05
 
 def identity(orbit: Orbit) -> frozenset[ReducedWord]:
     """Return the orbit's reduced word and its mirror image, canonical."""
-    model, word = orbit.model, orbit.word
+    return _images(orbit.model, orbit.word)
+
+
+@cache
+def _images(model: Model, word: Word) -> frozenset[ReducedWord]:
     words = {canonical_word(word, model)}
     if model.symmetry is not None:
         words.add(canonical_word(mirror_pairs(model, word), model))

@@ -47,8 +47,9 @@ from contfric.orbit.monitor import (
     lasting_margin,
     regular_margin,
 )
-from contfric.orbit.newton import ALONG, CHECKS, INTEGRATED, MULTIPLIERS
+from contfric.orbit.newton import ALONG, CHECKS, INTEGRATED, MULTIPLIERS, SOLVES
 from contfric.orbit.spectrum import multipliers
+from contfric.orbit.system import IntArray
 
 #: What locate() follows: a column of the tests, a label, or the parameter itself.
 BY_TEST, BY_LABEL, BY_PARAMETER = range(3)
@@ -144,11 +145,13 @@ class Sought(NamedTuple):
     kind : BY_TEST, BY_LABEL or BY_PARAMETER
     number : column of the tests, or row of the labels
     target : the label before, or the value of the parameter
+    plain : counts the values for which a label was that of one of the two points, shape (1,)
     """
 
     kind: int
     number: int
     target: float
+    plain: IntArray
 
 
 @helper
@@ -163,6 +166,9 @@ def watched_value(way, sought, points, row):  # type: ignore[no-untyped-def]
         code, nearest, _, _ = crossings(
             functions, layout, index, z, p, workspace.equations, workspace.stationary
         )
+        labels = points.labels
+        if code == labels[0, index] or code == labels[1, index]:
+            sought.plain[0] += 1
         # the distance of the nearest stationary point to a surface vanishes where the label changes;
         # elsewhere a joint may lie on a surface
         return nearest if code == int(sought.target) else -max(nearest, 1e-300)
@@ -308,20 +314,22 @@ def located(way, sought, kinked, points):  # type: ignore[no-untyped-def]
     narrowest = resolution(layout.rounding, abs(arc[1] - arc[0]), largest_state(zs[0]))
     given_up = _LOST if two_sided and layout.rounding > INTEGRATED else 0.0
     rules = accuracy, two_sided, noise, narrowest, given_up
+    before, sought.plain[0] = way.counts[SOLVES], 0
     best, _, lost, _ = _bracket(way, sought, points, ends, rules)
+    plain = sought.plain[0] == way.counts[SOLVES] - before
     # the last Jacobian at the located point, for its rates and multipliers; the point itself stays
     copy_row(points, 2, 3)
     fine, _ = correct_branch(way, zs[2], ws[2], tzs[2], tws[2], AT_EVENT)
     if not fine:
-        return -1.0
+        return -1.0, False
     way.p[way.which[0]] = ws[3, 0]
     close_chain(way.functions, layout, zs[3], way.p, workspace.equations.none, workspace.equations)
     observe_branch(way, zs[3], ws[3], tws[3], tests[3], labels[3], mu[3])
-    return -2.0 - best if lost else best
+    return -2.0 - best if lost else best, plain
 
 
 @kernel(
-    f8(
+    types.Tuple((f8, types.boolean))(
         FlowType,
         LayoutType,
         vector,
@@ -350,11 +358,14 @@ def locate(  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    float
+    (float, bool)
         Position in the step, from 0 to 1; -1 if no trial point could be solved; -2 minus the
-        position of the last good point if it is Newton that fails behind it.
+        position of the last good point if it is Newton that fails behind it. And, for a label, whether
+        all trials were solved and had that of one of the points: then it changes at one place only, as far
+        as is seen.
     """
     zs, followed = points.joints, min(index, 0)  # nothing, but no literal
     workspace = step_workspace(zs.shape[1], zs.shape[2], p.shape[0], followed, followed)
     way = Along(functions, layout, p.copy(), which, scale, stability, counts, workspace)
-    return located(way, Sought(kind, index, target), kinked, points)
+    plain = np.zeros(1, dtype=np.int64)
+    return located(way, Sought(kind, index, target, plain), kinked, points)

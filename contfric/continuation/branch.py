@@ -147,7 +147,11 @@ class Branch(Shown):
     @property
     def period(self) -> FloatArray:
         """Duration of the orbit at each point, shape (k,)."""
-        return np.array([orbit.period for orbit in self])
+        sides = 2.0 if self.system.half else 1.0
+        if self.model.autonomous:
+            return -self.joints[:, 0, 0] * sides
+        periods = self.model.periods_along(self.vector, self.parameter, self.values)
+        return self.system.layout.turn * periods * sides
 
     @cached_property
     def name(self) -> str:
@@ -248,8 +252,8 @@ class Branch(Shown):
         word = mirror_pairs(self.model, self.system.word)
         system = build_system(self.model, word, self.system.periods, self.system.half)
         joints = self.joints @ _block(symmetry.array()).T
-        fraction = 0.0 if self.model.autonomous else symmetry.fraction
-        joints[:, :, 0] += np.array([[fraction * o.period / o.periods] for o in self])
+        if not self.model.autonomous:
+            joints[:, :, 0] += (symmetry.fraction * self.period / self.system.periods)[:, None]
         images = {id(b): b.mirror() for b in self._all_bifurcations()}
         return replace(
             self,

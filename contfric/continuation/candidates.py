@@ -117,7 +117,7 @@ def _relations(
         return None  # composed: the first sequence is right, and its relation the dearest part
     found = []
     for form in forms:
-        relation = relation_of(incident.unit, form, active, incident.least)
+        relation = relation_of(form, active, incident.least)
         if relation is None:
             return None
         found.append(relation)
@@ -126,7 +126,8 @@ def _relations(
 
 def _candidate(unit: Unit, forms: tuple[Form, ...], reason: str) -> Candidate:
     try:
-        orbit, away = unit.orbit(forms)
+        (form, *others) = forms
+        orbit, away = unit.orbit(forms) if others else (form.orbit, form.away)
     except NotationError as error:
         return Candidate(reason, None, str(error))
     words = frozenset(form.word for form in forms)

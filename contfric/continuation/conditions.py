@@ -25,7 +25,7 @@ import numpy as np
 
 from contfric.continuation.gradients import closing, gradient_of
 from contfric.continuation.incident import vanishing
-from contfric.continuation.unit import Form, Unit
+from contfric.continuation.unit import Form
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import jacobian_blocks, linearised
 from contfric.orbit.orbit import Orbit
@@ -67,7 +67,7 @@ class Relation:
     signed: FloatArray
 
 
-def relation_of(unit: Unit, form: Form, active: int, least: float) -> Relation | None:
+def relation_of(form: Form, active: int, least: float) -> Relation | None:
     """Return the relation of a form; None where its orders are not clear.
 
     Parameters
@@ -75,7 +75,7 @@ def relation_of(unit: Unit, form: Form, active: int, least: float) -> Relation |
     active : index of the parameter that varies
     least : margins below it vanish
     """
-    orbit = unit.orbit((form,))[0]
+    orbit = form.orbit
     system, m = orbit.system, orbit.joints.shape[1]
     a, b, c, close = jacobian_blocks(system, orbit.joints, orbit.vector)
     inner, outer = _columns(a, b, c[:, :, active], close)

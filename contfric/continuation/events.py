@@ -47,7 +47,7 @@ from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import Model
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.slides import Outline, outline_of
+from contfric.orbit.slides import Outline
 from contfric.orbit.system import Margin, System, Test, inside_sign
 from contfric.remember.stored import made_of
 
@@ -239,10 +239,10 @@ class Bifurcation(MeasuredEvent):
             return False
         return self.outline.apart_from_image < max(_SYMMETRIC, self.accuracy)
 
-    @cached_property
+    @property
     def outline(self) -> Outline:
         """The slides of the motion at the event, whatever word it was reached with."""
-        return outline_of(self.orbit)
+        return self.orbit.outline
 
     @property
     def label(self) -> str:

@@ -30,7 +30,7 @@ from contfric.continuation.outcomes import (
     outcome_at,
 )
 from contfric.continuation.places import normal_place, places_of
-from contfric.continuation.unit import Form, Unit, pieces, unit_of
+from contfric.continuation.unit import Form, Unit, form_of, pieces, unit_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
@@ -154,25 +154,26 @@ class _Collection:
 
     def take(self, orbit: Orbit, away: FloatArray, reason: str) -> frozenset[Word]:
         """Take the units of an orbit as forms; return their words."""
-        taken = list(pieces(orbit, away, self.unit, reason))
-        for form in taken:
-            if form.word in self._words:
+        taken = pieces(orbit, self.unit)
+        for piece in taken:
+            if piece.word in self._words:
                 continue
             if len(self.forms) >= _MOST_FORMS:
                 text = f"more than {_MOST_FORMS} words at once: the others are not tried"
                 self.refusals.append(Refusal("other outcomes", text))
                 break
+            form = form_of(orbit, away, self.unit, piece, reason)
             self._words.add(form.word)
             self.forms.append(form)
             self._waiting.append(form)
-        return frozenset(form.word for form in taken)
+        return frozenset(piece.word for piece in taken)
 
     def close(self) -> None:
         """Add what the outcomes at the places of every form make of it."""
         while self._waiting:
             form = self._waiting.popleft()
             try:
-                orbit = self.unit.whole(form)
+                orbit = form.orbit.as_whole()
             except NotationError as error:
                 self.refusals.append(Refusal(form.reason, str(error)))
                 self.forms = [other for other in self.forms if other is not form]
@@ -186,7 +187,9 @@ class _Collection:
         self, orbit: Orbit, away: FloatArray, reason: str, places: list[tuple[Test, Kind]]
     ) -> None:
         """Add the forms that follow from the outcomes at places of an orbit."""
-        before = frozenset(form.word for form in pieces(orbit, away, self.unit))
+        if not places:
+            return
+        before = frozenset(piece.word for piece in pieces(orbit, self.unit))
         for place, kind in places:
             try:
                 outcome = outcome_at(orbit, place, kind)
@@ -253,9 +256,9 @@ def edited_whole(
     kept = np.zeros(len(orbit.word)) if away is None else away
     moves = np.array([speeds.get(o, kept[o[0]] if o[1] < 0 else 0.0) for o in origins])
     first = next(k for k, (_, exit_) in enumerate(word) if not exit_.startswith("hold@"))
-    word, moves = word[first:] + word[:first], np.roll(moves, -first)
-    starts = np.roll(starts, -first, axis=0)
     if first:
+        word, moves = word[first:] + word[:first], np.roll(moves, -first)
+        starts = np.roll(starts, -first, axis=0)
         starts[-first:, 0] += orbit.period
     starts = clocked(orbit.model, starts, float(starts[0, 0]) + orbit.period)
     try:

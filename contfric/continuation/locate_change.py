@@ -22,12 +22,45 @@ def locate_change(
     target: float = 0.0,
 ) -> Point | None:
     """Locate one change of sign; None if no point could be solved on the way."""
+    return _located(orbit, before, after, settings, kind, index, target)[0]
+
+
+def locate_label(
+    orbit: Orbit, before: Point, after: Point, settings: Settings, index: int
+) -> list[Point]:
+    """Locate a change of a label: the first one, seen from the one point, and the last one if it is another.
+
+    Where every trial had one of the two labels the last change, seen from the other point, is the first:
+    the same places are tried.
+    """
+    from contfric.continuation.bracket import BY_LABEL
+
+    found = []
+    for one, other in ((before, after), (after, before)):
+        target = float(one.labels[index])
+        point, plain = _located(orbit, one, other, settings, BY_LABEL, index, target)
+        found += [] if point is None else [point]
+        if found and plain:
+            break
+    return found
+
+
+def _located(
+    orbit: Orbit,
+    before: Point,
+    after: Point,
+    settings: Settings,
+    kind: int,
+    index: int,
+    target: float,
+) -> tuple[Point | None, bool]:
+    """Return the place of one change of sign, and whether a label changes at one place only."""
     from contfric.continuation.bracket import BY_TEST, locate
 
     rows = Rows.empty(orbit.system, 4)
     rows.put(0, before)
     rows.put(1, after)
-    at = locate(
+    at, plain = locate(
         orbit.system.functions(),
         orbit.system.layout,
         orbit.vector,
@@ -43,8 +76,8 @@ def locate_change(
     )
     # behind -2 Newton fails: the last good point, marked as such
     if at == -1.0 or (at < 0.0 and kind != BY_TEST):
-        return None
-    return replace(rows.point(3), lost=at < 0.0)
+        return None, False
+    return replace(rows.point(3), lost=at < 0.0), plain
 
 
 def locate_value(

@@ -201,7 +201,8 @@ class Rows:
         """Return the arrays up to a row, as the march takes them."""
         from contfric.continuation.geometry import Points
 
-        return Points(*(a[:stop] for a in vars(self).values()))
+        arrays = vars(self).values()
+        return Points(*(arrays if stop is None else (a[:stop] for a in arrays)))
 
     def first(self, count: int) -> Rows:
         """Return the first rows."""

@@ -60,8 +60,7 @@ def sliding_events(
     first, point = min(located, key=lambda pair: pair[1].arc)
     while hidden := _located_before(orbit, before, point, settings):
         first, point = min(hidden, key=lambda pair: pair[1].arc)
-    point = _pulled_in(orbit, before, point, settings)
-    here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    point, here = _pulled_in(orbit, before, point, settings)
     first = _stop_behind(here, point, first)
     kind = kind_of_margin(orbit.system, orbit.system.tests[first], here)
     together, known = _TOGETHER, 0.0
@@ -93,22 +92,26 @@ def sliding_events(
     return [(replace(found, bound=max(found.accuracy, known)) if known > 0.0 else found, point)]
 
 
-def _pulled_in(orbit: Orbit, before: Point, point: Point, settings: Settings) -> Point:
+def _pulled_in(
+    orbit: Orbit, before: Point, point: Point, settings: Settings
+) -> tuple[Point, Orbit]:
     """Return a located point that is admissible: the same, or one before it, by less than it is located to.
 
+    And the orbit there.
     Where a slide has no length any more the equations are nearly singular, and the last correction takes a
     margin that was zero to either side of it.
     """
     active = orbit.model.index_of(settings.parameter)
-    if point.lost or _is_inside(point.orbit(orbit.system, orbit.vector, active)):
-        return point
+    here = point.orbit(orbit.system, orbit.vector, active)
+    if point.lost or _is_inside(here):
+        return point, here
     for back in _BACK:
-        moved = point.orbit(orbit.system, orbit.vector, active)
-        moved = replace(moved, joints=moved.joints - back * point.tangent)
+        moved = replace(here, joints=here.joints - back * point.tangent)
         nearer = first_point(moved, settings, point.tangent, point.slope)
-        if nearer is not None and _is_inside(nearer.orbit(orbit.system, orbit.vector, active)):
-            return replace(nearer, arc=point.arc - back)
-    return point
+        there = None if nearer is None else nearer.orbit(orbit.system, orbit.vector, active)
+        if nearer is not None and there is not None and _is_inside(there):
+            return replace(nearer, arc=point.arc - back), there
+    return point, here
 
 
 def _is_inside(here: Orbit) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from contfric.continuation.continuum import LEVEL
 from contfric.continuation.crossing import crossing_between
 from contfric.continuation.events import Bifurcation, Kind
-from contfric.continuation.locate_change import locate_change
+from contfric.continuation.locate_change import locate_change, locate_label
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.report import ROUGH, bifurcation_at
 from contfric.continuation.vertices import (
@@ -67,7 +67,8 @@ def smooth_events(
         if max(abs(a), abs(b)) < LEVEL:
             continue  # zero on both sides: a continuum of orbits, and the sign is rounding
         share = a / (a - b) if np.isfinite(a) else 0.5  # infinite at a grazing: nothing is known
-        if column == CHI_ONE and not _passes_vertex(orbit, before, after, share, settings):
+        may_cross = column == CHI_ONE and orbit.model.symmetry is None
+        if may_cross and not _passes_vertex(orbit, before, after, share, settings):
             crossing = _crossing(orbit, before, after, beyond, share, settings)
             if crossing is not None:
                 found.append(crossing)
@@ -278,17 +279,12 @@ def _is_pole(value: float, a: float, b: float) -> bool:
 
 def _tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -> list[Located]:
     """Return the events T: changes of the surfaces that a segment crosses."""
-    from contfric.continuation.bracket import BY_LABEL
-
     found: list[Located] = []
     active = orbit.model.index_of(settings.parameter)
     for k in range(len(before.labels)):
         if before.labels[k] == after.labels[k]:
             continue
-        # the first change, seen from the start, and the last one, seen from the end of the step
-        first = locate_change(orbit, before, after, settings, BY_LABEL, k, float(before.labels[k]))
-        last = locate_change(orbit, after, before, settings, BY_LABEL, k, float(after.labels[k]))
-        places = [p for p in (first, last) if p is not None]
+        places = locate_label(orbit, before, after, settings, k)
         if len(places) > 1 and places[1].arc - places[0].arc < SAME_PLACE:
             places.pop()
         if not places:

@@ -65,16 +65,19 @@ def resting_domain(system: System, test: Test) -> Domain | None:
 
     Where the surface is that of another contact, whose state changes at the same time, the rest goes on.
     """
-    model = system.model
-    mode, exit_ = system.word[test.segment]
+    return _resting(system.model, *system.word[test.segment], test.surface)
+
+
+@cache
+def _resting(model: Model, mode: str, exit_: str, surface: str) -> Domain | None:
     resting = [
         d
         for d in _near(model, mode, exit_)
-        if model.mode_by_name[d.mode].sliding and d.signs.get(test.surface, 0) != 0
+        if model.mode_by_name[d.mode].sliding and d.signs.get(surface, 0) != 0
     ]
-    own = [d for d in resting if d.mode == mode and _ends_rest(model, d, test.surface)]
+    own = [d for d in resting if d.mode == mode and _ends_rest(model, d, surface)]
     others = [
-        d for d in resting if d.signs.get(exit_) == 0 and _ends_rest(model, d, test.surface, exit_)
+        d for d in resting if d.signs.get(exit_) == 0 and _ends_rest(model, d, surface, exit_)
     ]
     return next(iter([*own, *others]), None)
 

@@ -6,8 +6,8 @@ cut at the start of a slide of some length, which every word has; each word of a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,12 +30,25 @@ class Form:
     joints : start joints (t, y) of the segments, shape (k, 1 + n)
     away : how fast the start joints move in time where the new orbit is singular at the event, shape (k,)
     reason : what happens at its places, in words
+    unit : of the motion
     """
 
     word: Word
     joints: FloatArray
     away: FloatArray
-    reason: str = ""
+    reason: str
+    unit: Unit
+
+    @cached_property
+    def orbit(self) -> Orbit:
+        """The motion as an orbit of this form alone; on its half where the unit is half of it.
+
+        Raises
+        ------
+        NotationError
+            If there is no such word.
+        """
+        return self.unit.orbit((self,))[0]
 
     @property
     def has_hold(self) -> bool:
@@ -75,6 +88,15 @@ class Unit:
             moved[:, 1:] = moved[:, 1:] @ self.model.symmetry.array().T
         return moved
 
+    def starts(self, count: int) -> FloatArray:
+        """Return the joints at which that many units begin, one after the other, shape (count, 1 + n)."""
+        starts = np.tile(self.cut, (count, 1))
+        starts[:, 0] += np.arange(count) * self.duration
+        if self.half:
+            assert self.model.symmetry is not None
+            starts[1::2, 1:] = starts[1::2, 1:] @ self.model.symmetry.array().T
+        return starts
+
     def image_word(self, word: Word, times: int) -> Word:
         """Return a word of the unit as one of the unit that is some number of times later."""
         return mirror_pairs(self.model, word) if self.half and times % 2 else word
@@ -102,10 +124,6 @@ class Unit:
             raise NotationError(str(error)) from None
         return Orbit(system, joints, self.vector.copy(), 0.0, Status.CONVERGED), away
 
-    def whole(self, form: Form) -> Orbit:
-        """Return the motion as an orbit of one form alone, on its whole cycle."""
-        return self.orbit((form,))[0].as_whole()
-
 
 def unit_of(orbit: Orbit) -> Unit:
     """Return the unit of the motion of a whole orbit."""
@@ -120,35 +138,63 @@ def unit_of(orbit: Orbit) -> Unit:
     return Unit(orbit.model, orbit.vector, periods, half, duration, mode, cut)
 
 
-def pieces(orbit: Orbit, away: FloatArray, unit: Unit, reason: str = "") -> Iterator[Form]:
-    """Yield the units of a whole orbit as forms, each as the first unit of the motion."""
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One unit of a whole orbit.
+
+    Attributes
+    ----------
+    number : units of the orbit before it
+    segments : of the orbit; those past its end are of its next period
+    word : of the piece, as that of the first unit of the motion
+    """
+
+    number: int
+    segments: range
+    word: Word
+
+
+def pieces(orbit: Orbit, unit: Unit) -> list[Piece]:
+    """Return the units of a whole orbit.
+
+    Raises
+    ------
+    NotationError
+        If the orbit does not begin with a slide where a unit does.
+    """
     cuts = _cuts(orbit, unit)
     if cuts is None:
         raise NotationError("the edited word does not begin with a slide where the motion does")
-    count = len(orbit.word)
+    count, found = len(orbit.word), []
     for j, (start, stop) in enumerate(zip(cuts, [*cuts[1:], cuts[0]], strict=True)):
-        places = range(start, stop if stop > start else stop + count)
-        word = tuple(orbit.word[i % count] for i in places)
-        joints = np.array([orbit.cycle[i % count] for i in places])
-        joints[:, 0] += np.array([orbit.period * (i // count) for i in places])
-        joints[:, 0] += unit.cut[0] + j * unit.duration - joints[0, 0]
-        back = unit.image(joints, -j)
-        yield Form(unit.image_word(word, j), back, away[[i % count for i in places]], reason)
+        segments = range(start, stop if stop > start else stop + count)
+        word = tuple(orbit.word[i % count] for i in segments)
+        found.append(Piece(j, segments, unit.image_word(word, j)))
+    return found
+
+
+def form_of(orbit: Orbit, away: FloatArray, unit: Unit, piece: Piece, reason: str) -> Form:
+    """Return one unit of a whole orbit as a form, as the first unit of the motion."""
+    count = len(orbit.word)
+    places = [i % count for i in piece.segments]
+    joints = orbit.cycle[places]
+    joints[:, 0] += np.array([orbit.period * (i // count) for i in piece.segments])
+    joints[:, 0] += unit.cut[0] + piece.number * unit.duration - joints[0, 0]
+    return Form(piece.word, unit.image(joints, -piece.number), away[places], reason, unit)
 
 
 def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
     """Return the segments with which the units of a whole orbit begin; None if one is not there."""
+    period, whole = orbit.period, unit.model.whole_mode
+    gaps = np.abs(orbit.cycle - unit.starts(round(period / unit.duration))[:, None])
+    if orbit.model.autonomous:
+        gaps[:, :, 0] = 0.0
+    else:
+        gaps[:, :, 0] = np.abs((gaps[:, :, 0] + 0.5 * period) % period - 0.5 * period)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
     cuts = []
-    for j in range(round(orbit.period / unit.duration)):
+    for j, fits in enumerate((gaps.max(axis=2) < SAME_MOTION) & (lasts > SAME_MOTION)):
         mode = mirror_mode(unit.model)[unit.mode] if unit.half and j % 2 else unit.mode
-        joint = unit.image(unit.cut[None, :], j)[0]
-        gap = np.abs(orbit.cycle - joint)
-        gap[:, 0] = np.abs((gap[:, 0] + 0.5 * orbit.period) % orbit.period - 0.5 * orbit.period)
-        if orbit.model.autonomous:
-            gap[:, 0] = 0.0
-        fits = (np.max(gap, axis=1) < SAME_MOTION) & (lasts > SAME_MOTION)
-        whole = unit.model.whole_mode
         found = [i for i in np.flatnonzero(fits) if whole(orbit.word[i][0]) == whole(mode)]
         if not found:
             return None

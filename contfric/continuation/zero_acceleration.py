@@ -48,13 +48,12 @@ def first_zero_acceleration(orbit: Orbit, i: int, start: float, departs: str) ->
     rate = _departure_rate(orbit, i, departs)
     end = float(orbit.ends[i, 0])
     places = [t for t in _stationary(orbit, i) if start < t < end]
-    grid = np.unique(
-        np.concatenate(
-            [
-                np.linspace(a, b, _PIECES + 1)
-                for a, b in zip([start, *places], [*places, end], strict=True)
-            ]
-        )
+    grid = sorted(
+        {
+            float(time)
+            for a, b in pairwise([start, *places, end])
+            for time in np.linspace(a, b, _PIECES + 1)
+        }
     )
     for a, b in pairwise(grid):
         if rate(b) < (0.0 if b < end else -_ZERO) and (rate(a) > 0.0 or a > start):

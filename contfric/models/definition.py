@@ -215,6 +215,15 @@ class Model(Shown, TransitionMaps):
 
         return FlowView(self, vector)
 
+    def periods_along(self, vector: FloatArray, name: str, values: FloatArray) -> FloatArray:
+        """Return the period of the excitation at values of one parameter."""
+        moved, active, period = vector.copy(), self.index_of(name), self.flow.period
+        which, grad, found = np.empty(0, dtype=np.int64), np.empty(0), np.empty(len(values))
+        for k, value in enumerate(values):
+            moved[active] = value
+            found[k] = period(moved, which, grad)
+        return found
+
     @property
     def directions(self) -> int:
         """Number of multipliers of an orbit: one less than states without excitation (a shift in time)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,5 +173,11 @@ class Symmetry:
     surfaces: Mapping[str, str]
 
     def array(self) -> FloatArray:
-        """Return the state matrix, shape (n, n)."""
-        return np.array(self.matrix, dtype=np.float64)
+        """Return the state matrix, shape (n, n); not to be changed."""
+        return self._array
+
+    @cached_property
+    def _array(self) -> FloatArray:
+        found: FloatArray = np.array(self.matrix, dtype=np.float64)
+        found.flags.writeable = False
+        return found

@@ -83,10 +83,10 @@ def tangent_of(
     numpy.linalg.LinAlgError
         If the curve has no unique direction.
     """
-    _, _, c, _ = jacobian_blocks(system, joints, vector)
+    a, b, c, close = jacobian_blocks(system, joints, vector)
     size = joints.size
     full = np.empty((size + 1, size + 1))
-    full[:size, :size] = assembled(system, joints, vector)
+    full[:size, :size] = stacked(a, b, close)
     full[:size, size] = c[:, :, active].ravel()
     wanted = np.zeros(size + 1)
     wanted[size] = 1.0
@@ -105,8 +105,8 @@ def null_space(
     The null vectors of the Jacobian with the parameter's column, shapes (k, N, m) and (k,): one where the
     curve has a unique direction.
     """
-    _, _, c, _ = jacobian_blocks(system, joints, vector)
-    full = np.hstack([assembled(system, joints, vector), c[:, :, active].reshape(-1, 1)])
+    a, b, c, close = jacobian_blocks(system, joints, vector)
+    full = np.hstack([stacked(a, b, close), c[:, :, active].reshape(-1, 1)])
     _, size, right = np.linalg.svd(full)
     rank = int(np.sum(size > _NULL * size[0]))
     found = right[rank:]

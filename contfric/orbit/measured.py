@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
 from contfric.base.shown import Shown
@@ -9,11 +10,19 @@ from contfric.base.shown import Shown
 if TYPE_CHECKING:
     from contfric.orbit.gradient import Gradient
     from contfric.orbit.orbit import Orbit
+    from contfric.orbit.slides import Outline
     from contfric.quantities.registry import QuantityLike
 
 
 class MeasuredOrbit(Shown):
     """The quantities of an orbit: a part of :class:`contfric.orbit.orbit.Orbit`."""
+
+    @cached_property
+    def outline(self) -> Outline:
+        """The slides of the motion, whatever word it is solved with."""
+        from contfric.orbit.slides import outline_of
+
+        return outline_of(cast("Orbit", self))
 
     def quantity(self, name: QuantityLike) -> Any:
         """Return a quantity: by its name, as an expression, or as a function of an orbit.

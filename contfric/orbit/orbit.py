@@ -167,8 +167,10 @@ class Orbit(MeasuredOrbit):
 
     def as_whole(self) -> Orbit:
         """Return the same orbit as a problem on its whole cycle."""
-        if not self.system.half:
-            return self
+        return self._whole if self.system.half else self
+
+    @cached_property
+    def _whole(self) -> Orbit:
         system = build_system(self.model, self.word, self.periods)
         return replace(self, system=system, joints=self.cycle)
 

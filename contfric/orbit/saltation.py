@@ -25,7 +25,7 @@ import numpy as np
 
 from contfric.models.definition import FloatArray, Model
 from contfric.models.view import FlowView
-from contfric.orbit.system import System, following_modes
+from contfric.orbit.system import System, Word, following_modes
 from contfric.signature.holds import is_hold
 
 #: Fields that differ by less than this share of each rate's size, at all states, are equal there: rounding.
@@ -59,15 +59,14 @@ def pass_when_due(
     a, b : blocks on z_i and z_{i+1}, shape (N, m, m); changed in place
     """
     model, word = system.model, system.word
-    after = following_modes(model, word, system.half)
+    due = _due(model, word, system.half)
+    if not due:
+        return
     view = FlowView(model, vector)
-    for i, ((mode, exit_), following) in enumerate(zip(word, after, strict=True)):
-        passage = passage_at(model, mode, exit_, following)
-        held = is_hold(word[(i + 1) % len(word)][1])  # what is held has equations of its own
-        if passage is Passage.JUMP or held:
-            continue
+    for i, passage, following in due:
+        mode, exit_ = word[i]
         last = i + 1 == len(word)
-        end = _end(system, joints, view.period, i)
+        end = _end(system, joints, view, i)
         slope = view.gradient(model.surface_by_name[exit_].observable, *end)
         if not _is_small(slope, b[i, :-1, 0]):
             continue
@@ -84,17 +83,30 @@ def pass_when_due(
             a[i, -1, 0], b[i, -1, 0] = -1.0, 1.0
 
 
-def _end(system: System, joints: FloatArray, period: float, i: int) -> tuple[float, FloatArray]:
+@cache
+def _due(model: Model, word: Word, half: bool) -> list[tuple[int, Passage, str]]:
+    """Return the joints at which the rate may vanish, with what the field does there and what follows."""
+    after = following_modes(model, word, half)
+    found: list[tuple[int, Passage, str]] = []
+    for i, ((mode, exit_), following) in enumerate(zip(word, after, strict=True)):
+        passage = passage_at(model, mode, exit_, following)
+        held = is_hold(word[(i + 1) % len(word)][1])  # what is held has equations of its own
+        if passage is not Passage.JUMP and not held:
+            found.append((i, passage, following))
+    return found
+
+
+def _end(system: System, joints: FloatArray, view: FlowView, i: int) -> tuple[float, FloatArray]:
     """Return time and state at the end of segment i: that of the last is the image of the first joint."""
     if i + 1 < len(joints):
         return float(joints[i + 1, 0]), joints[i + 1, 1:]
     layout = system.layout
-    return float(joints[0, 0]) + layout.turn * period, layout.closure @ joints[0, 1:]
+    return float(joints[0, 0]) + layout.turn * view.period, layout.closure @ joints[0, 1:]
 
 
 def _is_small(slope: FloatArray, field: FloatArray) -> bool:
     rate = slope[0] + slope[1:] @ field
-    return bool(abs(rate) < _SMALL * np.linalg.norm(slope) * np.linalg.norm([1.0, *field]))
+    return bool(rate * rate < _SMALL**2 * (slope @ slope) * (1.0 + field @ field))
 
 
 def _projection(view: FlowView, slope: FloatArray, joint: tuple[str, str, str]) -> FloatArray:

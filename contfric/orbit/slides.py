@@ -7,10 +7,11 @@ inside of a slide. The slides of some length, joined over such touches, are the 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 
 #: Parts of a cycle that agree to this (nondimensional) are the same motion: the root of rounding.
@@ -108,15 +109,24 @@ class Outline:
         """Return how far two motions are apart, up to symmetry; infinite if they are of another kind."""
         if self.periods != other.periods or len(self.starts) != len(other.starts):
             return np.inf
-        return min(
-            _apart(self.starts, there, self.cycle, self.angles)
-            for there in (other.starts, other.images)
-        )
+        from contfric.orbit.apart import farthest_apart
 
-    @property
+        images = (other.starts, other.images)
+        return min(float(farthest_apart(self.starts, there, self._cycles)) for there in images)
+
+    @cached_property
+    def _cycles(self) -> FloatArray:
+        """What times and states are modulo; infinite where they are not, shape (1 + n,)."""
+        cycles = np.full(self.starts.shape[1], np.inf)
+        cycles[[0, *self.angles]] = [self.cycle, *(2.0 * np.pi for _ in self.angles)]
+        return cycles
+
+    @cached_property
     def apart_from_image(self) -> float:
         """How far the motion is from its symmetry image."""
-        return _apart(self.starts, self.images, self.cycle, self.angles)
+        from contfric.orbit.apart import farthest_apart
+
+        return float(farthest_apart(self.starts, self.images, self._cycles))
 
 
 def outline_of(orbit: Orbit) -> Outline:
@@ -181,14 +191,3 @@ def _columns(model: Model) -> tuple[int, ...]:
 def modulo(gaps: FloatArray, cycle: float) -> FloatArray:
     """Return distances on a circle of circumference ``cycle``."""
     return np.asarray(np.abs((gaps + 0.5 * cycle) % cycle - 0.5 * cycle))
-
-
-def _apart(one: FloatArray, other: FloatArray, cycle: float, angles: tuple[int, ...] = ()) -> float:
-    """Return the Hausdorff distance of two sets of joints, times modulo a cycle, angles modulo a turn."""
-    gaps = np.abs(one[:, None, :] - other[None, :, :])
-    if np.isfinite(cycle):
-        gaps[:, :, 0] = modulo(gaps[:, :, 0], cycle)
-    for k in angles:
-        gaps[:, :, k] = modulo(gaps[:, :, k], 2.0 * np.pi)
-    distance = np.max(gaps, axis=2)
-    return float(max(distance.min(axis=0).max(), distance.min(axis=1).max()))

@@ -43,11 +43,13 @@ def _bounds(model: Model, modes: dict[str, str]) -> dict[str, tuple[str, ...]]:
     }
 
 
-def mode_domains(model: Model, mode: str) -> list[str]:
+@cache
+def mode_domains(model: Model, mode: str) -> tuple[str, ...]:
     """Return the domains of one mode."""
-    return [d.name for d in model.domains_of(model.whole_mode(mode))]
+    return tuple(d.name for d in model.domains_of(model.whole_mode(mode)))
 
 
+@cache
 def inside_sign(model: Model, mode: str, surface: str) -> int:
     """Return the sign of (observable - level) inside a mode, 0 if the mode lies on both sides."""
     signs = {d.signs.get(surface, 0) for d in model.domains_of(model.whole_mode(mode))}
@@ -55,7 +57,7 @@ def inside_sign(model: Model, mode: str, surface: str) -> int:
 
 
 def ending_sides(
-    model: Model, mode: str, surface: str, following: str, inside: list[str]
+    model: Model, mode: str, surface: str, following: str, inside: tuple[str, ...]
 ) -> dict[str, int]:
     """Return the sides of surfaces where a mode is left through one into the following mode, as far as known.
 
@@ -80,13 +82,14 @@ def is_section(model: Model, mode: str, surface: str) -> bool:
     return (mode, surface) in model.sections
 
 
-def exit_domains(model: Model, mode: str, surface: str, following: str) -> list[str]:
+@cache
+def exit_domains(model: Model, mode: str, surface: str, following: str) -> tuple[str, ...]:
     """Return the domains of a mode from which a surface leads into the following mode."""
     if isinstance(model, ComposedModel):
-        return [mode] if model.follows(mode, surface, following) else []
+        return (mode,) if model.follows(mode, surface, following) else ()
     side = model.section_sides.get((mode, surface), 0)
     whole = model.whole_mode(mode if side else following)
-    return [
+    return tuple(
         name
         for name in mode_domains(model, mode)
         if side in (0, model.domain_by_name[name].signs[surface])
@@ -94,7 +97,7 @@ def exit_domains(model: Model, mode: str, surface: str, following: str) -> list[
             model.domain_by_name[target].mode == whole
             for target in model.targets.get((name, surface), ())
         )
-    ]
+    )
 
 
 @cache

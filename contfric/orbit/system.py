@@ -229,10 +229,10 @@ def following_modes(model: Model, word: Word, half: bool) -> list[str]:
 
 def _segment_domains(
     model: Model, mode: str, surface: str, after: str, given: tuple[str, ...]
-) -> list[str]:
+) -> tuple[str, ...]:
     """Domains in which the segment may end."""
     if given:
-        return list(given)
+        return given
     if is_hold(surface):
         return mode_domains(model, mode)
     found = exit_domains(model, mode, surface, after)
@@ -263,7 +263,7 @@ def _pin(hold: Hold | None, surfaces: list[str]) -> int:
 
 
 def _exit_sign(
-    model: Model, index: int, inside: list[str], surface: str, holds: tuple[Hold, ...]
+    model: Model, index: int, inside: tuple[str, ...], surface: str, holds: tuple[Hold, ...]
 ) -> float:
     """Sign of the rate of the observable where the exit surface is met from inside."""
     for hold in holds:
@@ -282,7 +282,7 @@ def _surface_observables(model: Model) -> IntArray:
 def _margins(
     model: Model,
     word: Word,
-    inside: list[list[str]],
+    inside: list[tuple[str, ...]],
     ending: list[dict[str, int]],
     full: bool,
     holds: tuple[Hold, ...],

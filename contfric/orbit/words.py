@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from functools import cache
 
 from contfric.models.definition import Model
 from contfric.orbit.structure import exit_domains
@@ -10,12 +11,14 @@ from contfric.orbit.system import Word
 from contfric.signature.reduced import mirror_pair
 
 
+@cache
 def mirror_pairs(model: Model, word: Word) -> Word:
     """Return the mirror image of a word, segment by segment (not rotated)."""
     assert model.symmetry is not None
     return tuple(mirror_pair(pair, model) for pair in word)
 
 
+@cache
 def half_of(model: Model, word: Word, periods: int) -> Word | None:
     """Return the first half if the second one is its mirror image, else None.
 

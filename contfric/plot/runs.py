@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import TYPE_CHECKING
+from itertools import compress, pairwise
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -31,8 +31,7 @@ class Run:
     y: FloatArray
 
 
-@dataclass(frozen=True)
-class _Vertex:
+class _Vertex(NamedTuple):  # there is one for each point: cheaper than a dataclass
     arc: float
     x: float
     y: FloatArray
@@ -80,18 +79,20 @@ def _vertices(branch: Branch, row: QuantityLike) -> list[_Vertex]:
     columns = quantity(branch, row)
     tolerance = _SAME * max(float(np.ptp(branch.arc)), 1e-300)
     events = [_event_vertex(branch, b, columns, row) for b in branch.bifurcations]
-    taken = np.array([v.arc for v in events])
-    points = [v for v in _points(branch, columns) if not np.any(np.abs(taken - v.arc) <= tolerance)]
-    return sorted([*events, *points], key=lambda v: v.arc)
+    points = list(_points(branch, columns))
+    gaps = np.subtract.outer([v.arc for v in points], [v.arc for v in events])
+    free = ~np.any(np.abs(gaps) <= tolerance, axis=1)
+    return sorted([*events, *compress(points, free)], key=lambda v: v.arc)
 
 
 def _points(branch: Branch, columns: FloatArray) -> Iterator[_Vertex]:
     stable = branch.stable
     positions = np.array([_position(branch, b) for b in branch.bifurcations])
-    for k, (arc, x) in enumerate(zip(branch.arc, branch.values, strict=True)):
-        state = None if stable is None else bool(stable[k])
-        yield _Vertex(float(arc), float(x), columns[k], state, state, False)
-        if stable is None or k + 1 == len(columns) or stable[k] == stable[k + 1]:
+    arcs, values = branch.arc.tolist(), branch.values.tolist()
+    states = [None] * len(arcs) if stable is None else stable.tolist()
+    for k, (arc, x, state) in enumerate(zip(arcs, values, states, strict=True)):
+        yield _Vertex(arc, x, columns[k], state, state, False)
+        if stable is None or k + 1 == len(columns) or state == states[k + 1]:
             continue
         after = float(branch.arc[k + 1])
         if not np.any((positions >= arc) & (positions <= after)):

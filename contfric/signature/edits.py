@@ -220,9 +220,14 @@ def is_closed_walk(word: Sequence[ReducedPair], model: Model) -> bool:
     >>> is_closed_walk((("slide+", "v"), ("stick", "F+")), load_model("coulomb"))
     False
     """
+    return _is_closed_walk(tuple(word), model)
+
+
+@cache
+def _is_closed_walk(word: ReducedWord, model: Model) -> bool:
     if any(is_hold(exit_) for _, exit_ in word):
         try:
-            word = without_holds(tuple(word), model)
+            word = without_holds(word, model)
         except NotationError:
             return False
     modes = [mode for mode, _ in word]

@@ -201,7 +201,7 @@ def test_local_conditions_agree_with_what_is_solved() -> None:
         if b.kind.value not in ("SS", "CS", "AS", "GS"):
             continue
         incident = incident_forms(b)
-        relations = [relation_of(incident.unit, f, active, incident.least) for f in incident.forms]
+        relations = [relation_of(f, active, incident.least) for f in incident.forms]
         assert all(r is not None for r in relations)
         sides = possible(
             [r for r in relations if r is not None], [(k,) for k in range(len(relations))]

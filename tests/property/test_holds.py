@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import contfric as cf
-from contfric.continuation.unit import pieces, unit_of
+from contfric.continuation.unit import form_of, pieces, unit_of
 from contfric.continuation.vertices import passed_vertex
 from contfric.errors import NotationError
 from contfric.models import load_model
@@ -313,10 +313,11 @@ def test_the_unit_of_a_doubled_orbit_is_that_of_the_orbit(index: int) -> None:
     unit, doubled = unit_of(orbit.as_whole()), unit_of(orbit.doubled())
     assert unit.periods == doubled.periods == orbit.periods
     assert unit.half == doubled.half == orbit.symmetric
-    copies = list(pieces(orbit.doubled(), np.zeros(len(orbit.word) * 2), doubled))
+    twice, still = orbit.doubled(), np.zeros(len(orbit.word) * 2)
+    copies = pieces(twice, doubled)
     assert len(copies) == (4 if orbit.symmetric else 2)
     for copy in copies:
-        again = doubled.whole(copy)
+        again = form_of(twice, still, doubled, copy, "").orbit.as_whole()
         assert same(again.word, orbit.word)
         assert np.allclose(np.sort(again.stops), np.sort(orbit.stops), rtol=0, atol=1e-12)
 
