@@ -76,6 +76,11 @@ CAUGHT = {
         "Omega",
         (0.4082753582408252, 0.5198415555197237),
     ),
+    "a doubled branch is 5e-10 of the range wide, between a doubling and a crossing that is known to 6e-9": (
+        {"Omega": 0.27913139027746076, "S": 0.047032795367651294, "S0": 0.1946105906990455},
+        "h",
+        (-0.038285131522884853, 0.08811813294417477),
+    ),
     "the stop of a hold depends on its length twice": (
         {"Omega": 0.43, "S": 0.17605, "S0": 0.219291},
         "Omega",
