@@ -81,6 +81,17 @@ CAUGHT = {
         "h",
         (-0.038285131522884853, 0.08811813294417477),
     ),
+    "what leaves an event changes the parameter by the square of the distance, by rounding in short steps": (
+        {
+            "Omega": 0.0962982025516357,
+            "S": 0.04368564349816659,
+            "S0": 0.0457320716739423,
+            "h": -0.10168439555447883,
+            "zeta": 1.133909093793713e-05,
+        },
+        "zeta",
+        (-0.03761426489112284, 0.04014072549999835),
+    ),
     "the stop of a hold depends on its length twice": (
         {"Omega": 0.43, "S": 0.17605, "S0": 0.219291},
         "Omega",
@@ -99,6 +110,14 @@ def test_the_same_from_every_branch(name: str) -> None:
     assert diagram.verified
     assert len(found.restarts) >= 3
     assert sum(b.below is not None for b in found.balances) >= 2
+
+
+def test_a_start_that_is_symmetric_but_for_rounding_is_a_symmetric_branch() -> None:
+    """With damping 1e-9 at Omega = 1/2 a multiplier is 1 - 1e-8, and the asymmetry rounding over that."""
+    params = {"Omega": 0.5, "S": 0.0439970781077225, "S0": 0.058912052048617, "zeta": 1e-9}
+    diagram = cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.45, 0.54))
+    (branch,) = diagram.branches
+    assert branch.system.half
 
 
 def test_random_scenes() -> None:
