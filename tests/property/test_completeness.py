@@ -25,6 +25,7 @@ from report import Tally
 
 #: Scenes of the share that runs here: few enough for a minute.
 SHARE = range(60)
+EQUAL_MAXIMA = "a hold is left where its load has an equal maximum, which is no event"
 #: Scenes that gave different diagrams from different starts: S, S0, Omega, zeta, h; what varies, its range.
 CAUGHT = {
     "a one-hold bridge met a symmetric pair": (
@@ -92,6 +93,17 @@ CAUGHT = {
         "zeta",
         (-0.03761426489112284, 0.04014072549999835),
     ),
+    EQUAL_MAXIMA: (
+        {
+            "Omega": 0.08480765440122788,
+            "S": 0.15705218456394032,
+            "S0": 0.21671017753854144,
+            "h": -0.15446417988348338,
+            "zeta": 0.0014557001118207622,
+        },
+        "h",
+        (-0.212482322652623, -0.08062492770669732),
+    ),
     "the stop of a hold depends on its length twice": (
         {"Omega": 0.43, "S": 0.17605, "S0": 0.219291},
         "Omega",
@@ -110,6 +122,15 @@ def test_the_same_from_every_branch(name: str) -> None:
     assert diagram.verified
     assert len(found.restarts) >= 3
     assert sum(b.below is not None for b in found.balances) >= 2
+
+
+def test_a_margin_that_vanishes_all_along_gives_no_accuracy() -> None:
+    """A load with equal maxima touches its limit twice: the event is where the slide behind it vanishes."""
+    params, vary, bounds = CAUGHT[EQUAL_MAXIMA]
+    diagram = cf.explore(cf.find_orbit("coulomb", params), vary, bounds)
+    (event,) = (b for b in diagram.of_kind("AS") if abs(b.params["h"] + 0.136152696511) < 1e-9)
+    assert len(event.tests) > 1
+    assert event.accuracy < 1e-9
 
 
 def test_a_start_that_is_symmetric_but_for_rounding_is_a_symmetric_branch() -> None:
