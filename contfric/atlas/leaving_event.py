@@ -64,7 +64,19 @@ def leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branc
         return leave_singular(state, orbit, event, settings)
     there, side = longest
     first = first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
-    return assemble(there, settings, side, first)
+    return _from_admissible(assemble(there, settings, side, first), orbit)
+
+
+def _from_admissible(branch: Branch, orbit: Orbit) -> Branch:
+    """Return a branch whose first point is the orbit at the event, where the solved one misses a condition.
+
+    At an event at which another curve crosses, the first point is solved to the root of rounding only.
+    """
+    if branch[0].admissible or not orbit.admissible or orbit.joints.shape != branch.joints[0].shape:
+        return branch
+    joints, values = branch.joints.copy(), branch.values.copy()
+    joints[0], values[0] = orbit.joints, orbit.params[branch.parameter]
+    return replace(branch, joints=joints, values=values)
 
 
 def _longest_way(

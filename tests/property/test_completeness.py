@@ -124,6 +124,21 @@ def test_the_same_from_every_branch(name: str) -> None:
     assert sum(b.below is not None for b in found.balances) >= 2
 
 
+def test_the_first_point_at_an_event_that_another_curve_crosses_is_admissible() -> None:
+    """Of an asymmetric bridge from a symmetric event stops are known to 5e-7: it is singular there."""
+    params = {
+        "Omega": 0.16742068370826402,
+        "S": 0.07384486161575685,
+        "S0": 0.08595331380687442,
+        "h": 0.18445708029357755,
+        "zeta": 1e-9,
+    }
+    bounds = (0.14973615465637774, 0.17677309246138423)
+    diagram = cf.explore(cf.find_orbit("coulomb", params), "Omega", bounds)
+    points = [orbit for b in diagram.branches if not b.mirrored for orbit in b]
+    assert [orbit.violations() for orbit in points if not orbit.admissible] == []
+
+
 def test_a_margin_that_vanishes_all_along_gives_no_accuracy() -> None:
     """A load with equal maxima touches its limit twice: the event is where the slide behind it vanishes."""
     params, vary, bounds = CAUGHT[EQUAL_MAXIMA]
