@@ -152,11 +152,24 @@ def leave_singular(
 
     Its directions lie in the plane of two null vectors; those at regular angles are tried.
     """
-    for away in plane_of(orbit, orbit.model.index_of(settings.parameter)):
+    active = orbit.model.index_of(settings.parameter)
+    for away in (*plane_of(orbit, active), *_line_of(orbit, active, settings)):
         branch = _leave_beside(state, orbit, away, event, settings)
         if branch is not None and branch.arc[-1] > _SURELY_AWAY:
             return branch
     return None
+
+
+def _line_of(orbit: Orbit, active: int, settings: Settings) -> Iterator[FloatArray]:
+    """Yield both directions of the one null vector where no first point is found at the event itself."""
+    vectors, _ = null_space(orbit.system, orbit.joints, orbit.vector, active)
+    if len(vectors) != 1 or any(
+        first_point(orbit, settings, *way) is not None for way in directions(orbit, active)
+    ):
+        return
+    away = vectors[0] / np.max(np.abs(vectors[0]))
+    yield away
+    yield -away
 
 
 def plane_of(orbit: Orbit, active: int) -> Iterator[FloatArray]:

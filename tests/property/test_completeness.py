@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.atlas.verification import differences
 from contfric.continuation.conditions import possible, relation_of
 from contfric.continuation.incident import incident_forms
 from contfric.continuation.sequences import count, lengths, necklaces
@@ -137,6 +138,22 @@ def test_the_first_point_at_an_event_that_another_curve_crosses_is_admissible() 
     diagram = cf.explore(cf.find_orbit("coulomb", params), "Omega", bounds)
     points = [orbit for b in diagram.branches if not b.mirrored for orbit in b]
     assert [orbit.violations() for orbit in points if not orbit.admissible] == []
+
+
+def test_what_leaves_where_no_first_point_is_found_at_the_event_itself() -> None:
+    """A slide of no length at an AS: the equations were singular there from one start only."""
+    params = {
+        "Omega": 0.31242610984038927,
+        "S": 0.08102347855961815,
+        "S0": 0.1864180921912119,
+        "h": 0.041746373454093044,
+        "zeta": 1e-9,
+    }
+    bounds = (0.0005565498964693605, 0.18542434685558723)
+    diagram = cf.explore(cf.find_orbit("coulomb", params), "h", bounds)
+    bridge = next(b for b in diagram.branches if b.name == "0s, 16seg, 2hold")
+    again = cf.explore(bridge[len(bridge) // 2], "h", bounds, max_step=0.0031)
+    assert list(differences(diagram, again)) == list(differences(again, diagram)) == []
 
 
 def test_a_margin_that_vanishes_all_along_gives_no_accuracy() -> None:
