@@ -6,6 +6,7 @@ be says that something is not in the diagram.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -106,10 +107,12 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
         value, slack = b.params[diagram.parameter], _BESIDE * b.accuracy * width
         if not diagram.range[0] + slack < value < diagram.range[1] - slack:
             continue
-        period = unit_of(b.orbit.as_whole()).periods if not b.orbit.model.autonomous else 0
-        if period == 0:
+        if b.orbit.model.autonomous:
             continue
         nodes, slack = _joined(diagram, number)
+        # a doubling that is joined has a shorter unit than what ends next to it
+        units = (diagram.nodes[joined].bifurcation.orbit.as_whole() for joined in nodes)
+        period = math.gcd(*(unit_of(whole).periods for whole in units))
         families = [
             found
             for joined in nodes

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.atlas.matching import stops_apart
+from contfric.continuation.branch import Branch
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 
 if TYPE_CHECKING:
@@ -42,14 +43,19 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
         if gap <= known and stops_apart(a.orbit, b.orbit) < _ALIKE:
             yield f"{a.label} and {b.label} at {a.params[parameter]:.10g}: not to be told apart"
     for branch in diagram.branches:
-        ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
-        known = sum(b.accuracy for b in ends) * width
-        if not branch.mirrored and len(ends) == 2 and np.ptp(branch.values) < known:
+        if not branch.mirrored and unresolved(branch, width):
             place = f"{branch.name} at {branch.values[0]:.10g}"
             yield f"{place}: {parameter} changes by less along it than its ends are known to"
     for b in values:
         if b.kind in _SMOOTH and _least_margin(b) < _SECOND:
             yield f"{b.label} at {b.params[parameter]:.10g}: a margin vanishes there, too"
+
+
+def unresolved(branch: Branch, width: float) -> bool:
+    """Tell whether the parameter changes along a branch by less than its two ends are known to."""
+    ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
+    known = sum(b.accuracy for b in ends) * width
+    return len(ends) == 2 and bool(np.ptp(branch.values) < known)
 
 
 def _least_margin(event: Bifurcation) -> float:

@@ -29,8 +29,10 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.linear import null_space
 from contfric.orbit.orbit import Orbit
 
-#: First step away from an event, in largest steps: the new word is proved close to it.
-_NEAR_EVENT = 0.01
+#: First step away from an event, in largest steps: the new word is proved close to it. Where the parameter
+#: stands there (a share of the tangent below the second number), it and margins change by the square of the
+#: step, which may be rounding: then a longer one is tried.
+_NEAR_EVENT, _STANDS = (0.01, 0.1), 1e-9
 #: Null vectors where two curves may cross, and the directions between them that are tried: the corrector
 #: reaches a curve from 30 degrees off it.
 _PLANE, _ANGLES = 2, 12
@@ -54,21 +56,46 @@ def leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branc
     settings = settings_for(orbit, state.settings)
     if candidate.away is not None:
         return _leave_beside(state, orbit, candidate.away, event, settings)
-    longest: tuple[Orbit, Side] | None = None
-    for there, side in _ways(orbit, settings, state.progress):
-        if went_somewhere(side, event) and (longest is None or side.length > longest[1].length):
-            longest = there, side
-        if longest is not None and side.length > _SURELY_AWAY:
+    for first_step in _NEAR_EVENT:
+        longest, stands = _longest_way(orbit, event, settings, first_step, state.progress)
+        if longest is not None or not stands:
             break
     if longest is None:
         return leave_singular(state, orbit, event, settings)
     there, side = longest
     first = first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
-    return assemble(there, settings, side, first)
+    return _from_admissible(assemble(there, settings, side, first), orbit)
+
+
+def _from_admissible(branch: Branch, orbit: Orbit) -> Branch:
+    """Return a branch whose first point is the orbit at the event, where the solved one misses a condition.
+
+    At an event at which another curve crosses, the first point is solved to the root of rounding only.
+    """
+    if branch[0].admissible or not orbit.admissible or orbit.joints.shape != branch.joints[0].shape:
+        return branch
+    joints, values = branch.joints.copy(), branch.values.copy()
+    joints[0], values[0] = orbit.joints, orbit.params[branch.parameter]
+    return replace(branch, joints=joints, values=values)
+
+
+def _longest_way(
+    orbit: Orbit, event: Event, settings: Settings, first_step: float, progress: Progress | None
+) -> tuple[tuple[Orbit, Side] | None, bool]:
+    """Return what gets farthest from an event, if any does, and whether the parameter stands there."""
+    longest: tuple[Orbit, Side] | None = None
+    stands = False
+    for there, side in _ways(orbit, settings, first_step, progress):
+        stands = stands or abs(side.first.slope) < _STANDS * settings.width
+        if went_somewhere(side, event) and (longest is None or side.length > longest[1].length):
+            longest = there, side
+        if longest is not None and side.length > _SURELY_AWAY:
+            break
+    return longest, stands
 
 
 def _ways(
-    orbit: Orbit, settings: Settings, progress: Progress | None
+    orbit: Orbit, settings: Settings, first_step: float, progress: Progress | None
 ) -> Iterator[tuple[Orbit, Side]]:
     """Yield what is traced in each direction from an orbit at an event."""
     active = orbit.model.index_of(settings.parameter)
@@ -78,7 +105,7 @@ def _ways(
             continue
         there = start.orbit(orbit.system, orbit.vector, active)
         for point in (start, start.reversed()):
-            yield there, _trace(there, point, settings, progress)
+            yield there, _trace(there, point, settings, first_step, progress)
 
 
 def _leave_beside(
@@ -96,7 +123,7 @@ def _leave_beside(
             if float(np.sum(away * point.tangent)) < 0.0:
                 point = point.reversed()
             point.arc = float(np.linalg.norm(there.joints - orbit.joints)) / len(away) ** 0.5
-            side = _trace(there, point, settings, state.progress)
+            side = _trace(there, point, settings, _NEAR_EVENT[0], state.progress)
             if there.admissible and side.count > 1:
                 origin = replace(
                     point, joints=orbit.joints, w=np.array([settings_value(orbit, settings)])
@@ -125,11 +152,24 @@ def leave_singular(
 
     Its directions lie in the plane of two null vectors; those at regular angles are tried.
     """
-    for away in plane_of(orbit, orbit.model.index_of(settings.parameter)):
+    active = orbit.model.index_of(settings.parameter)
+    for away in (*plane_of(orbit, active), *_line_of(orbit, active, settings)):
         branch = _leave_beside(state, orbit, away, event, settings)
         if branch is not None and branch.arc[-1] > _SURELY_AWAY:
             return branch
     return None
+
+
+def _line_of(orbit: Orbit, active: int, settings: Settings) -> Iterator[FloatArray]:
+    """Yield both directions of the one null vector where no first point is found at the event itself."""
+    vectors, _ = null_space(orbit.system, orbit.joints, orbit.vector, active)
+    if len(vectors) != 1 or any(
+        first_point(orbit, settings, *way) is not None for way in directions(orbit, active)
+    ):
+        return
+    away = vectors[0] / np.max(np.abs(vectors[0]))
+    yield away
+    yield -away
 
 
 def plane_of(orbit: Orbit, active: int) -> Iterator[FloatArray]:
@@ -142,9 +182,11 @@ def plane_of(orbit: Orbit, active: int) -> Iterator[FloatArray]:
         yield away / np.max(np.abs(away))
 
 
-def _trace(orbit: Orbit, point: Point, settings: Settings, progress: Progress | None) -> Side:
+def _trace(
+    orbit: Orbit, point: Point, settings: Settings, first_step: float, progress: Progress | None
+) -> Side:
     return trace_side(
-        orbit, point, settings, first_step=_NEAR_EVENT, at_event=True, progress=progress
+        orbit, point, settings, first_step=first_step, at_event=True, progress=progress
     )
 
 

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.atlas.balance import Balance, IndexSum, balances, index_sums
-from contfric.atlas.degenerate import degenerate_events
-from contfric.atlas.matching import on_branch, same_place
+from contfric.atlas.degenerate import degenerate_events, unresolved
+from contfric.atlas.matching import identity, on_branch, same_place
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation
 from contfric.continuation.points import LARGEST_STEP
@@ -219,7 +219,8 @@ def differences(one: Diagram, other: Diagram) -> Iterator[str]:
             yield f"{event.label} at {one.parameter} = {event.params[one.parameter]:.12g}"
     for branch in one.branches:
         if not branch.mirrored and not any(
-            _covers(other_branch, branch) for other_branch in other.branches
+            _covers(other_branch, branch) or _as_narrow(other_branch, branch, one)
+            for other_branch in other.branches
         ):
             low, high = branch.values.min(), branch.values.max()
             yield f"branch {branch.name} from {low:.10g} to {high:.10g}"
@@ -235,3 +236,25 @@ def _covers(known: Branch, branch: Branch) -> bool:
         return False
     inside = (_inside(branch, share) for share in _INSIDE)
     return any(on_branch(orbit, known) for orbit in inside if orbit.converged)
+
+
+def _as_narrow(known: Branch, branch: Branch, diagram: Diagram) -> bool:
+    """Tell whether two branches of one word have the same two ends, and no width that is known.
+
+    On these no value of the parameter is known to be a value of both.
+    """
+    width = diagram.range[1] - diagram.range[0]
+    if known.mirrored or not (unresolved(branch, width) and unresolved(known, width)):
+        return False
+    if known.system.half != branch.system.half or identity(known[0]) != identity(branch[0]):
+        return False
+    ends, others = (
+        [end.bifurcation for end in b.ends if end.bifurcation is not None] for b in (branch, known)
+    )
+    return any(
+        all(
+            _same_bifurcation(a, b, diagram.parameter, width)
+            for a, b in zip(ends, way, strict=True)
+        )
+        for way in (others, others[::-1])
+    )

@@ -108,12 +108,26 @@ class Estimate:
         """Return the error, and what is claimed if there is none."""
         kind, here, active = self.kind, self.here, self.here.model.index_of(self.parameter)
         if self.tests:
-            labels = kind is Kind.T and self.tests[0].margin is Margin.INTERIOR  # else a joint
-            condition = (_touch if labels else _margin)(here, self.tests[0], active)
-            return None if condition is None else _error_of(here, active, condition), _SINGULAR
+            return self._of_margins(active), _SINGULAR
         if kind is Kind.SN:
             return _fold_error(here, active, self.sides, self.point), _SINGULAR
         return _multiplier_error(kind, here, active, self.width), ACCURACY
+
+    def _of_margins(self, active: int) -> float | None:
+        """Return the least error that one of the margins tells, the first that is good enough.
+
+        Of equal maxima of a load one margin vanishes all along the branch, and tells nothing.
+        """
+        here, best = self.here, None
+        for test in self.tests:
+            labels = self.kind is Kind.T and test.margin is Margin.INTERIOR  # else a joint
+            condition = (_touch if labels else _margin)(here, test, active)
+            error = None if condition is None else _error_of(here, active, condition)
+            if error is not None and not np.isnan(error) and (best is None or error < best):
+                best = error
+            if best is not None and best < ACCURACY * self.width:
+                break
+        return best
 
 
 def _margin(here: Orbit, test: Test, active: int) -> _Condition:

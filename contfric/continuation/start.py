@@ -9,6 +9,7 @@ import numpy as np
 from contfric.continuation.continuum import LEVEL, in_continuum
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.side import first_point
+from contfric.continuation.vertices import symmetrised
 from contfric.errors import ConvergenceError
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import canonical
@@ -16,6 +17,10 @@ from contfric.orbit.solve import polish
 
 #: Tests of the events that have a multiplier 1 or -1, the first ones.
 _LINEAR = 3
+#: Farthest (joints) that a start lies from its mirror image to be asked whether rounding tells them apart.
+_NEARLY_SYMMETRIC = 1e-6
+#: Rounding of the equations of an orbit: some fifty units of its states.
+_ROUNDING = 1e-14
 #: Where a start is looked for that is at no event, relative to the range: in the first steps from it.
 _BESIDE_START = (1.3e-3, -1.3e-3)
 
@@ -28,7 +33,7 @@ def start_of(orbit: Orbit, settings: Settings) -> tuple[Orbit, Point]:
     ConvergenceError
         If the orbit has no unique continuation.
     """
-    orbit = canonical(orbit).as_half()
+    orbit = _as_symmetric(canonical(orbit).as_half())
     start = first_point(orbit, settings)
     at_event = start is not None and _is_at_event(start, settings)
     if start is None or (
@@ -37,6 +42,21 @@ def start_of(orbit: Orbit, settings: Settings) -> tuple[Orbit, Point]:
         why = _why(orbit, settings)
         raise ConvergenceError(f"the orbit has no unique continuation: {why}", orbit)
     return _off_events(orbit, start, settings)
+
+
+def _as_symmetric(orbit: Orbit) -> Orbit:
+    """Return the symmetric orbit, on its half, where rounding does not tell an orbit from it.
+
+    With a multiplier mu near 1 an orbit is known to rounding over 1 - mu along the null vector of 1 - M.
+    Traced on its whole period it would be a branch twice, once as its own mirror image.
+    """
+    part = symmetrised(orbit, _NEARLY_SYMMETRIC)
+    if part is None or orbit.system.holds:
+        return orbit
+    solved = polish(part)
+    away = np.min(np.abs(orbit.turn_multipliers - 1.0), initial=1.0)
+    gap = np.max(np.abs(solved.cycle - orbit.joints)) if solved.converged else np.inf
+    return solved if gap * away < _ROUNDING else orbit
 
 
 def _why(orbit: Orbit, settings: Settings) -> str:

@@ -43,6 +43,8 @@ _AT_PIN = 1e-6
 #: Maxima of equal height of a load at rest (under an even excitation, or one period apart) differ by
 #: rounding: by less than this, relative to 1 + the level.
 _SAME_HEIGHT = 1e-13
+#: Duration below which a hold comes to no later maximum; divided by its square the above is 1e-10.
+_SOON = 0.03
 #: Duration below which rounding hides what is left of a margin without its double zero: at this one it is
 #: known to 1e-3, and a curvature of the load is larger.
 _CLEAR = 1e-6
@@ -109,12 +111,12 @@ def is_doubled(layout, column):  # type: ignore[no-untyped-def]
 
 
 @helper
-def equal_heights(layout, i, column, level):  # type: ignore[no-untyped-def]
+def equal_heights(layout, i, column, level, lasts):  # type: ignore[no-untyped-def]
     """Return what a margin is allowed for equal maxima of the load that segment i may have touched already.
 
-    Not one that is divided by the square of a duration: there it would be no rounding.
+    Not one that is divided by the square of a short duration: there it would be no rounding.
     """
-    if layout.pins[i] != TOUCH_PIN or is_doubled(layout, column):
+    if layout.pins[i] != TOUCH_PIN or (lasts < _SOON and is_doubled(layout, column)):
         return 0.0
     return _SAME_HEIGHT * (1.0 + abs(level))
 
@@ -135,7 +137,7 @@ def interior_margin(functions, layout, k, found, z, p, workspace, stationary):  
     target = functions.level(layout.interior[k, 1], p, workspace.none, workspace.empty)
     least = least_distance(found, float(layout.interior[k, 2]), target, stationary, first, last)
     # what it touched at its start it may touch at the same height again
-    least += equal_heights(layout, i, k, target)
+    least += equal_heights(layout, i, k, target, duration)
     if layout.pins[i] == layout.interior[k, 1]:  # its load falls from the limit on which it starts
         c = layout.observables[layout.interior[k, 1]]
         none, empty = workspace.none, workspace.empty
@@ -167,7 +169,9 @@ def joint_margin(functions, layout, k, z, p, workspace):  # type: ignore[no-unty
     level = functions.level(surface, p, workspace.none, workspace.empty)
     # a hold behind a touch may be left where its load has the same height again: it does not end there
     column = layout.interior.shape[0] + layout.exits.shape[0] + k
-    return layout.joint[k, 2] * (value - level) + equal_heights(layout, i, column, level)
+    return layout.joint[k, 2] * (value - level) + equal_heights(
+        layout, i, column, level, after[0] - z[i, 0]
+    )
 
 
 @helper

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from contfric.models.definition import FloatArray
+from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 
 #: Parts of a cycle that agree to this (nondimensional) are the same motion: the root of rounding.

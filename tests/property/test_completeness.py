@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.atlas.verification import differences
 from contfric.continuation.conditions import possible, relation_of
 from contfric.continuation.incident import incident_forms
 from contfric.continuation.sequences import count, lengths, necklaces
@@ -25,6 +26,7 @@ from report import Tally
 
 #: Scenes of the share that runs here: few enough for a minute.
 SHARE = range(60)
+EQUAL_MAXIMA = "a hold is left where its load has an equal maximum, which is no event"
 #: Scenes that gave different diagrams from different starts: S, S0, Omega, zeta, h; what varies, its range.
 CAUGHT = {
     "a one-hold bridge met a symmetric pair": (
@@ -76,6 +78,33 @@ CAUGHT = {
         "Omega",
         (0.4082753582408252, 0.5198415555197237),
     ),
+    "a doubled branch is 5e-10 of the range wide, between a doubling and a crossing that is known to 6e-9": (
+        {"Omega": 0.27913139027746076, "S": 0.047032795367651294, "S0": 0.1946105906990455},
+        "h",
+        (-0.038285131522884853, 0.08811813294417477),
+    ),
+    "what leaves an event changes the parameter by the square of the distance, by rounding in short steps": (
+        {
+            "Omega": 0.0962982025516357,
+            "S": 0.04368564349816659,
+            "S0": 0.0457320716739423,
+            "h": -0.10168439555447883,
+            "zeta": 1.133909093793713e-05,
+        },
+        "zeta",
+        (-0.03761426489112284, 0.04014072549999835),
+    ),
+    EQUAL_MAXIMA: (
+        {
+            "Omega": 0.08480765440122788,
+            "S": 0.15705218456394032,
+            "S0": 0.21671017753854144,
+            "h": -0.15446417988348338,
+            "zeta": 0.0014557001118207622,
+        },
+        "h",
+        (-0.212482322652623, -0.08062492770669732),
+    ),
     "the stop of a hold depends on its length twice": (
         {"Omega": 0.43, "S": 0.17605, "S0": 0.219291},
         "Omega",
@@ -94,6 +123,54 @@ def test_the_same_from_every_branch(name: str) -> None:
     assert diagram.verified
     assert len(found.restarts) >= 3
     assert sum(b.below is not None for b in found.balances) >= 2
+
+
+def test_the_first_point_at_an_event_that_another_curve_crosses_is_admissible() -> None:
+    """Of an asymmetric bridge from a symmetric event stops are known to 5e-7: it is singular there."""
+    params = {
+        "Omega": 0.16742068370826402,
+        "S": 0.07384486161575685,
+        "S0": 0.08595331380687442,
+        "h": 0.18445708029357755,
+        "zeta": 1e-9,
+    }
+    bounds = (0.14973615465637774, 0.17677309246138423)
+    diagram = cf.explore(cf.find_orbit("coulomb", params), "Omega", bounds)
+    points = [orbit for b in diagram.branches if not b.mirrored for orbit in b]
+    assert [orbit.violations() for orbit in points if not orbit.admissible] == []
+
+
+def test_what_leaves_where_no_first_point_is_found_at_the_event_itself() -> None:
+    """A slide of no length at an AS: the equations were singular there from one start only."""
+    params = {
+        "Omega": 0.31242610984038927,
+        "S": 0.08102347855961815,
+        "S0": 0.1864180921912119,
+        "h": 0.041746373454093044,
+        "zeta": 1e-9,
+    }
+    bounds = (0.0005565498964693605, 0.18542434685558723)
+    diagram = cf.explore(cf.find_orbit("coulomb", params), "h", bounds)
+    bridge = next(b for b in diagram.branches if b.name == "0s, 16seg, 2hold")
+    again = cf.explore(bridge[len(bridge) // 2], "h", bounds, max_step=0.0031)
+    assert list(differences(diagram, again)) == list(differences(again, diagram)) == []
+
+
+def test_a_margin_that_vanishes_all_along_gives_no_accuracy() -> None:
+    """A load with equal maxima touches its limit twice: the event is where the slide behind it vanishes."""
+    params, vary, bounds = CAUGHT[EQUAL_MAXIMA]
+    diagram = cf.explore(cf.find_orbit("coulomb", params), vary, bounds)
+    (event,) = (b for b in diagram.of_kind("AS") if abs(b.params["h"] + 0.136152696511) < 1e-9)
+    assert len(event.tests) > 1
+    assert event.accuracy < 1e-9
+
+
+def test_a_start_that_is_symmetric_but_for_rounding_is_a_symmetric_branch() -> None:
+    """With damping 1e-9 at Omega = 1/2 a multiplier is 1 - 1e-8, and the asymmetry rounding over that."""
+    params = {"Omega": 0.5, "S": 0.0439970781077225, "S0": 0.058912052048617, "zeta": 1e-9}
+    diagram = cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.45, 0.54))
+    (branch,) = diagram.branches
+    assert branch.system.half
 
 
 def test_random_scenes() -> None:
