@@ -1,0 +1,268 @@
+"""Covers a branch with boxes, from event to event."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+from flint import arb
+
+from contfric.certify.chain import Chain, Segments, segments_of
+from contfric.certify.closing import closing_of, is_symmetry
+from contfric.certify.events import EventCertificate
+from contfric.certify.extended import Builder
+from contfric.certify.inequalities import inequalities
+from contfric.certify.leaving import WITHIN, Flip, flip_at, join, leave
+from contfric.certify.meeting import as_zero_of
+from contfric.certify.passing import passes_once
+from contfric.certify.phases import in_phases
+from contfric.certify.piece import Piece
+from contfric.certify.tube import Box, are_linked, box_between, solved
+from contfric.certify.turns import turns_of
+from contfric.certify.verdict import Finding, Verdict, all_of
+from contfric.certify.zeros import Closing
+from contfric.continuation.branch import Branch
+from contfric.continuation.events import TERMINAL
+from contfric.models.balls.build import ball_model
+from contfric.models.balls.model import BallModel
+from contfric.models.balls.numbers import Vector
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import System
+
+#: Halvings of a step of the branch: what is not proved then is left.
+HALVINGS = 12
+#: Shortest step that is halved, as a share of the branch.
+_SHORTEST = 1e-5
+#: A box is tried only if it is at most this much longer than the last one that was proved.
+_GROWTH = 2.5
+#: Most boxes that are tried along a branch: some minutes of work.
+_MOST = 30_000
+
+#: How far the box of a PD or BP may reach, as a share of the branch.
+_FAR = 0.1
+
+Arcs = tuple[float, float]
+NO_BOX = Finding(Verdict.UNDECIDED, "no box")
+
+
+class Tracer:
+    """Covers the steps of a branch with boxes.
+
+    Parameters
+    ----------
+    proofs : certificates of the events of the branch
+    until : when to end, by ``time.time``
+    """
+
+    def __init__(self, branch: Branch, proofs: list[EventCertificate], until: float) -> None:
+        self.branch, self.parameter, self.until = branch, branch.parameter, until
+        orbit = branch[len(branch) // 2]
+        self.orbit = orbit
+        low, high = float(branch.values.min()), float(branch.values.max())
+        exact = self._model(arb(low))
+        between = replace(exact, slopes=self._model(arb(low).union(arb(high))).slopes)
+        half = branch.system.half
+        self.whole = half and not is_symmetry(orbit, segments_of(orbit.system), between)
+        self.system = orbit.as_whole().system if self.whole else orbit.system
+        self.segments: Segments = segments_of(self.system)
+        self.build: Builder = self._build
+        self.last: Box | Vector | None = None
+        self.count, self.ended, self.length = 0, "", math.inf
+        self.shortest = _SHORTEST * float(branch.arc[-1] - branch.arc[0])
+        self.met = self._met(proofs)
+        self.flips = [self._flip(proofs, end) for end in (0, -1)]
+
+    # ------------------------------------------------------------------ the branch in balls
+
+    def _model(self, value: arb) -> BallModel:
+        return ball_model(self.branch.model, self.orbit.params, self.parameter, value)
+
+    def _build(self, value: arb) -> BallModel:
+        return in_phases(self._model(value))
+
+    def closing(self, system: System, segments: Segments, model: BallModel) -> Closing:
+        return closing_of(segments, model, system.half)
+
+    def _point(self, orbit: Orbit) -> Vector:
+        """Return joints (phase and state) and parameter of an orbit of the branch's chain, exact numbers."""
+        if self.whole:
+            orbit = orbit.as_whole()
+        value = arb(orbit.params[self.parameter])
+        period = self._model(value).period
+        found = [[arb(float(c)) for c in row] for row in orbit.joints]
+        if not period.is_zero():
+            for joint in found:
+                joint[0] *= 2 * arb.pi() / period
+        return [*(c.mid() for joint in found for c in joint), value]
+
+    def _met(self, proofs: list[EventCertificate]) -> list[tuple[str, Vector]]:
+        """Return the proved events as solutions of the branch's chain, each with its label."""
+        found = []
+        for proof in proofs:
+            event = proof.event
+            own = event.orbit.system is self.branch.system
+            near = event.orbit if own else self.branch[0 if self._starts(proof) else -1]
+            at = self._point(near)
+            zero = as_zero_of(proof, self.system, self.segments, self.build, at)
+            if proof.proved and zero is not None:
+                found.append((event.label, zero))
+        return found
+
+    def _starts(self, proof: EventCertificate) -> bool:
+        arc = self.branch.arc
+        return proof.event.position <= 0.5 * float(arc[0] + arc[-1])
+
+    def _flip(self, proofs: list[EventCertificate], end: int) -> Flip | None:
+        """Return the box of the event at an end, if that is a PD or BP at which two turns become one."""
+        at = float(self.branch.arc[end])
+        near = self._point(self.branch[end])
+        for proof in proofs:
+            if proof.proved and abs(proof.event.position - at) <= self.shortest * 1e-3:
+                turns = turns_of(proof, self.system, near)
+                if turns is not None:
+                    return flip_at(self, turns, self._far_from(end))
+        return None
+
+    def _far_from(self, end: int) -> Vector:
+        """Return the orbit of the branch up to which the box of an event at an end may reach."""
+        arc = self.branch.arc
+        apart = np.abs(arc - arc[end]) - _FAR * (arc[-1] - arc[0])
+        inner = [k for k in range(len(arc)) if apart[k] >= 0]
+        return self._point(self.branch[min(inner, key=lambda k: float(apart[k]))])
+
+    def end_of(self, forward: bool) -> tuple[float, float]:
+        """Return arclength and parameter at an end of the branch."""
+        k = -1 if forward else 0
+        return float(self.branch.arc[k]), float(self.branch.values[k])
+
+    def _has_edge(self, end: int) -> bool:
+        """Tell whether the branch ends at an event of its inequalities."""
+        if self.branch.ends[end].reason.name in [kind.value for kind in TERMINAL]:
+            return True
+        at = float(self.branch.arc[end])
+        return any(
+            event.kind in TERMINAL and abs(event.position - at) <= self.shortest * 1e-3
+            for event in self.branch.bifurcations
+        )
+
+    # ------------------------------------------------------------------ steps
+
+    def step(self, k: int) -> list[Piece]:
+        """Cover the step from point k to the next one."""
+        first, last = self._point(self.branch[k]), self._point(self.branch[k + 1])
+        arcs = (float(self.branch.arc[k]), float(self.branch.arc[k + 1]))
+        plane = [b - a for a, b in zip(first, last, strict=True)]
+        if not self.goes_on():
+            return [self._nothing(arcs, first, last)]
+        for end, flip in enumerate(self.flips):
+            if flip is not None:
+                inside = [abs(flip.amplitude(at)) < WITHIN for at in (first, last)]
+                if all(inside):
+                    return []
+                if inside[end]:
+                    return join(self, flip, first, last, arcs, end == 1)
+        ends = [solved(self.segments, self.build, point, plane) for point in (first, last)]
+        sides = [k == 0 and self._has_edge(0), k + 2 == len(self.branch) and self._has_edge(-1)]
+        points = [
+            at if at is not None else raw for at, raw in zip(ends, (first, last), strict=True)
+        ]
+        if all(sides):
+            middle = self.middle(*points)
+            if middle is None:
+                return [self._nothing(arcs, first, last)]
+            between = 0.5 * (arcs[0] + arcs[1])
+            before = leave(self, points[0], middle, (arcs[0], between), False)
+            return [*before, *leave(self, middle, points[1], (between, arcs[1]), True)]
+        if any(sides):
+            return leave(self, *points, arcs, sides[1])
+        if ends[0] is None or ends[1] is None:
+            return [self._nothing(arcs, first, last)]
+        return self.cover(*points, arcs, 0)
+
+    def _is_left(self, end: int) -> bool:
+        return self.turns[end] is not None or self._has_edge(end)
+
+    def goes_on(self) -> bool:
+        """Tell whether more boxes may be tried; else it is said what ended the work."""
+        if time.time() > self.until:
+            self.ended = "the time limit ended it"
+        elif self.count >= _MOST:
+            self.ended = f"{_MOST} boxes were tried"
+        return not self.ended
+
+    def _nothing(self, arcs: Arcs, first: Vector, last: Vector) -> Piece:
+        self.last = None
+        why = Finding(Verdict.UNDECIDED, self.ended) if self.ended else NO_BOX
+        return Piece(*arcs, (float(first[-1].mid()), float(last[-1].mid())), False, why)
+
+    def middle(self, first: Vector, last: Vector) -> Vector | None:
+        plane = [b - a for a, b in zip(first, last, strict=True)]
+        middle = [((a + b) / 2).mid() for a, b in zip(first, last, strict=True)]
+        return solved(self.segments, self.build, middle, plane)
+
+    def cover(self, first: Vector, last: Vector, arcs: Arcs, level: int) -> list[Piece]:
+        length = arcs[1] - arcs[0]
+        splits = level < HALVINGS and length > self.shortest and self.goes_on()
+        if length > _GROWTH * self.length and splits:
+            halves = self._halves(first, last, arcs, level)
+            if halves is not None:
+                return halves
+        self.count += 1
+        box = box_between(self.segments, self.build, first, last)
+        admissible = NO_BOX if box is None else self.admissible(box.all)
+        refuted = admissible.verdict is Verdict.REFUTED  # by all orbits of the box
+        piece = None
+        if box is not None and (admissible.proved or not splits or refuted):
+            piece = self.piece(box, arcs, (first[-1], last[-1]), admissible)
+        whole = piece is not None and piece.proved and max(piece.folds, piece.flips, piece.tori) < 2
+        if not (whole or refuted) and splits:
+            self.length = length / 2
+            halves = self._halves(first, last, arcs, level)
+            if halves is not None:
+                return halves
+        self.length = max(self.length, length) if whole else math.inf
+        if box is None or piece is None:
+            return [self._nothing(arcs, first, last)]
+        return [self.linked(piece, box)]
+
+    def piece(self, box: Box, arcs: Arcs, values: tuple[arb, arb], admissible: Finding) -> Piece:
+        """Return what is proved of a box, but for its link."""
+        inside = tuple(label for label, zero in self.met if box.holds(zero))
+        counts = [
+            0 if none else 1 if passes_once(self.segments, self.build, box, sigma) else 2
+            for none, sigma in ((box.monotone, 1), (box.no_flip, -1))
+        ]
+        ends = (float(values[0].mid()), float(values[1].mid()))
+        return Piece(*arcs, ends, True, admissible, *counts, tori=0, events=inside)
+
+    def linked(self, piece: Piece, box: Box) -> Piece:
+        """Return a piece with its link to the one before; from now on it is the last one."""
+        before, self.last = self.last, box
+        if before is None:
+            return piece
+        if isinstance(before, Box):
+            return replace(piece, linked=are_linked(self.segments, self.build, before, box))
+        return replace(piece, linked=box.holds(before))
+
+    def _halves(self, first: Vector, last: Vector, arcs: Arcs, level: int) -> list[Piece] | None:
+        point = self.middle(first, last)
+        if point is None:
+            return None
+        between = 0.5 * (arcs[0] + arcs[1])
+        return [
+            *self.cover(first, point, (arcs[0], between), level + 1),
+            *self.cover(point, last, (between, arcs[1]), level + 1),
+        ]
+
+    def admissible(self, x: Vector) -> Finding:
+        return self.obeys(self.system, self.segments, x)
+
+    def obeys(self, system: System, segments: Segments, x: Vector) -> Finding:
+        model = replace(self.build(x[-1]), slopes=None)
+        chain, closing = Chain(segments, model), self.closing(system, segments, model)
+        for inequality in inequalities(chain, system, chain.joints(x[:-1]), closing):
+            if not inequality.finding.proved:
+                return inequality.named(system)
+        return all_of([])
