@@ -10,6 +10,7 @@ ends of a branch, where an inequality vanishes, and about its events.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,11 +19,33 @@ from contfric.certify.events import certify_event
 from contfric.certify.piece import Piece
 from contfric.certify.tracing import Tracer
 from contfric.continuation.branch import Branch
+from contfric.continuation.events import TERMINAL, EndReason
 from contfric.models.balls.numbers import working
 from contfric.shown import Shown
 
 #: Bits: rounding of 1e-24 is nothing to boxes that are 1e-7 long.
 _BITS = 80
+
+
+#: What is counted in a piece, and kinds of the events that it may be.
+_COUNTED: tuple[tuple[str, set[str], Callable[[Piece], int]], ...] = (
+    ("folds", {"SN"}, lambda piece: piece.folds),
+    ("flips", {"PD", "BP"}, lambda piece: piece.flips),
+    ("tori", {"NS"}, lambda piece: piece.tori),
+)
+_MISSED = {
+    "folds": "a fold may be there",
+    "flips": "a multiplier -1 of a turn may be there",
+    "tori": "a pair of multipliers may be on the unit circle",
+}
+#: Reasons of ends that are events.
+_AT_EVENTS = frozenset({EndReason[kind.value] for kind in TERMINAL} | {EndReason.BP, EndReason.PD})
+
+
+def _runs(pieces: tuple[Piece, ...], count: Callable[[Piece], int]) -> list[list[Piece]]:
+    """Return the runs of neighbouring pieces in which something may be."""
+    groups = itertools.groupby(pieces, key=lambda piece: count(piece) > 0)
+    return [list(group) for there, group in groups if there]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,7 +86,33 @@ class BranchCertificate(Shown):
         if not inner:
             return False
         within = self.pieces[inner[0] : inner[-1] + 1]
-        return all(piece.proved for piece in within) and all(p.linked for p in within[:-1])
+        return all(piece.proved for piece in within) and all(p.linked for p in within[1:])
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """Labels of the proved events that its tube holds."""
+        return tuple(dict.fromkeys(label for piece in self.pieces for label in piece.events))
+
+    @property
+    def complete(self) -> bool:
+        """Whether it is one curve of admissible orbits from end to end, with no event but those that are proved."""
+        linked = all(piece.linked for piece in self.pieces[1:])
+        return bool(self.pieces) and linked and not self.gaps and not self.open
+
+    @property
+    def open(self) -> list[str]:
+        """Where a fold or a multiplier on the unit circle may be that no proved event is, and ends without one."""
+        found = []
+        for name, kinds, count in _COUNTED:
+            for run in _runs(self.pieces, count):
+                known = {label.split("_")[0] for piece in run for label in piece.events}
+                if not known & kinds or (name != "tori" and len(run) > 1):
+                    at = f"{run[0].values[0]:.12g} to {run[-1].values[1]:.12g}"
+                    found.append(f"{self.branch.parameter} from {at}: {_MISSED[name]}")
+        for piece, end in zip((self.pieces[0], self.pieces[-1]), self.branch.ends, strict=True):
+            if end.reason in _AT_EVENTS and not piece.events:
+                found.append(f"no proved event at the end '{end}'")
+        return found
 
     @property
     def gaps(self) -> list[str]:

@@ -301,11 +301,18 @@ class Chain:
 
     # ------------------------------------------------------------------ second derivatives
 
-    def bent(self, x: Vector, phi: Vector, sigma: int) -> list[Vector]:
-        """Return the derivative of ``J_sigma(x) phi`` by unknowns and parameter, phi held fixed."""
+    def bent(
+        self, x: Vector, phi: Vector, sigma: int, turned: Vector | None = None
+    ) -> list[Vector]:
+        """Return the derivative of ``J_sigma(x) phi`` by unknowns and parameter, phi held fixed.
+
+        Parameters
+        ----------
+        turned : the disturbance of the last joint, where it is another one than sigma times the closure of phi
+        """
         z = self.joints(x)
         step = [phi[i * self.m : (i + 1) * self.m] for i in range(self.segments.count)]
-        step.append([sigma * c for c in self.closed_change(step[0])])
+        step.append(turned or [sigma * c for c in self.closed_change(step[0])])
         rows = zeros(self.size, self.size + 1)
         for i in range(self.segments.count):
             first = i * self.m
@@ -331,17 +338,19 @@ class Chain:
     def _bent_flow(self, i: int, z: list[Vector], step: list[Vector], rows: list[Vector]) -> None:
         """Write the derivatives of L of the module's text."""
         move, model, t = self.move(i, z), self.model, z[i][0]
-        if move.reset is not None:
-            raise NotImplementedError("second derivatives behind a reset")
         late, delta = step[i][0], step[i + 1][0] - step[i][0]
-        a = column(self._disturbed(t, step[i]))
-        later = move.field * (move.flow * a) + move.field * move.speed * delta  # dL/dd
-        early = move.flow * column(model.by_time(t, 2)) * late  # dL/dt at fixed d
-        early = early + move.field * (move.flow * move.by_time) * delta
-        by_state = move.field * move.flow * delta
+        a, again = column(self._disturbed(t, step[i])), column(model.by_time(t, 2))
         slope, flow, start = self._slope_of(i, z[i], self.duration(i, z), move)
+        mixed, state = column([late * c for c in model.by_parameter(t, 1)]), move.flow
+        if move.reset is not None:
+            assert model.slopes is not None
+            mixed = move.reset * mixed + model.slopes.resets[self.segments.resets[i]] * a
+            a, again, state = move.reset * a, move.reset * again, move.flow * move.reset
+        later = move.field * (move.flow * a) + move.field * move.speed * delta  # dL/dd
+        early = move.flow * again * late  # dL/dt at fixed d
+        early = early + move.field * (move.flow * move.by_time) * delta
+        by_state = move.field * state * delta
         own = slope * move.end + move.field * (flow * move.start + move.flow * start)
-        mixed = column([late * c for c in model.by_parameter(t, 1)])
         by_parameter = flow * a + move.flow * mixed + own * delta
         for j in range(self.n):
             own_row = [early[j, 0] - later[j, 0], *(by_state[j, k] for k in range(self.n))]

@@ -196,4 +196,7 @@ def _branch_summary(number: int, branch: Branch, proof: BranchCertificate | None
         length * proof.regular,
         len(proof.pieces),
         gaps,
+        proof.complete,
+        proof.events,
+        tuple(proof.open),
     )

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from flint import arb
 
+from contfric.certify.circle import is_off
 from contfric.certify.ending import Edge, ends_inside
 from contfric.certify.passing import dot
-from contfric.certify.piece import Piece
+from contfric.certify.piece import UNKNOWN, Piece
 from contfric.certify.splitting import Split, event_of, has_no_flip, split_box
 from contfric.certify.tube import Box, box_between, orbit_in, solved
 from contfric.certify.turns import Turns
@@ -80,10 +81,11 @@ def _flip(tracer: Tracer, turns: Turns, split: Split) -> Flip:
     turn, v = split.turn, split.centre[split.size : -1]
     admissible = tracer.obeys(turns.system, turns.segments, turn)
     whole = [*turns.joined(turn[:-1], turn[:-1]), turn[-1]]
-    flips = 0 if has_no_flip(tracer.segments, tracer.build, whole) else 2
-    folds = 0 if split.one_sided else 2
-    labels = (turns.label,)
-    piece = Piece(0, 0, (0, 0), True, admissible, folds, flips, tori=0, events=labels)
+    flips = 0 if has_no_flip(tracer.segments, tracer.build, whole) else UNKNOWN
+    folds = 0 if split.one_sided else UNKNOWN
+    labels = (turns.proof.event.label,) if turns.is_event(split.box, split.functional) else ()
+    tori = 0 if is_off(tracer.segments, tracer.build, tracer.closes, whole) else UNKNOWN
+    piece = Piece(0, 0, (0, 0), True, admissible, folds, flips, tori, events=labels)
     return Flip(turns, split, piece, [*turns.directed(v, [-c for c in v]), arb(0)])
 
 
@@ -124,12 +126,11 @@ def _edge(tracer: Tracer, first: Vector, last: Vector, arcs: Arcs, forward: bool
     box = box_between(segments, build, *((inner, outer) if forward else (outer, inner)))
     if box is None:
         return None
-    closing = tracer.closing(tracer.system, segments, build(box.all[-1]))
-    names = ends_inside(Edge(tracer.system, segments, build, closing, forward), box)
+    names = ends_inside(Edge(tracer.system, segments, build, tracer.closes, forward), box)
     if not names:
         return None
     piece = tracer.piece(box, arcs, (first[-1], last[-1]), all_of([]))
-    if max(piece.folds, piece.flips, piece.tori) == 2:
+    if not piece.decided:
         return None
     return tracer.linked(replace(piece, ends=names), box)
 

@@ -29,10 +29,12 @@ _NEAR = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class _Cycle:
-    """The event's whole orbit: joints (phase and state), modes, what vanishes at each joint."""
+    """The event's whole orbit: joints (phase and state), modes, resets before them, and what
+    vanishes at each joint."""
 
     joints: list[Vector]
     modes: list[str]
+    resets: list[str]
     vanishing: list[list[Vector]]
     turn: arb
     periods: int
@@ -83,7 +85,7 @@ def _cycle(proof: EventCertificate, model: BallModel) -> _Cycle | None:
     closure = arb_mat([[arb(c) for c in row] for row in segments.closure])
     one = arb_mat([[arb(int(a == b)) for b in range(m - 1)] for a in range(m - 1)])
     twice = closure * closure == one  # for certain
-    if any(segments.resets) or not twice:
+    if not twice:
         return None
     two_pi = 2 * arb.pi()
     timed = ball_model(event.orbit.model, event.params, proof.parameter, proof.value)
@@ -96,13 +98,15 @@ def _cycle(proof: EventCertificate, model: BallModel) -> _Cycle | None:
         met = {condition.segment: [_row(condition, segments, model)]}
     closing = closing_of(segments, model, half)
     known = zeros_at_joints(segments, model, closing, met)
-    modes, turn = list(segments.modes), arb(segments.turn) * two_pi
+    modes, resets = list(segments.modes), list(segments.resets)
+    turn = arb(segments.turn) * two_pi
     if half:
         image = [[z[0] + turn, *numbers(closure * column(z[1:]))] for z in joints]
         joints, known = [*joints, *image], [*known, *([closing(r) for r in rows] for rows in known)]
         modes = [mode for mode, _ in orbit.word]
+        resets = list(segments_of(orbit.as_whole().system).resets)
         turn = 2 * turn
-    return _Cycle(joints, modes, known, turn, orbit.periods)
+    return _Cycle(joints, modes, resets, known, turn, orbit.periods)
 
 
 def _row(condition: Condition, segments: Segments, model: BallModel) -> Vector:
@@ -147,7 +151,8 @@ def _leads(
     """Tell whether the orbit obeys the equations of segment i of the branch."""
     j, later = start
     following = ((j + 1) % len(cycle.joints), later + (j + 1) // len(cycle.joints))
-    if not (start == end or (end == following and cycle.modes[j] == segments.modes[i])):
+    own = (cycle.modes[j], cycle.resets[j]) == (segments.modes[i], segments.resets[i])
+    if not ((start == end and not segments.resets[i]) or (end == following and own)):
         return False
     pin = segments.pins[i]
     if pin is None:

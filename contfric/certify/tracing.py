@@ -7,9 +7,10 @@ import time
 from dataclasses import replace
 
 import numpy as np
-from flint import arb
+from flint import arb, arb_mat
 
 from contfric.certify.chain import Chain, Segments, segments_of
+from contfric.certify.circle import has_no_pair
 from contfric.certify.closing import closing_of, is_symmetry
 from contfric.certify.events import EventCertificate
 from contfric.certify.extended import Builder
@@ -18,11 +19,10 @@ from contfric.certify.leaving import WITHIN, Flip, flip_at, join, leave
 from contfric.certify.meeting import as_zero_of
 from contfric.certify.passing import passes_once
 from contfric.certify.phases import in_phases
-from contfric.certify.piece import Piece
-from contfric.certify.tube import Box, are_linked, box_between, solved
+from contfric.certify.piece import UNKNOWN, Piece
+from contfric.certify.tube import Box, are_linked, box_between, section, solved
 from contfric.certify.turns import turns_of
 from contfric.certify.verdict import Finding, Verdict, all_of
-from contfric.certify.zeros import Closing
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL
 from contfric.models.balls.build import ball_model
@@ -68,9 +68,12 @@ class Tracer:
         self.system = orbit.as_whole().system if self.whole else orbit.system
         self.segments: Segments = segments_of(self.system)
         self.build: Builder = self._build
+        # the closure is that of whole numbers at every value of the parameter
+        self.closes = closing_of(self.segments, self.build(arb(low)), self.system.half)
         self.last: Box | Vector | None = None
         self.count, self.ended, self.length = 0, "", math.inf
-        self.shortest = _SHORTEST * float(branch.arc[-1] - branch.arc[0])
+        length = float(branch.arc[-1] - branch.arc[0])
+        self.shortest, self.far = _SHORTEST * length, _FAR * length
         self.met = self._met(proofs)
         self.flips = [self._flip(proofs, end) for end in (0, -1)]
 
@@ -81,9 +84,6 @@ class Tracer:
 
     def _build(self, value: arb) -> BallModel:
         return in_phases(self._model(value))
-
-    def closing(self, system: System, segments: Segments, model: BallModel) -> Closing:
-        return closing_of(segments, model, system.half)
 
     def _point(self, orbit: Orbit) -> Vector:
         """Return joints (phase and state) and parameter of an orbit of the branch's chain, exact numbers."""
@@ -127,10 +127,9 @@ class Tracer:
 
     def _far_from(self, end: int) -> Vector:
         """Return the orbit of the branch up to which the box of an event at an end may reach."""
-        arc = self.branch.arc
-        apart = np.abs(arc - arc[end]) - _FAR * (arc[-1] - arc[0])
-        inner = [k for k in range(len(arc)) if apart[k] >= 0]
-        return self._point(self.branch[min(inner, key=lambda k: float(apart[k]))])
+        apart = np.abs(self.branch.arc - self.branch.arc[end]) - self.far
+        inner = np.flatnonzero(apart >= 0)
+        return self._point(self.branch[int(inner[np.argmin(apart[inner])])])
 
     def end_of(self, forward: bool) -> tuple[float, float]:
         """Return arclength and parameter at an end of the branch."""
@@ -151,38 +150,31 @@ class Tracer:
 
     def step(self, k: int) -> list[Piece]:
         """Cover the step from point k to the next one."""
-        first, last = self._point(self.branch[k]), self._point(self.branch[k + 1])
+        printed = self._point(self.branch[k]), self._point(self.branch[k + 1])
         arcs = (float(self.branch.arc[k]), float(self.branch.arc[k + 1]))
-        plane = [b - a for a, b in zip(first, last, strict=True)]
         if not self.goes_on():
-            return [self._nothing(arcs, first, last)]
+            return [self._nothing(arcs, *printed)]
         for end, flip in enumerate(self.flips):
-            if flip is not None:
-                inside = [abs(flip.amplitude(at)) < WITHIN for at in (first, last)]
+            if flip is not None and abs(arcs[1 - end] - self.branch.arc[-end]) < self.far:
+                inside = [abs(flip.amplitude(at)) < WITHIN for at in printed]
                 if all(inside):
                     return []
                 if inside[end]:
-                    return join(self, flip, first, last, arcs, end == 1)
-        ends = [solved(self.segments, self.build, point, plane) for point in (first, last)]
-        sides = [k == 0 and self._has_edge(0), k + 2 == len(self.branch) and self._has_edge(-1)]
-        points = [
-            at if at is not None else raw for at, raw in zip(ends, (first, last), strict=True)
-        ]
-        if all(sides):
-            middle = self.middle(*points)
-            if middle is None:
-                return [self._nothing(arcs, first, last)]
-            between = 0.5 * (arcs[0] + arcs[1])
-            before = leave(self, points[0], middle, (arcs[0], between), False)
-            return [*before, *leave(self, middle, points[1], (between, arcs[1]), True)]
-        if any(sides):
-            return leave(self, *points, arcs, sides[1])
-        if ends[0] is None or ends[1] is None:
-            return [self._nothing(arcs, first, last)]
-        return self.cover(*points, arcs, 0)
-
-    def _is_left(self, end: int) -> bool:
-        return self.turns[end] is not None or self._has_edge(end)
+                    return join(self, flip, *printed, arcs, end == 1)
+        plane = [b - a for a, b in zip(*printed, strict=True)]
+        exact = [solved(self.segments, self.build, point, plane) for point in printed]
+        first, last = (at or raw for at, raw in zip(exact, printed, strict=True))
+        left = k == 0 and self._has_edge(0), k + 2 == len(self.branch) and self._has_edge(-1)
+        if all(left):
+            middle, between = self.middle(first, last), 0.5 * (arcs[0] + arcs[1])
+            if middle is not None:
+                before = leave(self, first, middle, (arcs[0], between), False)
+                return [*before, *leave(self, middle, last, (between, arcs[1]), True)]
+        elif any(left):
+            return leave(self, first, last, arcs, left[1])
+        elif None not in exact:
+            return self.cover(first, last, arcs, 0)
+        return [self._nothing(arcs, first, last)]
 
     def goes_on(self) -> bool:
         """Tell whether more boxes may be tried; else it is said what ended the work."""
@@ -198,11 +190,13 @@ class Tracer:
         return Piece(*arcs, (float(first[-1].mid()), float(last[-1].mid())), False, why)
 
     def middle(self, first: Vector, last: Vector) -> Vector | None:
+        """Return the orbit halfway between two others."""
         plane = [b - a for a, b in zip(first, last, strict=True)]
         middle = [((a + b) / 2).mid() for a, b in zip(first, last, strict=True)]
         return solved(self.segments, self.build, middle, plane)
 
     def cover(self, first: Vector, last: Vector, arcs: Arcs, level: int) -> list[Piece]:
+        """Cover the stretch between two orbits with boxes; ``level`` says how often it was halved."""
         length = arcs[1] - arcs[0]
         splits = level < HALVINGS and length > self.shortest and self.goes_on()
         if length > _GROWTH * self.length and splits:
@@ -211,12 +205,12 @@ class Tracer:
                 return halves
         self.count += 1
         box = box_between(self.segments, self.build, first, last)
-        admissible = NO_BOX if box is None else self.admissible(box.all)
+        admissible = NO_BOX if box is None else self.obeys(self.system, self.segments, box.all)
         refuted = admissible.verdict is Verdict.REFUTED  # by all orbits of the box
         piece = None
         if box is not None and (admissible.proved or not splits or refuted):
             piece = self.piece(box, arcs, (first[-1], last[-1]), admissible)
-        whole = piece is not None and piece.proved and max(piece.folds, piece.flips, piece.tori) < 2
+        whole = piece is not None and piece.proved and piece.decided
         if not (whole or refuted) and splits:
             self.length = length / 2
             halves = self._halves(first, last, arcs, level)
@@ -230,12 +224,27 @@ class Tracer:
     def piece(self, box: Box, arcs: Arcs, values: tuple[arb, arb], admissible: Finding) -> Piece:
         """Return what is proved of a box, but for its link."""
         inside = tuple(label for label, zero in self.met if box.holds(zero))
-        counts = [
-            0 if none else 1 if passes_once(self.segments, self.build, box, sigma) else 2
-            for none, sigma in ((box.monotone, 1), (box.no_flip, -1))
-        ]
+        folds = 0 if box.monotone else self._count(box, 1)
+        flips = 0 if box.no_flip else self._count(box, -1)
         ends = (float(values[0].mid()), float(values[1].mid()))
-        return Piece(*arcs, ends, True, admissible, *counts, tori=0, events=inside)
+        off = has_no_pair(self.segments, self.build, self.closes, box)
+        tori = 0 if off else UNKNOWN
+        return Piece(*arcs, ends, True, admissible, folds, flips, tori, events=inside)
+
+    def _count(self, box: Box, sigma: int) -> int:
+        """Return how often the Jacobian with sigma times the closure is singular between the ends of a box."""
+        if not passes_once(self.segments, self.build, box, sigma):
+            return UNKNOWN
+        signs = []
+        for end in (box.first, box.last):
+            at = section(self.segments, self.build, box, end)
+            if at is None:
+                return UNKNOWN
+            _, rows = Chain(self.segments, self.build(at[-1])).linearised(at[:-1], sigma)
+            signs.append(arb_mat([row[:-1] for row in rows]).det())
+        if signs[0].contains(0) or signs[1].contains(0):
+            return UNKNOWN
+        return int(bool(signs[0] * signs[1] < 0))
 
     def linked(self, piece: Piece, box: Box) -> Piece:
         """Return a piece with its link to the one before; from now on it is the last one."""
@@ -256,12 +265,10 @@ class Tracer:
             *self.cover(point, last, (between, arcs[1]), level + 1),
         ]
 
-    def admissible(self, x: Vector) -> Finding:
-        return self.obeys(self.system, self.segments, x)
-
     def obeys(self, system: System, segments: Segments, x: Vector) -> Finding:
+        """Return whether all solutions (z, p) in some balls obey every inequality of a system."""
         model = replace(self.build(x[-1]), slopes=None)
-        chain, closing = Chain(segments, model), self.closing(system, segments, model)
+        chain, closing = Chain(segments, model), closing_of(segments, model, system.half)
         for inequality in inequalities(chain, system, chain.joints(x[:-1]), closing):
             if not inequality.finding.proved:
                 return inequality.named(system)

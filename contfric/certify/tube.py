@@ -71,6 +71,15 @@ class Box:
         """Whether the parameter is monotone along it: the last entry of T has a sign."""
         return self.tangent is not None and not self.tangent[-1].contains(0)
 
+    def part(self, k: int, count: int) -> Vector:
+        """Return balls of all solutions of part k of ``count`` along it."""
+        edges = [-0.5 - OVERLAP + (1 + 2 * OVERLAP) * arb(j) / count for j in (k, k + 1)]
+        s = edges[0].union(edges[1])
+        middle = [((a + b) / 2).mid() for a, b in zip(self.first, self.last, strict=True)]
+        difference = [(b - a).mid() for a, b in zip(self.first, self.last, strict=True)]
+        line = zip(middle, difference, self.radii, strict=True)
+        return [around(m + s * d, r) for m, d, r in line]
+
     def holds(self, point: Vector) -> bool:
         """Tell whether a solution that is known to lie in some balls is on the curve of this box."""
         difference = [(b - a).mid() for a, b in zip(self.first, self.last, strict=True)]

@@ -9,6 +9,7 @@ from flint import arb, arb_mat
 from contfric.certify.chain import Segments, segments_of
 from contfric.certify.events import EventCertificate
 from contfric.continuation.events import Kind
+from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import Vector, column, numbers
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import System
@@ -29,7 +30,7 @@ class Turns:
         by how much that is later
     later : duration of a turn, in phases
     closure : matrix of the closure of a turn
-    label : of the event
+    proof : of the event
     """
 
     system: System
@@ -38,7 +39,7 @@ class Turns:
     places: tuple[tuple[int, arb], ...]
     later: arb
     closure: arb_mat
-    label: str
+    proof: EventCertificate
 
     def of(self, z: Vector) -> tuple[Vector, Vector]:
         """Return the joints of the two turns from those of the branch's chain."""
@@ -50,6 +51,18 @@ class Turns:
                 time, state = time - self.later, numbers(self.closure * column(state))
             found[i >= count].extend([time, *state])
         return found
+
+    def is_event(self, box: Vector, functional: Vector) -> bool:
+        """Tell whether the proved event is the one in a box of (u, v, p), c v = 1 (of the other units of time)."""
+        proof, m, size = self.proof, self.segments.states + 1, (len(box) - 1) // 2
+        event = proof.event
+        model = ball_model(event.orbit.model, event.params, proof.parameter, proof.value)
+        scale = 2 * arb.pi() / model.period
+        scaled = [x * scale if k % m == 0 else x for k, x in enumerate(proof.zero[:-1])]
+        u, phi = scaled[:size], scaled[size:]
+        factor = sum((c * x for c, x in zip(functional, phi, strict=True)), arb(0))
+        found = [*u, *(x / factor for x in phi), proof.zero[-1]]
+        return all(ball.contains(x) for ball, x in zip(box, found, strict=True))
 
     def joined(self, first: Vector, second: Vector) -> Vector:
         """Return the joints of the branch's chain from those of the two turns."""
@@ -95,7 +108,7 @@ def turns_of(proof: EventCertificate, system: System, near: Vector) -> Turns | N
     scale = 2 * arb.pi() / orbit.flow.period
     places = _places(pair, system, near, scale)
     twice = closure * closure == one  # for certain
-    if places is None or any(segments.resets) or not twice:
+    if places is None or not twice:
         return None
     joints = [
         [(arb(float(z[0])) * scale).mid(), *(arb(float(y)) for y in z[1:])] for z in orbit.joints
@@ -107,7 +120,7 @@ def turns_of(proof: EventCertificate, system: System, near: Vector) -> Turns | N
         places,
         arb(segments.turn) * 2 * arb.pi(),
         closure,
-        proof.event.label,
+        proof,
     )
 
 
