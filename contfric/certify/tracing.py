@@ -154,16 +154,16 @@ class Tracer:
         arcs = (float(self.branch.arc[k]), float(self.branch.arc[k + 1]))
         if not self.goes_on():
             return [self._nothing(arcs, *printed)]
+        plane = [b - a for a, b in zip(*printed, strict=True)]
+        exact = [solved(self.segments, self.build, point, plane) for point in printed]
+        first, last = (at or raw for at, raw in zip(exact, printed, strict=True))
         for end, flip in enumerate(self.flips):
             if flip is not None and abs(arcs[1 - end] - self.branch.arc[-end]) < self.far:
                 inside = [abs(flip.amplitude(at)) < WITHIN for at in printed]
                 if all(inside):
                     return []
                 if inside[end]:
-                    return join(self, flip, *printed, arcs, end == 1)
-        plane = [b - a for a, b in zip(*printed, strict=True)]
-        exact = [solved(self.segments, self.build, point, plane) for point in printed]
-        first, last = (at or raw for at, raw in zip(exact, printed, strict=True))
+                    return join(self, flip, first, last, arcs, end == 1)
         left = k == 0 and self._has_edge(0), k + 2 == len(self.branch) and self._has_edge(-1)
         if all(left):
             middle, between = self.middle(first, last), 0.5 * (arcs[0] + arcs[1])
