@@ -14,12 +14,15 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
-from contfric.certify.events import certify_event
+from contfric.certify.certificate import Certificate
+from contfric.certify.events import EventCertificate, certify_event
 from contfric.certify.piece import Piece
 from contfric.certify.tracing import Tracer
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL, EndReason
+from contfric.errors import ParameterError
 from contfric.models.balls.numbers import working
 from contfric.shown import Shown
 
@@ -60,11 +63,41 @@ class BranchCertificate(Shown):
         Along the branch, in its order.
     ended : str
         What ended the work before all was tried; empty if nothing did.
+    points : tuple of Certificate
+        Those of its printed orbits, in its order.
+    proofs : tuple of EventCertificate
+        Those of its events.
     """
 
     branch: Branch
     pieces: tuple[Piece, ...]
     ended: str = ""
+    points: tuple[Certificate, ...] = ()
+    proofs: tuple[EventCertificate, ...] = ()
+
+    @property
+    def points_proved(self) -> int:
+        """How many of the printed orbits are proved, with their stability; at an event none can be."""
+        return sum(point.proved for point in self.points)
+
+    def save(self, path: Any) -> None:
+        """Write the certificates of all printed orbits and events as one file for ``contfric verify``.
+
+        The tube between them is not in it.
+
+        Raises
+        ------
+        ParameterError
+            If there is nothing that the checker knows.
+        ResultFileError
+            If the file cannot be written.
+        """
+        from contfric.certify.files import checkable, write_data
+
+        parts = checkable([*self.proofs, *self.points])
+        if not parts:
+            raise ParameterError("there is nothing to write: the checker knows orbits of coulomb")
+        write_data({"certificate": "diagram", "format": 1, "checkable": parts}, path)
 
     @property
     def covered(self) -> float:
@@ -165,4 +198,9 @@ def certify_branch(
             pieces += tracer.step(k)
             if progress is not None:
                 progress(f"{branch.name}, step {k + 1} of {steps}, {tracer.count} boxes")
-    return BranchCertificate(branch, tuple(pieces), tracer.ended)
+    points = []
+    for orbit in branch:
+        if not tracer.goes_on():
+            break
+        points.append(orbit.certify())
+    return BranchCertificate(branch, tuple(pieces), tracer.ended, tuple(points), tuple(proofs))

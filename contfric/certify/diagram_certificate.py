@@ -51,6 +51,7 @@ class BranchSummary:
     complete : whether it is one curve from end to end, with no event but the proved ones in its tube
     events : labels of these
     open : where another event may be
+    points, points_proved : number of its printed orbits, and of those that are proved with their stability
     """
 
     number: int
@@ -63,6 +64,8 @@ class BranchSummary:
     complete: bool = False
     events: tuple[str, ...] = ()
     open: tuple[str, ...] = ()
+    points: int = 0
+    points_proved: int = 0
 
 
 @dataclass(frozen=True)
@@ -122,7 +125,7 @@ class DiagramCertificate(Shown):
     ended : str
         What ended the run before all was tried (a time limit, an interrupt); empty if nothing did.
     checkable : tuple of dict
-        Certificates of events as plain data, which ``contfric verify`` checks.
+        Certificates of events and of printed orbits as plain data, which ``contfric verify`` checks.
     """
 
     model: str
@@ -161,7 +164,7 @@ class DiagramCertificate(Shown):
     def save(self, path: Any) -> None:
         """Write it as a JSON file; :func:`load_diagram_certificate` reads it.
 
-        ``contfric verify`` checks the events in it that are ``checkable``, and not the summary.
+        ``contfric verify`` checks the events and orbits in it that are ``checkable``, and not the summary.
 
         Raises
         ------
@@ -171,7 +174,7 @@ class DiagramCertificate(Shown):
         summary = asdict(self)
         checkable = summary.pop("checkable")
         data = {"certificate": _KIND, "format": _FORMAT, "checkable": checkable, "summary": summary}
-        text = json.dumps(data, indent=1)
+        text = json.dumps(data)
         with replacing(path_of("a certificate file", path)) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
 
@@ -196,6 +199,8 @@ class DiagramCertificate(Shown):
             f"{_percent(self.regular)} without a fold or a multiplier on the unit circle",
             f"  {sum(b.complete for b in self.branches)} of {len(self.branches)} branches proved from "
             "end to end, with all of their events",
+            f"  {sum(b.points_proved for b in self.branches)} of {sum(b.points for b in self.branches)} "
+            "printed orbits proved, with their stability",
             f"  {events}",
             *(f"  {self.ended}" for _ in [0] if self.ended),
         ]
