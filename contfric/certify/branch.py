@@ -128,13 +128,13 @@ class BranchCertificate(Shown):
 
     @property
     def complete(self) -> bool:
-        """Whether it is one curve of admissible orbits from end to end, with no event but those that are proved."""
+        """Whether it is one curve of admissible orbits from end to end, with proved events only."""
         linked = all(piece.linked for piece in self.pieces[1:])
         return bool(self.pieces) and linked and not self.gaps and not self.open
 
     @property
     def open(self) -> list[str]:
-        """Where a fold or a multiplier on the unit circle may be that no proved event is, and ends without one."""
+        """Where an event of multipliers may be that is not proved, and ends without a proved one."""
         found = []
         for name, kinds, count in _COUNTED:
             for run in _runs(self.pieces, count):

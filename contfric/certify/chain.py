@@ -308,7 +308,8 @@ class Chain:
 
         Parameters
         ----------
-        turned : the disturbance of the last joint, where it is another one than sigma times the closure of phi
+        turned : the disturbance of the last joint, where it is another one than sigma times the closure of
+            phi
         """
         z = self.joints(x)
         step = [phi[i * self.m : (i + 1) * self.m] for i in range(self.segments.count)]

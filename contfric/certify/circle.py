@@ -3,10 +3,12 @@ r"""No complex pair of multipliers on the unit circle, for all orbits of a box.
 Of a complex pair on the circle the product is 1. So it is not there where 1 is no eigenvalue of the second
 compound of the derivative P of a Poincare map, the matrix of its minors of two rows and two columns, whose
 eigenvalues are the products of two of those of P (K. Guckenheimer, M. Myers and B. Sturmfels, SIAM J. Numer.
-Anal. 34 (1997) 1-21). Of two real ones the product may be 1, too (a neutral saddle): in the plane the discriminant
-tells these apart. A map of one dimension has no pair: that of every orbit of two states that sticks.
+Anal. 34 (1997) 1-21). Of two real ones the product may be 1, too (a neutral saddle): in the plane the
+discriminant tells these apart. A map of one dimension has no pair: that of every orbit of two states that
+sticks.
 
-For a symmetric orbit P is that of half a turn. A pair ``+-i`` there is a double multiplier -1 of the whole one.
+For a symmetric orbit P is that of half a turn. A pair ``+-i`` there is a double multiplier -1 of the whole
+one.
 """
 
 from __future__ import annotations
@@ -42,7 +44,7 @@ def has_no_pair(segments: Segments, build: Builder, closing: Closing, box: Box) 
 
 
 def is_off(segments: Segments, build: Builder, closing: Closing, x: Vector) -> bool:
-    """Tell the same for all solutions (z, p) in some balls; of orbits with holds, which have none, it is true."""
+    """Tell the same for all solutions (z, p) in some balls; orbits with holds have no pair."""
     if any(pin is not None for pin in segments.pins):
         return True
     chain = Chain(segments, replace(build(x[-1]), slopes=None))

@@ -16,6 +16,7 @@ from typing import Any
 
 from contfric.atlas.diagram import Diagram
 from contfric.certify.branch import BranchCertificate, certify_branch
+from contfric.certify.certificate import Certificate
 from contfric.certify.diagram_certificate import (
     BranchSummary,
     DiagramCertificate,
@@ -24,7 +25,6 @@ from contfric.certify.diagram_certificate import (
     merged,
 )
 from contfric.certify.events import EventCertificate, certify_event
-from contfric.certify.certificate import Certificate
 from contfric.certify.files import checkable
 from contfric.chaos.running import Progress, check_executor, compute_all
 from contfric.continuation.branch import Branch

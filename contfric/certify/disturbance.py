@@ -18,7 +18,7 @@ def null_vector(orbit: Orbit, segments: Segments, sigma: int) -> Vector:
 
 
 def pair_of(orbit: Orbit, segments: Segments) -> tuple[Vector, Vector]:
-    """Return about (a, b, c, s) of the pair of multipliers ``c +- i s`` next to the unit circle, and a functional.
+    """Return about (a, b, c, s) of a pair of multipliers ``c +- i s`` near the circle, and a functional.
 
     The disturbance ``a + i b`` is turned so that a and b are orthogonal; the functional is 1 of a, 0 of b.
     """

@@ -1,14 +1,14 @@
-r"""A box that reaches beyond the end of a branch: the orbits in it are admissible up to one, where a margin vanishes.
+r"""A box that reaches beyond the end of a branch: its orbits are admissible up to one.
 
 The equations of a chain know nothing of its inequalities, so that a box (:mod:`contfric.certify.tube`) may
-reach beyond the event at which a branch ends. Let X(s) be the curve in it, T its direction. A few inequalities
-change their sign in the box: a load at a joint less its limit, a rate at an exit, the duration of a segment are
-numbers m(s), with ``m' = (derivative of m by the unknowns) T``; inside of a segment q(tau, s) may vanish for
-times tau in a window W only, and its derivative by s for fixed tau is known in the same way. Where all of these
-derivatives are negative over the whole box, towards its outer end, each of the inequalities holds for s below some
-number, so that all of them hold up to the least, s*: there the branch ends, and nowhere else in the box. The other
-inequalities are proved for all s; where they lean on one of the first (a load that begins at its limit at the event
-is below it before) they hold up to s*.
+reach beyond the event at which a branch ends. Let X(s) be the curve in it, T its direction. A few
+inequalities change their sign in the box: a load at a joint less its limit, a rate at an exit, the
+duration of a segment are numbers m(s), with ``m' = (derivative of m by the unknowns) T``; inside of a
+segment q(tau, s) may vanish for times tau in a window W only, and its derivative by s for fixed tau is
+known in the same way. Where all of these derivatives are negative over the whole box, towards its outer
+end, each of the inequalities holds for s below some number, so that all of them hold up to the least, s*:
+there the branch ends, and nowhere else in the box. The other inequalities are proved for all s; where they
+lean on one of the first (a load that begins at its limit at the event is below it before) they hold up to s*.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from flint import arb, arb_mat
 
 from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
+from contfric.certify.disturbance import null_vector, pair_of
 from contfric.certify.extended import (
     Builder,
     at_joint,
@@ -24,7 +25,6 @@ from contfric.certify.extended import (
     with_pair,
 )
 from contfric.certify.inequalities import Touch, inequalities
-from contfric.certify.disturbance import null_vector, pair_of
 from contfric.certify.krawczyk import Equations, Inclusion, approximate_inverse, enclosed
 from contfric.certify.locating import Location, NotLocatedError, location_of
 from contfric.certify.verdict import Finding, Verdict, all_of
@@ -225,7 +225,7 @@ def _extended(
 
 
 def _resonates(c: arb, s: arb) -> bool:
-    """Tell whether a multiplier ``c + i s`` may be a strong resonance: 1, -1, or a third or fourth root of 1."""
+    """Tell whether a multiplier ``c + i s`` may be a strong resonance: a power up to the fourth is 1."""
     return bool(s.contains(0) or c.contains(0) or (2 * c + 1).contains(0))
 
 

@@ -9,7 +9,8 @@ The unknowns are the joints z of the chain ``F(z, p) = 0``, p, and what the even
   SIAM J. Numer. Anal. 17 (1980) 567-576; B. Werner and A. Spence, SIAM J. Numer. Anal. 21 (1984)
   388-399).
 
-* a complex pair ``c + i s`` of multipliers on the unit circle (NS), with its disturbance ``a + i b``: the equations
+* a complex pair ``c + i s`` of multipliers on the unit circle (NS), with its disturbance ``a + i b``: the
+equations
   above in their real and imaginary parts, the closure of the disturbance multiplied by ``c + i s``, and
   ``c^2 + s^2 = 1``.
 

@@ -129,7 +129,7 @@ def _edge(tracer: Tracer, first: Vector, last: Vector, arcs: Arcs, forward: bool
     names = ends_inside(Edge(tracer.system, segments, build, tracer.closes, forward), box)
     if not names:
         return None
-    piece = tracer.piece(box, arcs, (first[-1], last[-1]), all_of([]))
+    piece = tracer.piece(box, arcs, (first[-1], last[-1]), all_of([]), forward)
     if not piece.decided:
         return None
     return tracer.linked(replace(piece, ends=names), box)

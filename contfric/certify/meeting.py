@@ -1,10 +1,10 @@
 """The orbit of a proved event as a zero of the chain of a branch that ends or passes there.
 
 An event is proved on the shortest problem of its orbit: without segments that have vanished there, on its
-half if it is symmetric (:mod:`contfric.certify.locating`). A branch has another chain. Where each of its joints is
-one of the event's orbit, and each of its segments leads from one of these joints to the next one in the same mode,
-or has no length there and its exit surface is met anyway, the event's orbit solves the equations of the branch
-exactly; not only up to the width of balls.
+half if it is symmetric (:mod:`contfric.certify.locating`). A branch has another chain. Where each of its
+joints is one of the event's orbit, and each of its segments leads from one of these joints to the next one
+in the same mode, or has no length there and its exit surface is met anyway, the event's orbit solves the
+equations of the branch exactly; not only up to the width of balls.
 """
 
 from __future__ import annotations
@@ -29,8 +29,7 @@ _NEAR = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class _Cycle:
-    """The event's whole orbit: joints (phase and state), modes, resets before them, and what
-    vanishes at each joint."""
+    """The event's whole orbit: joints, modes, resets before them, and what vanishes at each joint."""
 
     joints: list[Vector]
     modes: list[str]

@@ -1,8 +1,8 @@
 r"""A fold or a multiplier -1 in a box of a tube: there is one at most, and it is passed with speed.
 
-Let ``J(s)`` be the Jacobian of the chain by the joints along the curve of a box, with sigma times the closure: it
-is singular at a fold (sigma = 1), or where a multiplier of a turn is -1. With fixed vectors b and c near its
-null vectors the bordered matrix
+Let ``J(s)`` be the Jacobian of the chain by the joints along the curve of a box, with sigma times the
+closure: it is singular at a fold (sigma = 1), or where a multiplier of a turn is -1. With fixed vectors b
+and c near its null vectors the bordered matrix
 
     B = [[J, b], [c, 0]],      B (phi, g) = e,      (psi, g) B = e,      e the last unit vector,
 
@@ -11,8 +11,8 @@ is regular, and J is singular where the number g vanishes. Along the curve, T it
     g' = - psi J' phi ,        J' phi = (derivative of J(X) phi, phi held fixed) T .
 
 Where the balls of g' over the whole box do not contain 0, g is monotone: it has one zero at most, and that is
-simple. At a fold it says that the fold is quadratic, at a multiplier -1 that it passes with speed. (A. Griewank and
-G. W. Reddien, IMA J. Numer. Anal. 4 (1984) 295-303.)
+simple. At a fold it says that the fold is quadratic, at a multiplier -1 that it passes with speed. (A.
+Griewank and G. W. Reddien, IMA J. Numer. Anal. 4 (1984) 295-303.)
 """
 
 from __future__ import annotations

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from contfric.certify.inequalities import Name
 from contfric.certify.verdict import Finding
 
-
 #: For a number of events that is not known.
 UNKNOWN = 2
 

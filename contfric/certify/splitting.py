@@ -1,30 +1,34 @@
 r"""The branch that leaves a period doubling, or a symmetric orbit (BP), in one box with the event.
 
-At the event two turns of the new orbits become the same turn: the equations of their chain are singular there.
-Let ``Phi(e)`` be the residual of the chain of one turn at ``u + e v``, closed to the other turn, ``u - e v``. The
-orbits of two turns are the zeros of Phi(e) and Phi(-e). Split into a symmetric and an antisymmetric part,
+At the event two turns of the new orbits become the same turn: the equations of their chain are singular
+there. Let ``Phi(e)`` be the residual of the chain of one turn at ``u + e v``, closed to the other turn,
+``u - e v``. The orbits of two turns are the zeros of Phi(e) and Phi(-e). Split into a symmetric and an
+antisymmetric part,
 
     G = ( (Phi(e) + Phi(-e)) / 2,  (Phi(e) - Phi(-e)) / (2 e),  c v - 1 )
 
-for the unknowns (u, v, p), they are the zeros of a system that is regular at e = 0: there it is the extended system
-of the event (:mod:`contfric.certify.extended`), as Phi(0) = F(u), Phi' (0) = J_-(u) v, with the closure of a
-disturbance that changes its sign. Krawczyk's operator is used for all e in [-r, r] at once, with
+for the unknowns (u, v, p), they are the zeros of a system that is regular at e = 0: there it is the
+extended system of the event (:mod:`contfric.certify.extended`), as Phi(0) = F(u), Phi' (0) = J_-(u) v,
+with the closure of a disturbance that changes its sign. Krawczyk's operator is used for all e in [-r, r]
+at once, with
 
     G_1 = F(u) + e^2 / 2 Phi'',        G_2 = J_-(u) v + e^2 / 6 Phi''' ,
 
-the derivatives somewhere on the way from u - e v to u + e v. So for each e there is one such orbit in the box; e and
+the derivatives somewhere on the way from u - e v to u + e v. So for each e there is one such orbit in the
+box; e and
 -e are the same one, begun a turn later (or are images of each other). By ``h = e^2``
 
     G_x x' = - (Phi'' / 2, Phi''' / 6, 0),
 
-and where p' has a sign over the whole box the new branch lies on one side of the event, and has no fold there: the
-cubic coefficient of the bifurcation does not vanish. (M. Golubitsky and D. G. Schaeffer, Singularities and groups in
-bifurcation theory I, 1985, chapter VI.)
+and where p' has a sign over the whole box the new branch lies on one side of the event, and has no fold
+there: the cubic coefficient of the bifurcation does not vanish. (M. Golubitsky and D. G. Schaeffer,
+Singularities and groups in bifurcation theory I, 1985, chapter VI.)
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -166,8 +170,8 @@ def split_box(
 class _Ways:
     """What is known on the way from u - e v to u + e v, for all (u, v, p) of a box and all e up to a reach.
 
-    Even functions of e change by its square only. So the reach is cut into parts, and what is even is evaluated
-    at e and -e at once.
+    Even functions of e change by its square only. So the reach is cut into parts, and what is even is
+    evaluated at e and -e at once.
     """
 
     def __init__(self, segments: Segments, build: Builder, box: Vector, reach: float) -> None:
@@ -176,7 +180,7 @@ class _Ways:
         self.plain = Chain(segments, replace(self.chain.model, slopes=None))
         self.u, self.v = box[: self.size], box[self.size : -1]
         edges = [arb(reach * k / _PARTS) for k in range(_PARTS + 1)]
-        self.parts = [a.union(b) for a, b in zip(edges, edges[1:], strict=False)]
+        self.parts = [a.union(b) for a, b in pairwise(edges)]
 
     def _pair(self, e: arb) -> list[Vector]:
         return [
@@ -185,7 +189,7 @@ class _Ways:
         ]
 
     def bends(self) -> Vector:
-        """Return balls of half the second derivative of Phi, a sixth of the third one, and 0: of even parts."""
+        """Return balls of half the second derivative of Phi, a sixth of the third one, and 0."""
         found: Vector = []
         for e in self.parts:
             value: Vector = []

@@ -97,8 +97,8 @@ class Tracer:
                 joint[0] *= 2 * arb.pi() / period
         return [*(c.mid() for joint in found for c in joint), value]
 
-    def _met(self, proofs: list[EventCertificate]) -> list[tuple[str, Vector]]:
-        """Return the proved events as solutions of the branch's chain, each with its label."""
+    def _met(self, proofs: list[EventCertificate]) -> list[tuple[str, Vector, bool]]:
+        """Return label and solution of the proved events on the branch, and whether one may end there."""
         found = []
         for proof in proofs:
             event = proof.event
@@ -107,7 +107,7 @@ class Tracer:
             at = self._point(near)
             zero = as_zero_of(proof, self.system, self.segments, self.build, at)
             if proof.proved and zero is not None:
-                found.append((event.label, zero))
+                found.append((event.label, zero, event.kind in TERMINAL))
         return found
 
     def _starts(self, proof: EventCertificate) -> bool:
@@ -221,23 +221,44 @@ class Tracer:
             return [self._nothing(arcs, first, last)]
         return [self.linked(piece, box)]
 
-    def piece(self, box: Box, arcs: Arcs, values: tuple[arb, arb], admissible: Finding) -> Piece:
-        """Return what is proved of a box, but for its link."""
-        inside = tuple(label for label, zero in self.met if box.holds(zero))
-        folds = 0 if box.monotone else self._count(box, 1)
-        flips = 0 if box.no_flip else self._count(box, -1)
+    def piece(
+        self,
+        box: Box,
+        arcs: Arcs,
+        values: tuple[arb, arb],
+        admissible: Finding,
+        leaves: bool | None = None,
+    ) -> Piece:
+        """Return what is proved of a box, but for its link.
+
+        Parameters
+        ----------
+        leaves : whether the branch ends in it on the way to its last point; to its first one if False
+        """
+        events = [(label, zero, ends) for label, zero, ends in self.met if box.holds(zero)]
+        inside = tuple(label for label, _, _ in events)
+        points: list[Vector | None] = [None, None]
+        if leaves is not None:
+            points[leaves] = next((zero for _, zero, ends in events if ends), None)
+        folds = 0 if box.monotone else self._count(box, 1, points)
+        flips = 0 if box.no_flip else self._count(box, -1, points)
         ends = (float(values[0].mid()), float(values[1].mid()))
         off = has_no_pair(self.segments, self.build, self.closes, box)
         tori = 0 if off else UNKNOWN
         return Piece(*arcs, ends, True, admissible, folds, flips, tori, events=inside)
 
-    def _count(self, box: Box, sigma: int) -> int:
-        """Return how often the Jacobian with sigma times the closure is singular between the ends of a box."""
+    def _count(self, box: Box, sigma: int, points: list[Vector | None]) -> int:
+        """Return how often the Jacobian with sigma times the closure is singular between the ends of a box.
+
+        Parameters
+        ----------
+        points : solutions on its curve in the place of its ends, where the branch ends at one
+        """
         if not passes_once(self.segments, self.build, box, sigma):
             return UNKNOWN
         signs = []
-        for end in (box.first, box.last):
-            at = section(self.segments, self.build, box, end)
+        for end, known in zip((box.first, box.last), points, strict=True):
+            at = known or section(self.segments, self.build, box, end)
             if at is None:
                 return UNKNOWN
             _, rows = Chain(self.segments, self.build(at[-1])).linearised(at[:-1], sigma)

@@ -26,7 +26,8 @@ class Turns:
     ----------
     system, segments : of one turn
     near : joints (phase and state) and parameter of the turn at the event, printed
-    places : for each joint of the first turn and then of the second one, the joint of the branch that it is, and
+    places : for each joint of the first turn and then of the second one, the joint of the branch that it
+        is, and
         by how much that is later
     later : duration of a turn, in phases
     closure : matrix of the closure of a turn
@@ -53,7 +54,7 @@ class Turns:
         return found
 
     def is_event(self, box: Vector, functional: Vector) -> bool:
-        """Tell whether the proved event is the one in a box of (u, v, p), c v = 1 (of the other units of time)."""
+        """Tell whether the proved event is the one in a box of (u, v, p), c v = 1."""
         proof, m, size = self.proof, self.segments.states + 1, (len(box) - 1) // 2
         event = proof.event
         model = ball_model(event.orbit.model, event.params, proof.parameter, proof.value)

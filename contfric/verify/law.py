@@ -1,8 +1,8 @@
 """The law of friction over the whole of every segment, multipliers, and events (see the package).
 
-At an event something changes its sign over a ball of one parameter, along the curve of orbits: a load less its
-limit, det(M + 1), det M - 1, or what is touched, where it is stationary. At a fold one equation phi is left out
-for one joint s: phi(s) has two zeros at one end of the ball, none at the other.
+At an event something changes its sign over a ball of one parameter, along the curve of orbits: a load less
+its limit, det(M + 1), det M - 1, or what is touched, where it is stationary. At a fold one equation is left
+out for one joint s: phi(s) has two zeros at one end of the ball, none at the other.
 """
 
 from __future__ import annotations
@@ -55,10 +55,7 @@ def check_admissible(scene: Scene, zero: list[arb], at: int, level: int, touches
 def _positive(
     scene: Scene, z: list[arb], i: int, surface: str, sign: int, order: int, ends: bool, touch: Any
 ) -> None:
-    """See that an observable has a sign inside of a segment; by derivatives where it vanishes.
-
-    ``order`` of it and its rate do at the start, it does at the end if ``ends``, and both do at a touch.
-    """
+    """See that an observable has a sign inside of a segment, but for zeros at its ends and at a touch."""
     duration = (scene.joint(z, i + 1)[0] - scene.joint(z, i)[0]).upper()
     waiting, what = [(0, 0)], f"segment {i + 1}: {surface} is not met inside"
     for _ in range(MOST_PIECES):
