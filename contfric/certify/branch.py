@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -67,6 +68,9 @@ class BranchCertificate(Shown):
         Those of its printed orbits, in its order.
     proofs : tuple of EventCertificate
         Those of its events.
+    held : frozenset of int
+        Numbers of orbits that are alone by the tube that holds them; not within their stated error, which is
+        large next to a PD or BP.
     """
 
     branch: Branch
@@ -74,11 +78,12 @@ class BranchCertificate(Shown):
     ended: str = ""
     points: tuple[Certificate, ...] = ()
     proofs: tuple[EventCertificate, ...] = ()
+    held: frozenset[int] = frozenset()
 
     @property
     def points_proved(self) -> int:
         """How many of the printed orbits are proved, with their stability; at an event none can be."""
-        return sum(point.proved for point in self.points)
+        return sum(point.proved or k in self.held for k, point in enumerate(self.points))
 
     def save(self, path: Any) -> None:
         """Write the certificates of all printed orbits and events as one file for ``contfric verify``.
@@ -191,16 +196,19 @@ def certify_branch(
     True
     """
     proofs = [certify_event(event, branch.parameter) for event in branch.bifurcations]
+    points = []
+    for orbit in branch:
+        if time.time() > until:
+            break
+        points.append(orbit.certify())
     with working(_BITS):
-        tracer = Tracer(branch, proofs, until)
+        tracer = Tracer(branch, proofs, until, points)
         pieces, steps = [], len(branch) - 1
         for k in range(steps):
             pieces += tracer.step(k)
             if progress is not None:
                 progress(f"{branch.name}, step {k + 1} of {steps}, {tracer.count} boxes")
-    points = []
-    for orbit in branch:
-        if not tracer.goes_on():
-            break
-        points.append(orbit.certify())
-    return BranchCertificate(branch, tuple(pieces), tracer.ended, tuple(points), tuple(proofs))
+    held = frozenset(tracer.held)
+    return BranchCertificate(
+        branch, tuple(pieces), tracer.ended, tuple(points), tuple(proofs), held
+    )

@@ -45,6 +45,11 @@ class Flip:
     piece: Piece
     plane: Vector
 
+    def holds(self, zero: Vector) -> bool:
+        """Tell whether a solution (z, p) in some balls is one of the box, and admissible."""
+        held = self.split.holds(*self.turns.of(zero[:-1]), zero[-1])
+        return held and self.piece.proved
+
     def amplitude(self, point: Vector) -> float:
         """Return the e of an orbit (z, p) of the branch, as a share of the reach."""
         return self.split.amplitude(self.turns.of(point[:-1])) / float(self.split.reach)

@@ -4,153 +4,88 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
 from flint import arb, arb_mat
 
-from contfric.certify.chain import Chain, Segments, segments_of
+from contfric.certify.certificate import Certificate
+from contfric.certify.chain import Chain, Segments
 from contfric.certify.circle import has_no_pair
-from contfric.certify.closing import closing_of, is_symmetry
+from contfric.certify.closing import closing_of
 from contfric.certify.events import EventCertificate
-from contfric.certify.extended import Builder
 from contfric.certify.inequalities import inequalities
 from contfric.certify.leaving import WITHIN, Flip, flip_at, join, leave
-from contfric.certify.meeting import as_zero_of
 from contfric.certify.passing import passes_once
-from contfric.certify.phases import in_phases
 from contfric.certify.piece import UNKNOWN, Piece
+from contfric.certify.strand import Strand
 from contfric.certify.tube import Box, are_linked, box_between, section, solved
 from contfric.certify.turns import turns_of
 from contfric.certify.verdict import Finding, Verdict, all_of
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import TERMINAL
-from contfric.models.balls.build import ball_model
-from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector
-from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import System
 
 #: Halvings of a step of the branch: what is not proved then is left.
 HALVINGS = 12
-#: Shortest step that is halved, as a share of the branch.
-_SHORTEST = 1e-5
 #: A box is tried only if it is at most this much longer than the last one that was proved.
 _GROWTH = 2.5
 #: Most boxes that are tried along a branch: some minutes of work.
 _MOST = 30_000
 
-#: How far the box of a PD or BP may reach, as a share of the branch.
-_FAR = 0.1
-
 Arcs = tuple[float, float]
 NO_BOX = Finding(Verdict.UNDECIDED, "no box")
 
 
-class Tracer:
+class Tracer(Strand):
     """Covers the steps of a branch with boxes.
 
     Parameters
     ----------
     proofs : certificates of the events of the branch
+    points : certificates of its printed orbits
     until : when to end, by ``time.time``
     """
 
-    def __init__(self, branch: Branch, proofs: list[EventCertificate], until: float) -> None:
-        self.branch, self.parameter, self.until = branch, branch.parameter, until
-        orbit = branch[len(branch) // 2]
-        self.orbit = orbit
-        low, high = float(branch.values.min()), float(branch.values.max())
-        exact = self._model(arb(low))
-        between = replace(exact, slopes=self._model(arb(low).union(arb(high))).slopes)
-        half = branch.system.half
-        self.whole = half and not is_symmetry(orbit, segments_of(orbit.system), between)
-        self.system = orbit.as_whole().system if self.whole else orbit.system
-        self.segments: Segments = segments_of(self.system)
-        self.build: Builder = self._build
-        # the closure is that of whole numbers at every value of the parameter
-        self.closes = closing_of(self.segments, self.build(arb(low)), self.system.half)
+    def __init__(
+        self,
+        branch: Branch,
+        proofs: list[EventCertificate],
+        until: float,
+        points: Sequence[Certificate] = (),
+    ) -> None:
+        super().__init__(branch)
+        self.until = until
         self.last: Box | Vector | None = None
         self.count, self.ended, self.length = 0, "", math.inf
-        length = float(branch.arc[-1] - branch.arc[0])
-        self.shortest, self.far = _SHORTEST * length, _FAR * length
-        self.met = self._met(proofs)
+        self.met = self.met_by(proofs)
         self.flips = [self._flip(proofs, end) for end in (0, -1)]
-
-    # ------------------------------------------------------------------ the branch in balls
-
-    def _model(self, value: arb) -> BallModel:
-        return ball_model(self.branch.model, self.orbit.params, self.parameter, value)
-
-    def _build(self, value: arb) -> BallModel:
-        return in_phases(self._model(value))
-
-    def _point(self, orbit: Orbit) -> Vector:
-        """Return joints (phase and state) and parameter of an orbit of the branch's chain, exact numbers."""
-        if self.whole:
-            orbit = orbit.as_whole()
-        value = arb(orbit.params[self.parameter])
-        period = self._model(value).period
-        found = [[arb(float(c)) for c in row] for row in orbit.joints]
-        if not period.is_zero():
-            for joint in found:
-                joint[0] *= 2 * arb.pi() / period
-        return [*(c.mid() for joint in found for c in joint), value]
-
-    def _met(self, proofs: list[EventCertificate]) -> list[tuple[str, Vector, bool]]:
-        """Return label and solution of the proved events on the branch, and whether one may end there."""
-        found = []
-        for proof in proofs:
-            event = proof.event
-            own = event.orbit.system is self.branch.system
-            near = event.orbit if own else self.branch[0 if self._starts(proof) else -1]
-            at = self._point(near)
-            zero = as_zero_of(proof, self.system, self.segments, self.build, at)
-            if proof.proved and zero is not None:
-                found.append((event.label, zero, event.kind in TERMINAL))
-        return found
-
-    def _starts(self, proof: EventCertificate) -> bool:
-        arc = self.branch.arc
-        return proof.event.position <= 0.5 * float(arc[0] + arc[-1])
+        self.near = self.nearly_singular(points)
+        self.held: set[int] = set()
+        for flip in self.flips:
+            if flip is not None:
+                self._hold(flip)
 
     def _flip(self, proofs: list[EventCertificate], end: int) -> Flip | None:
         """Return the box of the event at an end, if that is a PD or BP at which two turns become one."""
         at = float(self.branch.arc[end])
-        near = self._point(self.branch[end])
+        near = self.point(self.branch[end])
         for proof in proofs:
-            if proof.proved and abs(proof.event.position - at) <= self.shortest * 1e-3:
+            if proof.proved and abs(proof.event.position - at) <= self.end:
                 turns = turns_of(proof, self.system, near)
                 if turns is not None:
-                    return flip_at(self, turns, self._far_from(end))
+                    return flip_at(self, turns, self.far_from(end))
         return None
 
-    def _far_from(self, end: int) -> Vector:
-        """Return the orbit of the branch up to which the box of an event at an end may reach."""
-        apart = np.abs(self.branch.arc - self.branch.arc[end]) - self.far
-        inner = np.flatnonzero(apart >= 0)
-        return self._point(self.branch[int(inner[np.argmin(apart[inner])])])
-
-    def end_of(self, forward: bool) -> tuple[float, float]:
-        """Return arclength and parameter at an end of the branch."""
-        k = -1 if forward else 0
-        return float(self.branch.arc[k]), float(self.branch.values[k])
-
-    def _has_edge(self, end: int) -> bool:
-        """Tell whether the branch ends at an event of its inequalities."""
-        if self.branch.ends[end].reason.name in [kind.value for kind in TERMINAL]:
-            return True
-        at = float(self.branch.arc[end])
-        return any(
-            event.kind in TERMINAL and abs(event.position - at) <= self.shortest * 1e-3
-            for event in self.branch.bifurcations
-        )
+    def _hold(self, box: Box | Flip) -> None:
+        """Note which of these orbits are on the curve of a proved box."""
+        self.held |= {k for k, zero in self.near.items() if box.holds(zero)}
 
     # ------------------------------------------------------------------ steps
 
     def step(self, k: int) -> list[Piece]:
         """Cover the step from point k to the next one."""
-        printed = self._point(self.branch[k]), self._point(self.branch[k + 1])
+        printed = self.point(self.branch[k]), self.point(self.branch[k + 1])
         arcs = (float(self.branch.arc[k]), float(self.branch.arc[k + 1]))
         if not self.goes_on():
             return [self._nothing(arcs, *printed)]
@@ -164,7 +99,7 @@ class Tracer:
                     return []
                 if inside[end]:
                     return join(self, flip, first, last, arcs, end == 1)
-        left = k == 0 and self._has_edge(0), k + 2 == len(self.branch) and self._has_edge(-1)
+        left = k == 0 and self.has_edge(0), k + 2 == len(self.branch) and self.has_edge(-1)
         if all(left):
             middle, between = self.middle(first, last), 0.5 * (arcs[0] + arcs[1])
             if middle is not None:
@@ -270,6 +205,8 @@ class Tracer:
     def linked(self, piece: Piece, box: Box) -> Piece:
         """Return a piece with its link to the one before; from now on it is the last one."""
         before, self.last = self.last, box
+        if piece.proved:
+            self._hold(box)
         if before is None:
             return piece
         if isinstance(before, Box):

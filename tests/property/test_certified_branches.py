@@ -214,7 +214,7 @@ def test_where_two_turns_become_one(parameter: str, kind: str) -> None:
         assert (flip.split.slope[-1] > 0) is (side > 0)
         inside = 0
         for k in range(len(branch)):
-            point = tracer._point(branch[k])
+            point = tracer.point(branch[k])
             first, second = flip.turns.of(point[:-1])
             if (
                 1e-4 < abs(flip.amplitude(point)) < 0.99
