@@ -38,7 +38,7 @@ def _vanishing(data: dict[str, Any], truth: Truth, z: list[mpf]) -> mpf:
     if data["kind"] in _TOUCHES:
         return _touched(data, truth, z)
     one, other = truth.multipliers(z)
-    return mp.re((1 + one) * (1 + other))
+    return mp.re(one * other - 1 if data["kind"] == "NS" else (1 + one) * (1 + other))
 
 
 def _touched(data: dict[str, Any], truth: Truth, z: list[mpf]) -> mpf:
@@ -76,6 +76,8 @@ def _obeys(data: dict[str, Any], truth: Truth, z: list[mpf]) -> bool:
         slides = truth.segments[i][0] != "stick"
         if (slides, surface[0]) != _TOUCHES[data["kind"]]:
             return False
+    if data["kind"] == "NS" and not abs(mp.im(truth.multipliers(z)[0])) > 0:
+        return False  # a neutral saddle
     if data["kind"] not in ("CS", "SS"):
         return truth.admissible(z)
     i, level = data["at"]
@@ -132,7 +134,7 @@ def _other_params(data: dict[str, Any], rng: np.random.Generator) -> None:
 
 
 def _other_kind(data: dict[str, Any], rng: np.random.Generator) -> None:
-    data["kind"] = str(rng.choice(["SN", "PD", "BP", "CS", "SS", "AS", "T"]))
+    data["kind"] = str(rng.choice(["SN", "PD", "BP", "NS", "CS", "SS", "AS", "T"]))
     if data["at"] is None and rng.uniform() < 0.5:
         data["at"] = [int(rng.integers(len(data["segments"]))), int(rng.choice([-1, 1]))]
 

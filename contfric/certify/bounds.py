@@ -12,7 +12,7 @@ import numpy as np
 from flint import arb, arb_mat
 
 from contfric.certify.krawczyk import approximate_inverse
-from contfric.models.balls.numbers import Vector, column
+from contfric.models.balls.numbers import Vector, around, column
 from contfric.models.definition import FloatArray
 
 #: Upper bounds are rounded to floats and multiplied by this.
@@ -85,8 +85,8 @@ class Bounds:
         total = total + self.half * (self.rest @ upper(d)[:, 0])
         return (np.eye(len(change)) + self.half * upper(self.turn)) @ total
 
-    def keeps_sign(self, k: int) -> bool:
-        """Tell whether an entry of T, ``J T = e`` with e the last unit vector, has a sign for all s.
+    def solution(self) -> Vector | None:
+        """Return balls of T, ``J T = e`` with e the last unit vector, for all s; None if none are found.
 
         ``T = C(s) e + (1 - C(s) J) T``, and ``C(s) e = c - s B c``.
         """
@@ -96,9 +96,9 @@ class Bounds:
         known = upper(first)[:, 0] + self.half * upper(second)[:, 0]
         error = supersolution(self.gap, self.gap @ known)
         if error is None:
-            return False
-        beside = self.half * float(second[k, 0].abs_upper()) + error[k]
-        return bool(float(first[k, 0].abs_lower()) > beside * (1 + 1e-9))
+            return None
+        spread = (self.half * upper(second)[:, 0] + error) * (1 + 1e-9)
+        return [around(first[k, 0], arb(float(r))) for k, r in enumerate(spread)]
 
 
 def supersolution(gap: FloatArray, moved: FloatArray) -> FloatArray | None:

@@ -10,72 +10,46 @@ ends of a branch, where an inequality vanishes, and about its events.
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-
-from flint import arb
+from dataclasses import dataclass
+from typing import Any
 
 from contfric.base.shown import Shown
-from contfric.certify.chain import Chain, Segments, segments_of
-from contfric.certify.closing import closing_of, is_symmetry
-from contfric.certify.extended import Builder
-from contfric.certify.inequalities import inequalities
-from contfric.certify.phases import in_phases
-from contfric.certify.tube import Box, are_linked, box_between, solved
-from contfric.certify.verdict import Finding, Verdict, all_of
-from contfric.certify.zeros import Closing
+from contfric.certify.certificate import Certificate
+from contfric.certify.events import EventCertificate, certify_event
+from contfric.certify.piece import Piece
+from contfric.certify.tracing import Tracer
 from contfric.continuation.branch import Branch
-from contfric.models.balls.build import ball_model
-from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector, working
+from contfric.continuation.events import TERMINAL, EndReason
+from contfric.errors import ParameterError
+from contfric.models.balls.numbers import working
 
 #: Bits: rounding of 1e-24 is nothing to boxes that are 1e-7 long.
 _BITS = 80
-#: Halvings of a step of the branch: events are left with as little about them.
-_HALVINGS = 12
-#: Shortest step that is halved, as a share of the branch: what is about events is left so short.
-_SHORTEST = 1e-5
-#: A box is tried only if it is at most this much longer than the last one that was proved.
-_GROWTH = 2.5
-#: Most boxes that are tried along a branch: some minutes of work.
-_MOST = 30_000
 
 
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A stretch of a branch, and what was proved of it.
+#: What is counted in a piece, and kinds of the events that it may be.
+_COUNTED: tuple[tuple[str, set[str], Callable[[Piece], int]], ...] = (
+    ("folds", {"SN"}, lambda piece: piece.folds),
+    ("flips", {"PD", "BP"}, lambda piece: piece.flips),
+    ("tori", {"NS"}, lambda piece: piece.tori),
+)
+_MISSED = {
+    "folds": "a fold may be there",
+    "flips": "a multiplier -1 of a turn may be there",
+    "tori": "a pair of multipliers may be on the unit circle",
+}
+#: Reasons of ends that are events.
+_AT_EVENTS = frozenset({EndReason[kind.value] for kind in TERMINAL} | {EndReason.BP, EndReason.PD})
 
-    Attributes
-    ----------
-    start, stop : where it is, in arclength of the branch
-    values : the parameter at its ends
-    exists : there is one curve of solutions in a box about it
-    admissible : every orbit of it obeys every inequality
-    monotone : the parameter is monotone along it (no SN)
-    no_flip : no multiplier of a turn is -1 (no PD, no BP of a half)
-    linked : it goes on in the next piece
-    """
 
-    start: float
-    stop: float
-    values: tuple[float, float]
-    exists: bool
-    admissible: Finding
-    monotone: bool = False
-    no_flip: bool = False
-    linked: bool = True
-
-    @property
-    def proved(self) -> bool:
-        """Whether it is one curve of admissible orbits."""
-        return self.exists and self.admissible.proved
-
-    @property
-    def why(self) -> str:
-        """What is not proved; empty if all is."""
-        return "" if self.proved else self.admissible.why
+def _runs(pieces: tuple[Piece, ...], count: Callable[[Piece], int]) -> list[list[Piece]]:
+    """Return the runs of neighbouring pieces in which something may be."""
+    groups = itertools.groupby(pieces, key=lambda piece: count(piece) > 0)
+    return [list(group) for there, group in groups if there]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,11 +64,45 @@ class BranchCertificate(Shown):
         Along the branch, in its order.
     ended : str
         What ended the work before all was tried; empty if nothing did.
+    points : tuple of Certificate
+        Those of its printed orbits, in its order.
+    proofs : tuple of EventCertificate
+        Those of its events.
+    held : frozenset of int
+        Numbers of orbits that are alone by the tube that holds them; not within their stated error, which is
+        large next to a PD or BP.
     """
 
     branch: Branch
     pieces: tuple[Piece, ...]
     ended: str = ""
+    points: tuple[Certificate, ...] = ()
+    proofs: tuple[EventCertificate, ...] = ()
+    held: frozenset[int] = frozenset()
+
+    @property
+    def points_proved(self) -> int:
+        """How many of the printed orbits are proved, with their stability; at an event none can be."""
+        return sum(point.proved or k in self.held for k, point in enumerate(self.points))
+
+    def save(self, path: Any) -> None:
+        """Write the certificates of all printed orbits and events as one file for ``contfric verify``.
+
+        The tube between them is not in it.
+
+        Raises
+        ------
+        ParameterError
+            If there is nothing that the checker knows.
+        ResultFileError
+            If the file cannot be written.
+        """
+        from contfric.certify.files import checkable, write_data
+
+        parts = checkable([*self.proofs, *self.points])
+        if not parts:
+            raise ParameterError("there is nothing to write: the checker knows orbits of coulomb")
+        write_data({"certificate": "diagram", "format": 1, "checkable": parts}, path)
 
     @property
     def covered(self) -> float:
@@ -106,7 +114,7 @@ class BranchCertificate(Shown):
     def regular(self) -> float:
         """Share of the arclength on which it has neither a fold nor a multiplier -1 in addition."""
         whole = sum(p.stop - p.start for p in self.pieces)
-        found = (p for p in self.pieces if p.proved and p.monotone and p.no_flip)
+        found = (p for p in self.pieces if p.regular)
         return sum(p.stop - p.start for p in found) / whole if whole else 0.0
 
     @property
@@ -116,7 +124,33 @@ class BranchCertificate(Shown):
         if not inner:
             return False
         within = self.pieces[inner[0] : inner[-1] + 1]
-        return all(piece.proved for piece in within) and all(p.linked for p in within[:-1])
+        return all(piece.proved for piece in within) and all(p.linked for p in within[1:])
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """Labels of the proved events that its tube holds."""
+        return tuple(dict.fromkeys(label for piece in self.pieces for label in piece.events))
+
+    @property
+    def complete(self) -> bool:
+        """Whether it is one curve of admissible orbits from end to end, with proved events only."""
+        linked = all(piece.linked for piece in self.pieces[1:])
+        return bool(self.pieces) and linked and not self.gaps and not self.open
+
+    @property
+    def open(self) -> list[str]:
+        """Where an event of multipliers may be that is not proved, and ends without a proved one."""
+        found = []
+        for name, kinds, count in _COUNTED:
+            for run in _runs(self.pieces, count):
+                known = {label.split("_")[0] for piece in run for label in piece.events}
+                if not known & kinds or (name != "tori" and len(run) > 1):
+                    at = f"{run[0].values[0]:.12g} to {run[-1].values[1]:.12g}"
+                    found.append(f"{self.branch.parameter} from {at}: {_MISSED[name]}")
+        for piece, end in zip((self.pieces[0], self.pieces[-1]), self.branch.ends, strict=True):
+            if end.reason in _AT_EVENTS and not piece.events:
+                found.append(f"no proved event at the end '{end}'")
+        return found
 
     @property
     def gaps(self) -> list[str]:
@@ -161,127 +195,20 @@ def certify_branch(
     >>> certify_branch(cf.continue_orbit(orbit, "Omega", (0.495, 0.505))).proved
     True
     """
+    proofs = [certify_event(event, branch.parameter) for event in branch.bifurcations]
+    points = []
+    for orbit in branch:
+        if time.time() > until:
+            break
+        points.append(orbit.certify())
     with working(_BITS):
-        tracer, pieces, steps = _Tracer(branch, until), [], len(branch) - 1
+        tracer = Tracer(branch, proofs, until, points)
+        pieces, steps = [], len(branch) - 1
         for k in range(steps):
             pieces += tracer.step(k)
             if progress is not None:
                 progress(f"{branch.name}, step {k + 1} of {steps}, {tracer.count} boxes")
-    return BranchCertificate(branch, tuple(pieces), tracer.ended)
-
-
-class _Tracer:
-    """Covers the steps of a branch with boxes."""
-
-    def __init__(self, branch: Branch, until: float) -> None:
-        self.branch, self.parameter, self.until = branch, branch.parameter, until
-        half = branch.system.half
-        orbit = branch[len(branch) // 2]
-        self.orbit = orbit
-        low, high = float(branch.values.min()), float(branch.values.max())
-        exact = self._model(arb(low))
-        between = replace(exact, slopes=self._model(arb(low).union(arb(high))).slopes)
-        self.whole = half and not is_symmetry(orbit, segments_of(orbit.system), between)
-        self.system = orbit.as_whole().system if self.whole else orbit.system
-        self.segments: Segments = segments_of(self.system)
-        self.build: Builder = self._build
-        self.last: Box | None = None
-        self.count, self.ended, self.length = 0, "", math.inf
-        self.shortest = _SHORTEST * float(branch.arc[-1] - branch.arc[0])
-
-    def _model(self, value: arb) -> BallModel:
-        return ball_model(self.branch.model, self.orbit.params, self.parameter, value)
-
-    def _build(self, value: arb) -> BallModel:
-        return in_phases(self._model(value))
-
-    def _closing(self, model: BallModel) -> Closing:
-        return closing_of(self.segments, model, self.system.half)
-
-    def _point(self, k: int) -> Vector:
-        orbit = self.branch[k].as_whole() if self.whole else self.branch[k]
-        value = arb(float(self.branch.values[k]))
-        period, found = (
-            self._model(value).period,
-            [[arb(float(c)) for c in row] for row in orbit.joints],
-        )
-        if not period.is_zero():
-            for joint in found:
-                joint[0] *= 2 * arb.pi() / period
-        return [*(c.mid() for joint in found for c in joint), value]
-
-    def step(self, k: int) -> list[Piece]:
-        """Cover the step from point k to the next one."""
-        first, last = self._point(k), self._point(k + 1)
-        arcs = (float(self.branch.arc[k]), float(self.branch.arc[k + 1]))
-        if not self._goes_on():
-            return [self._nothing(arcs, first, last)]
-        plane = [b - a for a, b in zip(first, last, strict=True)]
-        ends = [solved(self.segments, self.build, point, plane) for point in (first, last)]
-        if ends[0] is None or ends[1] is None:
-            return [self._nothing(arcs, first, last)]
-        return self._cover(ends[0], ends[1], arcs, 0)
-
-    def _goes_on(self) -> bool:
-        """Tell whether more boxes may be tried; else it is said what ended the work."""
-        if time.time() > self.until:
-            self.ended = "the time limit ended it"
-        elif self.count >= _MOST:
-            self.ended = f"{_MOST} boxes were tried"
-        return not self.ended
-
-    def _nothing(self, arcs: tuple[float, float], first: Vector, last: Vector) -> Piece:
-        self.last = None
-        why = Finding(Verdict.UNDECIDED, self.ended or "no box")
-        return Piece(*arcs, (float(first[-1].mid()), float(last[-1].mid())), False, why)
-
-    def _cover(
-        self, first: Vector, last: Vector, arcs: tuple[float, float], level: int
-    ) -> list[Piece]:
-        length = arcs[1] - arcs[0]
-        splits = level < _HALVINGS and length > self.shortest and self._goes_on()
-        if length > _GROWTH * self.length and splits:
-            halves = self._halves(first, last, arcs, level)
-            if halves is not None:
-                return halves
-        self.count += 1
-        box = box_between(self.segments, self.build, first, last)
-        admissible = Finding(Verdict.UNDECIDED, "no box") if box is None else self._admissible(box)
-        whole = box is not None and admissible.proved and box.monotone and box.no_flip
-        refuted = admissible.verdict is Verdict.REFUTED  # by all orbits of the box
-        if not (whole or refuted) and splits:
-            self.length = length / 2
-            halves = self._halves(first, last, arcs, level)
-            if halves is not None:
-                return halves
-        self.length = max(self.length, length) if whole else math.inf
-        if box is None:
-            return [self._nothing(arcs, first, last)]
-        linked = self.last is None or are_linked(self.segments, self.build, self.last, box)
-        self.last = box
-        values = (float(first[-1].mid()), float(last[-1].mid()))
-        return [Piece(*arcs, values, True, admissible, box.monotone, box.no_flip, linked)]
-
-    def _halves(
-        self, first: Vector, last: Vector, arcs: tuple[float, float], level: int
-    ) -> list[Piece] | None:
-        plane = [b - a for a, b in zip(first, last, strict=True)]
-        middle = [((a + b) / 2).mid() for a, b in zip(first, last, strict=True)]
-        point = solved(self.segments, self.build, middle, plane)
-        if point is None:
-            return None
-        between = 0.5 * (arcs[0] + arcs[1])
-        return [
-            *self._cover(first, point, (arcs[0], between), level + 1),
-            *self._cover(point, last, (between, arcs[1]), level + 1),
-        ]
-
-    def _admissible(self, box: Box) -> Finding:
-        model = replace(self.build(box.all[-1]), slopes=None)
-        chain = Chain(self.segments, model)
-        joints = chain.joints(box.all[:-1])
-        found = inequalities(chain, self.system, joints, self._closing(model))
-        for inequality in found:
-            if not inequality.finding.proved:
-                return inequality.named(self.system)
-        return all_of([])
+    held = frozenset(tracer.held)
+    return BranchCertificate(
+        branch, tuple(pieces), tracer.ended, tuple(points), tuple(proofs), held
+    )

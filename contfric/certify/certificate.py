@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from contfric.base.shown import Shown
@@ -59,6 +59,11 @@ class Certificate(Shown):
         wanted = Verdict.PROVED if self.orbit.stable else Verdict.REFUTED
         whole = all_of([self.exists, self.unique, self.admissible])
         return whole.proved and (bool(self.orbit.system.holds) or self.stable.verdict is wanted)
+
+    @property
+    def proved_but_unique(self) -> bool:
+        """Whether all is proved, but perhaps that no other orbit is so near."""
+        return replace(self, unique=Finding(Verdict.PROVED)).proved
 
     @property
     def why(self) -> str:

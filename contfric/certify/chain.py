@@ -143,9 +143,9 @@ class Chain:
         time, turn = arb(0), self.segments.turn
         if turn != 0.0:
             time = first[0] + arb(turn) * self.model.period
-        return [time, *self._linearly_closed(first)[1:]]
+        return [time, *self.closed_change(first)[1:]]
 
-    def _linearly_closed(self, first: Vector) -> Vector:
+    def closed_change(self, first: Vector) -> Vector:
         """Return the closure of a disturbance of the first joint."""
         rows = self.segments.closure
         state = [
@@ -170,6 +170,15 @@ class Chain:
         """Return the duration of segment i."""
         return z[i + 1][0] - z[i][0]
 
+    def times_by(self, at: int, change: Vector) -> arb:
+        """Return how the time of a joint changes with the unknowns and the parameter."""
+        if at < self.segments.count:
+            return change[at * self.m]
+        if self.segments.turn == 0.0:
+            return arb(0)
+        assert self.model.slopes is not None
+        return change[0] + arb(self.segments.turn) * self.model.slopes.period * change[-1]
+
     # ------------------------------------------------------------------ first derivatives
 
     def linearised(self, x: Vector, sigma: int = 1) -> tuple[Vector, list[Vector]]:
@@ -188,7 +197,7 @@ class Chain:
             self._flow_rows(i, move, rows[first : first + self.n], sigma)
             residual += [move.end[j, 0] - z[i + 1][1 + j] for j in range(self.n)]
             self._by_parameter(i, z, move, rows[first : first + self.n])
-            value, rows[first + self.n] = self.observed(z, *self._condition(i), sigma)
+            value, rows[first + self.n] = self.observed(z, *self.condition(i), sigma)
             residual.append(value)
         return residual, rows
 
@@ -229,7 +238,7 @@ class Chain:
         found[-1] += (slope * end + row * change)[0, 0]
         return (row * end)[0, 0], found, (row * move.field * end)[0, 0]
 
-    def _condition(self, i: int) -> tuple[int, arb_mat, arb_mat | None]:
+    def condition(self, i: int) -> tuple[int, arb_mat, arb_mat | None]:
         """Return the last equation of a segment: at which joint which row vanishes, and its slope."""
         pin, model = self.segments.pins[i], self.model
         name = pin if isinstance(pin, str) else pin[1] if pin else self.segments.exits[i]
@@ -292,16 +301,24 @@ class Chain:
 
     # ------------------------------------------------------------------ second derivatives
 
-    def bent(self, x: Vector, phi: Vector, sigma: int) -> list[Vector]:
-        """Return the derivative of ``J_sigma(x) phi`` by unknowns and parameter, phi held fixed."""
+    def bent(
+        self, x: Vector, phi: Vector, sigma: int, turned: Vector | None = None
+    ) -> list[Vector]:
+        """Return the derivative of ``J_sigma(x) phi`` by unknowns and parameter, phi held fixed.
+
+        Parameters
+        ----------
+        turned : the disturbance of the last joint, where it is another one than sigma times the closure of
+            phi
+        """
         z = self.joints(x)
         step = [phi[i * self.m : (i + 1) * self.m] for i in range(self.segments.count)]
-        step.append([sigma * c for c in self._linearly_closed(step[0])])
+        step.append(turned or [sigma * c for c in self.closed_change(step[0])])
         rows = zeros(self.size, self.size + 1)
         for i in range(self.segments.count):
             first = i * self.m
             self._bent_flow(i, z, step, rows[first : first + self.n])
-            at, row, slope = self._condition(i)
+            at, row, slope = self.condition(i)
             t, change = z[at][0], step[at]
             last, model = rows[first + self.n], self.model
             twice = (row * column(model.by_time(t, 2)))[0, 0] * change[0]
@@ -322,17 +339,19 @@ class Chain:
     def _bent_flow(self, i: int, z: list[Vector], step: list[Vector], rows: list[Vector]) -> None:
         """Write the derivatives of L of the module's text."""
         move, model, t = self.move(i, z), self.model, z[i][0]
-        if move.reset is not None:
-            raise NotImplementedError("second derivatives behind a reset")
         late, delta = step[i][0], step[i + 1][0] - step[i][0]
-        a = column(self._disturbed(t, step[i]))
-        later = move.field * (move.flow * a) + move.field * move.speed * delta  # dL/dd
-        early = move.flow * column(model.by_time(t, 2)) * late  # dL/dt at fixed d
-        early = early + move.field * (move.flow * move.by_time) * delta
-        by_state = move.field * move.flow * delta
+        a, again = column(self._disturbed(t, step[i])), column(model.by_time(t, 2))
         slope, flow, start = self._slope_of(i, z[i], self.duration(i, z), move)
+        mixed, state = column([late * c for c in model.by_parameter(t, 1)]), move.flow
+        if move.reset is not None:
+            assert model.slopes is not None
+            mixed = move.reset * mixed + model.slopes.resets[self.segments.resets[i]] * a
+            a, again, state = move.reset * a, move.reset * again, move.flow * move.reset
+        later = move.field * (move.flow * a) + move.field * move.speed * delta  # dL/dd
+        early = move.flow * again * late  # dL/dt at fixed d
+        early = early + move.field * (move.flow * move.by_time) * delta
+        by_state = move.field * state * delta
         own = slope * move.end + move.field * (flow * move.start + move.flow * start)
-        mixed = column([late * c for c in model.by_parameter(t, 1)])
         by_parameter = flow * a + move.flow * mixed + own * delta
         for j in range(self.n):
             own_row = [early[j, 0] - later[j, 0], *(by_state[j, k] for k in range(self.n))]

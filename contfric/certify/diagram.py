@@ -16,6 +16,7 @@ from typing import Any
 
 from contfric.atlas.diagram import Diagram
 from contfric.certify.branch import BranchCertificate, certify_branch
+from contfric.certify.certificate import Certificate
 from contfric.certify.diagram_certificate import (
     BranchSummary,
     DiagramCertificate,
@@ -24,7 +25,7 @@ from contfric.certify.diagram_certificate import (
     merged,
 )
 from contfric.certify.events import EventCertificate, certify_event
-from contfric.certify.files import event_data
+from contfric.certify.files import checkable
 from contfric.chaos.running import Progress, check_executor, compute_all
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation
@@ -93,7 +94,7 @@ def certify_diagram(
         tuple(events),
         time.time() - began,
         ended,
-        _checkable([found[k] for k in range(len(nodes)) if k in found]),
+        tuple(checkable([part for k in tasks for part in _parts_of(found.get(k))])),
     )
 
 
@@ -154,15 +155,11 @@ def prove(
     return certify_event(task.what, task.parameter)
 
 
-def _checkable(proofs: list[EventCertificate]) -> tuple[dict[str, Any], ...]:
-    """Return the certificates that the checker knows, as plain data."""
-    found = []
-    for proof in proofs:
-        try:
-            found.append(event_data(proof))
-        except ParameterError:  # not proved, or none of those that it knows
-            continue
-    return tuple(found)
+def _parts_of(
+    proof: BranchCertificate | EventCertificate | None,
+) -> tuple[Certificate | EventCertificate | None, ...]:
+    """Return the event, or the orbits of a branch, whose events are those of the diagram."""
+    return proof.points if isinstance(proof, BranchCertificate) else (proof,)
 
 
 def _event_summary(
@@ -196,4 +193,9 @@ def _branch_summary(number: int, branch: Branch, proof: BranchCertificate | None
         length * proof.regular,
         len(proof.pieces),
         gaps,
+        proof.complete,
+        proof.events,
+        tuple(proof.open),
+        len(proof.points),
+        proof.points_proved,
     )

@@ -48,6 +48,10 @@ class BranchSummary:
     regular : arclength on which it has neither a fold nor a multiplier -1 in addition
     boxes : number of boxes of its tube
     gaps : where it is not proved, and why
+    complete : whether it is one curve from end to end, with no event but the proved ones in its tube
+    events : labels of these
+    open : where another event may be
+    points, points_proved : number of its printed orbits, and of those that are proved with their stability
     """
 
     number: int
@@ -57,6 +61,11 @@ class BranchSummary:
     regular: float
     boxes: int
     gaps: tuple[Gap, ...]
+    complete: bool = False
+    events: tuple[str, ...] = ()
+    open: tuple[str, ...] = ()
+    points: int = 0
+    points_proved: int = 0
 
 
 @dataclass(frozen=True)
@@ -116,7 +125,7 @@ class DiagramCertificate(Shown):
     ended : str
         What ended the run before all was tried (a time limit, an interrupt); empty if nothing did.
     checkable : tuple of dict
-        Certificates of events as plain data, which ``contfric verify`` checks.
+        Certificates of events and of printed orbits as plain data, which ``contfric verify`` checks.
     """
 
     model: str
@@ -149,12 +158,13 @@ class DiagramCertificate(Shown):
         gaps = [(b, gap) for b in self.branches for gap in b.gaps]
         gaps.sort(key=lambda pair: -pair[1].length)
         lines = [f"branch {b.number} ({b.name}), {self.parameter} {gap}" for b, gap in gaps]
-        return (*events, *lines)
+        other = [f"branch {b.number} ({b.name}), {text}" for b in self.branches for text in b.open]
+        return (*events, *lines, *other)
 
     def save(self, path: Any) -> None:
         """Write it as a JSON file; :func:`load_diagram_certificate` reads it.
 
-        ``contfric verify`` checks the events in it that are ``checkable``, and not the summary.
+        ``contfric verify`` checks the events and orbits in it that are ``checkable``, and not the summary.
 
         Raises
         ------
@@ -164,7 +174,7 @@ class DiagramCertificate(Shown):
         summary = asdict(self)
         checkable = summary.pop("checkable")
         data = {"certificate": _KIND, "format": _FORMAT, "checkable": checkable, "summary": summary}
-        text = json.dumps(data, indent=1)
+        text = json.dumps(data)
         with replacing(path_of("a certificate file", path)) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
 
@@ -186,7 +196,11 @@ class DiagramCertificate(Shown):
             f"{self.model}, {self.parameter} in [{self.range[0]:g}, {self.range[1]:g}]: "
             f"{len(self.branches)} branches, {boxes} boxes, {self.seconds:.3g} s",
             f"  {_percent(self.covered)} of the arclength proved, "
-            f"{_percent(self.regular)} without a fold or a multiplier -1",
+            f"{_percent(self.regular)} without a fold or a multiplier on the unit circle",
+            f"  {sum(b.complete for b in self.branches)} of {len(self.branches)} branches proved from "
+            "end to end, with all of their events",
+            f"  {sum(b.points_proved for b in self.branches)} of {sum(b.points for b in self.branches)} "
+            "printed orbits proved, with their stability",
             f"  {events}",
             *(f"  {self.ended}" for _ in [0] if self.ended),
         ]
@@ -239,7 +253,14 @@ def load_diagram_certificate(path: Any) -> DiagramCertificate:
             raise ValueError(f"it is no certificate of a diagram of format {_FORMAT}")
         checkable, data = tuple(data["checkable"]), data["summary"]
         branches = tuple(
-            BranchSummary(**{**b, "gaps": tuple(Gap(**g) for g in b["gaps"])})
+            BranchSummary(
+                **{
+                    **b,
+                    "gaps": tuple(Gap(**g) for g in b["gaps"]),
+                    "events": tuple(b.get("events", ())),
+                    "open": tuple(b.get("open", ())),
+                }
+            )
             for b in data.pop("branches")
         )
         events = tuple(

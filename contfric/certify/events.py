@@ -11,13 +11,20 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 from flint import arb, arb_mat
 
 from contfric.base.shown import Shown
 from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
-from contfric.certify.extended import Builder, at_joint, rows_of, touched_within, with_multiplier
+from contfric.certify.disturbance import null_vector, pair_of
+from contfric.certify.extended import (
+    Builder,
+    at_joint,
+    rows_of,
+    touched_within,
+    with_multiplier,
+    with_pair,
+)
 from contfric.certify.inequalities import Touch, inequalities
 from contfric.certify.krawczyk import Equations, Inclusion, approximate_inverse, enclosed
 from contfric.certify.locating import Location, NotLocatedError, location_of
@@ -191,7 +198,7 @@ def _attempt(event: Bifurcation, location: Location, parameter: str, bits: int) 
         parameter,
         value,
         Finding(Verdict.PROVED),
-        _simple(event, location, chain, z, touch),
+        _simple(event, chain, z, touch, inclusion.zero[-3:-1]),
         _of_kind(event, location, chain, z, touch),
         _admissible(orbit, chain, z, touch),
         location,
@@ -204,9 +211,12 @@ def _extended(
 ) -> tuple[Equations, Vector]:
     """Return the extended system of an event, and where to start but for the parameter."""
     joints = [arb(float(x)) for x in location.orbit.joints.ravel()]
+    if event.kind is Kind.NS:
+        start, functional = pair_of(location.orbit, segments)
+        return with_pair(segments, build, functional), [*joints, *start]
     if location.condition is None:
         sigma = 1 if event.kind is Kind.SN else -1
-        phi = _null_vector(location.orbit, segments, sigma)
+        phi = null_vector(location.orbit, segments, sigma)
         return with_multiplier(segments, build, sigma, phi), [*joints, *phi]
     if location.condition.within:
         after = arb(location.after)
@@ -214,13 +224,9 @@ def _extended(
     return at_joint(segments, build, location.condition), joints
 
 
-def _null_vector(orbit: Orbit, segments: Segments, sigma: int) -> Vector:
-    """Return the unit vector that the linearised chain at the printed orbit maps nearest to zero."""
-    model = ball_model(orbit.model, orbit.params)
-    printed = [arb(float(x)) for x in orbit.joints.ravel()]
-    _, rows = Chain(segments, model).linearised(printed, sigma)
-    matrix = np.array([[float(x.mid()) for x in row] for row in rows])
-    return [arb(float(x)) for x in np.linalg.svd(matrix)[2][-1]]
+def _resonates(c: arb, s: arb) -> bool:
+    """Tell whether a multiplier ``c + i s`` may be a strong resonance: a power up to the fourth is 1."""
+    return bool(s.contains(0) or c.contains(0) or (2 * c + 1).contains(0))
 
 
 def _touch(location: Location, inclusion: Inclusion) -> Touch | None:
@@ -230,7 +236,11 @@ def _touch(location: Location, inclusion: Inclusion) -> Touch | None:
 
 
 def _simple(
-    event: Bifurcation, location: Location, chain: Chain, z: Vector, touch: Touch | None
+    event: Bifurcation,
+    chain: Chain,
+    z: Vector,
+    touch: Touch | None,
+    pair: Vector,
 ) -> Finding:
     """Find whether the event is passed with speed.
 
@@ -240,6 +250,8 @@ def _simple(
     """
     if event.kind is Kind.SN:
         return Finding(Verdict.PROVED)
+    if event.kind is Kind.NS and _resonates(*pair):
+        return Finding(Verdict.UNDECIDED, "a power of the multiplier up to the fourth may be 1")
     if touch is not None and (touch.condition.within or touch.condition.rate):
         if _second(chain, z, touch).contains(0):
             return Finding(Verdict.UNDECIDED, "the second derivative of the touch may vanish")

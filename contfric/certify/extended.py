@@ -9,6 +9,11 @@ The unknowns are the joints z of the chain ``F(z, p) = 0``, p, and what the even
   SIAM J. Numer. Anal. 17 (1980) 567-576; B. Werner and A. Spence, SIAM J. Numer. Anal. 21 (1984)
   388-399).
 
+* a complex pair ``c + i s`` of multipliers on the unit circle (NS), with its disturbance ``a + i b``: the
+equations
+  above in their real and imaginary parts, the closure of the disturbance multiplied by ``c + i s``, and
+  ``c^2 + s^2 = 1``.
+
 That the Jacobian of the extended system is regular is what makes the event a simple one: a fold is quadratic
 and passed with a speed that does not vanish, a multiplier -1 is simple and passes with speed, a margin
 changes its sign with speed.
@@ -24,7 +29,7 @@ from flint import arb, arb_mat
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.krawczyk import Equations
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector
+from contfric.models.balls.numbers import Vector, column, numbers
 
 #: Returns the model at a value of the free parameter.
 Builder = Callable[[arb], BallModel]
@@ -119,6 +124,58 @@ def with_multiplier(
             for curved, row in zip(bent, turned, strict=True)
         ]
         matrix.append([*nothing, *functional, arb(0)])
+        return residual, arb_mat(matrix)
+
+    return equations
+
+
+def with_pair(segments: Segments, build: Builder, functional: Vector) -> Equations:
+    """Return the equations for the unknowns (z, a, b, c, s, p) of a pair of multipliers ``c +- i s``."""
+
+    def equations(x: Vector) -> tuple[Vector, arb_mat]:
+        model = build(x[-1])
+        chain = Chain(segments, model)
+        size, m = chain.size, chain.m
+        z, a, b = (x[k * size : (k + 1) * size] for k in range(3))
+        c, s = x[-3], x[-2]
+        residual, rows = chain.linearised(z)
+        minus = chain.linearised(z, -1)[1]
+        plus, other = (arb_mat([row[:size] for row in found]) for found in (rows, minus))
+        own, closing = (plus + other) / 2, (plus - other) / 2
+        first, second = closing * column(a), closing * column(b)
+        last, image = chain.closed_change(a[:m]), chain.closed_change(b[:m])
+        parts = (
+            (
+                own * column(a) + first * c - second * s,
+                a,
+                [c * u - s * v for u, v in zip(last, image, strict=True)],
+            ),
+            (
+                own * column(b) + first * s + second * c,
+                b,
+                [s * u + c * v for u, v in zip(last, image, strict=True)],
+            ),
+        )
+        same, turned = own + closing * c, closing * s
+        blocks = ((same, turned * -1, first, second * -1), (turned, same, second, first))
+        nothing = [arb(0)] * size
+        matrix = [[*row[:size], *nothing, *nothing, arb(0), arb(0), row[-1]] for row in rows]
+        residual = list(residual)
+        for (value, phi, end), (by_a, by_b, by_c, by_s) in zip(parts, blocks, strict=True):
+            residual += numbers(value)
+            bent = chain.bent(z, phi, 1, end)
+            tables = zip(
+                bent, by_a.tolist(), by_b.tolist(), numbers(by_c), numbers(by_s), strict=True
+            )
+            matrix += [[*row[:size], *u, *v, at, on, row[-1]] for row, u, v, at, on in tables]
+        for phi, wanted in ((a, 1), (b, 0)):
+            residual.append(
+                sum((f * u for f, u in zip(functional, phi, strict=True)), arb(0)) - wanted
+            )
+        matrix.append([*nothing, *functional, *nothing, arb(0), arb(0), arb(0)])
+        matrix.append([*nothing, *nothing, *functional, arb(0), arb(0), arb(0)])
+        residual.append(c * c + s * s - 1)
+        matrix.append([*nothing, *nothing, *nothing, 2 * c, 2 * s, arb(0)])
         return residual, arb_mat(matrix)
 
     return equations

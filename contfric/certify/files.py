@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +26,8 @@ _DIGITS = 40
 _WIDER = 1e-25
 #: Bits with which the balls of events are printed.
 _EVENT_BITS = 320
-#: A larger file is no certificate: 400 segments take 200 kB.
-_LARGEST = 10_000_000
+#: A larger file is no certificate: an orbit takes 4 kB, one of 400 segments 200 kB.
+_LARGEST = 200_000_000
 
 
 def certificate_data(certificate: Certificate) -> dict[str, Any]:
@@ -122,6 +123,22 @@ def event_data(proof: EventCertificate) -> dict[str, Any]:
         "near": [balls[i : i + m] for i in range(0, len(balls), m)],
         "at": at,
     }
+
+
+def checkable(proofs: Iterable[Certificate | EventCertificate | None]) -> list[dict[str, Any]]:
+    """Return those certificates that are proved and that the checker knows, as plain data."""
+    from contfric.certify.certificate import Certificate
+
+    found = []
+    for proof in proofs:
+        if proof is None or not proof.proved:
+            continue
+        try:
+            data = certificate_data if isinstance(proof, Certificate) else event_data
+            found.append(data(proof))  # type: ignore[arg-type] # each has its own
+        except ParameterError:  # none of those that it knows
+            continue
+    return found
 
 
 def _printed(x: arb) -> str:

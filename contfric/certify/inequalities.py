@@ -8,14 +8,16 @@ way no limit of rest is passed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 from flint import arb, arb_mat
 
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.extended import Condition
-from contfric.certify.sign import Path, positive, touched
+from contfric.certify.sign import Path, positive, touched, undecided
 from contfric.certify.verdict import Finding, Verdict
 from contfric.certify.zeros import Closing, at_start, order_at_start, zeros_at_joints
 from contfric.models.balls.model import BallModel
@@ -37,14 +39,36 @@ class Touch:
     after: arb | None = None
 
 
+#: What an inequality is about.
+DURATION, JOINT, EXIT, INSIDE, ENTRY = "duration", "joint", "exit", "inside", "entry"
+
+
+class Name(NamedTuple):
+    """Which inequality it is: its segment, its surface, and what it is about."""
+
+    segment: int
+    surface: str
+    what: str
+
+
 @dataclass(frozen=True)
 class Inequality:
-    """An inequality of one segment, and what became of it."""
+    """An inequality of one segment, and what became of it.
+
+    ``window`` returns a ball of times after the start of the segment, outside of which it holds; None if none
+    is known.
+    """
 
     segment: int
     surface: str
     what: str
     finding: Finding
+    window: Callable[[], arb | None] = lambda: None
+
+    @property
+    def name(self) -> Name:
+        """Which one it is."""
+        return Name(self.segment, self.surface, self.what)
 
     def named(self, system: System) -> Finding:
         """Return the finding with its place in words."""
@@ -61,6 +85,7 @@ def inequalities(
     joints: list[Vector],
     closing: Closing,
     touch: Touch | None = None,
+    loose: Collection[Name] = (),
 ) -> Iterator[Inequality]:
     """Return all inequalities of a chain, joint by joint.
 
@@ -69,6 +94,7 @@ def inequalities(
     joints : enclosures of joints 0 .. N
     closing : how rows at the last joint read at the first one
     touch : the inequality that does not hold strictly, of an orbit at an event
+    loose : inequalities at joints that are known to hold, of the others that are returned
     """
     model, segments = chain.model, chain.segments
     known = zeros_at_joints(segments, model, closing, _met(touch, segments.modes, model))
@@ -78,16 +104,22 @@ def inequalities(
         duration = joints[i + 1][0] - joints[i][0]
         if not duration > 0:
             verdict = Verdict.REFUTED if duration < 0 else Verdict.UNDECIDED
-            yield Inequality(i, segments.exits[i], "duration", Finding(verdict, "not positive"))
-            continue
+            found = Inequality(i, segments.exits[i], DURATION, Finding(verdict, "not positive"))
+            if found.name not in loose:
+                yield found
+                continue
         zeros = at_start(segments, model, i, known[i])
         path = Path(move.field, move.start, duration.upper())
         for surface, sign in _inside(system, i, surfaces):
             row = model.surfaces[surface] * sign
             ends = (
-                segments.exits[i] == surface or segments.pins[(i + 1) % segments.count] == surface
+                segments.exits[i] == surface
+                or segments.pins[(i + 1) % segments.count] == surface
+                or Name(i, surface, JOINT) in loose
             )
             order = order_at_start(model, model.rows[surface], segments.modes[i], zeros, surface)
+            if Name(i - 1, surface, JOINT) in loose and i and not segments.resets[i]:
+                order = max(order, 1)  # it is not negative there, which is as good as zero
             if order and _stays(row, path.field):
                 continue
             if _is_event(touch, i, surface):
@@ -95,11 +127,13 @@ def inequalities(
             elif _is_left_held(segments, i, surface):
                 finding = touched(path, row, order, None)
             else:
-                finding = positive(path, row, order, ends)
-            yield Inequality(i, surface, "inside", finding)
+                bends = Name(i, surface, EXIT) in loose
+                finding = positive(path, row, order, ends, bends)
+            window = partial(undecided, path, row, order, ends)
+            yield Inequality(i, surface, INSIDE, finding, window)
         yield from _held(chain, system, i, path, zeros)
     for found in (*_at_joints(chain, system, joints, surfaces), *_exits(chain, system, joints)):
-        if touch is None or not _is_of(touch.condition, found):
+        if not (found.name in loose or (touch and _is_of(touch.condition, found))):
             yield found
 
 
@@ -128,7 +162,7 @@ def _met(touch: Touch | None, modes: tuple[str, ...], model: BallModel) -> dict[
 
 def _is_of(met: Condition, found: Inequality) -> bool:
     """Tell whether an inequality at a joint is the one that vanishes at an event."""
-    what = "exit" if met.rate else "joint"
+    what = EXIT if met.rate else JOINT
     return not met.within and (met.segment, met.surface, what) == (
         found.segment,
         found.surface,
@@ -174,7 +208,7 @@ def _at_joints(
             after = joints[int(i) + 1]
             state = column(model.extended(after[0], after[1:]))
         value = int(sign) * (model.surfaces[surfaces[k]] * state)[0, 0]
-        yield Inequality(int(i), surfaces[k], "joint", _sign(value))
+        yield Inequality(int(i), surfaces[k], ENTRY if where == 1 else JOINT, _sign(value))
 
 
 def _exits(chain: Chain, system: System, joints: list[Vector]) -> Iterator[Inequality]:
@@ -187,7 +221,7 @@ def _exits(chain: Chain, system: System, joints: list[Vector]) -> Iterator[Inequ
         after = joints[i + 1]
         state = column(model.extended(after[0], after[1:]))
         row = model.surfaces[exit_] * model.fields[segments.modes[i]]
-        yield Inequality(i, exit_, "exit", _sign(sign * (row * state)[0, 0]))
+        yield Inequality(i, exit_, EXIT, _sign(sign * (row * state)[0, 0]))
 
 
 def _sign(value: object) -> Finding:

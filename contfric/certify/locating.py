@@ -105,7 +105,7 @@ def _multiplier_orbit(event: Bifurcation) -> Orbit:
             raise NotLocatedError("a branch point without a symmetry is not proved")
     elif event.kind is Kind.PD:
         orbit = orbit.as_whole()
-    elif event.kind is not Kind.SN:
+    elif event.kind not in (Kind.SN, Kind.NS):
         raise NotLocatedError(f"{event.kind.value} is not proved")
     return orbit
 

@@ -16,6 +16,7 @@ and q' < 0. Which derivatives vanish is not a question of rounding: it is read o
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -30,6 +31,8 @@ _TERMS = 8
 _MOST = 4000
 #: Narrowest piece, as a power of 1/2 of the segment: a touch within 1e-24 of it is undecided.
 _NARROW = 80
+#: Halvings of a segment in which a touch is looked for.
+_WINDOW = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +80,9 @@ def range_over(path: Path, rows: list[arb_mat], level: int, index: int) -> arb:
     return (rows[0] * state)[0, 0] + arb(0, spread.upper())
 
 
-def positive(path: Path, row: arb_mat, start_order: int, ends: bool) -> Finding:
+def positive(
+    path: Path, row: arb_mat, start_order: int, ends: bool, bends: bool = False
+) -> Finding:
     """Find whether an observable is positive inside of a segment.
 
     Parameters
@@ -85,10 +90,9 @@ def positive(path: Path, row: arb_mat, start_order: int, ends: bool) -> Finding:
     row : the observable less its level, times the sign that is wanted
     start_order : how many of q, q', q'' vanish at the start by construction; 0 if q does not
     ends : whether q vanishes at the end by construction
+    bends : whether q falls at the end, too, if only a little: so it does before where q'' is positive
     """
-    rows = path.derivatives(row)
-    first = path.derivatives(higher(path, row, start_order)) if start_order else rows
-    last = path.derivatives(-row * path.field) if ends else rows
+    shown = _shown(path, row, start_order, ends, bends)
     level = 0
     while (path.norm * path.duration).upper() > 2**level and 2**level < _MOST:
         level += 1
@@ -97,20 +101,56 @@ def positive(path: Path, row: arb_mat, start_order: int, ends: bool) -> Finding:
         if not waiting:
             return Finding(Verdict.PROVED)
         level, index = waiting.pop()
-        value = range_over(path, rows, level, index)
-        if value < 0 or (row * path.middle(level, index))[0, 0] < 0:
+        found = shown(level, index)
+        if found is False:
             return Finding(Verdict.REFUTED, f"negative after {_share(level, index)} of it")
-        at_start, at_end = index == 0 and start_order > 0, index == 2**level - 1 and ends
-        if value > 0:
-            continue
-        if at_start and not at_end and range_over(path, first, level, index) > 0:
-            continue
-        if at_end and not at_start and range_over(path, last, level, index) > 0:
+        if found:
             continue
         if level >= _NARROW:
             return Finding(Verdict.UNDECIDED, f"no sign after {_share(level, index)} of it")
         waiting += [(level + 1, 2 * index + 1), (level + 1, 2 * index)]
     return Finding(Verdict.UNDECIDED, "the segment needs too many pieces")
+
+
+def _shown(
+    path: Path, row: arb_mat, start_order: int, ends: bool, bends: bool
+) -> Callable[[int, int], bool | None]:
+    """Return what tells whether an observable is positive on a piece; None if that is not decided."""
+    rows = path.derivatives(row)
+    first = path.derivatives(higher(path, row, start_order)) if start_order else rows
+    last = path.derivatives(-row * path.field) if ends else rows
+    bend = path.derivatives(higher(path, row, 2)) if bends else rows
+
+    def shown(level: int, index: int) -> bool | None:
+        value = range_over(path, rows, level, index)
+        if value < 0 or (row * path.middle(level, index))[0, 0] < 0:
+            return False
+        at_start, at_end = index == 0 and start_order > 0, index == 2**level - 1 and ends
+        if value > 0:
+            return True
+        if at_start and range_over(path, first, level, index) > 0:
+            return True
+        if at_end and range_over(path, last, level, index) > 0:
+            return True
+        bent = at_end and bends and range_over(path, bend, level, index) > 0
+        return True if bent else None
+
+    return shown
+
+
+def undecided(path: Path, row: arb_mat, start_order: int, ends: bool) -> arb | None:
+    """Return a ball of times outside of which an observable is positive inside of a segment.
+
+    None if it may not be positive next to an end of the segment.
+    """
+    shown, waiting, level = _shown(path, row, start_order, ends, False), [0], 0
+    for level in range(_WINDOW + 1):
+        found = [k for k in waiting if not shown(level, k)]
+        waiting = [half for k in found for half in (2 * k, 2 * k + 1)]
+    if not found or found[0] == 0 or found[-1] == 2**level - 1:
+        return None
+    piece = path.duration / 2**level
+    return (piece * found[0]).union(piece * (found[-1] + 1))
 
 
 def touched(path: Path, row: arb_mat, start_order: int, after: arb | None) -> Finding:

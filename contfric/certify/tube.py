@@ -52,8 +52,9 @@ class Box:
     normal : of the planes that are its sections
     all : enclosure of all solutions in it
     radii : half-widths R about the chord
-    monotone : whether the parameter is monotone along it
+    tangent : balls of the direction T of the curve, over the whole box; None if none are found
     no_flip : whether no multiplier of a turn is -1 in it
+    linear : the Jacobian over the box
     """
 
     first: Vector
@@ -61,8 +62,23 @@ class Box:
     normal: Vector
     all: Vector
     radii: Vector
-    monotone: bool
+    tangent: Vector | None
     no_flip: bool
+    linear: Linear
+
+    @property
+    def monotone(self) -> bool:
+        """Whether the parameter is monotone along it: the last entry of T has a sign."""
+        return self.tangent is not None and not self.tangent[-1].contains(0)
+
+    def part(self, k: int, count: int) -> Vector:
+        """Return balls of all solutions of part k of ``count`` along it."""
+        edges = [-0.5 - OVERLAP + (1 + 2 * OVERLAP) * arb(j) / count for j in (k, k + 1)]
+        s = edges[0].union(edges[1])
+        middle = [((a + b) / 2).mid() for a, b in zip(self.first, self.last, strict=True)]
+        difference = [(b - a).mid() for a, b in zip(self.first, self.last, strict=True)]
+        line = zip(middle, difference, self.radii, strict=True)
+        return [around(m + s * d, r) for m, d, r in line]
 
     def holds(self, point: Vector) -> bool:
         """Tell whether a solution that is known to lie in some balls is on the curve of this box."""
@@ -136,8 +152,9 @@ def box_between(segments: Segments, build: Builder, first: Vector, last: Vector)
                 normal,
                 [around(c, arb(r)) for c, r in zip(line, radii, strict=True)],
                 [arb(r) for r in radii],
-                bounds.keeps_sign(len(middle) - 1),
-                regular_along(_square(found, -1), 0.5 + OVERLAP),
+                bounds.solution(),
+                regular_along(squared(found, -1), 0.5 + OVERLAP),
+                found,
             )
     return None
 
@@ -149,22 +166,31 @@ def _bordered(found: Linear, normal: Vector) -> list[arb_mat]:
     return [arb_mat([*m.tolist(), row]) for m, row in zip(found.whole(1), rows, strict=True)]
 
 
-def _square(found: Linear, sigma: int) -> list[arb_mat]:
+def squared(found: Linear, sigma: int) -> list[arb_mat]:
     """Return the Jacobian by the joints, with sigma times the closure."""
     return [arb_mat([row[:-1] for row in m.tolist()]) for m in found.whole(sigma)]
 
 
-def are_linked(segments: Segments, build: Builder, before: Box, after: Box) -> bool:
-    """Tell whether the curve of a box goes on as that of the next one: both hold one and the same orbit."""
-    end = before.last
-    difference = [(b - a).mid() for a, b in zip(before.first, end, strict=True)]
+def orbit_in(segments: Segments, build: Builder, at: Vector, plane: Vector) -> Vector | None:
+    """Return balls of the only orbit next to a point, in a plane through it."""
 
     def equations(x: Vector) -> tuple[Vector, arb_mat]:
         residual, rows = Chain(segments, build(x[-1])).linearised(x[:-1])
-        off = sum((c * (a - b) for c, a, b in zip(difference, x, end, strict=True)), arb(0))
-        return [*residual, off], arb_mat([*rows, difference])
+        off = sum((c * (a - b) for c, a, b in zip(plane, x, at, strict=True)), arb(0))
+        return [*residual, off], arb_mat([*rows, plane])
 
-    found = krawczyk(equations, end, [_LEAST * 16 * (1 + c.abs_upper()) for c in end])
-    if found.verdict is not Verdict.PROVED:
-        return False
-    return before.holds(found.zero) and after.holds(found.zero)
+    found = krawczyk(equations, at, [_LEAST * 16 * (1 + c.abs_upper()) for c in at])
+    return found.zero if found.verdict is Verdict.PROVED else None
+
+
+def section(segments: Segments, build: Builder, box: Box, at: Vector) -> Vector | None:
+    """Return balls of the orbit of a box in the plane of its sections through a point on its chord."""
+    difference = [(b - a).mid() for a, b in zip(box.first, box.last, strict=True)]
+    zero = orbit_in(segments, build, at, difference)
+    return zero if zero is not None and box.holds(zero) else None
+
+
+def are_linked(segments: Segments, build: Builder, before: Box, after: Box) -> bool:
+    """Tell whether the curve of a box goes on as that of the next one: both hold one and the same orbit."""
+    zero = section(segments, build, before, before.last)
+    return zero is not None and after.holds(zero)

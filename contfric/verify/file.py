@@ -12,7 +12,6 @@ from contfric.verify.law import check_admissible, check_event, check_multipliers
 from contfric.verify.solution import Refused, Scene, Undecided, ball, decided
 
 BITS = (106, 212, 424, 848)  # asked for one after the other, until all is decided
-_DAMAGE = (AttributeError, KeyError, TypeError, ValueError, IndexError, OverflowError)
 CHECKED_MODELS = ("coulomb",)
 KINDS = ("diagram", "event", "orbit")
 _STATED = ("exists", "unique", "admissible", "stable")
@@ -43,7 +42,7 @@ def check_text(text: str) -> Answer:
                 return Answer(False, str(error), bits=bits)
             except (Undecided, ZeroDivisionError) as error:
                 why = str(error)
-            except _DAMAGE as error:
+            except (AttributeError, LookupError, TypeError, ValueError, OverflowError) as error:
                 return Answer(False, f"damaged: {type(error).__name__}: {error}", bits=bits)
     return Answer(False, f"not decided with {BITS[-1]} bits: {why}", bits=BITS[-1])
 
@@ -53,7 +52,8 @@ def _check(data: dict[str, Any], kinds: tuple[str, ...]) -> tuple[str, ...]:
     if kind not in kinds or data.get("format") != 1:
         raise Refused("it is no certificate of format 1")
     if kind == "diagram":
-        return (f"{sum(bool(_check(part, kinds[1:2])) for part in data['checkable'])} events",)
+        parts = [part["certificate"] for part in data["checkable"] if _check(part, kinds[1:])]
+        return tuple(f"{parts.count(name)} {name}s" for name in kinds[1:])
     if data.get("model") not in CHECKED_MODELS:
         raise Refused(f"the checker does not know the model {str(data.get('model'))[:40]}")
     return tuple(check_event(data) if kind == "event" else _check_orbit(data))

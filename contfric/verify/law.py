@@ -1,9 +1,8 @@
 """The law of friction over the whole of every segment, multipliers, and events (see the package).
 
-At an event something changes its sign over a ball of one parameter, along the curve of orbits: the load at a
-stop less its limit, det(M + 1), or what is touched, where it is stationary. At a fold one equation phi is
-left out for one joint s: phi(s) = 0 has two solutions at one end of the ball, none at the other, and so a
-double zero in between.
+At an event something changes its sign over a ball of one parameter, along the curve of orbits: a load less
+its limit, det(M + 1), det M - 1, or what is touched, where it is stationary. At a fold one equation is left
+out for one joint s: phi(s) has two zeros at one end of the ball, none at the other.
 """
 
 from __future__ import annotations
@@ -56,10 +55,7 @@ def check_admissible(scene: Scene, zero: list[arb], at: int, level: int, touches
 def _positive(
     scene: Scene, z: list[arb], i: int, surface: str, sign: int, order: int, ends: bool, touch: Any
 ) -> None:
-    """See that an observable has a sign inside of a segment; by derivatives where it vanishes.
-
-    ``order`` of it and its rate do at the start, it does at the end if ``ends``, and both do at a touch.
-    """
+    """See that an observable has a sign inside of a segment, but for zeros at its ends and at a touch."""
     duration = (scene.joint(z, i + 1)[0] - scene.joint(z, i)[0]).upper()
     waiting, what = [(0, 0)], f"segment {i + 1}: {surface} is not met inside"
     for _ in range(MOST_PIECES):
@@ -94,8 +90,8 @@ def turn(scene: Scene, zero: list[arb]) -> tuple[arb, arb]:
         _, own, after = scene.segment(zero, i)
         total = arb_mat(after).solve(arb_mat(own)) * total * -1
     total = arb_mat([[1, 0], [0, -1 if scene.half else 1]]) * total
-    sticks = any(direction == 0 for direction, _ in scene.segments)
-    return total[0, 0] + total[1, 1], arb(0) if sticks else total.det()
+    slides = all(direction for direction, _ in scene.segments)  # rest leaves one multiplier only
+    return total[0, 0] + total[1, 1], total.det() if slides else arb(0)
 
 
 def check_multipliers(scene: Scene, data: Any, zero: list[arb], stable: str) -> list[str]:
@@ -144,11 +140,15 @@ def check_event(data: dict[str, Any]) -> list[str]:
         if surface:
             return own.observed(z, at, surface, _stationary(own, z, at, surface, box))[0]
         (end, y), (trace, det) = own.joint(z, at + 1), turn(own, z)
-        return y - own.force(end) - level * own.s0 if level else 1 + trace + det
+        other = det - 1 if kind == "NS" else 1 + trace + det
+        return y - own.force(end) - level * own.s0 if level else other
 
     if kind != "SN":
         product = vanishing(sides[0]) * vanishing(sides[1])
         decided(product < 0, product > 0, f"what vanishes at a {kind} changes its sign")
+    if kind == "NS":
+        trace, det = turn(scene, zero)
+        decided(trace * trace < 4 * det, trace * trace > 4 * det, "the multipliers are a pair")
     if level:
         out = level * scene.force(scene.joint(zero, at + 1)[0], 1) * (-1 if kind == "CS" else 1)
         decided(out > 0, out < 0, f"the load moves as at a {kind}")
@@ -158,7 +158,7 @@ def check_event(data: dict[str, Any]) -> list[str]:
 
 def _place(scene: Scene, kind: str, at: Any) -> tuple[int, int, str, Any]:
     """Return the segment of an event, the load's limit at its end, or what is touched in it and when."""
-    if kind in ("SN", "BP" if scene.half else "PD") and at is None:
+    if kind in ("SN", "NS", "BP" if scene.half else "PD") and at is None:
         return -1, 0, "", None
     if at and at[0] in range(scene.count):
         slides, what = scene.segments[at[0]][0] != 0, at[1]

@@ -9,6 +9,7 @@ from flint import acb, arb, arb_mat, ctx
 
 #: Direction and exit: (1 or -1, 0) of a slide, (0, 1 or -1) of a stick that ends at +-S0.
 SEGMENTS = {"slide+ v": (1, 0), "slide- v": (-1, 0), "stick F+": (0, 1), "stick F-": (0, -1)}
+PARAMETERS = ("Omega", "S", "S0", "h", "zeta")
 _NUMBER = r"\d{1,99}([.]\d{1,99})?(e[+-]?\d{1,4})?"
 
 
@@ -44,11 +45,10 @@ class Scene:
     """The parameters and segments of a file, and the motion that they have."""
 
     def __init__(self, data: dict[str, Any], balls: dict[str, arb] | None = None) -> None:
-        if set(data["params"]) != {"Omega", "S", "S0", "h", "zeta"}:
+        if set(data["params"]) != set(PARAMETERS):
             raise Refused("the parameters are not Omega, S, S0, h and zeta")
         params = {name: number(value) for name, value in data["params"].items()} | (balls or {})
-        self.omega, self.s, self.s0 = (params[name] for name in ("Omega", "S", "S0"))
-        self.h, self.zeta = params["h"], params["zeta"]
+        self.omega, self.s, self.s0, self.h, self.zeta = (params[name] for name in PARAMETERS)
         if not (self.omega > 0 and self.s >= 0 and self.s0 >= self.s):
             raise Refused("the parameters do not obey Omega > 0 and S0 >= S >= 0")
         periods, self.half = data["periods"], data["half"]
@@ -73,8 +73,7 @@ class Scene:
     def force(self, t: arb, order: int = 0) -> arb:
         """Return f(t) or a derivative of it."""
         waves = ((arb(1), self.omega), (self.h, 3 * self.omega))
-        found = (a * (acb(0, w) ** order * acb(0, w * t).exp()).real for a, w in waves)
-        return sum(found, arb(0))
+        return sum((a * (acb(0, w) ** order * acb(0, w * t).exp()).real for a, w in waves), arb(0))
 
     def forced(self, t: arb, tau: arb) -> tuple[arb, arb]:
         """Return what f adds to displacement and velocity some time after t, from rest at 0."""

@@ -12,10 +12,19 @@ from flint import arb, arb_mat, ctx
 from mpmath import mp, mpf
 
 import contfric as cf
-from contfric.certify.chain import segments_of
-from contfric.certify.extended import Condition, at_joint, touched_within, with_multiplier
+from contfric.certify.chain import Chain, segments_of
+from contfric.certify.circle import no_pair
+from contfric.certify.events import _resonates
+from contfric.certify.extended import (
+    Condition,
+    at_joint,
+    touched_within,
+    with_multiplier,
+    with_pair,
+)
 from contfric.certify.krawczyk import Equations, enclosed, krawczyk
 from contfric.certify.orbit import certify_orbit
+from contfric.certify.splitting import along
 from contfric.certify.verdict import Verdict
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.models.balls.build import ball_model
@@ -215,6 +224,7 @@ def test_derivatives_of_extended_systems(model: str, free: str) -> None:
                 (with_multiplier(segments, build, sigma, phi), [*z, *phi, value])
                 for sigma in (1, -1)
             ),
+            (with_pair(segments, build, phi), [*z, *phi, *phi[::-1], arb(0.3), arb(0.8), value]),
         ]
         for equations, x in cases:
             assert worst_difference(equations, x) < 1e-28
@@ -226,8 +236,99 @@ def test_derivatives_behind_a_reset() -> None:
     with ctx.workprec(200):
         z = [arb(float(c)) for c in orbit.joints.ravel()]
         for free in orbit.params:
-            equations = at_joint(segments, builder(orbit, free), Condition(0, segments.exits[0]))
-            assert worst_difference(equations, [*z, arb(orbit.params[free])]) < 1e-28
+            build, value = builder(orbit, free), arb(orbit.params[free])
+            phi = [arb(float(c)) for c in np.random.default_rng(2).normal(size=len(z))]
+            for equations, x in (
+                (at_joint(segments, build, Condition(0, segments.exits[0])), [*z, value]),
+                (with_multiplier(segments, build, -1, phi), [*z, *phi, value]),
+                (
+                    with_pair(segments, build, phi),
+                    [*z, *phi, *phi[::-1], arb(0.3), arb(0.8), value],
+                ),
+            ):
+                assert worst_difference(equations, x) < 1e-28
+
+
+@pytest.mark.parametrize("model", ["coulomb", "impact"])
+def test_higher_derivatives_in_a_direction(model: str) -> None:
+    """Residuals at ``u + e v``, closed to the other turn, are polynomials of e up to e^4."""
+    orbit = cf.find_orbit(model, SCENE if model == "coulomb" else None)
+    segments = segments_of(orbit.system)
+    with ctx.workprec(300):
+        chain = Chain(segments, ball_model(orbit.model, orbit.params))
+        z = [arb(float(c)) for c in orbit.joints.ravel()]
+        v = [arb(float(c)) for c in np.random.default_rng(3).normal(size=len(z))]
+        m, step = chain.m, arb(2) ** -40
+
+        def residual(e: arb) -> Vector:
+            """The chain that does not close: its last joint is that of u - e v."""
+            first = [c + e * d for c, d in zip(z, v, strict=True)]
+            other = [c - e * d for c, d in zip(z[:m], v[:m], strict=True)]
+            joints = [first[i * m : (i + 1) * m] for i in range(segments.count)]
+            joints.append(chain.joints([*other, *first[m:]])[-1])
+            found: Vector = []
+            for i in range(segments.count):
+                end = chain.move(i, joints).end
+                found += [end[k, 0] - joints[i + 1][1 + k] for k in range(chain.n)]
+                at, row, _ = chain.condition(i)
+                state = chain.model.extended(joints[at][0], joints[at][1:])
+                found.append(sum((row[0, k] * c for k, c in enumerate(state)), arb(0)))
+            return found
+
+        values = {k: residual(k * step) for k in (-2, -1, 0, 1, 2)}
+        second = [
+            (a - 2 * b + c) / step**2
+            for a, b, c in zip(values[1], values[0], values[-1], strict=True)
+        ]
+        third = [
+            (a - 2 * b + 2 * c - d) / (2 * step**3)
+            for a, b, c, d in zip(values[2], values[1], values[-1], values[-2], strict=True)
+        ]
+        for order, wanted in ((2, second), (3, third)):
+            for one, other in zip(along(chain, z, v, order), wanted, strict=True):
+                assert abs(float(one - other)) < 1e-18 * (1 + abs(float(one)))
+
+
+# --------------------------------------------------------------------------------- tori
+
+
+def test_a_torus_is_where_impacts_lose_what_negative_damping_gives() -> None:
+    """The determinant of the return map is e^2 exp(-2 pi c / w): 1 at c = w log(e) / pi."""
+    orbit = cf.find_orbit("impact", {"w": 2.6, "c": 0.05, "e": 0.9, "d": 0.0})
+    branch = cf.continue_orbit(orbit, "c", (-0.3, 0.1))
+    (event,) = branch.bifurcations
+    proof = event.certify()
+    assert event.kind is Kind.NS and proof.proved and proof.value is not None
+    assert proof.radius < 1e-35
+    with ctx.workprec(200):
+        assert proof.value.overlaps(arb(2.6) * arb(0.9).log() / arb.pi())
+    tube = branch.certify()
+    assert tube.complete and tube.events == (event.label,)
+    near = [piece for piece in tube.pieces if piece.tori]
+    assert near and all(abs(p.values[0] - event.params["c"]) < 1e-4 for p in near)
+
+
+def test_a_strong_resonance_is_not_proved_to_be_a_torus() -> None:
+    assert _resonates(arb(0, 1e-10), arb(1)) and _resonates(arb(-0.5), arb(3).sqrt() / 2)
+    assert _resonates(arb(1), arb(0, 1e-9)) and not _resonates(arb(0.6), arb(0.8))
+
+
+@pytest.mark.parametrize("size", [2, 3, 5])
+def test_pairs_on_the_circle(size: int) -> None:
+    """Real matrices with a pair of a known modulus, the others real and apart from products of 1."""
+    rng = np.random.default_rng(size)
+    for modulus, angle in ((1.0, 1.1), (0.99, 1.1), (1.02, 2.0), (1.0, 0.01)):
+        block = np.diag([0.3, 0.5, 0.7, 1.5, 0.2][:size])
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        block[:2, :2] = modulus * turn
+        basis = rng.normal(size=(size, size))
+        with ctx.workprec(80):
+            change = arb_mat([[arb(float(x)) for x in row] for row in basis])
+            matrix = (
+                change * arb_mat([[arb(float(x)) for x in row] for row in block]) * change.inv()
+            )
+            wide = matrix + arb_mat(size, size, [arb(0, 1e-12)] * size**2)
+        assert no_pair(wide) is (modulus != 1.0)
 
 
 # ------------------------------------------------------------------------------ Krawczyk

@@ -116,7 +116,9 @@ def test_a_folder_gets_a_certificate_and_a_column(
     data = json.loads((folder / "certificate.json").read_text())
     assert data["certificate"] == "diagram"
     assert main(["verify", str(folder / "certificate.json")]) == 0
-    assert capsys.readouterr().out.startswith(f"yes: {len(data['checkable'])} events")
+    kinds = [part["certificate"] for part in data["checkable"]]
+    counts = f"yes: {kinds.count('event')} events, {kinds.count('orbit')} orbits"
+    assert kinds.count("event") == len(rows) and capsys.readouterr().out.startswith(counts)
     run_study(read_study(path), folder, force=True)  # what it says is of the run before
     assert not (folder / "certificate.json").exists()
 

@@ -27,8 +27,9 @@ SCENES: tuple[tuple[dict[str, float], str, tuple[float, float], str], ...] = (
     ({"Omega": 0.5, "S": 0.072}, "S", (0.06, 0.09), ""),
     ({"Omega": 0.5, "S": 0.3, "h": 0.25}, "h", (0.15, 0.3), ""),
     ({"Omega": 0.5, "S": 0.3, "h": 0.2885}, "h", (0.28, 0.3), "1a"),
+    ({"Omega": 1.6, "S": 0.1, "S0": 0.1, "zeta": 0.05}, "zeta", (-0.1, 0.06), "0s"),
 )
-KINDS = ("SN", "PD", "BP", "CS", "SS", "AS", "GS", "T")
+KINDS = ("SN", "PD", "BP", "NS", "CS", "SS", "AS", "GS", "T")
 
 
 @cache
@@ -58,7 +59,8 @@ def test_true_events_are_verified(kind: str) -> None:
 # a fold is decided by brute force in 60 digits, which takes minutes
 _SLOW = pytest.mark.slow
 _DECIDED = [
-    pytest.param(k, marks=_SLOW) if k in ("SN", "PD", "BP", "AS", "GS", "T") else k for k in KINDS
+    pytest.param(k, marks=_SLOW) if k in ("SN", "PD", "BP", "NS", "AS", "GS", "T") else k
+    for k in KINDS
 ]
 
 
@@ -88,7 +90,7 @@ def test_files_of_events(tmp_path: Path) -> None:
     assert verify(tmp_path / "fold.json").yes
     data = json.loads((tmp_path / "fold.json").read_text())
     several = {"certificate": "diagram", "format": 1, "checkable": [data, data]}
-    assert check_text(json.dumps(several)).statements == ("2 events",)
+    assert check_text(json.dumps(several)).statements == ("2 events", "0 orbits")
     data["value"] = data["value"].replace("0.5419", "0.5418")
     assert not check_text(json.dumps(several | {"checkable": [data]})).yes
     nested = {"certificate": "diagram", "format": 1, "checkable": [several]}
@@ -122,3 +124,19 @@ def test_an_event_beside_the_place_that_it_states_is_refused() -> None:
         centre, _, radius = data["value"].partition(" +/- ")
         data["value"] = f"{float(centre) + 1e-12!r} +/- {radius}"
         assert not check_text(json.dumps(data)).yes
+
+
+def test_the_file_of_a_branch_holds_its_orbits_and_events(tmp_path: Path) -> None:
+    orbit = cf.solve_orbit("coulomb", "0s", {**PARAMS, "Omega": 0.55})
+    branch = cf.continue_orbit(orbit, "Omega", (0.53, 0.56))
+    proof = branch.certify()
+    assert proof.points_proved >= len(branch) - 1  # at the event itself it is none, or the event's
+    proof.save(tmp_path / "branch.json")
+    answer = verify(tmp_path / "branch.json")
+    assert answer.yes and answer.statements == ("1 events", f"{proof.points_proved} orbits")
+    data = json.loads((tmp_path / "branch.json").read_text())
+    data["checkable"][3]["joints"][0][1] += 1e-6
+    assert not check_text(json.dumps(data)).yes
+    bilinear = cf.find_orbit("impact")
+    with pytest.raises(ParameterError, match="coulomb"):
+        cf.continue_orbit(bilinear, "w", (0.99, 1.01)).certify().save(tmp_path / "none.json")

@@ -13,7 +13,9 @@ import contfric as cf
 from contfric.certify.branch import certify_branch
 from contfric.certify.chain import segments_of
 from contfric.certify.phases import in_phases
+from contfric.certify.tracing import Tracer
 from contfric.certify.tube import Box, box_between, solved
+from contfric.continuation.events import EndReason
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector
@@ -34,12 +36,41 @@ def test_a_branch_is_one_curve_up_to_its_ends() -> None:
     assert certificate.proved, certificate.why
     assert certificate.covered > 0.9999
     assert certificate.regular > 0.9999
-    # what is left is beside the CS at which the branch ends, with the margin that vanishes
-    assert all("F-" in gap or "F+" in gap for gap in certificate.gaps)
-    end = min(branch.values)
+    # its tube holds the CS at which it ends: nothing is left between
+    assert not certificate.gaps
+    assert certificate.complete and certificate.events == ("CS_s",)
+    (last,) = [piece for piece in certificate.pieces if piece.ends]
+    assert [name.what for name in last.ends] == ["joint"]
     for piece in certificate.pieces:
-        assert piece.proved or abs(piece.values[0] - end) < 1e-6
-        assert piece.start < piece.stop
+        assert piece.start < piece.stop and piece.linked
+
+
+def test_what_only_says_that_it_ends_is_not_taken_for_an_end() -> None:
+    """A branch that is cut in the middle, and says CS: no inequality changes its sign there."""
+    branch = den_hartog()
+    inner = slice(4, None) if branch.ends[0].reason.name == "CS" else slice(None, -4)
+    cut = replace(
+        branch,
+        values=branch.values[inner],
+        joints=branch.joints[inner],
+        arc=branch.arc[inner],
+        labels=branch.labels[inner],
+        bifurcations=(),
+    )
+    certificate = certify_branch(cut)
+    assert certificate.covered == 1.0
+    assert not certificate.complete and "no proved event at the end" in certificate.open[0]
+    assert not any(piece.ends for piece in certificate.pieces)
+
+
+def test_an_event_of_another_branch_is_none_of_this_one() -> None:
+    """A proved fold of 1a, said to be at the end of 0s: its orbit does not solve the equations of 0s."""
+    branch = den_hartog()
+    orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5417, "S": 0.32, "S0": 0.4})
+    fold = next(b for b in cf.continue_orbit(orbit, "Omega", (0.5416, 0.545)).bifurcations)
+    at = next(b.position for b in branch.bifurcations)
+    certificate = certify_branch(replace(branch, bifurcations=(replace(fold, position=at),)))
+    assert not certificate.events and not certificate.complete
 
 
 def test_a_fold_is_covered_and_not_taken_for_monotone() -> None:
@@ -58,9 +89,9 @@ def test_a_fold_is_covered_and_not_taken_for_monotone() -> None:
     certificate = certify_branch(cut)
     assert certificate.proved
     assert certificate.covered == 1.0
-    turned = [p for p in certificate.pieces if not p.monotone and p.proved]
-    assert turned
-    assert all(abs(p.values[0] - fold) < 1e-5 for p in turned)
+    (turned,) = [p for p in certificate.pieces if p.folds]
+    assert turned.folds == 1 and turned.events == ("SN_1a",)
+    assert max(turned.values) < fold and fold - min(turned.values) < 1e-4
     assert certificate.regular < certificate.covered
 
 
@@ -147,11 +178,66 @@ def test_a_branch_beyond_its_end_is_not_proved() -> None:
     assert all("joint at F" in gap for gap in certificate.gaps)
 
 
-@pytest.mark.slow
-def test_a_bridge_and_an_asymmetric_branch() -> None:
-    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
-    diagram = cf.explore(orbit, "Omega", (0.4, 0.6))
-    bridge = next(b for b in diagram.branches if b.system.holds)
-    assert bridge.certify().covered > 0.999
-    stable = next(b for b in diagram.branches if b.name == "1a")
-    assert stable.certify().covered > 0.999
+@functools.cache
+def figure(parameter: str) -> cf.Diagram:
+    start = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
+    bounds = {"Omega": (0.487, 0.495), "S": (0.043, 0.07)}[parameter]
+    return cf.explore(
+        cf.solve_orbit("coulomb", "1a", {**start, parameter: bounds[1] - 1e-3}), parameter, bounds
+    )
+
+
+def test_bridges_and_asymmetric_branches_from_event_to_event() -> None:
+    for branch in figure("Omega").branches:
+        certificate = branch.certify()
+        assert certificate.complete, (branch, certificate.gaps, certificate.open)
+
+
+@pytest.mark.parametrize(("parameter", "kind"), [("Omega", "BP"), ("S", "PD")])
+def test_where_two_turns_become_one(parameter: str, kind: str) -> None:
+    """All computed orbits next to the event are in its box, on the side that is proved; others are not."""
+    event = next(b for b in figure(parameter).bifurcations if b.kind == kind)
+    branch = next(
+        b
+        for b in figure(parameter).branches
+        if EndReason[kind] in {e.reason for e in b.ends}
+        or b.ends[0].message.startswith(f"the branch starts here: {kind}")
+    )
+    proofs = [b.certify(parameter) for b in branch.bifurcations]
+    with ctx.workprec(80):
+        tracer = Tracer(branch, proofs, float("inf"))
+        at = 0 if tracer.flips[0] is not None else -1
+        flip = tracer.flips[at]
+        assert flip is not None and flip.piece.regular and flip.piece.events == (event.label,)
+        assert flip.split.one_sided
+        side = float(branch.values[len(branch) // 2]) - event.params[parameter]
+        assert (flip.split.slope[-1] > 0) is (side > 0)
+        inside = 0
+        for k in range(len(branch)):
+            point = tracer.point(branch[k])
+            first, second = flip.turns.of(point[:-1])
+            if (
+                1e-4 < abs(flip.amplitude(point)) < 0.99
+                and abs(branch.arc[k] - branch.arc[at]) < tracer.far
+            ):
+                inside += 1
+                assert flip.split.holds(first, second, point[-1])
+            moved = [first[0] + 1e-2, *first[1:]]
+            assert not flip.split.holds(moved, second, point[-1])
+            assert not flip.split.holds(first, second, point[-1] + 1e-2)
+        assert inside > 0
+
+
+def test_without_its_event_an_end_is_open() -> None:
+    branch = next(b for b in figure("Omega").branches if b.name == "2a" and not b.mirrored)
+    bare = replace(branch, bifurcations=tuple(b for b in branch.bifurcations if b.kind != "BP"))
+    short = slice(-4, None) if branch.ends[1].reason is EndReason.BP else slice(None, 4)
+    bare = replace(
+        bare,
+        values=branch.values[short],
+        joints=branch.joints[short],
+        arc=branch.arc[short],
+        labels=branch.labels[short],
+    )
+    certificate = bare.certify()
+    assert not certificate.complete and certificate.open

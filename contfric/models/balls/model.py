@@ -90,12 +90,13 @@ class BallModel:
         return [*y, arb(1), *waves]
 
     def by_time(self, t: arb, order: int) -> Vector:
-        """Return the derivative of the extended state by time, of first or second order, y held fixed."""
+        """Return a derivative of the extended state by time, of order 1 or more, y held fixed."""
         found = [arb(0)] * (self.states + 1)
         for w in self.frequencies:
             sine, cosine = (w * t).sin_cos()
-            first, second = [-w * sine, w * cosine], [-w * w * cosine, -w * w * sine]
-            found += first if order == 1 else second
+            for _ in range(order):
+                sine, cosine = w * cosine, -w * sine
+            found += [cosine, sine]
         return found
 
     def by_parameter(self, t: arb, order: int) -> Vector:

@@ -1,0 +1,85 @@
+r"""No complex pair of multipliers on the unit circle, for all orbits of a box.
+
+Of a complex pair on the circle the product is 1. So it is not there where 1 is no eigenvalue of the second
+compound of the derivative P of a Poincare map, the matrix of its minors of two rows and two columns, whose
+eigenvalues are the products of two of those of P (K. Guckenheimer, M. Myers and B. Sturmfels, SIAM J. Numer.
+Anal. 34 (1997) 1-21). Of two real ones the product may be 1, too (a neutral saddle): in the plane the
+discriminant tells these apart. A map of one dimension has no pair: that of every orbit of two states that
+sticks.
+
+For a symmetric orbit P is that of half a turn. A pair ``+-i`` there is a double multiplier -1 of the whole
+one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+from flint import arb_mat
+
+from contfric.certify.bounds import regular_along
+from contfric.certify.chain import Chain, Segments
+from contfric.certify.extended import Builder
+from contfric.certify.multipliers import poincare_map
+from contfric.certify.tube import Box
+from contfric.certify.zeros import Closing, zeros_at_joints
+from contfric.models.balls.numbers import Vector
+
+#: Most parts of a box that are looked at one by one.
+_PARTS = 16
+#: Largest maps whose compound is computed: 66 minors.
+_LARGEST = 12
+
+
+def has_no_pair(segments: Segments, build: Builder, closing: Closing, box: Box) -> bool:
+    """Tell whether no complex pair of multipliers is on the unit circle for any orbit of a box."""
+    count = 1
+    while count <= _PARTS:
+        parts = (box.part(k, count) for k in range(count))
+        if all(is_off(segments, build, closing, x) for x in parts):
+            return True
+        count *= 4
+    return False
+
+
+def is_off(segments: Segments, build: Builder, closing: Closing, x: Vector) -> bool:
+    """Tell the same for all solutions (z, p) in some balls; orbits with holds have no pair."""
+    if any(pin is not None for pin in segments.pins):
+        return True
+    chain = Chain(segments, replace(build(x[-1]), slopes=None))
+    known = zeros_at_joints(segments, chain.model, closing)
+    found = poincare_map(chain, chain.joints(x[:-1]), known)
+    return found is not None and no_pair(found)
+
+
+def no_pair(matrix: arb_mat) -> bool:
+    """Tell whether a matrix has no complex pair of eigenvalues on the unit circle.
+
+    Examples
+    --------
+    >>> from flint import arb
+    >>> turn = arb_mat([[arb(0.6), arb(-0.8)], [arb(0.8), arb(0.6)]])
+    >>> no_pair(turn), no_pair(turn * arb(0.9)), no_pair(arb_mat([[2, 0], [0, 0.5]]))
+    (False, True, True)
+    """
+    size = matrix.nrows()
+    if size < 2:
+        return True
+    if size > _LARGEST:
+        return False
+    if size == 2:
+        trace, det = matrix[0, 0] + matrix[1, 1], matrix.det()
+        return not (det - 1).contains(0) or bool(trace * trace - 4 * det > 0)
+    pairs = list(combinations(range(size), 2))
+    compound = arb_mat(
+        [
+            [
+                matrix[a, c] * matrix[b, d] - matrix[a, d] * matrix[b, c] - int((a, b) == (c, d))
+                for c, d in pairs
+            ]
+            for a, b in pairs
+        ]
+    )
+    nothing = arb_mat(len(pairs), len(pairs))
+    return regular_along([compound, nothing, nothing], 0.0)

@@ -1,0 +1,169 @@
+"""The ends of a tube at events: the last box holds the event, so that nothing is left between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from flint import arb
+
+from contfric.certify.circle import is_off
+from contfric.certify.ending import Edge, ends_inside
+from contfric.certify.passing import dot
+from contfric.certify.piece import UNKNOWN, Piece
+from contfric.certify.splitting import Split, event_of, has_no_flip, split_box
+from contfric.certify.tube import Box, box_between, orbit_in, solved
+from contfric.certify.turns import Turns
+from contfric.certify.verdict import all_of
+from contfric.models.balls.numbers import Vector
+
+if TYPE_CHECKING:
+    from contfric.certify.tracing import Arcs, Tracer
+
+#: Halvings of a step up to an event.
+_HALVINGS = 24
+#: How far the box of an end reaches beyond it, as a share of its length.
+_BEYOND = 0.1
+#: Where in the box of a PD or BP its tube begins, as a share of its reach.
+WITHIN = 0.8
+
+
+@dataclass(frozen=True, eq=False)
+class Flip:
+    """The box of a PD or BP at an end of a branch.
+
+    Attributes
+    ----------
+    turns : how the branch's chain is that of two turns
+    split : the box
+    piece : what is proved in it, but for its place
+    plane : normal of the planes in which the tube meets it
+    """
+
+    turns: Turns
+    split: Split
+    piece: Piece
+    plane: Vector
+
+    def holds(self, zero: Vector) -> bool:
+        """Tell whether a solution (z, p) in some balls is one of the box, and admissible."""
+        held = self.split.holds(*self.turns.of(zero[:-1]), zero[-1])
+        return held and self.piece.proved
+
+    def amplitude(self, point: Vector) -> float:
+        """Return the e of an orbit (z, p) of the branch, as a share of the reach."""
+        return self.split.amplitude(self.turns.of(point[:-1])) / float(self.split.reach)
+
+
+def flip_at(tracer: Tracer, turns: Turns, far: Vector) -> Flip | None:
+    """Return the box of a PD or BP at an end, as wide as it can be proved with all that is asked for.
+
+    Parameters
+    ----------
+    far : orbit of the branch that is as far from the event as the box need reach
+    """
+    event = event_of(turns.segments, tracer.build, turns.near)
+    if event is None:
+        return None
+    centre, functional = event
+    first, second = turns.of(far[:-1])
+    half = [(a - b) / 2 for a, b in zip(first, second, strict=True)]
+    reach, best = abs(float(dot(functional, half).mid())), None
+    for _ in range(_HALVINGS):
+        tracer.count += 1
+        split = split_box(turns.segments, tracer.build, centre, functional, reach)
+        if split is not None:
+            best = _flip(tracer, turns, split)
+            piece = best.piece
+            if piece.regular or not tracer.goes_on():
+                break
+        reach /= 2
+    return best
+
+
+def _flip(tracer: Tracer, turns: Turns, split: Split) -> Flip:
+    """Return what is proved of the orbits of two turns in the box of their event."""
+    turn, v = split.turn, split.centre[split.size : -1]
+    admissible = tracer.obeys(turns.system, turns.segments, turn)
+    whole = [*turns.joined(turn[:-1], turn[:-1]), turn[-1]]
+    flips = 0 if has_no_flip(tracer.segments, tracer.build, whole) else UNKNOWN
+    folds = 0 if split.one_sided else UNKNOWN
+    labels = (turns.proof.event.label,) if turns.is_event(split.box, split.functional) else ()
+    tori = 0 if is_off(tracer.segments, tracer.build, tracer.closes, whole) else UNKNOWN
+    piece = Piece(0, 0, (0, 0), True, admissible, folds, flips, tori, events=labels)
+    return Flip(turns, split, piece, [*turns.directed(v, [-c for c in v]), arb(0)])
+
+
+def leave(
+    tracer: Tracer, first: Vector, last: Vector, arcs: Arcs, forward: bool, level: int = 0
+) -> list[Piece]:
+    """Cover a step at whose last (or first) point the branch ends at an event of its inequalities."""
+    piece = _edge(tracer, first, last, arcs, forward)
+    if piece is not None:
+        return [piece]
+    splits = level < _HALVINGS and tracer.goes_on()
+    middle = tracer.middle(first, last) if splits else None
+    if middle is None:
+        return tracer.cover(first, last, arcs, _HALVINGS)
+    between = 0.5 * (arcs[0] + arcs[1])
+    before, after = (arcs[0], between), (between, arcs[1])
+    if forward:
+        return [
+            *tracer.cover(first, middle, before, 0),
+            *leave(tracer, middle, last, after, True, level + 1),
+        ]
+    return [
+        *leave(tracer, first, middle, before, False, level + 1),
+        *tracer.cover(middle, last, after, 0),
+    ]
+
+
+def _edge(tracer: Tracer, first: Vector, last: Vector, arcs: Arcs, forward: bool) -> Piece | None:
+    """Return the piece whose box reaches beyond the end of the branch, or None if it is not proved."""
+    segments, build = tracer.segments, tracer.build
+    inner, end = (first, last) if forward else (last, first)
+    plane = [b - a for a, b in zip(inner, end, strict=True)]
+    beyond = [(b + _BEYOND * c).mid() for b, c in zip(end, plane, strict=True)]
+    outer = solved(segments, build, beyond, plane)
+    if outer is None:
+        return None
+    tracer.count += 1
+    box = box_between(segments, build, *((inner, outer) if forward else (outer, inner)))
+    if box is None:
+        return None
+    names = ends_inside(Edge(tracer.system, segments, build, tracer.closes, forward), box)
+    if not names:
+        return None
+    piece = tracer.piece(box, arcs, (first[-1], last[-1]), all_of([]), forward)
+    if not piece.decided:
+        return None
+    return tracer.linked(replace(piece, ends=names), box)
+
+
+def join(
+    tracer: Tracer, flip: Flip, first: Vector, last: Vector, arcs: Arcs, forward: bool
+) -> list[Piece]:
+    """Cover the step in which the tube meets the box of a PD or BP, and all beyond it."""
+    far, near = (first, last) if forward else (last, first)
+    shares = [flip.amplitude(point) for point in (far, near)]
+    wanted = WITHIN if shares[0] > 0 else -WITHIN
+    one, other, value = flip.split.at(arb(wanted * float(flip.split.reach)))
+    guess = [*flip.turns.joined(one, other), value]
+    point = solved(tracer.segments, tracer.build, [c.mid() for c in guess], flip.plane)
+    zero = None if point is None else orbit_in(tracer.segments, tracer.build, point, flip.plane)
+    if point is None or zero is None or not flip.split.holds(*flip.turns.of(zero[:-1]), zero[-1]):
+        return tracer.cover(first, last, arcs, 0)
+    share = (shares[0] - wanted) / (shares[0] - shares[1])
+    start, stop = arcs if forward else arcs[::-1]
+    arc = start + share * (stop - start)
+    end = tracer.end_of(forward)
+    here = (arc, float(point[-1].mid()))
+    (start, one_value), (stop, other_value) = (here, end) if forward else (end, here)
+    piece = replace(flip.piece, start=start, stop=stop, values=(one_value, other_value))
+    if forward:
+        before = tracer.cover(first, point, (arcs[0], arc), 0)
+        held = isinstance(tracer.last, Box) and tracer.last.holds(zero)
+        tracer.last = None
+        return [*before, replace(piece, linked=held)]
+    tracer.last = zero
+    return [piece, *tracer.cover(point, last, (arc, arcs[1]), 0)]

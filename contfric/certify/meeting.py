@@ -1,0 +1,161 @@
+"""The orbit of a proved event as a zero of the chain of a branch that ends or passes there.
+
+An event is proved on the shortest problem of its orbit: without segments that have vanished there, on its
+half if it is symmetric (:mod:`contfric.certify.locating`). A branch has another chain. Where each of its
+joints is one of the event's orbit, and each of its segments leads from one of these joints to the next one
+in the same mode, or has no length there and its exit surface is met anyway, the event's orbit solves the
+equations of the branch exactly; not only up to the width of balls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flint import arb, arb_mat
+
+from contfric.certify.chain import Segments, segments_of
+from contfric.certify.closing import closing_of
+from contfric.certify.events import EventCertificate
+from contfric.certify.extended import Builder, Condition
+from contfric.certify.zeros import in_span, zeros_at_joints
+from contfric.models.balls.build import ball_model
+from contfric.models.balls.model import BallModel
+from contfric.models.balls.numbers import Vector, column, numbers
+from contfric.orbit.system import System
+
+#: A joint of the branch is taken for that of the event within this distance.
+_NEAR = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class _Cycle:
+    """The event's whole orbit: joints, modes, resets before them, and what vanishes at each joint."""
+
+    joints: list[Vector]
+    modes: list[str]
+    resets: list[str]
+    vanishing: list[list[Vector]]
+    turn: arb
+    periods: int
+
+
+def as_zero_of(
+    proof: EventCertificate, system: System, segments: Segments, build: Builder, near: Vector
+) -> Vector | None:
+    """Return balls that hold the event's orbit as a solution (z, p) of a branch's chain; None if it is none.
+
+    Parameters
+    ----------
+    build : the model with the phase for its time
+    near : approximate solution of the chain at the event
+    """
+    if proof.location is None or proof.value is None or system.model.autonomous:
+        return None
+    own = proof.location.orbit.system
+    if own.model is not system.model or (system.half and not own.half):
+        return None
+    if system.periods % own.periods:
+        return None
+    model = build(proof.value)
+    cycle = _cycle(proof, model)
+    if cycle is None:
+        return None
+    m, count = segments.states + 1, segments.count
+    found: list[tuple[int, int]] = []
+    for i in range(count):
+        at = _matched(cycle, near[i * m : (i + 1) * m])
+        if at is None:
+            return None
+        found.append(at)
+    found.append(_closed(found[0], cycle, system))
+    if not all(_leads(cycle, model, segments, i, *found[i : i + 2]) for i in range(count)):
+        return None
+    joints = [_moved(cycle, at) for at in found[:-1]]
+    return [*(c for joint in joints for c in joint), proof.value]
+
+
+def _cycle(proof: EventCertificate, model: BallModel) -> _Cycle | None:
+    """Return the whole orbit of an event in phases."""
+    location, event = proof.location, proof.event
+    assert location is not None
+    orbit = location.orbit
+    segments = segments_of(orbit.system)
+    m, half = segments.states + 1, orbit.system.half
+    closure = arb_mat([[arb(c) for c in row] for row in segments.closure])
+    one = arb_mat([[arb(int(a == b)) for b in range(m - 1)] for a in range(m - 1)])
+    twice = closure * closure == one  # for certain
+    if not twice:
+        return None
+    two_pi = 2 * arb.pi()
+    timed = ball_model(event.orbit.model, event.params, proof.parameter, proof.value)
+    scale = two_pi / timed.period
+    joints = [list(proof.zero[i * m : (i + 1) * m]) for i in range(segments.count)]
+    joints = [[joint[0] * scale, *joint[1:]] for joint in joints]
+    met: dict[int, list[Vector]] = {}
+    condition = location.condition
+    if condition is not None and not condition.within:
+        met = {condition.segment: [_row(condition, segments, model)]}
+    closing = closing_of(segments, model, half)
+    known = zeros_at_joints(segments, model, closing, met)
+    modes, resets = list(segments.modes), list(segments.resets)
+    turn = arb(segments.turn) * two_pi
+    if half:
+        image = [[z[0] + turn, *numbers(closure * column(z[1:]))] for z in joints]
+        joints, known = [*joints, *image], [*known, *([closing(r) for r in rows] for rows in known)]
+        modes = [mode for mode, _ in orbit.word]
+        resets = list(segments_of(orbit.as_whole().system).resets)
+        turn = 2 * turn
+    return _Cycle(joints, modes, resets, known, turn, orbit.periods)
+
+
+def _row(condition: Condition, segments: Segments, model: BallModel) -> Vector:
+    if condition.rate:
+        return model.rate(condition.surface, segments.modes[condition.segment])
+    return model.rows[condition.surface]
+
+
+def _matched(cycle: _Cycle, joint: Vector) -> tuple[int, int] | None:
+    """Return which joint of the orbit one of the branch is, and how many times the orbit later."""
+    for j, own in enumerate(cycle.joints):
+        later = round(float(((joint[0] - own[0]) / cycle.turn).mid()))
+        moved = _moved(cycle, (j, later))
+        if all(abs(float((a - b).mid())) < _NEAR for a, b in zip(joint, moved, strict=True)):
+            return j, later
+    return None
+
+
+def _moved(cycle: _Cycle, at: tuple[int, int]) -> Vector:
+    joint = cycle.joints[at[0]]
+    return [joint[0] + at[1] * cycle.turn, *joint[1:]]
+
+
+def _closed(first: tuple[int, int], cycle: _Cycle, system: System) -> tuple[int, int]:
+    """Return the joint that the closure of the branch leads to from its first one."""
+    j, later = first
+    if not system.half:
+        return j, later + system.periods // cycle.periods
+    count = len(cycle.joints)
+    steps = j + count // 2
+    return steps % count, later + steps // count
+
+
+def _leads(
+    cycle: _Cycle,
+    model: BallModel,
+    segments: Segments,
+    i: int,
+    start: tuple[int, int],
+    end: tuple[int, int],
+) -> bool:
+    """Tell whether the orbit obeys the equations of segment i of the branch."""
+    j, later = start
+    following = ((j + 1) % len(cycle.joints), later + (j + 1) // len(cycle.joints))
+    own = (cycle.modes[j], cycle.resets[j]) == (segments.modes[i], segments.resets[i])
+    if not ((start == end and not segments.resets[i]) or (end == following and own)):
+        return False
+    pin = segments.pins[i]
+    if pin is None:
+        return in_span(model.rows[segments.exits[i]], cycle.vanishing[end[0]])
+    if isinstance(pin, str):
+        return in_span(model.rows[pin], cycle.vanishing[j])
+    return in_span(numbers(arb_mat([model.rate(pin[1], pin[0])])), cycle.vanishing[j])

@@ -1,0 +1,120 @@
+"""A branch in balls: its chain with the phase for its time, its orbits, and its events as solutions of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from flint import arb
+
+from contfric.certify.certificate import Certificate
+from contfric.certify.chain import Segments, segments_of
+from contfric.certify.closing import closing_of, is_symmetry
+from contfric.certify.events import EventCertificate
+from contfric.certify.extended import Builder
+from contfric.certify.meeting import as_zero_of
+from contfric.certify.phases import in_phases
+from contfric.continuation.branch import Branch
+from contfric.continuation.events import TERMINAL
+from contfric.models.balls.build import ball_model
+from contfric.models.balls.model import BallModel
+from contfric.models.balls.numbers import Vector
+from contfric.orbit.orbit import Orbit
+
+#: Shortest step that is halved, as a share of the branch; events at its ends are as near to them and nearer.
+_SHORTEST, _AT_END = 1e-5, 1e-8
+#: How far the box of a PD or BP may reach, as a share of the branch.
+_FAR = 0.1
+
+
+class Strand:
+    """A branch in balls."""
+
+    def __init__(self, branch: Branch) -> None:
+        self.branch, self.parameter = branch, branch.parameter
+        orbit = branch[len(branch) // 2]
+        self.orbit = orbit
+        low, high = float(branch.values.min()), float(branch.values.max())
+        exact = self._model(arb(low))
+        between = replace(exact, slopes=self._model(arb(low).union(arb(high))).slopes)
+        half = branch.system.half
+        self.whole = half and not is_symmetry(orbit, segments_of(orbit.system), between)
+        self.system = orbit.as_whole().system if self.whole else orbit.system
+        self.segments: Segments = segments_of(self.system)
+        self.build: Builder = self._build
+        # the closure is that of whole numbers at every value of the parameter
+        self.closes = closing_of(self.segments, self.build(arb(low)), self.system.half)
+        length = float(branch.arc[-1] - branch.arc[0])
+        self.shortest, self.far, self.end = _SHORTEST * length, _FAR * length, _AT_END * length
+
+    def _model(self, value: arb) -> BallModel:
+        return ball_model(self.branch.model, self.orbit.params, self.parameter, value)
+
+    def _build(self, value: arb) -> BallModel:
+        return in_phases(self._model(value))
+
+    def point(self, orbit: Orbit) -> Vector:
+        """Return joints (phase and state) and parameter of an orbit of the branch's chain, exact numbers."""
+        if self.whole:
+            orbit = orbit.as_whole()
+        value = arb(orbit.params[self.parameter])
+        period = self._model(value).period
+        found = [[arb(float(c)) for c in row] for row in orbit.joints]
+        if not period.is_zero():
+            for joint in found:
+                joint[0] *= 2 * arb.pi() / period
+        return [*(c.mid() for joint in found for c in joint), value]
+
+    def met_by(self, proofs: list[EventCertificate]) -> list[tuple[str, Vector, bool]]:
+        """Return label and solution of the proved events on the branch, and whether one may end there."""
+        found = []
+        for proof in proofs:
+            event = proof.event
+            own = event.orbit.system is self.branch.system
+            near = event.orbit if own else self.branch[0 if self._starts(proof) else -1]
+            at = self.point(near)
+            zero = as_zero_of(proof, self.system, self.segments, self.build, at)
+            if proof.proved and zero is not None:
+                found.append((event.label, zero, event.kind in TERMINAL))
+        return found
+
+    def _starts(self, proof: EventCertificate) -> bool:
+        arc = self.branch.arc
+        return proof.event.position <= 0.5 * float(arc[0] + arc[-1])
+
+    def far_from(self, end: int) -> Vector:
+        """Return the orbit of the branch up to which the box of an event at an end may reach."""
+        apart = np.abs(self.branch.arc - self.branch.arc[end]) - self.far
+        inner = np.flatnonzero(apart >= 0)
+        return self.point(self.branch[int(inner[np.argmin(apart[inner])])])
+
+    def nearly_singular(self, points: Sequence[Certificate]) -> dict[int, Vector]:
+        """Return balls of those orbits that may not be alone within their stated error, by number."""
+        if self.whole:
+            return {}
+        found = {}
+        for k, point in enumerate(points):
+            if point.proved or not point.proved_but_unique:
+                continue
+            value, m = arb(float(self.branch.values[k])), self.segments.states + 1
+            period = self._model(value).period
+            scale = arb(1) if period.is_zero() else 2 * arb.pi() / period
+            joints = [x * scale if i % m == 0 else x for i, x in enumerate(point.enclosure)]
+            found[k] = [*joints, value]
+        return found
+
+    def end_of(self, forward: bool) -> tuple[float, float]:
+        """Return arclength and parameter at an end of the branch."""
+        k = -1 if forward else 0
+        return float(self.branch.arc[k]), float(self.branch.values[k])
+
+    def has_edge(self, end: int) -> bool:
+        """Tell whether the branch ends at an event of its inequalities."""
+        if self.branch.ends[end].reason.name in [kind.value for kind in TERMINAL]:
+            return True
+        at = float(self.branch.arc[end])
+        return any(
+            event.kind in TERMINAL and abs(event.position - at) <= self.end
+            for event in self.branch.bifurcations
+        )

@@ -1,0 +1,233 @@
+"""Covers a branch with boxes, from event to event."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+from flint import arb, arb_mat
+
+from contfric.certify.certificate import Certificate
+from contfric.certify.chain import Chain, Segments
+from contfric.certify.circle import has_no_pair
+from contfric.certify.closing import closing_of
+from contfric.certify.events import EventCertificate
+from contfric.certify.inequalities import inequalities
+from contfric.certify.leaving import WITHIN, Flip, flip_at, join, leave
+from contfric.certify.passing import passes_once
+from contfric.certify.piece import UNKNOWN, Piece
+from contfric.certify.strand import Strand
+from contfric.certify.tube import Box, are_linked, box_between, section, solved
+from contfric.certify.turns import turns_of
+from contfric.certify.verdict import Finding, Verdict, all_of
+from contfric.continuation.branch import Branch
+from contfric.models.balls.numbers import Vector
+from contfric.orbit.system import System
+
+#: Halvings of a step of the branch: what is not proved then is left.
+HALVINGS = 12
+#: A box is tried only if it is at most this much longer than the last one that was proved.
+_GROWTH = 2.5
+#: Most boxes that are tried along a branch: some minutes of work.
+_MOST = 30_000
+
+Arcs = tuple[float, float]
+NO_BOX = Finding(Verdict.UNDECIDED, "no box")
+
+
+class Tracer(Strand):
+    """Covers the steps of a branch with boxes.
+
+    Parameters
+    ----------
+    proofs : certificates of the events of the branch
+    points : certificates of its printed orbits
+    until : when to end, by ``time.time``
+    """
+
+    def __init__(
+        self,
+        branch: Branch,
+        proofs: list[EventCertificate],
+        until: float,
+        points: Sequence[Certificate] = (),
+    ) -> None:
+        super().__init__(branch)
+        self.until = until
+        self.last: Box | Vector | None = None
+        self.count, self.ended, self.length = 0, "", math.inf
+        self.met = self.met_by(proofs)
+        self.flips = [self._flip(proofs, end) for end in (0, -1)]
+        self.near = self.nearly_singular(points)
+        self.held: set[int] = set()
+        for flip in self.flips:
+            if flip is not None:
+                self._hold(flip)
+
+    def _flip(self, proofs: list[EventCertificate], end: int) -> Flip | None:
+        """Return the box of the event at an end, if that is a PD or BP at which two turns become one."""
+        at = float(self.branch.arc[end])
+        near = self.point(self.branch[end])
+        for proof in proofs:
+            if proof.proved and abs(proof.event.position - at) <= self.end:
+                turns = turns_of(proof, self.system, near)
+                if turns is not None:
+                    return flip_at(self, turns, self.far_from(end))
+        return None
+
+    def _hold(self, box: Box | Flip) -> None:
+        """Note which of these orbits are on the curve of a proved box."""
+        self.held |= {k for k, zero in self.near.items() if box.holds(zero)}
+
+    # ------------------------------------------------------------------ steps
+
+    def step(self, k: int) -> list[Piece]:
+        """Cover the step from point k to the next one."""
+        printed = self.point(self.branch[k]), self.point(self.branch[k + 1])
+        arcs = (float(self.branch.arc[k]), float(self.branch.arc[k + 1]))
+        if not self.goes_on():
+            return [self._nothing(arcs, *printed)]
+        plane = [b - a for a, b in zip(*printed, strict=True)]
+        exact = [solved(self.segments, self.build, point, plane) for point in printed]
+        first, last = (at or raw for at, raw in zip(exact, printed, strict=True))
+        for end, flip in enumerate(self.flips):
+            if flip is not None and abs(arcs[1 - end] - self.branch.arc[-end]) < self.far:
+                inside = [abs(flip.amplitude(at)) < WITHIN for at in printed]
+                if all(inside):
+                    return []
+                if inside[end]:
+                    return join(self, flip, first, last, arcs, end == 1)
+        left = k == 0 and self.has_edge(0), k + 2 == len(self.branch) and self.has_edge(-1)
+        if all(left):
+            middle, between = self.middle(first, last), 0.5 * (arcs[0] + arcs[1])
+            if middle is not None:
+                before = leave(self, first, middle, (arcs[0], between), False)
+                return [*before, *leave(self, middle, last, (between, arcs[1]), True)]
+        elif any(left):
+            return leave(self, first, last, arcs, left[1])
+        elif None not in exact:
+            return self.cover(first, last, arcs, 0)
+        return [self._nothing(arcs, first, last)]
+
+    def goes_on(self) -> bool:
+        """Tell whether more boxes may be tried; else it is said what ended the work."""
+        if time.time() > self.until:
+            self.ended = "the time limit ended it"
+        elif self.count >= _MOST:
+            self.ended = f"{_MOST} boxes were tried"
+        return not self.ended
+
+    def _nothing(self, arcs: Arcs, first: Vector, last: Vector) -> Piece:
+        self.last = None
+        why = Finding(Verdict.UNDECIDED, self.ended) if self.ended else NO_BOX
+        return Piece(*arcs, (float(first[-1].mid()), float(last[-1].mid())), False, why)
+
+    def middle(self, first: Vector, last: Vector) -> Vector | None:
+        """Return the orbit halfway between two others."""
+        plane = [b - a for a, b in zip(first, last, strict=True)]
+        middle = [((a + b) / 2).mid() for a, b in zip(first, last, strict=True)]
+        return solved(self.segments, self.build, middle, plane)
+
+    def cover(self, first: Vector, last: Vector, arcs: Arcs, level: int) -> list[Piece]:
+        """Cover the stretch between two orbits with boxes; ``level`` says how often it was halved."""
+        length = arcs[1] - arcs[0]
+        splits = level < HALVINGS and length > self.shortest and self.goes_on()
+        if length > _GROWTH * self.length and splits:
+            halves = self._halves(first, last, arcs, level)
+            if halves is not None:
+                return halves
+        self.count += 1
+        box = box_between(self.segments, self.build, first, last)
+        admissible = NO_BOX if box is None else self.obeys(self.system, self.segments, box.all)
+        refuted = admissible.verdict is Verdict.REFUTED  # by all orbits of the box
+        piece = None
+        if box is not None and (admissible.proved or not splits or refuted):
+            piece = self.piece(box, arcs, (first[-1], last[-1]), admissible)
+        whole = piece is not None and piece.proved and piece.decided
+        if not (whole or refuted) and splits:
+            self.length = length / 2
+            halves = self._halves(first, last, arcs, level)
+            if halves is not None:
+                return halves
+        self.length = max(self.length, length) if whole else math.inf
+        if box is None or piece is None:
+            return [self._nothing(arcs, first, last)]
+        return [self.linked(piece, box)]
+
+    def piece(
+        self,
+        box: Box,
+        arcs: Arcs,
+        values: tuple[arb, arb],
+        admissible: Finding,
+        leaves: bool | None = None,
+    ) -> Piece:
+        """Return what is proved of a box, but for its link.
+
+        Parameters
+        ----------
+        leaves : whether the branch ends in it on the way to its last point; to its first one if False
+        """
+        events = [(label, zero, ends) for label, zero, ends in self.met if box.holds(zero)]
+        inside = tuple(label for label, _, _ in events)
+        points: list[Vector | None] = [None, None]
+        if leaves is not None:
+            points[leaves] = next((zero for _, zero, ends in events if ends), None)
+        folds = 0 if box.monotone else self._count(box, 1, points)
+        flips = 0 if box.no_flip else self._count(box, -1, points)
+        ends = (float(values[0].mid()), float(values[1].mid()))
+        off = has_no_pair(self.segments, self.build, self.closes, box)
+        tori = 0 if off else UNKNOWN
+        return Piece(*arcs, ends, True, admissible, folds, flips, tori, events=inside)
+
+    def _count(self, box: Box, sigma: int, points: list[Vector | None]) -> int:
+        """Return how often the Jacobian with sigma times the closure is singular between the ends of a box.
+
+        Parameters
+        ----------
+        points : solutions on its curve in the place of its ends, where the branch ends at one
+        """
+        if not passes_once(self.segments, self.build, box, sigma):
+            return UNKNOWN
+        signs = []
+        for end, known in zip((box.first, box.last), points, strict=True):
+            at = known or section(self.segments, self.build, box, end)
+            if at is None:
+                return UNKNOWN
+            _, rows = Chain(self.segments, self.build(at[-1])).linearised(at[:-1], sigma)
+            signs.append(arb_mat([row[:-1] for row in rows]).det())
+        if signs[0].contains(0) or signs[1].contains(0):
+            return UNKNOWN
+        return int(bool(signs[0] * signs[1] < 0))
+
+    def linked(self, piece: Piece, box: Box) -> Piece:
+        """Return a piece with its link to the one before; from now on it is the last one."""
+        before, self.last = self.last, box
+        if piece.proved:
+            self._hold(box)
+        if before is None:
+            return piece
+        if isinstance(before, Box):
+            return replace(piece, linked=are_linked(self.segments, self.build, before, box))
+        return replace(piece, linked=box.holds(before))
+
+    def _halves(self, first: Vector, last: Vector, arcs: Arcs, level: int) -> list[Piece] | None:
+        point = self.middle(first, last)
+        if point is None:
+            return None
+        between = 0.5 * (arcs[0] + arcs[1])
+        return [
+            *self.cover(first, point, (arcs[0], between), level + 1),
+            *self.cover(point, last, (between, arcs[1]), level + 1),
+        ]
+
+    def obeys(self, system: System, segments: Segments, x: Vector) -> Finding:
+        """Return whether all solutions (z, p) in some balls obey every inequality of a system."""
+        model = replace(self.build(x[-1]), slopes=None)
+        chain, closing = Chain(segments, model), closing_of(segments, model, system.half)
+        for inequality in inequalities(chain, system, chain.joints(x[:-1]), closing):
+            if not inequality.finding.proved:
+                return inequality.named(system)
+        return all_of([])
