@@ -70,6 +70,16 @@ def test_what_a_release_needs_is_listed() -> None:
     assert all(re.search(rf"^{target}:", makefile, re.MULTILINE) for target in targets)
 
 
+def test_every_installation_names_all_of_its_extras() -> None:
+    """A comma ends an argument of make's `call`: `.[dev,docs]` arrived as `.[dev`, and `make docs` failed."""
+    stamps = [".venv/.installed", ".venv/.docs-installed", ".venv/.bench-installed"]
+    done = subprocess.run(
+        ["make", "-n", "-B", *stamps], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    named = set(re.findall(r"--editable (\S+)", done.stdout.replace(";", "")))
+    assert named == {"'.[dev]'", "'.[dev,docs]'", "'.[dev,bench]'"}
+
+
 def test_the_animation_is_small_and_moves() -> None:
     image = pytest.importorskip("PIL.Image")
     path = ROOT / "docs/images/growing.gif"
