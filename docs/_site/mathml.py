@@ -18,4 +18,6 @@ _SCROLLS = '<div style="overflow-x: auto">{}</div>'
 def on_page_content(content: str, **_: Any) -> str:
     """Replace every formula of a page."""
     content = _INLINE.sub(lambda m: convert(html.unescape(m[1])), content)
-    return _DISPLAY.sub(lambda m: _SCROLLS.format(convert(html.unescape(m[1]), display="block")), content)
+    return _DISPLAY.sub(
+        lambda m: _SCROLLS.format(convert(html.unescape(m[1]), display="block")), content
+    )
