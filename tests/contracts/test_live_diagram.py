@@ -120,8 +120,10 @@ def test_points_tell_their_orbits(diagram: cf.Diagram, data: dict[str, Any]) -> 
         assert np.allclose(unquantised(point["t"]), times - times[0], atol=1e-3)
         for packed, column in zip(point["s"], states.T, strict=True):
             assert np.allclose(unquantised(packed), column, atol=1e-4)
-        assert point["signature"] == str(orbit.signature)
-        assert float(point["margin"].split()[0]) == pytest.approx(orbit.margins.min(), 1e-3, 1e-9)
+        assert data["systems"][point["system"]]["signature"] == str(orbit.signature)
+        margins = np.frombuffer(base64.b64decode(point["margins"]), "<f4")
+        assert margins == pytest.approx(orbit.margins, rel=1e-6, abs=1e-9)
+        assert len(data["systems"][point["system"]]["watched"]) == len(margins)
         if branch.bridge:
             assert point["multipliers"] is None
         else:
@@ -253,7 +255,8 @@ function drive() {
     stable: source("stable").x.length, unstable: source("unstable").x.length,
     bridge: source("bridge").x.length, marks: source("marks").x.length,
     labels: source("labels").label, facts: document.getElementById("facts").innerText,
-    parts: source("parts").x.length, curves: source("curves").y.map((y) => y.length),
+    parts: source("parts").x.length, margins: document.querySelectorAll("#margins li").length,
+    curves: source("curves").y.map((y) => y.length),
   });
   const change = (node, key, value) => {
     node[key] = value;
@@ -309,6 +312,7 @@ def test_a_browser_shows_it(written: Path, tmp_path: Path) -> None:
     for name in ("signature", "Floquet multipliers", "smallest margin"):
         assert name in picked["facts"]
     assert "2s" in picked["facts"]
+    assert picked["margins"] > 4  # every inequality that is watched
     assert picked["parts"] >= 4  # phases of slip and stick
     assert len(set(picked["curves"])) == 1
 
