@@ -52,6 +52,9 @@ def test_addresses_are_addresses(settings: dict[str, Any]) -> None:
     assert urls and all(re.fullmatch(r"https://\S+", url) for url in urls.values())
 
 
+CHANGES = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
 def test_the_citation_is_valid_and_names_the_authors(settings: dict[str, Any]) -> None:
     cffconvert = pytest.importorskip("cffconvert")
     text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
@@ -60,6 +63,8 @@ def test_the_citation_is_valid_and_names_the_authors(settings: dict[str, Any]) -
     assert "Csernák" in text and "Licskó" in text and "see the doi" not in text
     assert citation.cffobj["version"] == settings["project"]["version"]
     assert "@misc" in citation.as_bibtex() and "contfric" in citation.as_bibtex()
+    released = re.search(rf"## \[{re.escape(citation.cffobj['version'])}\] - (\S+)", CHANGES)
+    assert released and str(citation.cffobj["date-released"]) == released[1]
 
 
 def test_what_a_release_needs_is_listed() -> None:
