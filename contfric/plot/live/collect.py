@@ -62,6 +62,7 @@ def collect(
     """
     points = list(_points(diagram, detail, orbits))
     systems = sorted({p["system"] for p in points})  # few, and long: points only name theirs
+    names = sorted({name for p in points for _, name in p["parts"]})
     return {
         **lines_and_marks(diagram, detail, tuple(ROWS)),
         "parameter": symbol(diagram.parameter),
@@ -71,7 +72,13 @@ def collect(
         "states": list(diagram.model.states),
         "domains": domain_colours(diagram.model),
         "systems": [{"signature": signature, "watched": tests} for signature, tests in systems],
-        "points": [{**p, "system": systems.index(p["system"])} for p in points],
+        "names": names,
+        "points": [
+            p
+            | {"system": systems.index(p["system"])}
+            | {"parts": [[k, names.index(name)] for k, name in p["parts"]]}
+            for p in points
+        ],
     }
 
 
@@ -115,7 +122,7 @@ def _mark(mark: Mark, diagram: Diagram) -> dict[str, Any]:
         "label": mark.label,
         "meaning": mark.meaning,
         "x": mark.x,
-        "y": mark.y.tolist(),
+        "y": [_short(value) for value in mark.y],
         "on_bridges": mark.on_bridges,
         "branches": sorted(there),
     }

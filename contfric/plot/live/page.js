@@ -150,7 +150,8 @@ function draw_orbit() {
   const [a, b] = [by_id("abscissa").selectedIndex, by_id("ordinate").selectedIndex];
   const pieces = {x: [], y: [], colour: [], domain: []};
   const starts = {x: [], y: [], colour: [], domain: []};
-  selected.parts.forEach(([from, domain], k) => {
+  selected.parts.forEach(([from, name], k) => {
+    const domain = data.names[name];
     const to = k + 1 < selected.parts.length ? selected.parts[k + 1][0] + 1 : t.length;
     const colour = data.domains[domain] ?? "black";
     pieces.x.push(states[a].slice(from, to));
@@ -194,7 +195,7 @@ function list_branches() {
 // Another diagram of the same model: all of it, or what is seen of one row while a parameter is dragged.
 function renew(found) {
   for (const r of found.rows) data.rows[data.rows.findIndex((old) => old.name === r.name)] = r;
-  Object.assign(data, {branches: found.branches, runs: found.runs, systems: found.systems ?? [], points: found.points ?? []});
+  Object.assign(data, {branches: found.branches, runs: found.runs, systems: found.systems ?? [], names: found.names ?? [], points: found.points ?? []});
   by_id("fixed").textContent = found.fixed;
   list_branches();
   const [low, high] = draw();
