@@ -12,9 +12,11 @@ DEMO := demo
 STRESS := .stress
 
 # uv takes a tenth of pip's time; where it cannot be had, or does not find the packages, pip does it.
+# $(1) are extras; a comma would end the argument of `call`.
+comma := ,
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
-install = { $(PIP) uv && $(BIN)/uv pip install --quiet --python $(BIN)/python --editable '$(1)'; } 2>/dev/null \
-	    || $(PIP) --editable '$(1)'
+install = { $(PIP) uv && $(BIN)/uv pip install --quiet --python $(BIN)/python --editable '.[$(1)]'; } 2>/dev/null \
+	    || $(PIP) --editable '.[$(1)]'
 
 .DEFAULT_GOAL := help
 .PHONY: help setup kernels wheel demo test lint types contracts unit test-all gate bench stress studies gallery docs notebooks clean
@@ -50,18 +52,18 @@ wheel: $(STAMP)
 $(STAMP): pyproject.toml
 	@echo "== setup: $(VENV)"
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@$(call install,.[dev])
+	@$(call install,dev)
 	@touch $@
 
 $(BENCH_STAMP): $(STAMP)
 	@echo "== setup: peers for the benchmarks"
-	@$(call install,.[dev,bench]) \
+	@$(call install,dev$(comma)bench) \
 	    || echo "not all peers can be installed here: those that are missing are left out"
 	@touch $@
 
 $(DOCS_STAMP): $(STAMP)
 	@echo "== setup: mkdocs"
-	@$(call install,.[dev,docs])
+	@$(call install,dev$(comma)docs)
 	@touch $@
 
 demo: $(STAMP)

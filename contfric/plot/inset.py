@@ -23,7 +23,7 @@ _CROWD, _WINDOW = 4, 0.08
 _BESIDE = 0.3
 #: Size of an inset, its distance from the frame and what is too near to it, as shares of the axes; space on
 #: its left and beneath it for its numbers.
-_WIDTH, _HEIGHT, _EDGE, _NEAR = 0.3, 0.4, 0.06, 0.03
+WIDTH, _HEIGHT, _EDGE, _NEAR = 0.3, 0.4, 0.06, 0.03
 _LEFT, _BENEATH = 0.03, 0.06
 
 
@@ -109,18 +109,18 @@ def _place(ax: Axes) -> tuple[float, float, float, float]:
         )  # the share that is left to the lines
         ax.set_ylim(low, low + (high - low) / drawn)
         found = _empty_place(ax)
-    return found or (_EDGE + _LEFT, 1.0 - _EDGE - _HEIGHT, _WIDTH, _HEIGHT)
+    return found or (_EDGE + _LEFT, 1.0 - _EDGE - _HEIGHT, WIDTH, _HEIGHT)
 
 
 def _empty_place(ax: Axes) -> tuple[float, float, float, float] | None:
     """Return a corner, or the middle of a side, in which nothing is drawn."""
     points = np.vstack([line_pixels(ax), marker_pixels(ax)])
     shares = ax.transAxes.inverted().transform(points) if len(points) else points
-    for left in (_EDGE + _LEFT, 0.5 * (1.0 - _WIDTH), 1.0 - _EDGE - _WIDTH):
+    for left in (_EDGE + _LEFT, 0.5 * (1.0 - WIDTH), 1.0 - _EDGE - WIDTH):
         for bottom in (1.0 - _EDGE - _HEIGHT, _EDGE + _BENEATH):
             box = Bbox.from_bounds(
-                left - _LEFT, bottom - _BENEATH, _WIDTH + _LEFT, _HEIGHT + _BENEATH
+                left - _LEFT, bottom - _BENEATH, WIDTH + _LEFT, _HEIGHT + _BENEATH
             ).padded(_NEAR)
             if not np.any(np.all((shares > box.min) & (shares < box.max), axis=1)):
-                return left, bottom, _WIDTH, _HEIGHT
+                return left, bottom, WIDTH, _HEIGHT
     return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 
 from contfric.errors import either
 from contfric.plot.events import Mark
+from contfric.plot.inset import WIDTH, crowd
 from contfric.plot.look import Look
 from contfric.plot.style import (
     BRIDGE_COLOUR,
@@ -59,12 +60,12 @@ def handles_of(
         handles.append(_line("stability not computed", GREY, styles["unknown"], UNKNOWN_WIDTH))
     width = max((float(b.values.max()) for b in branches), default=0.0)
     width -= min((float(b.values.min()) for b in branches), default=0.0)
-    zoomed = bool(look.inset)
-    bridges = [b for b in branches if b.bridge]
-    if any(zoomed or float(np.ptp(b.values)) > _SMALLEST * width for b in bridges):
+    windows = [(-np.inf, np.inf, _SMALLEST * width), *_enlarged(marks, width, look)]
+    bridges = [b.values for b in branches if b.bridge]
+    if any(np.ptp(np.clip(x, a, b)) > least for x in bridges for a, b, least in windows):
         handles.append(_line(BRIDGE_NAME, BRIDGE_COLOUR, styles["bridge"], BRIDGE_WIDTH))
     kinds: dict[str, str] = {}
-    for m in marks if zoomed else _seen(marks, width):
+    for m in (m for window in windows for m in _seen(marks, *window)):
         kinds[m.kind.value] = either(kinds.get(m.kind.value, ""), m.meaning)
     order = [*MARKERS, *(k for k in kinds if k not in MARKERS)]
     return handles + [_marker(k, kinds[k]) for k in order if k in kinds]
@@ -79,11 +80,17 @@ def _marker(kind: str, meaning: str) -> Line2D:
     return Line2D([], [], label=f"{kind}: {meaning}", **marker.look())
 
 
-def _seen(marks: Sequence[Mark], width: float) -> list[Mark]:
-    """Return the marks that do not lie beneath others: a tangency is a small stroke."""
-    large = [m.x for m in marks if m.kind.value != "T"]
-    return [
-        m
-        for m in marks
-        if m.kind.value != "T" or all(abs(m.x - x) > _SMALLEST * width for x in large)
-    ]
+def _enlarged(
+    marks: Sequence[Mark], width: float, look: Look
+) -> Iterator[tuple[float, float, float]]:
+    """Yield the part that an inset enlarges, with the least length that is seen in it."""
+    part = crowd(marks, width) if look.inset is True else look.inset
+    if part:
+        yield (*part, _SMALLEST / WIDTH * (part[1] - part[0]))
+
+
+def _seen(marks: Sequence[Mark], low: float, high: float, least: float) -> list[Mark]:
+    """Return the marks of a part that do not lie beneath others: a tangency is a small stroke."""
+    inside = [m for m in marks if low <= m.x <= high]
+    large = [m.x for m in inside if m.kind.value != "T"]
+    return [m for m in inside if m.kind.value != "T" or all(abs(m.x - x) > least for x in large)]

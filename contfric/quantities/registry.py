@@ -123,7 +123,8 @@ def quantity_of(asked: QuantityLike, model: Model) -> Quantity:
     if isinstance(asked, str):
         return _quantity_of(asked.strip(), model)
     if callable(asked):
-        return Quantity(getattr(asked, "__name__", "function"), model, None, asked)
+        name = getattr(asked, "__name__", "function")
+        return Quantity(name.strip("<>"), model, None, asked)  # "<lambda>" is no label of an axis
     raise ParameterError(
         f"a quantity is a name, an expression such as 'max(x) - min(x)', or a function of an orbit; got "
         f"{shown(asked)}"

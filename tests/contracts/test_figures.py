@@ -303,7 +303,7 @@ def test_bridges_are_drawn_apart(diagram: Any) -> None:
     assert max(b.get_linewidth() for b in drawn) < min(o.get_linewidth() for o in others)
     assert all(is_dashed(line) for line in drawn)
     assert BRIDGE_NAME not in entries(ax.get_legend())  # here they lie beneath the markers
-    known = entries(diagram.plot(inset=(0.4875, 0.4935)).get_legend())
+    known = entries(diagram.plot(inset=(0.4916, 0.4919)).get_legend())
     assert known.count(BRIDGE_NAME) == 1
     assert not bridges & set(known)
     plain = plot_branches([b for b in diagram.branches if not b.bridge])

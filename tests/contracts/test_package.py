@@ -52,6 +52,9 @@ def test_addresses_are_addresses(settings: dict[str, Any]) -> None:
     assert urls and all(re.fullmatch(r"https://\S+", url) for url in urls.values())
 
 
+CHANGES = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
 def test_the_citation_is_valid_and_names_the_authors(settings: dict[str, Any]) -> None:
     cffconvert = pytest.importorskip("cffconvert")
     text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
@@ -60,6 +63,8 @@ def test_the_citation_is_valid_and_names_the_authors(settings: dict[str, Any]) -
     assert "Csernák" in text and "Licskó" in text and "see the doi" not in text
     assert citation.cffobj["version"] == settings["project"]["version"]
     assert "@misc" in citation.as_bibtex() and "contfric" in citation.as_bibtex()
+    released = re.search(rf"## \[{re.escape(citation.cffobj['version'])}\] - (\S+)", CHANGES)
+    assert released and str(citation.cffobj["date-released"]) == released[1]
 
 
 def test_what_a_release_needs_is_listed() -> None:
@@ -68,6 +73,16 @@ def test_what_a_release_needs_is_listed() -> None:
     targets = set(re.findall(r"`make ([a-z-]+)`", text))
     assert {"test", "test-all", "docs", "gallery", "notebooks"} <= targets
     assert all(re.search(rf"^{target}:", makefile, re.MULTILINE) for target in targets)
+
+
+def test_every_installation_names_all_of_its_extras() -> None:
+    """A comma ends an argument of make's `call`: `.[dev,docs]` arrived as `.[dev`, and `make docs` failed."""
+    stamps = [".venv/.installed", ".venv/.docs-installed", ".venv/.bench-installed"]
+    done = subprocess.run(
+        ["make", "-n", "-B", *stamps], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    named = set(re.findall(r"--editable (\S+)", done.stdout.replace(";", "")))
+    assert named == {"'.[dev]'", "'.[dev,docs]'", "'.[dev,bench]'"}
 
 
 def test_the_animation_is_small_and_moves() -> None:

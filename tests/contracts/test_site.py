@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import re
 from collections.abc import Iterator
@@ -132,3 +133,20 @@ def test_wrong_links_are_seen(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     assert wrong_links(page) == ["none.md", "#no"]
+
+
+def test_docstrings_of_one_line_a_parameter_are_descriptions(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Otherwise the site shows "seed (number the samples are drawn from) –". Types stay where they are."""
+    pytest.importorskip("griffe")
+    monkeypatch.syspath_prepend(DOCS / "_site")
+    rewritten = importlib.import_module("roles").rewritten
+    text = (
+        "Do it.\n\nParameters\n----------\nseed, more : what :func:`contfric.explore` is given\nk : int\n"
+        "x : float\n    Its place.\nlast : where it ends\n\nReturns\n-------\ny : what it is"
+    )
+    assert rewritten(text) == text.replace(
+        "seed, more : what :func:`contfric.explore`",
+        "seed, more\n    what [`explore`][contfric.explore]",
+    ).replace("last : where", "last\n    where")

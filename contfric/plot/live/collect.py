@@ -60,6 +60,9 @@ def collect(
 
     ``orbits`` keeps those that were sampled, by branch and point, for a call that asks for fewer.
     """
+    points = list(_points(diagram, detail, orbits))
+    systems = sorted({p["system"] for p in points})  # few, and long: points only name theirs
+    names = sorted({name for p in points for _, name in p["parts"]})
     return {
         **lines_and_marks(diagram, detail, tuple(ROWS)),
         "parameter": symbol(diagram.parameter),
@@ -68,7 +71,14 @@ def collect(
         "autonomous": diagram.model.autonomous,
         "states": list(diagram.model.states),
         "domains": domain_colours(diagram.model),
-        "points": list(_points(diagram, detail, orbits)),
+        "systems": [{"signature": signature, "watched": tests} for signature, tests in systems],
+        "names": names,
+        "points": [
+            p
+            | {"system": systems.index(p["system"])}
+            | {"parts": [[k, names.index(name)] for k, name in p["parts"]]}
+            for p in points
+        ],
     }
 
 
@@ -112,7 +122,7 @@ def _mark(mark: Mark, diagram: Diagram) -> dict[str, Any]:
         "label": mark.label,
         "meaning": mark.meaning,
         "x": mark.x,
-        "y": mark.y.tolist(),
+        "y": [_short(value) for value in mark.y],
         "on_bridges": mark.on_bridges,
         "branches": sorted(there),
     }
@@ -221,11 +231,11 @@ def _point(
         "branch": branch,
         "x": float(orbit.params[diagram.parameter]),
         "y": {name: [_short(value) for value in values] for name, values in y.items()},
-        "signature": str(orbit.signature),
+        "system": (str(orbit.signature), _watched(orbit)),
         "periods": orbit.periods,
         "period": _short(orbit.period),
         "multipliers": None if multipliers is None else [_complex(mu) for mu in multipliers],
-        "margin": _smallest_margin(orbit),
+        "margins": floats(orbit.margins),
         **_motion(orbit),
     }
 
@@ -247,17 +257,12 @@ def _complex(value: complex) -> str:
     return f"{value.real:.6g} {'−' if value.imag < 0.0 else '+'} {abs(value.imag):.6g}i"
 
 
-def _smallest_margin(orbit: Orbit) -> str:
-    """Return the margin nearest to zero, and where it is."""
-    tests = orbit.system.tests
-    if not tests:
-        return "none is watched"
-    k = int(np.argmin(orbit.margins))
-    test = tests[k]
-    mode = orbit.system.word[test.segment][0]
-    return (
-        f"{orbit.margins[k]:.4g} ({test.margin.value}, at {test.surface}, "
-        f"in segment {test.segment + 1}: {mode})"
+def _watched(orbit: Orbit) -> tuple[str, ...]:
+    """Return what each margin is, and where."""
+    return tuple(
+        f"{test.margin.value}, at {test.surface}, in segment {test.segment + 1}: "
+        f"{orbit.system.word[test.segment][0]}"
+        for test in orbit.system.tests
     )
 
 

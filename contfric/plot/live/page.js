@@ -99,6 +99,11 @@ function pick(x, y) {
   return nearest;
 }
 
+// Every margin with what it is, the smallest first.
+const margins_of = (point) =>
+  floats(point.margins).map((value, k) => [value, data.systems[point.system].watched[k]])
+    .sort((a, b) => a[0] - b[0]).map(([value, what]) => `${Number(value.toPrecision(4))} (${what})`);
+
 function show(point) {
   selected = point;
   mark_selected();
@@ -106,11 +111,11 @@ function show(point) {
   const stability = point.stable === null ? "not computed" : point.stable ? "stable" : "unstable";
   const facts = {
     orbit: branch.name + (branch.mirrored ? ", mirror image" : ""),
-    [data.parameter]: String(point.x),
-    signature: point.signature,
+    [data.parameter]: String(Number(point.x.toPrecision(12))),
+    signature: data.systems[point.system].signature,
     stability: branch.bridge ? "bridge: the least disturbance ends its hold" : stability,
     "Floquet multipliers": point.multipliers ? point.multipliers.join(", ") : branch.bridge ? "none" : "not computed",
-    "smallest margin": point.margin,
+    "smallest margin": margins_of(point)[0] ?? "none is watched",
     period: String(point.period),
     [data.autonomous ? "cycles" : "periods of the excitation"]: String(point.periods),
   };
@@ -127,6 +132,8 @@ function show(point) {
     line.append(head);
     line.insertCell().textContent = value;
   }
+  by_id("margins").replaceChildren(...margins_of(point).map(
+    (text) => Object.assign(document.createElement("li"), {textContent: text})));
   draw_orbit();
 }
 
@@ -143,7 +150,8 @@ function draw_orbit() {
   const [a, b] = [by_id("abscissa").selectedIndex, by_id("ordinate").selectedIndex];
   const pieces = {x: [], y: [], colour: [], domain: []};
   const starts = {x: [], y: [], colour: [], domain: []};
-  selected.parts.forEach(([from, domain], k) => {
+  selected.parts.forEach(([from, name], k) => {
+    const domain = data.names[name];
     const to = k + 1 < selected.parts.length ? selected.parts[k + 1][0] + 1 : t.length;
     const colour = data.domains[domain] ?? "black";
     pieces.x.push(states[a].slice(from, to));
@@ -187,7 +195,7 @@ function list_branches() {
 // Another diagram of the same model: all of it, or what is seen of one row while a parameter is dragged.
 function renew(found) {
   for (const r of found.rows) data.rows[data.rows.findIndex((old) => old.name === r.name)] = r;
-  Object.assign(data, {branches: found.branches, runs: found.runs, points: found.points ?? []});
+  Object.assign(data, {branches: found.branches, runs: found.runs, systems: found.systems ?? [], names: found.names ?? [], points: found.points ?? []});
   by_id("fixed").textContent = found.fixed;
   list_branches();
   const [low, high] = draw();

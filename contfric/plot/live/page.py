@@ -42,6 +42,7 @@ _DETAILS = (
     Detail(120, 5e-4),
     Detail(50, 2e-3),
     Detail(20, 5e-3),
+    Detail(20, 2e-2),
 )
 #: Dashes of the lines, in pixels; a stable line is solid.
 _DASHES = {"stable": "solid", "unstable": "7 4", "unknown": "solid", "bridge": "2 3"}
