@@ -143,10 +143,28 @@ function mark_selected() {
   chosen.data = {x: values.map(() => selected.x), y: values};
 }
 
+// Cubics through the samples, with the slopes of parabolas through three of them; a jump (no time passes) stays.
+function smooth(t, y) {
+  const h = (k) => t[k + 1] - t[k];
+  const d = (k) => (y[k + 1] - y[k]) / h(k);
+  const inner = (k) => k > 0 && k + 1 < t.length && h(k - 1) > 0 && h(k) > 0;
+  const slope = (k) => (h(k) * d(k - 1) + h(k - 1) * d(k)) / (h(k - 1) + h(k));
+  const end = (k, other) => (inner(other) ? (3 * d(k) - slope(other)) / 2 : d(k));
+  const found = [y[0]];
+  for (let k = 0; k + 1 < t.length; k++) {
+    const [q, r] = [[k, k + 1], [k + 1, k]].map(([at, other]) => h(k) * (inner(at) ? slope(at) : end(k, other)));
+    const p = y[k + 1] - y[k];
+    for (const s of [0.25, 0.5, 0.75, 1])
+      found.push(h(k) > 0 ? y[k] + s * (q + s * (3 * p - 2 * q - r + s * (q + r - 2 * p))) : y[k + 1]);
+  }
+  return found;
+}
+
 function draw_orbit() {
   if (!selected) return;
   const t = quantised(selected.t);
   const states = selected.s.map(quantised);
+  const seen = {t: [], s: states.map(() => [])}; // piece by piece: across a joint nothing is smooth
   const [a, b] = [by_id("abscissa").selectedIndex, by_id("ordinate").selectedIndex];
   const pieces = {x: [], y: [], colour: [], domain: []};
   const starts = {x: [], y: [], colour: [], domain: []};
@@ -154,8 +172,11 @@ function draw_orbit() {
     const domain = data.names[name];
     const to = k + 1 < selected.parts.length ? selected.parts[k + 1][0] + 1 : t.length;
     const colour = data.domains[domain] ?? "black";
-    pieces.x.push(states[a].slice(from, to));
-    pieces.y.push(states[b].slice(from, to));
+    const piece = (y) => smooth(t.slice(from, to), y.slice(from, to));
+    pieces.x.push(piece(states[a]));
+    pieces.y.push(piece(states[b]));
+    seen.t.push(...piece(t));
+    states.forEach((y, i) => seen.s[i].push(...piece(y)));
     starts.x.push(states[a][from]);
     starts.y.push(states[b][from]);
     for (const part of [pieces, starts]) {
@@ -165,7 +186,7 @@ function draw_orbit() {
   });
   parts.data = pieces;
   joints.data = starts;
-  curves.data = {x: states.map(() => t), y: states, colour: data.state_colours, state: data.states};
+  curves.data = {x: states.map(() => seen.t), y: seen.s, colour: data.state_colours, state: data.states};
   phase.below[0].axis_label = data.states[a];
   phase.left[0].axis_label = data.states[b];
 }
