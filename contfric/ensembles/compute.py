@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +32,9 @@ from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
 from contfric.quantities.registry import number_quantity
+
+if TYPE_CHECKING:
+    from contfric.study.read import Study
 
 #: Bytes that a sample takes at each of the values, for ten branches: 41 of a row with a name of five letters.
 _BYTES = 410
@@ -76,13 +79,13 @@ class _Job:
 
 
 def ensemble(
-    model: ModelSource,
-    parameter: str,
-    range: tuple[float, float],
-    distributions: Mapping[str, Any],
+    model: ModelSource | Study,
+    parameter: str | int | None = None,
+    range: tuple[float, float] | None = None,
+    distributions: Mapping[str, Any] | None = None,
     params: Parameters | None = None,
     *,
-    samples: int = 1000,
+    samples: int | None = None,
     seed: int = 0,
     row: str = "x_max",
     values: int | ArrayLike = 101,
@@ -99,6 +102,9 @@ def ensemble(
 ) -> Ensemble:
     """Explore the diagrams of random parameters.
 
+    ``ensemble(study, samples)`` computes the one that a study asks for (a path, a bundled name, or a study
+    that was read), with ``executor``, ``folder`` and ``progress``.
+
     Each sample is an exploration, as by :func:`contfric.explore`, from an orbit that a simulation finds at
     ``params[parameter]``, or elsewhere in the range. Sample i depends on ``seed`` and i only: the result is
     the same to the last bit for any number of workers. Ctrl-C ends the computation; the samples that are
@@ -109,7 +115,8 @@ def ensemble(
     model, params : the model (or its name) and the parameters that do not vary; defaults fill in
     parameter, range : the parameter of the diagrams, and where it is followed
     distributions : of the parameters that vary: (low, high) is uniform; or a frozen one of scipy.stats
-    samples : number of diagrams; Sobol indices of d parameters use (d + 2) times a power of 2 of them
+    samples : number of diagrams, 1000 by default; Sobol indices of d parameters use (d + 2) times a power of
+        2 of them
     seed : whole number that the samples are drawn from
     row : a quantity, of which bands are made
     values : number of values of the parameter for bands, or the values, ascending
@@ -136,14 +143,30 @@ def ensemble(
     >>> found.event("SN 1a").count
     6
     """
-    model, params = tied(model, params)
+    if parameter is None or isinstance(parameter, int):
+        from contfric.study.tasks.ensemble import ensemble_of
+
+        given = parameter if samples is None else samples
+        return ensemble_of(
+            cast("Study | str | Path", model),
+            given,
+            executor=executor,
+            folder=folder,
+            progress=progress,
+        )
+    if range is None or distributions is None:
+        raise ParameterError(
+            "an ensemble of a model takes parameter, range and distributions: ensemble('coulomb', 'Omega', "
+            "(0.4, 0.6), {'S': (0.3, 0.34)}); one of a study takes ensemble('study.yaml', samples)"
+        )
+    model, params = tied(cast(ModelSource, model), params)
     check_executor(executor)
     function_of("progress", progress)
     model.index_of(parameter)
     bounds = checked_range(parameter, range)
     varied = checked_distributions(model, distributions, parameter)
     number_quantity(row, model, "an ensemble")
-    count = whole_number("samples", samples, least=1)
+    count = whole_number("samples", 1000 if samples is None else samples, least=1)
     grid = _values(parameter, bounds, values)
     must_fit(f"an ensemble of {count} diagrams at {len(grid)} values", count * len(grid) * _BYTES)
     whole = {

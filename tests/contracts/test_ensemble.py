@@ -328,6 +328,17 @@ figures: [{kind: ensemble}]
 """
 
 
+def test_a_study_and_a_number_of_samples(found: cf.Ensemble, tmp_path: Path) -> None:
+    (tmp_path / "random.yaml").write_text(STUDY, encoding="utf-8")
+    again = cf.ensemble(tmp_path / "random.yaml", 4)
+    assert len(again) == 4 and again.parameter == found.parameter
+    np.testing.assert_array_equal(again.samples, found.samples[:4])
+    with pytest.raises(cf.StudyError, match="asks for no ensemble"):
+        cf.ensemble("fig05", 10)
+    with pytest.raises(cf.ParameterError, match="takes parameter, range and distributions"):
+        cf.ensemble("coulomb", "Omega")
+
+
 def test_a_study(found: cf.Ensemble, tmp_path: Path) -> None:
     (tmp_path / "random.yaml").write_text(STUDY, encoding="utf-8")
     result = cf.run_study(tmp_path / "random.yaml", out=tmp_path / "out")

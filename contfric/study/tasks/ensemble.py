@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field
 
 from contfric.base.shown import aligned
-from contfric.errors import ParameterError, checked_range, did_you_mean
+from contfric.errors import ParameterError, StudyError, checked_range, did_you_mean
 from contfric.study.tables import Table
 from contfric.study.tasks.response import Response
 from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Job, attempt, incomplete
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from contfric.base.yaml_lines import LocatedYaml
     from contfric.ensembles.ensemble import Ensemble
     from contfric.models.definition import Model
@@ -120,28 +122,23 @@ class EnsembleTask(Response):
         from concurrent.futures import ProcessPoolExecutor
         from multiprocessing import get_context
 
-        from contfric.ensembles.compute import ensemble
-
-        low, high = self.range
-        distributions = self._distributions()
-        params = {n: value for n, value in job.study.params.items() if n not in distributions}
-        if not low <= params[self.parameter] <= high:  # the model's default: nothing was asked for
-            params.pop(self.parameter)
         workers = self.workers or 1
         spawn = get_context("spawn")
         pool = ProcessPoolExecutor(workers, mp_context=spawn) if workers > 1 else None
         with pool or nullcontext():
-            return ensemble(
-                job.study.model,
-                self.parameter,
-                (low, high),
-                distributions,
-                params,
-                executor=pool,
-                folder=job.tiles,
-                progress=job.say,
-                **self.options(),
-            )
+            return self.drawn(job.study, executor=pool, folder=job.tiles, progress=job.say)
+
+    def drawn(self, study: Study, **options: Any) -> Ensemble:
+        """Compute it for a study, with options of :func:`contfric.ensemble` in place of the task's."""
+        from contfric.ensembles.compute import ensemble
+
+        low, high = self.range
+        distributions = self._distributions()
+        params = {n: value for n, value in study.params.items() if n not in distributions}
+        if not low <= params[self.parameter] <= high:  # the model's default: nothing was asked for
+            params.pop(self.parameter)
+        named = (study.model, self.parameter, (low, high), distributions, params)
+        return ensemble(*named, **{**self.options(), **options})
 
     def table(self, file: str, study: Study, found: Ensemble) -> Table:
         """Return one row for each event of each sample."""
@@ -198,3 +195,27 @@ class EnsembleTask(Response):
         if any(left):
             yield f"and {left[0]} rarer events, {left[1]} rarer classes, which run.json has"
         yield from incomplete(entry)
+
+
+def ensemble_of(source: Study | str | Path, samples: Any, **options: Any) -> Ensemble:
+    """Compute the ensemble that a study asks for; see :func:`contfric.ensemble`.
+
+    Parameters
+    ----------
+    source : the study, its path or its bundled name
+    samples : number of diagrams; None for that of the study
+
+    Raises
+    ------
+    StudyError
+        If the study is wrong, or has no ensemble.
+    """
+    from contfric.study.read import Study, read_study
+
+    study = source if isinstance(source, Study) else read_study(source)
+    task = next((t for t in study.content.tasks if isinstance(t, EnsembleTask)), None)
+    if task is None:
+        raise StudyError(
+            f"{study.path} asks for no ensemble: it needs 'ensemble: {{parameter, range, distributions}}'"
+        )
+    return task.drawn(study, **({} if samples is None else {"samples": samples}), **options)
