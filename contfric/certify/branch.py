@@ -101,7 +101,9 @@ class BranchCertificate(Shown):
 
         parts = checkable([*self.proofs, *self.points])
         if not parts:
-            raise ParameterError("there is nothing to write: the checker knows orbits of coulomb")
+            raise ParameterError(
+                "there is nothing to write: no proof of this branch is one that the checker knows"
+            )
         write_data({"certificate": "diagram", "format": 1, "checkable": parts}, path)
 
     @property

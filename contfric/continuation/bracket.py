@@ -39,8 +39,6 @@ from contfric.orbit.equations import LayoutType, close_chain
 from contfric.orbit.monitor import (
     count_margins,
     crossings,
-    find_behind,
-    find_stationary,
     held_margin,
     interior_margin,
     joint_margin,
@@ -49,6 +47,7 @@ from contfric.orbit.monitor import (
 )
 from contfric.orbit.newton import ALONG, CHECKS, INTEGRATED, MULTIPLIERS, SOLVES
 from contfric.orbit.spectrum import multipliers
+from contfric.orbit.stationary import find_behind, find_stationary
 from contfric.orbit.system import IntArray
 
 #: What locate() follows: a column of the tests, a label, or the parameter itself.

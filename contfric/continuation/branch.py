@@ -147,11 +147,11 @@ class Branch(Shown):
     @property
     def period(self) -> FloatArray:
         """Duration of the orbit at each point, shape (k,)."""
-        sides = 2.0 if self.system.half else 1.0
-        if self.model.autonomous:
-            return -self.joints[:, 0, 0] * sides
-        periods = self.model.periods_along(self.vector, self.parameter, self.values)
-        return self.system.layout.turn * periods * sides
+        turns = -self.joints[:, 0, 0]
+        if not self.model.autonomous:
+            periods = self.model.periods_along(self.vector, self.parameter, self.values)
+            turns = self.system.layout.turn * periods
+        return turns * (2.0 if self.system.half else 1.0)
 
     @cached_property
     def name(self) -> str:
@@ -251,7 +251,8 @@ class Branch(Shown):
             )
         word = mirror_pairs(self.model, self.system.word)
         system = build_system(self.model, word, self.system.periods, self.system.half)
-        joints = self.joints @ _block(symmetry.array()).T
+        joints = self.joints.copy()
+        joints[:, :, 1:] = joints[:, :, 1:] @ symmetry.array().T
         if not self.model.autonomous:
             joints[:, :, 0] += (symmetry.fraction * self.period / self.system.periods)[:, None]
         images = {id(b): b.mirror() for b in self._all_bifurcations()}
@@ -386,12 +387,6 @@ def _mirrored_labels(labels: IntArray, model: Model) -> IntArray:
     codes, inverse = np.unique(labels, return_inverse=True)
     mirrored = [encode([image[s] for s in decode(int(c), surfaces)], surfaces) for c in codes]
     return np.array(mirrored, dtype=np.int64)[inverse].reshape(labels.shape)
-
-
-def _block(matrix: FloatArray) -> FloatArray:
-    block = np.eye(len(matrix) + 1)
-    block[1:, 1:] = matrix
-    return block
 
 
 def _mirror_end(end: End, images: dict[int, Bifurcation]) -> End:

@@ -42,7 +42,8 @@ from contfric.orbit.followed import (
     segment_and_observable,
 )
 from contfric.orbit.holds import NO_PIN
-from contfric.orbit.monitor import count_margins, find_behind, find_stationary, is_doubled
+from contfric.orbit.monitor import count_margins, is_doubled
+from contfric.orbit.stationary import find_behind, find_stationary
 
 #: A parameter that changes more slowly than this (in ranges, by arclength) is constant: the sign of its slope
 #: is rounding.

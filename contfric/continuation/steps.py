@@ -12,7 +12,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import Elimination, elimination_workspace
 from contfric.orbit.equations import EquationWorkspace, close_chain, equation_workspace
 from contfric.orbit.followed import Followed, followed_values, remember
-from contfric.orbit.monitor import StationaryPoints, stationary_workspace, watch
+from contfric.orbit.monitor import watch
 from contfric.orbit.newton import (
     CHECKS,
     CONVERGED,
@@ -23,6 +23,7 @@ from contfric.orbit.newton import (
     normal_to_tangent,
 )
 from contfric.orbit.spectrum import SpectralWorkspace, multipliers, spectral_workspace
+from contfric.orbit.stationary import StationaryPoints, stationary_workspace
 from contfric.orbit.system import IntArray
 
 #: Extra columns of the tests behind the margins and the distances of the labels: slope of the

@@ -39,13 +39,13 @@ from contfric.orbit.equations import (
     segment_jacobian,
 )
 from contfric.orbit.followed import Followed, followed_values
-from contfric.orbit.monitor import (
+from contfric.orbit.spectrum import SpectralWorkspace, spectral_workspace
+from contfric.orbit.stationary import (
     StationaryPoints,
     find_behind,
     find_stationary,
     stationary_workspace,
 )
-from contfric.orbit.spectrum import SpectralWorkspace, spectral_workspace
 from contfric.orbit.system import IntArray
 
 JOINT, START, EXIT, INTERIOR, SPECTRAL = range(5)

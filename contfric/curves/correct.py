@@ -19,7 +19,7 @@ from contfric.curves.normal_form import cubic_coefficient
 from contfric.models.definition import FloatArray
 from contfric.orbit.equations import close_chain
 from contfric.orbit.followed import remember
-from contfric.orbit.monitor import find_behind, find_stationary, watch
+from contfric.orbit.monitor import watch
 from contfric.orbit.newton import (
     CHECKS,
     CONVERGED,
@@ -30,6 +30,7 @@ from contfric.orbit.newton import (
     off_normal,
 )
 from contfric.orbit.spectrum import multipliers
+from contfric.orbit.stationary import find_behind, find_stationary
 from contfric.orbit.system import IntArray
 
 #: The extra column that a curve watches where a branch watches the slope of its parameter: the

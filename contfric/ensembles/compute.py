@@ -156,7 +156,7 @@ def ensemble(
         )
     if range is None or distributions is None:
         raise ParameterError(
-            "an ensemble of a model takes parameter, range and distributions: ensemble('coulomb', 'Omega', "
+            "an ensemble of a model takes parameter, range and distributions: ensemble(model, 'Omega', "
             "(0.4, 0.6), {'S': (0.3, 0.34)}); one of a study takes ensemble('study.yaml', samples)"
         )
     model, params = tied(cast(ModelSource, model), params)

@@ -14,7 +14,7 @@ from contfric.models.contact_laws import KEY as LAWS
 from contfric.models.contact_laws import check_laws, read_laws
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.description import STRUCTURE, Description, DomainText, ModeText
-from contfric.models.entries import Part, mapping_in
+from contfric.models.entries import Part, is_number, mapping_in
 from contfric.models.measuring import measured
 from contfric.models.names import Names
 from contfric.models.parts import Chatter
@@ -350,7 +350,7 @@ def _integration(top: Part) -> tuple[str, float]:
     method = part.one_of("method", _METHODS, "method of integration", "explicit")
     tolerance = part.data.get("tolerance", 1e-12)
     low, high = _TOLERANCES
-    if not _is_number(tolerance) or not low <= tolerance <= high:
+    if not is_number(tolerance) or not low <= tolerance <= high:
         part.fail(
             "tolerance",
             f"'tolerance' is a number from {low:g} to {high:g}, got {tolerance!r}",
@@ -362,17 +362,13 @@ def _max_step(top: Part) -> float | None:
     step, (low, high) = top.data.get("max_step"), _STEPS
     if step is None:
         return None
-    if not _is_number(step) or not low <= step <= high:
+    if not is_number(step) or not low <= step <= high:
         top.fail(
             "max_step",
             f"'max_step' is the largest step of a continuation as a share of the range, from {low:g} to "
             f"{high:g}, got {step!r}",
         )
     return float(step)
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def _check_expressions(found: Description, names: Names) -> None:

@@ -114,3 +114,8 @@ class Part:
                 )
             found[surface] = side
         return found
+
+
+def is_number(value: object) -> bool:
+    """Tell whether an entry is a number; true and false are none."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)

@@ -8,7 +8,8 @@ from numba import types
 from contfric.compiled import i8, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.orbit.equations import LayoutType, close_chain, equation_workspace
-from contfric.orbit.monitor import find_behind, find_stationary, start_value, stationary_workspace
+from contfric.orbit.monitor import start_value
+from contfric.orbit.stationary import find_behind, find_stationary, stationary_workspace
 
 
 @kernel(types.boolean(FlowType, LayoutType, i8, matrix, vector, vector))

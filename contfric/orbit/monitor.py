@@ -8,15 +8,13 @@ the joints, which the exit and joint margins watch). The flow delivers *all* sta
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
-from contfric.compiled import allocating_helper, helper, indices, kernel, matrix, vector
+from contfric.compiled import helper, indices, kernel, matrix, vector
 from contfric.compiling.references import by_reference
 from contfric.flow.layouts import FlowType
-from contfric.models.definition import FloatArray
 from contfric.orbit.after_reset import apply_reset
 from contfric.orbit.equations import (
     LayoutType,
@@ -27,10 +25,7 @@ from contfric.orbit.equations import (
 from contfric.orbit.followed import followed_values, keep_end, keep_levels, keep_values
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN
 from contfric.orbit.newton import CHECKS
-
-#: Most interior stationary points of one observable in one segment; beyond it the orbit is reported
-#: as not finite. A stick of 30 excitation periods has 180 of them with a third harmonic.
-_MOST_TURNINGS = 256
+from contfric.orbit.stationary import find_behind, find_stationary, stationary_workspace
 
 #: An observable this near to a level, relative to 1 + the level, touches it to rounding (ten units in
 #: the last place): it is not labelled as a crossing.
@@ -48,45 +43,6 @@ _SOON = 0.03
 #: Duration below which rounding hides what is left of a margin without its double zero: at this one it is
 #: known to 1e-3, and a curvature of the load is larger.
 _CLEAR = 1e-6
-
-
-class StationaryPoints(NamedTuple):
-    """Stationary points of one observable along one segment: times after its start, and values."""
-
-    times: FloatArray
-    values: FloatArray
-
-
-@allocating_helper
-def stationary_workspace():  # type: ignore[no-untyped-def]
-    """Return the workspace for the stationary points of one segment."""
-    return StationaryPoints(np.empty(_MOST_TURNINGS), np.empty(_MOST_TURNINGS))
-
-
-@helper
-def find_stationary(functions, layout, i, c, z, p, last, stationary):  # type: ignore[no-untyped-def]
-    """Fill the stationary points of observable c in segment i; return their number, -1 if too many."""
-    after = z[i + 1] if i + 1 < z.shape[0] else last
-    duration = after[0] - z[i, 0]
-    if duration <= 0.0:
-        return 0
-    return functions.stationary(
-        layout.modes[i], c, z[i, 0], z[i, 1:], duration, p, stationary.times, stationary.values
-    )
-
-
-@helper
-def find_behind(functions, layout, i, c, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
-    """Do the same for a segment behind a reset."""
-    after, n = z[i + 1] if i + 1 < z.shape[0] else workspace.last, z.shape[1] - 1
-    duration = after[0] - z[i, 0]
-    if duration <= 0.0:
-        return 0
-    apply_reset(functions, layout, i, z[i], p, workspace.none, workspace)
-    begin = workspace.behind[n, :n]
-    return functions.stationary(
-        layout.modes[i], c, z[i, 0], begin, duration, p, stationary.times, stationary.values
-    )
 
 
 @helper

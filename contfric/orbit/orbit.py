@@ -240,16 +240,13 @@ class Orbit(MeasuredOrbit):
         count = len(self.system.tests)
         watched = np.empty(count + len(layout.labels))
         labels = np.zeros(len(layout.labels), dtype=np.int64)
-        functions = self.system.functions()
-        fine = examine(functions, layout, self.joints, self.vector, watched, labels, tally())
+        at = self.system.functions(), layout, self.joints, self.vector
+        fine = examine(*at, watched, labels, tally())
         return watched[:count], labels, bool(fine)
 
     @cached_property
     def turn_multipliers(self) -> ComplexArray:
-        """Multipliers of one turn, largest first, shape (n,); of an autonomous model without the trivial 1.
-
-        Then the shape is (n - 1,).
-        """
+        """Multipliers of one turn, largest first, shape (n,); (n - 1,) without the 1 of autonomous models."""
         from contfric.orbit.spectrum import stability
 
         mu = np.full(len(self.model.states), np.inf, dtype=np.complex128)

@@ -56,11 +56,11 @@ def test_sections_start_from_orbits_of_few_periods() -> None:
     ("parameters", "ranges", "says"),
     [
         (("Omga", "S"), RANGES, "did you mean 'Omega'"),
-        (("Omega", "Omega"), RANGES, "two different"),
+        (("Omega", "Omega"), RANGES, "different parameters"),
         (("Omega",), RANGES, "pair of parameters"),
         ("OS", RANGES, "pair of parameters"),
         (PLANE, {"Omega": (0.4, 0.6)}, "range of 'S' is missing"),
-        (PLANE, {**RANGES, "h": (0.0, 0.1)}, "'h' is not one of the two"),
+        (PLANE, {**RANGES, "h": (0.0, 0.1)}, "'h' is not one of the parameters that vary"),
         (PLANE, {**RANGES, "S": (0.4, 0.3)}, "lower first"),
         (PLANE, {**RANGES, "S": (0.3, np.inf)}, "finite"),
         (PLANE, {**RANGES, "S": 0.3}, "pair of numbers"),

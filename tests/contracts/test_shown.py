@@ -59,6 +59,9 @@ def found(orbit: cf.Orbit, diagram: cf.Diagram, tmp_path_factory: Any) -> dict[s
         cf.sweep("coulomb", "Omega", [0.5, 0.51], {"S": 0.32, "S0": 0.4}),
         *(cf.poincare("coulomb", PARAMS), cf.release_map("coulomb", CHAOS, count=60)),
         cf.basins("coulomb", starts, {"Omega": 0.541, "S": 0.32, "S0": 0.4}),
+        cf.stable_set(
+            cf.solve_orbit("coulomb", "2s", PARAMS), {"x": (-2, 2), "v": (-1, 1)}, max_points=3
+        ),
         cf.ensemble("coulomb", "Omega", (0.48, 0.55), {"S": (0.3, 0.34)}, {"S0": 0.4}, samples=3),
         *(rests, rests.points[0], rest, rest.branches[0]),
         cf.fit("coulomb", data, PARAMS, ["S"]),

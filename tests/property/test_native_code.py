@@ -50,7 +50,7 @@ def of_one(k, x):
     elif k == 11:
         return (1.5 + math.sin(x)) ** 0.3
     elif k == 12:
-        return 1.0 / (2.0 + math.floor(x)) if -1.5 < x < 3.0 or x == 7.0 else -math.pi
+        return 1.0 / (2.5 + math.floor(x)) if -1.5 < x < 3.0 or x == 7.0 else -math.pi
     return inner(x, k) ** 7
 
 
