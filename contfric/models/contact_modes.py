@@ -26,7 +26,8 @@ from contfric.models.grammar import Scope, number_of, parse
 from contfric.models.matrices import summed, times
 from contfric.models.not_affine import NotAffineError
 from contfric.models.shared_loads import Limit, Setting, load_name
-from contfric.models.structure import COORDINATES, Structure, defaults_of
+from contfric.models.structure import Structure, defaults_of
+from contfric.models.structure_names import COORDINATES
 from contfric.models.units import read_units
 
 #: What a model of a structure has of its own; everything else is as in any model.
