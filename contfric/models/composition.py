@@ -138,8 +138,8 @@ class Composition:
         limit = self.limit(name)
         if limit is None:
             raise KeyError(name)
-        fixed = self._parts.is_fixed(limit.contact)
-        texts = self._parts.load_texts(limit.contact, limit.setting, fixed)
+        fixed = self._parts.surfaces.is_fixed(limit.contact)
+        texts = self._parts.surfaces.load_texts(limit.contact, limit.setting, fixed)
         observable, formula, level = texts[limit.sign]
         return Surface(name, observable, level), formula
 
@@ -274,11 +274,11 @@ class Composition:
 
     def _stop(self, contact: Contact, states: Mapping[str, str]) -> dict[str, tuple[Way, ...]]:
         """Return what follows where a sliding element stops: all that slide along its direction do."""
-        stop, _ = self._parts.stop_of(contact)
+        stop, _ = self._parts.surfaces.stop_of(contact)
         along = {
             c.name
             for c in self.acting
-            if c.kind is ContactKind.JENKINS and self._parts.stop_of(c)[0] == stop
+            if c.kind is ContactKind.JENKINS and self._parts.surfaces.stop_of(c)[0] == stop
         }
         after = {c: "s" if c in along else letter for c, letter in states.items()}
         return {stop: (Way("".join(after.values()), {}),)}
@@ -322,7 +322,7 @@ class Composition:
                 states[c.name] = "c" if signs[c.name] < 0 else "o"
         for c in self.acting:
             if c.kind is ContactKind.JENKINS:
-                stop, ways = self._parts.stop_of(c)
+                stop, ways = self._parts.surfaces.stop_of(c)
                 out = {"p": signs[f"{c.name}+"] >= 0, "n": signs[f"{c.name}-"] <= 0}
                 going = [a for a in "pn" if out[a] and signs[stop] == SIDES[ways[a]]]
                 states[c.name] = going[0] if going else "s"

@@ -10,22 +10,24 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
 from typing import Any, TypeVar
 
 from contfric.errors import ModelError
 from contfric.models.coefficient_texts import text_of
 from contfric.models.coefficients import AFFINE, symbols
+from contfric.models.contact_changes import departures_of, resets_of
 from contfric.models.contact_laws import laws_of
 from contfric.models.contact_ranges import constraints_of
-from contfric.models.contacts import Contact, ContactKind, drift, factor_of
+from contfric.models.contact_surfaces import ContactSurfaces
+from contfric.models.contacts import Contact, ContactKind, drift
 from contfric.models.description import STRUCTURE
 from contfric.models.entries import EntryError, Part, mapping_in
-from contfric.models.grammar import Scope, names_in, number_of, parse
+from contfric.models.grammar import Scope, number_of, parse
 from contfric.models.matrices import summed, times
 from contfric.models.not_affine import NotAffineError
 from contfric.models.shared_loads import Limit, Setting, load_name
-from contfric.models.structure import COORDINATES, Structure, defaults_of
+from contfric.models.structure import Structure, defaults_of
+from contfric.models.structure_names import COORDINATES
 from contfric.models.units import read_units
 
 #: What a model of a structure has of its own; everything else is as in any model.
@@ -77,6 +79,7 @@ class Combinations:
         self.structure, self.top = structure, structure.top
         self.coordinates, self.velocities = structure.coordinates, structure.velocities
         self.contacts, self.mass = structure.contacts, structure.mass
+        self.surfaces = ContactSurfaces(structure)
         self.states: dict[str, Mapping[str, str]] = {}
 
     def data(self, only_quiet: bool = False) -> dict[str, Any]:
@@ -94,7 +97,7 @@ class Combinations:
             f"f_{q}": force
             for q, force in zip(self.coordinates, self.structure.forces, strict=True)
         }
-        observables, surfaces = self._surfaces()
+        observables, surfaces = self.surfaces.listed()
         modes = self._quiet() if only_quiet else self._modes()
         found = {
             **kept,
@@ -104,15 +107,13 @@ class Combinations:
             "surfaces": surfaces,
             "modes": modes,
             "forces": laws_of(self.structure, self.states),
-            "departures": []
-            if only_quiet
-            else [d for c in self.contacts for d in self._departures(c)],
+            "departures": [] if only_quiet else departures_of(self.surfaces),
             "spread": mapping_in(kept, "spread"),
         }
         found |= {"units": self._units(stretches)} if "units" in kept else {}
         if ranges := dict(constraints_of(self.contacts, defaults_of(self.top))):
             found["constraints"] = ranges | _with_meanings(kept.get("constraints"))
-        resets = self._resets()
+        resets = resets_of(self.structure)
         found |= {"resets": resets} if resets else {}
         if "symmetry" not in kept and self._is_symmetric():
             images = [f"{name} -> -{name}" for name in states]
@@ -150,88 +151,12 @@ class Combinations:
             return False
         return all(abs(math.remainder(order - 1.0, 2.0)) < _ODD for order in orders)
 
-    def _surfaces(self) -> tuple[dict[str, str], dict[str, Any]]:
-        observables: dict[str, str] = {}
-        surfaces: dict[str, Any] = {}
-
-        def add(name: str, observable: str, text: str, level: str) -> None:
-            if text in (*self.coordinates, *self.velocities) or text == observable:
-                observable = text  # a state needs no second name
-            else:
-                observables[observable] = text
-            surfaces[name] = {"observable": observable, "level": level}
-
-        for c in self.contacts:
-            if c.kind is ContactKind.FRICTION:
-                add(c.name, f"w_{c.name}", c.texts["velocity"], "0")
-                self._limits(c, add)
-            elif c.kind is ContactKind.JENKINS:
-                level = f"({c.texts['limit']})/({c.texts['stiffness']})"
-                if self.stop_of(c)[0] == c.name:
-                    add(c.name, f"w_{c.name}", self.structure.speed(c), "0")
-                add(f"{c.name}+", c.name, c.name, level)
-                add(f"{c.name}-", c.name, c.name, f"-{level}")
-            else:
-                add(c.name, f"g_{c.name}", c.texts["gap"], "0")
-                if self._section == f"w_{c.name}":
-                    add(self._section, self._section, self.structure.approach(c), "0")
-        return observables, surfaces
-
-    def _limits(self, c: Contact, add: Any) -> None:
-        fixed = self.is_fixed(c)
-        for setting in self._settings(c):
-            texts = self.load_texts(c, setting, fixed)
-            for limit in (Limit(c, "+", setting), Limit(c, "-", setting)):
-                add(limit.name, *texts[limit.sign])
-
-    def _settings(self, c: Contact) -> list[Setting]:
-        """Return the settings of a load that are listed: of contacts that share it, that where all stick."""
-        if self.structure.loads.couples(c):
-            quiet = {other.name: other.states[0] for other in self.contacts if other.states}
-            return [self.structure.loads.setting(c, quiet)]
-        springs = self.structure.springs[c.name]
-        return [tuple((s, "c") for s in closed) for closed in _subsets(springs)]
-
-    def load_texts(
-        self, c: Contact, setting: Setting, fixed: bool
-    ) -> dict[str, tuple[str, str, str]]:
-        """Return (observable, its formula, level) of both limits of a load.
-
-        Parameters
-        ----------
-        fixed : whether the limit is a number, else the level is 0
-        """
-        static, load = c.texts.get("static", c.texts["kinetic"]), self.structure.load(c, setting)
-        name = load_name(c, setting)
-        if fixed:
-            return {sign: (name, load, f"{sign}({static})") for sign in "+-"}
-        return {
-            "+": (f"{name}_high", f"{load} - ({static})", "0"),
-            "-": (f"{name}_low", f"{load} + ({static})", "0"),
-        }
-
-    def is_fixed(self, c: Contact) -> bool:
-        """Tell whether the static limit of a contact depends on parameters only."""
-        static = c.texts.get("static", c.texts["kinetic"])
-        return names_in(parse(static)) <= {*defaults_of(self.top), "pi"}
-
-    def stop_of(self, c: Contact) -> tuple[str, Mapping[str, str]]:
-        """Return the surface on which the velocity of an element vanishes, and its sides where it slides.
-
-        Jenkins elements that are stretched along one direction share that of the first.
-        """
-        for other in self.contacts:
-            if other.kind is ContactKind.JENKINS and (factor := factor_of(other, c)):
-                ways = "+-" if factor > 0.0 else "-+"
-                return other.name, dict(zip("pn", ways, strict=True))
-        raise AssertionError(c.name)  # its own direction is one of them
-
     def _contradicts(self, states: Mapping[str, str]) -> bool:
         """Tell whether elements along one direction slide opposite ways."""
         sides: dict[str, set[str]] = {}
         for c in self.contacts:
             if c.kind is ContactKind.JENKINS and states[c.name] != "s":
-                stop, ways = self.stop_of(c)
+                stop, ways = self.surfaces.stop_of(c)
                 sides.setdefault(stop, set()).add(ways[states[c.name]])
         return any(len(found) > 1 for found in sides.values())
 
@@ -243,7 +168,7 @@ class Combinations:
 
     def _listed_load(self, c: Contact, setting: Setting) -> str:
         """Return the load of a contact: the observable that it is, if its limit is a number."""
-        named = self.structure.loads.couples(c) and self.is_fixed(c)
+        named = self.structure.loads.couples(c) and self.surfaces.is_fixed(c)
         return load_name(c, setting) if named else self.structure.load(c, setting)
 
     def _modes(self) -> dict[str, Any]:
@@ -261,22 +186,13 @@ class Combinations:
 
     def _divide(self, modes: dict[str, Any]) -> None:
         """Divide the mode in which no contact acts, so that an orbit that stays in it meets a section."""
-        section = self._section
+        section = self.surfaces.section
         quiet = "".join(c.states[0] for c in self.contacts if c.states) or "free"
         if section:
             sides = modes[quiet]["in"]
             for name, side in (quiet, "+"), (f"{quiet}-", "-"):
                 modes[name] = {**modes[quiet], "in": {**sides, section: side}}
                 self.states[name] = self.states[quiet]
-
-    @cached_property
-    def _section(self) -> str:
-        """The surface of the velocity by which an orbit is found along which no contact changes; or none."""
-        if "period" not in self.top.data:  # where nothing acts nothing moves
-            return ""
-        elastic = [c for c in self.contacts if c.kind is ContactKind.JENKINS]
-        gaps = [c for c in self.contacts if c.kind is ContactKind.SPRING]
-        return elastic[0].name if elastic else f"w_{gaps[0].name}" if gaps else ""
 
     def sides(self, states: Mapping[str, str]) -> dict[str, str]:
         """Return the sides of surfaces that contacts in some states lie on, and no others."""
@@ -291,7 +207,7 @@ class Combinations:
                 limits = {"s": {"+": "-", "-": "+"}, "p": {"+": "0"}, "n": {"-": "0"}}[state]
                 sides |= {f"{c.name}{sign}": side for sign, side in limits.items()}
                 if state != "s":
-                    stop, ways = self.stop_of(c)
+                    stop, ways = self.surfaces.stop_of(c)
                     sides[stop] = ways[state]
             elif state == "s":
                 upper = Limit(c, "+", self.structure.loads.setting(c, states))
@@ -341,68 +257,9 @@ class Combinations:
         ]
         field[self.velocities[pivot]] = summed([*parts, times(repr(1.0 / by), drift(c))])
 
-    def _departures(self, c: Contact) -> list[dict[str, Any]]:
-        """Return where motion on the surfaces of a contact leaves to."""
-        if c.kind is ContactKind.JENKINS:
-            return self._stops(c) if self.stop_of(c)[0] == c.name else []
-        if c.kind is not ContactKind.FRICTION:
-            return []
-        found = []
-        for closed in _subsets(self.structure.springs[c.name]):
-            gaps = {s.name: "-" if s in closed else "+" for s in self.structure.springs[c.name]}
-            for sign in "+-":  # friction that has reached its limit slides
-                limit = Limit(c, sign, tuple((s, "c") for s in closed))
-                where = {c.name: "0", limit.name: sign, **gaps}
-                found.append({"where": where, "leaves": {c.name: sign}})
-        return found
-
-    def _stops(self, first: Contact) -> list[dict[str, Any]]:
-        """Return what sticks when a velocity changes its sign: all elements along it that slide, at once."""
-        along = [
-            (c, ways)
-            for c in self.contacts
-            if c.kind is ContactKind.JENKINS
-            for stop, ways in [self.stop_of(c)]
-            if stop == first.name
-        ]
-        found = []
-        for sliding in reversed(_subsets(along)):  # the largest set that slides is all of them
-            for side in "+-" if sliding else "":
-                limits = [
-                    (f"{c.name}{'+' if ways['p'] == side else '-'}", "+-"[ways["p"] == side])
-                    for c, ways in sliding
-                ]
-                where = {**dict.fromkeys((name for name, _ in limits), "0")}
-                found.append(
-                    {
-                        "where": where | {first.name: "-" if side == "+" else "+"},
-                        "leaves": dict(limits),
-                    }
-                )
-        return found
-
-    def _resets(self) -> dict[str, dict[str, Any]]:
-        found: dict[str, dict[str, Any]] = {}
-        for c in self.contacts:
-            if c.kind is ContactKind.IMPACT:
-                over = self.structure.mobility(c, c)
-                kick = f"-(1 + ({c.texts['restitution']}))*({self.structure.approach(c)})/({over})"
-                moved = self.mass.of({i: repr(w) for i, w in c.direction.items()})
-                found[c.name] = {
-                    self.velocities[i]: f"{self.velocities[i]} + {times(w, kick)}"
-                    for i, w in moved.items()
-                }
-                if c.chatter:
-                    found[c.name]["chatter"] = True
-        return found
-
 
 def _with_meanings(given: Any) -> dict[str, str]:
     """Return constraints as they are declared, as a list or with their meanings, with meanings."""
     if isinstance(given, Mapping):
         return {str(text): str(why or "") for text, why in given.items()}
     return {str(text): "" for text in given or ()}
-
-
-def _subsets(items: Sequence[_T]) -> list[tuple[_T, ...]]:
-    return [s for k in range(len(items) + 1) for s in itertools.combinations(items, k)]

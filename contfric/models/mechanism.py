@@ -12,7 +12,7 @@ from contfric.models.definition import Model
 from contfric.models.describe import describe
 from contfric.models.entries import EntryError
 from contfric.models.files import built
-from contfric.models.structure import COORDINATES
+from contfric.models.structure_names import COORDINATES
 
 
 def Mechanism(  # the name that is promised: it makes a model as a class makes an object

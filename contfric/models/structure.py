@@ -10,11 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from contfric.errors import ModelError, did_you_mean
 from contfric.models.contact_ranges import check_ranges
 from contfric.models.contacts import Contact, ContactKind, drift, factor_of, read_contacts
 from contfric.models.entries import EntryError, Part, mapping_in
-from contfric.models.grammar import names_in, parse
 from contfric.models.matrices import (
     Mass,
     Texts,
@@ -26,8 +24,8 @@ from contfric.models.matrices import (
     times,
 )
 from contfric.models.shared_loads import Setting, SharedLoads
+from contfric.models.structure_names import COORDINATES, check_names, check_states
 
-COORDINATES = "coordinates"
 #: Most combinations of states of contacts that are listed, each a mode with regions of its own.
 _MOST_MODES = 243
 #: Friction contacts from which on modes are made when they are visited: each has seven regions, four of them
@@ -57,6 +55,7 @@ class Structure:
         coordinates = _coordinates(top)
         size = len(coordinates)
         velocities = tuple(f"v{i}" for i in range(1, size + 1))
+        check_states(coordinates, velocities, mapping_in(top.data, "contacts"))
         params = defaults_of(top)
         mass = mass_of(matrix_of("mass", top.data.get("mass"), size, "identity"), params)
         damping, stiffness = (
@@ -81,7 +80,7 @@ class Structure:
         known |= {*mapping_in(top.data, "define"), *mapping_in(top.data, "observables")}
         known |= {*mapping_in(top.data, "parameters")}
         for key in ("damping", "stiffness", "force"):
-            _check_names(top, key, size, known)
+            check_names(top, key, size, known)
         found = cls(top, coordinates, velocities, mass, forces, tuple(contacts))
         found.check()
         check_ranges(contacts, params, mapping_in(top.data, "define"))
@@ -244,25 +243,6 @@ def defaults_of(top: Part) -> dict[str, float]:
         if isinstance(given, (int, float)) and not isinstance(given, bool):
             found[name] = float(given)
     return found
-
-
-def _check_names(top: Part, key: str, size: int, known: set[str]) -> None:
-    """Look up the names in a matrix or in the forces, each in its row."""
-    given = top.data.get(key)
-    rows: list[tuple[str | int, list[str]]] = (
-        [(q, [str(text)]) for q, text in mapping_in(top.data, key).items()]
-        if key == "force"
-        else list(enumerate(matrix_of(key, given, size, "0")))
-    )
-    for row, texts in rows:
-        for text in texts:
-            try:
-                foreign = sorted(names_in(parse(text)) - known)
-            except ModelError as error:
-                raise EntryError((key, row), str(error)) from None
-            if foreign:
-                hint = did_you_mean(foreign[0], sorted(known))
-                raise EntryError((key, row), f"unknown name '{foreign[0]}'{hint}")
 
 
 def _force(

@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contfric.errors import AperiodicError, ConvergenceError, function_of, real_number, whole_number
+from contfric.errors import ConvergenceError, function_of, real_number, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
+from contfric.orbit.aperiodic import MOST, MOST_PERIODS, affordable, why_none
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
@@ -21,8 +22,6 @@ from contfric.orbit.system import build_system
 from contfric.remember.journal import remembered
 from contfric.signature.cyclic import primitive_length
 
-#: Longest period that is looked for, in periods of the excitation.
-MOST_PERIODS = 64
 #: Most events of a cycle that is looked for: 64 periods of an orbit with 32 joints.
 _MOST_EVENTS = 2048
 #: A return nearer than this (nondimensional) is worth a Newton solve.
@@ -36,8 +35,6 @@ _SLOW, _SERIES = 0.9, 0.2
 _CREEPING = 1e-5
 #: Periods to follow before the first look, and how much longer before each next one.
 _FIRST, _LONGER = 200, 4
-#: Growth over the last stretch (three quarters of the whole simulation) that no settling motion has.
-_GROWTH = 2.0
 #: Turns smaller than this (relative to 1 + the states) are none: the motion has come to rest.
 _NO_SIZE = 1e-6
 #: An orbit that a motion converges to attracts; beyond rounding its multipliers cannot exceed 1.
@@ -51,7 +48,7 @@ def find_orbit(
     *,
     state: ArrayLike | None = None,
     time: float = 0.0,
-    longest: int = 50_000,
+    longest: int | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Orbit:
     """Simulate until the motion repeats itself, read off its signature and solve for it.
@@ -61,8 +58,9 @@ def find_orbit(
     periods : int, optional
         Period wanted, in periods of the excitation; by default any from 1 to 64.
     state, time : initial condition; by default displaced from rest
-    longest : int
-        Periods to simulate before the motion is called aperiodic.
+    longest : int, optional
+        Periods to simulate before the motion is called aperiodic; by default 50,000, or fewer (not below
+        1,000) where it has many states and meets many events.
     progress : called with one line of text now and then, where it takes long
 
     Raises
@@ -81,7 +79,8 @@ def find_orbit(
     model, params = tied(model, params)
     if periods is not None:
         periods = whole_number("periods", periods, least=1, most=MOST_PERIODS)
-    longest = whole_number("longest", longest, least=1)
+    if longest is not None:
+        longest = whole_number("longest", longest, least=1)
     function_of("progress", progress)
     checked, time = model.check_params({} if params is None else params), real_number("time", time)
     return _wanted(_settled(model, checked, state, time, longest, progress=progress), periods)
@@ -93,12 +92,13 @@ def _settled(
     params: dict[str, float],
     state: ArrayLike | None,
     time: float,
-    longest: int,
+    longest: int | None,
     *,
     progress: Callable[[str], None] | None = None,
 ) -> Orbit:
     """Return the orbit that a motion converges to."""
-    span, done = _FIRST, 0
+    span, done, events = _FIRST, 0, 0
+    most = MOST if longest is None else longest
 
     def heard(text: str) -> None:
         if progress is not None:
@@ -115,20 +115,18 @@ def _settled(
             return _settled(resting, params, state, time, longest, progress=progress)
     while True:
         _check_motion(trajectory)
-        done += span
-        orbit = _read_off(trajectory, final=done >= longest)
+        done, events = done + span, events + len(trajectory)
+        if longest is None:
+            most = min(most, affordable(model, done, events))
+        orbit = _read_off(trajectory, final=done >= most)
         if orbit is not None and model.autonomous and _is_point(orbit):
             raise ConvergenceError(_comes_to_rest(trajectory), trajectory)
         if orbit is not None:
             return orbit
-        if done >= longest:
+        if done >= most:
             slow = next((r for r in recurrences(trajectory) if r[2] < _CREEPING), None)
-            if slow is not None:
-                raise ConvergenceError(_marginal(trajectory, done, *slow[1:]), trajectory)
-            if _grows(trajectory):
-                raise ConvergenceError(_unbounded(trajectory), trajectory)
-            raise AperiodicError(_advice(trajectory, done), trajectory)
-        span = min(span * _LONGER, longest - done)
+            raise why_none(trajectory, done, slow, compared=longest is None)
+        span = min(span * _LONGER, most - done)
         heard(f"{span} more")
         trajectory = go_on(trajectory, span, heard)
 
@@ -164,43 +162,6 @@ def _check_motion(trajectory: Trajectory) -> None:
             f"no periodic orbit: {trajectory.end.value}. Choose other parameters or another start",
             trajectory,
         )
-
-
-def _marginal(trajectory: Trajectory, done: int, turns: int, mismatch: float) -> str:
-    where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
-    return (
-        f"the motion at {where} has not converged in {done} periods: it still changes by "
-        f"{mismatch:.1g} in {turns} period(s), more slowly than any exponential. The orbit is "
-        "marginally stable (a multiplier is 1), as orbits of a continuum are. Move a parameter a "
-        "little, or add damping"
-    )
-
-
-def _grows(trajectory: Trajectory) -> bool:
-    """Tell whether the last stretch of a simulation is far larger at its end than at its start."""
-    if not len(trajectory):  # it has met no surface at all
-        return False
-    size = np.max(np.abs(trajectory.states), axis=1)
-    tenth = max(1, len(size) // 10)
-    return bool(np.max(size[-tenth:]) > _GROWTH * np.max(size[:tenth]))
-
-
-def _unbounded(trajectory: Trajectory) -> str:
-    where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
-    size = float(np.max(np.abs(trajectory.states[-1])))
-    return (
-        f"no periodic orbit: the motion at {where} grows without bound (to {size:.3g} so far), as at "
-        "a resonance with too little damping. Choose other parameters"
-    )
-
-
-def _advice(trajectory: Trajectory, done: int) -> str:
-    where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
-    return (
-        f"the motion at {where} is aperiodic: no period from 1 to {MOST_PERIODS} was found in {done} "
-        "periods. Try another parameter value, another start (state=...), a longer simulation "
-        "(longest=...), or start from a signature (start: {signature: NAME} in a study)"
-    )
 
 
 def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:

@@ -383,6 +383,35 @@ def test_matrices_from_files(tmp_path: Any) -> None:
         cf.load_model(path)
 
 
+@pytest.mark.parametrize(
+    ("coordinates", "contact", "line", "message"),
+    [
+        (["a", "b", "a"], "rub", 7, "the coordinate 'a' has the name of a coordinate"),
+        (["a", "v3", "b"], "rub", 6, "the coordinate 'v3' has the name of a velocity"),
+        (["a", "t", "b"], "rub", 6, "coordinate 't': this name means"),
+        (["a", "b", "c"], "c", 10, "the stretch of 'c' has the name of a coordinate"),
+        (["a", "b", "c"], "v2", 10, "the stretch of 'v2' has the name of a velocity"),
+    ],
+)
+def test_a_name_that_is_taken_is_reported_in_its_line(
+    tmp_path: Any, coordinates: list[str], contact: str, line: int, message: str
+) -> None:
+    lines = [
+        "name: taken",
+        "parameters: {W: 0.9}",
+        "period: 2*pi/W",
+        "coordinates:",
+        *(f"  - {name}" for name in coordinates),
+        "force: {a: cos(W*t)}",
+        "contacts:",
+        f"  {contact}: {{kind: jenkins, displacement: a, stiffness: 1, limit: 0.2}}",
+    ]
+    path = tmp_path / "taken.yaml"
+    path.write_text("\n".join(lines))
+    with pytest.raises(ModelError, match=rf"taken.yaml:{line}: {message}"):
+        cf.load_model(path)
+
+
 def test_masses_side_by_side_move_as_one_alone() -> None:
     """Masses that share nothing move as one alone does."""
     contacts = {

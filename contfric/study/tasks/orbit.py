@@ -33,8 +33,8 @@ class Simulated(Part):
     periods: int | None = Field(
         None, ge=1, le=64, description="a whole number from 1 to 64: the period wanted"
     )
-    longest: int = Field(
-        50_000, ge=200, description="a whole number >= 200: periods to simulate at most"
+    longest: int | None = Field(
+        None, ge=200, description="a whole number >= 200: periods to simulate at most"
     )
 
 

@@ -1,0 +1,109 @@
+"""When a simulation that has not come to a periodic orbit is given up, and what is said of its motion.
+
+A motion that is not periodic is known by nothing but patience: chaos may be a transient, and a slow spiral
+needs thousands of periods. So a limit is set by the work, which grows with the events and about with the
+square of the number of states. Whether it is chaotic then is asked of two motions that begin close to each
+other: their distance grows as ``exp(t/t_0)`` along a chaotic motion, in proportion to t at most along a
+quasi-periodic one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.errors import AperiodicError, ConvergenceError
+from contfric.models.definition import Model
+from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
+
+#: Longest period that is looked for, in periods of the excitation.
+MOST_PERIODS = 64
+#: Periods that are simulated at most, and in any case.
+MOST, _LEAST = 50_000, 1_000
+#: Events times the square of the number of states that are worth it: about ten seconds.
+_WORK = 2e6
+#: Growth over the last stretch (three quarters of the whole simulation) that no settling motion has.
+_GROWTH = 2.0
+#: Two motions that begin this far apart (relative to 1 + the states) are compared after some periods; they
+#: part by a larger factor than quasi-periodic ones, in proportion to time, could.
+_APART, _COMPARED, _CHAOTIC = 1e-9, 100, 1e3
+
+
+def affordable(model: Model, done: int, events: int) -> int:
+    """Return how many periods a motion may be followed that has met some events in those that are done."""
+    work = events * len(model.states) ** 2
+    return MOST if not work else min(MOST, max(_LEAST, int(done * _WORK / work)))
+
+
+def why_none(
+    trajectory: Trajectory, done: int, slow: tuple[int, int, float] | None, compared: bool
+) -> ConvergenceError | AperiodicError:
+    """Return the error that says why a motion has come to no orbit.
+
+    Parameters
+    ----------
+    done : periods that were simulated
+    slow : a return (events, periods, mismatch) that is nearly exact
+    compared : whether it is worth 200 periods more to tell whether the motion is chaotic
+    """
+    if slow is not None:
+        return ConvergenceError(_marginal(trajectory, done, *slow[1:]), trajectory)
+    if _grows(trajectory):
+        return ConvergenceError(_unbounded(trajectory), trajectory)
+    text = _advice(trajectory, done) + (_parting(trajectory) if compared else "")
+    return AperiodicError(text, trajectory)
+
+
+def _marginal(trajectory: Trajectory, done: int, turns: int, mismatch: float) -> str:
+    where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
+    return (
+        f"the motion at {where} has not converged in {done} periods: it still changes by "
+        f"{mismatch:.1g} in {turns} period(s), more slowly than any exponential. The orbit is "
+        "marginally stable (a multiplier is 1), as orbits of a continuum are. Move a parameter a "
+        "little, or add damping"
+    )
+
+
+def _grows(trajectory: Trajectory) -> bool:
+    """Tell whether the last stretch of a simulation is far larger at its end than at its start."""
+    if not len(trajectory):  # it has met no surface at all
+        return False
+    size = np.max(np.abs(trajectory.states), axis=1)
+    tenth = max(1, len(size) // 10)
+    return bool(np.max(size[-tenth:]) > _GROWTH * np.max(size[:tenth]))
+
+
+def _unbounded(trajectory: Trajectory) -> str:
+    where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
+    size = float(np.max(np.abs(trajectory.states[-1])))
+    return (
+        f"no periodic orbit: the motion at {where} grows without bound (to {size:.3g} so far), as at "
+        "a resonance with too little damping. Choose other parameters"
+    )
+
+
+def _advice(trajectory: Trajectory, done: int) -> str:
+    where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
+    return (
+        f"the motion at {where} is aperiodic: no period from 1 to {MOST_PERIODS} was found in {done} "
+        f"periods. Try another parameter value, another start (state=...), a longer simulation "
+        "(longest=...), or start from a signature (start: {signature: NAME} in a study)"
+    )
+
+
+def _parting(trajectory: Trajectory) -> str:
+    """Return what two motions say that begin close to each other where a trajectory ends."""
+    model, (_, time, state, _) = trajectory.model, trajectory.last
+    shift = _APART * (1.0 + np.abs(state)) * (-1.0) ** np.arange(len(state))
+    one, other = (
+        simulate(model, trajectory.params, state=begin, time=time, periods=_COMPARED)
+        for begin in (state, state + shift)
+    )
+    if {one.end, other.end} != {SimulationEnd.TIME}:
+        return ""
+    apart = float(np.max(np.abs(one.last[2] - other.last[2]) / (1.0 + np.abs(one.last[2]))))
+    if apart > _CHAOTIC * _APART:
+        return (
+            f". Motions that begin {_APART:.0e} apart are {apart:.0e} apart after {_COMPARED} periods: it is "
+            "chaotic, or a long transient of chaos"
+        )
+    return ". Motions that begin close stay close: it is quasi-periodic, or it converges slowly"
