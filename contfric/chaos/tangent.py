@@ -139,7 +139,7 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
         for j in range(y.shape[0]):
             if not abs(y[j]) < TOO_LARGE:
                 why = CHATTER  # flights too short to be resolved
-                if walk.at_once[2] == 0:
+                if walk.at_once[2] == 0 or walk.at_once[0] == 0:
                     why = too_large(functions, mode, duration, p, walk, workspace)
                 return why, surface, mode, duration, turns, t
         reset = tables.bounds[mode, surface] == 2

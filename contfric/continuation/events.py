@@ -13,7 +13,8 @@ any        surface with a reset                    GS: a grazing impact
 exit       as the interior of the same segment     AS, GS or T: the exit becomes tangential
 joint      the state at a stop meets a surface     CS if it leaves the stick there (distance to
                                                    the limit grows outward), SS if it enters it;
-                                                   CS where there is no rest that the surface ends;
+                                                   CS where there is no rest that the surface ends, and GS
+                                                   where one of the two is the zero of the other's rate;
                                                    as the interior where a section is touched
 entry      behind a reset the state is on another  CS: another mode follows
            surface
@@ -41,7 +42,7 @@ from contfric.continuation.touching import (
     is_corner,
     rate_along,
     resting_domain,
-    touches_at_section,
+    touched_at_joint,
 )
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import Model
@@ -341,10 +342,12 @@ def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
         resting = resting_domain(system, test)
         if resting is None and inside_sign(model, mode, test.surface) == 0:
             return Kind.T
-    if test.margin is not Margin.JOINT or touches_at_section(system, test, orbit):
-        if model.mode_by_name[mode].sliding and not begins_to_slide(model, mode, test.surface):
+    joint = test.margin is Margin.JOINT
+    touched = touched_at_joint(system, test, orbit) if joint else test.surface
+    if touched is not None:
+        if model.mode_by_name[mode].sliding and not begins_to_slide(model, mode, touched):
             return Kind.AS
-        return Kind.T if inside_sign(model, mode, test.surface) == 0 else Kind.GS
+        return Kind.T if inside_sign(model, mode, touched) == 0 else Kind.GS
     # a load that stands still at rest: from beyond the limit the slide leads back into it, as at SS
     return Kind.CS if outward_rate(system, test, orbit) > 0.0 else Kind.SS
 

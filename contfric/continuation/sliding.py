@@ -86,6 +86,7 @@ def sliding_events(
             and _is_free(orbit.system.tests[first], test)
         )
     )
+    group = _once(here, group)
     found = bifurcation_at(kind, here, before, None, point, settings, group)
     point.rough = rough
     known = ROUGHLY_REACHED if rough else known
@@ -275,6 +276,17 @@ def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation 
     found = bifurcation_at(kind, here, tip, None, tip, settings, group)
     # the parameter changes by no more than the margins do, on the way that is left
     return replace(found, bound=max(found.accuracy, _NEARLY_REACHED))
+
+
+def _once(here: Orbit, group: tuple[Test, ...]) -> tuple[Test, ...]:
+    """Return the margins without joints whose exit is tangential: what is met there for that is one event."""
+    tangential = {(t.segment, t.surface) for t in group if t.margin is Margin.EXIT}
+    return tuple(
+        t
+        for t in group
+        if t.margin is not Margin.JOINT
+        or (t.segment, here.system.word[t.segment][1]) not in tangential
+    )
 
 
 def _is_free(first: Test, other: Test) -> bool:

@@ -21,17 +21,27 @@ _PASSED = 1e-4
 _STATES = 6
 
 
-def touches_at_section(system: System, test: Test, orbit: Orbit) -> bool:
-    """Tell whether the state at a joint touches a surface where the segment ends on a section.
+def touched_at_joint(system: System, test: Test, orbit: Orbit) -> str | None:
+    """Return the surface that is touched where two are met at a joint; None if that is a corner of them.
 
     A slider that begins to slip reaches its limit where its velocity vanishes, and that may be the section:
-    nothing stops there, and the touch is that inside of the segment, whose margin vanishes too.
+    nothing stops there, and the touch is that inside of the segment, whose margin vanishes too. So it is
+    where one of the two is the zero of the other one's rate, and nothing rests there: they are met at once
+    by a tangency alone, and which of them ends the segment is a matter of the word.
     """
-    mode, exit_ = system.word[test.segment]
-    if not is_section(system.model, mode, exit_):
-        return False
-    rate = rate_along(orbit, mode, test.surface, orbit.ends[test.segment])
-    return abs(rate) < _TANGENTIAL
+    model, (mode, exit_) = system.model, system.word[test.segment]
+    end = orbit.ends[test.segment]
+    if is_section(model, mode, exit_):
+        return (
+            test.surface if abs(rate_along(orbit, mode, test.surface, end)) < _TANGENTIAL else None
+        )
+    if exit_ not in model.surface_by_name or resting_domain(system, test) is not None:
+        return None
+    for touched, other in ((test.surface, exit_), (exit_, test.surface)):
+        slow = abs(rate_along(orbit, mode, touched, end)) < _PASSED
+        if slow and is_rate_of(model, mode, touched, other):
+            return touched
+    return None
 
 
 def is_corner(system: System, test: Test, orbit: Orbit) -> bool:

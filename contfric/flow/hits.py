@@ -48,7 +48,8 @@ def refine_hit(motion, mode, c, target, sign, t, h, low, high, at, p, workspace)
             high = at
         shift = -q / q1 if q1 != 0.0 else math.inf
         following = at + shift
-        if abs(shift) <= _LAST * h or high - low <= 2e-16 * abs(t):
+        # the bracket's rounding is that within the step, which may be below that of the time
+        if abs(shift) <= _LAST * h or high - low <= 2e-16 * high:
             if abs(shift) > _LAST * h:
                 return at
             for k in range(n):

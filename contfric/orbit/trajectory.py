@@ -299,8 +299,9 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
                 continue
             return ALL_TIME, event, mode, cycle, t
         waited = 0.0
-        if too_large(y):  # or flights too short to be resolved
-            return (CHATTER if struck else INFINITE), event, mode, cycle, t
+        if too_large(y):  # or, where flights were short, they are too short to be resolved
+            chatters = struck and at_once > 0
+            return (CHATTER if chatters else INFINITE), event, mode, cycle, t
         reset = tables.bounds[mode, surface] == 2
         if reset:  # rows keep the state before it, as the joints of orbits do
             copy_state(y, rows.states[event])

@@ -267,3 +267,114 @@ def test_a_clock_is_struck_on_its_way_up(tmp_path) -> None:
     assert branch.ends[1].bifurcation.kind is cf.Kind.GS
     with pytest.raises(cf.ModelError, match="acts in no mode"):
         typed(tmp_path, CLOCK.replace(", from: [forth]", ""))
+
+
+#: Exponential integrate-and-fire without a leak: V' = exp(V) blows up, and is cut far up at V = top.
+BLOWS_UP = """
+name: blow-up
+states: [V, w]
+parameters: {low: -8.0, top: 30.0, b: 2.0, tau: 4000.0}
+autonomous: true
+surfaces:
+  spike: {observable: V, level: top}
+modes:
+  free: {in: {spike: -}, field: {V: exp(V), w: -w/tau}}
+resets:
+  spike: {V: low, w: w + b}
+spread: {V: low}
+"""
+
+
+@pytest.mark.parametrize("top", [5.0, 20.0, 30.0])
+def test_a_motion_may_be_faster_than_the_time_can_say(tmp_path, top: float) -> None:
+    """At the top V moves by exp(top): over less than the rounding of a time of thousands.
+
+    The period is exp(-low) - exp(-top), and w decays over it by what it gains.
+    """
+    model = typed(tmp_path, BLOWS_UP)
+    T = math.exp(8.0) - math.exp(-top)
+    run = cf.simulate(model, {"top": top}, state=[-8.0, 0.0], time=1e6, periods=9.5 * T)
+    assert run.end.name == "TIME" and len(run) == 9
+    assert run.times == pytest.approx(1e6 + T * np.arange(1, 10), rel=1e-12)
+    if (
+        top > 20.0
+    ):  # an orbit has its durations as numbers, and V at the top depends on them by exp(top)
+        return
+    orbit = cf.find_orbit(model, {"top": top}, state=[-8.0, 0.0])
+    decay = math.exp(-T / 4000.0)
+    assert orbit.ends[0] == pytest.approx([0.0, top, 2.0 * decay / (1.0 - decay)], rel=1e-11)
+    assert orbit.period == pytest.approx(T, rel=1e-12)
+    assert max(abs(orbit.multipliers)) == pytest.approx(decay, rel=1e-9)
+
+
+ADEX = """
+name: adex
+states: [V, w]
+parameters: {C: 281.0, gL: 30.0, EL: -70.6, VT: -50.4, DT: 2.0, a: 4.0, b: 80.5, tau: 144.0, I: 800.0,
+  Vr: -70.6, Vspike: 0.0}
+autonomous: true
+surfaces:
+  spike: {observable: V, level: Vspike}
+modes:
+  free:
+    in: {spike: -}
+    field: {V: (-gL*(V - EL) + gL*DT*exp((V - VT)/DT) - w + I)/C, w: (a*(V - EL) - w)/tau}
+resets:
+  spike: {V: Vr, w: w + b}
+spread: {V: EL}
+"""
+
+
+def adex_flight(current: float, w: float):
+    """Return (time, w) of a spike from (Vr, w): scipy, in the time that runs as fast as V does."""
+
+    def field(_, y):
+        V, w, _ = y
+        rate = (-30.0 * (V + 70.6) + 60.0 * math.exp((V + 50.4) / 2.0) - w + current) / 281.0
+        slow = 1.0 / math.hypot(1.0, rate)
+        return [slow * rate, slow * (4.0 * (V + 70.6) - w) / 144.0, slow]
+
+    def spike(_, y):
+        return y[0]
+
+    spike.terminal = True
+    start = [-70.6, w, 0.0]
+    run = solve_ivp(field, (0.0, 1e4), start, "DOP853", events=spike, rtol=1e-12, atol=1e-11)
+    return run.y[2, -1], run.y[1, -1]
+
+
+@pytest.mark.parametrize("current", [700.0, 1000.0, 2500.0])
+def test_adaptive_exponential_neuron(tmp_path, current: float) -> None:
+    """Brette and Gerstner, J. Neurophysiol. 94 (2005) 3637: spikes at 0 mV, where V' is 2e10 mV/ms."""
+    model = typed(tmp_path, ADEX)
+    run = cf.simulate(model, {"I": current}, state=[-70.6, 0.0], periods=20_000)
+    w = brentq(lambda w: adex_flight(current, w)[1] + 80.5 - w, 100.0, 3000.0, xtol=1e-9)
+    T, at_spike = adex_flight(current, w)
+    assert run.end.name == "TIME"
+    assert np.diff(run.times)[-5:] == pytest.approx(T, rel=1e-8)
+    orbit = cf.find_orbit(model, {"I": current}, state=[-70.6, 0.0])
+    assert str(orbit.signature) == "free -> reset@spike" and orbit.stable
+    assert orbit.ends[0] == pytest.approx([0.0, 0.0, at_spike], rel=1e-8)
+    assert orbit.period == pytest.approx(T, rel=1e-8)
+
+
+def test_what_escapes_behind_an_impact_has_not_chattered(tmp_path) -> None:
+    """Thrown off by a wall, x'' = x^3 - 1 is infinite in finite time."""
+    model = typed(
+        tmp_path,
+        """
+name: thrown
+states: [x, v]
+parameters: {e: 6.0}
+autonomous: true
+surfaces:
+  wall: {observable: x}
+modes:
+  flight: {in: {wall: +}, field: {x: v, v: x**3 - 1}}
+resets:
+  wall: {v: -e*v}
+""",
+    )
+    run = cf.simulate(model, {}, state=[0.1, 0.0], periods=100)
+    assert run.end.name == "INFINITE" and len(run) == 1
+    assert "unbounded" in repr(cf.lyapunov_exponent(model, {}, state=[0.1, 0.0]))

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import contfric as cf
 
@@ -76,3 +77,51 @@ def test_a_slider_that_begins_to_slip_grazes_its_limit(seed: int) -> None:
     event = min(down.bifurcations, key=lambda b: b.params["F"])
     assert event.kind is cf.Kind.GS
     assert event.contacts == ("a",)
+
+
+#: A hopper on a leg that is stiffer on its way up: it hops where that gives more than damping takes.
+HOPPER = """
+name: hopper
+states: [y, v]
+parameters: {g: 1.0, k: 20.0, up: 22.0, c: 1.0}
+autonomous: true
+surfaces:
+  ground: {observable: y, level: 1}
+  bottom: {observable: v}
+modes:
+  flight: {in: {ground: +}, field: {y: v, v: -g}}
+  down: {in: {ground: -, bottom: -}, field: {y: v, v: k*(1 - y) - g - c*v}}
+  rise: {in: {ground: -, bottom: +}, field: {y: v, v: up*(1 - y) - g - c*v}}
+spread: {y: 1.2}
+"""
+
+
+@pytest.mark.parametrize("up", [22.0, 32.0])
+def test_two_surfaces_that_one_tangency_meets_at_once_are_no_corner(tmp_path, up: float) -> None:
+    """It takes off without speed: y = 1 is touched where v = 0 ends the rise, or the rise ends on y = 1.
+
+    From rest at y = 1 and back: with r(k) = exp(-pi c/(2 w)), w^2 = k - c^2/4, the share of a height over the
+    balance that is left half a turn later, (g/k (1 + r(k)) - g/up) r(up) = g/up.
+    """
+    path = tmp_path / "hopper.yaml"
+    path.write_text(HOPPER)
+
+    def decay(k: float) -> float:
+        return float(np.exp(-0.5 * np.pi / np.sqrt(k - 0.25)))
+
+    def mismatch(k: float) -> float:
+        lowest = (1.0 + decay(20.0)) / 20.0  # below y = 1
+        return (lowest - 1.0 / k) * decay(k) - 1.0 / k
+
+    at = brentq(mismatch, 21.0, 35.0, xtol=1e-13)
+    orbit = cf.find_orbit(cf.load_model(path), {"up": up}, state=[1.3, 0.0])
+    branch = cf.continue_orbit(orbit, "up", (20.5, 36.0))
+    events = [b for b in branch.bifurcations if b.tests]
+    assert [b.kind.value for b in events] == ["GS"]
+    assert events[0].params["up"] == pytest.approx(at, abs=1e-9)
+    found = cf.explore(orbit, "up", (20.5, 36.0))
+    assert [n.bifurcation.kind.value for n in found.nodes] == ["GS"] and not found.loose_ends
+    for one in found.branches:
+        for event in one.bifurcations:
+            joints = [(t.segment, t.margin.value) for t in event.tests]
+            assert len({segment for segment, _ in joints}) == len(joints)  # each place once
