@@ -21,6 +21,7 @@ from contfric.continuation.geometry import (
     PointsType,
     copy_to,
     copy_vector,
+    distance,
     interpolate,
     largest_state,
 )
@@ -66,6 +67,9 @@ _LOST = 1e-6
 #: Share of the value at the start of a step that may be left at a place where trials fail: it is found, and
 #: they fail by rounding, as they do where joints are at times of many periods.
 _LEFT = 1e-9
+#: Two trials that are farther apart than this many times the way between their places lie on two sheets: a
+#: step is refused whose ends differ by a third of a radian in direction.
+_APART = 100.0
 #: Trials after which a bracket has the width of the arithmetic, whatever the function.
 _MOST_TRIALS = 120
 
@@ -243,12 +247,13 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
         ends : (value at row 0, value at row 1)
         rules : (accuracy of a trial; whether the value has the sign that it has, or is positive before;
             value that is rounding; width of a bracket that is as narrow as can be; width below which it is
-            not narrowed down where trials fail)
+            not narrowed down where trials fail, 0 where sheets are not told apart)
 
         Returns
         -------
         tuple
-            (position in the step, value there, whether trials fail behind it, whether any did not).
+            (position in the step, value there, whether trials fail behind it or go over to another sheet,
+            whether any did not).
         """
         way = by_reference(way)
         zs, ws, tzs, tws = points.joints, points.w, points.tangents, points.directions
@@ -257,6 +262,7 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
         f_low, f_high = limited(sign * ends[0]), limited(sign * ends[1])
         low, high, x, best, best_f, left = 0.0, 1.0, 0.5, 0.0, f_low, _LEFT * f_low
         x_old, f_old, lost, solved = low, f_low, False, False
+        reach = _APART * distance(zs[0], ws[0], zs[1], ws[1], way.scale)
         copy_row(points, 3, 0)
         if f_low > 0.0 and f_high < 0.0:
             x = min(0.99, max(0.01, f_low / (f_low - f_high)))
@@ -281,6 +287,10 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
                 x_old, f_old = high, f_high
                 high, f_high = x, f
                 lost = not fine
+                if fine and given_up > 0.0:
+                    lost = distance(zs[2], ws[2], zs[3], ws[3], way.scale) > reach * (x - low)
+                    if lost:
+                        break
             if f == 0.0 or high - low <= narrowest or (f_low <= noise and f_high >= -noise):
                 break
             if lost and high - low < given_up:

@@ -33,6 +33,9 @@ from contfric.orbit.system import System
 _REGULAR = 3e-2
 #: Newton's method converges from there in 3 to 6 steps.
 _MOST_STEPS = 12
+#: Corrections longer than the one before after which it is given up: near a solution all are shorter, but for
+#: the first ones, which may be rounding.
+_MOST_RISES = 2
 #: Corrections that end it: far below what the derivatives, which are differences, leave in the next one.
 _SETTLED = 1e-12
 #: One that is this small and no longer falls is rounding.
@@ -163,7 +166,7 @@ def _moore(problem: _Problem, x: FloatArray) -> tuple[FloatArray, FloatArray] | 
     left, values, _ = np.linalg.svd(jacobian)
     if not values[-1] < _REGULAR * values[0]:
         return None
-    size, psi, beta, before = len(residual), left[:, -1], 0.0, np.inf
+    size, psi, beta, before, rises = len(residual), left[:, -1], 0.0, np.inf, 0
     rounding = max(problem.system.model.rounding, _LEAST_ROUNDING)
     full = np.zeros((2 * size + 2, 2 * size + 2))
     for _ in range(_MOST_STEPS):
@@ -182,7 +185,8 @@ def _moore(problem: _Problem, x: FloatArray) -> tuple[FloatArray, FloatArray] | 
             return None
         x, psi, beta = x + step[: size + 1], psi + step[size + 1 : -1], beta + float(step[-1])
         moved = float(np.max(np.abs(step[: size + 1])))
-        if not moved < 1.0:
+        rises += moved > before
+        if not moved < 1.0 or rises == _MOST_RISES:
             return None
         if moved < _SETTLED or (moved < _ROUNDED and moved > 0.5 * before):
             unfolded = abs(beta) > _UNFOLDED * rounding * max(1.0, float(values[0]))

@@ -90,6 +90,8 @@ def smooth_events(
             half = orbit.system.half or column == CHI_ONE
             kind = Kind.NS if column == CHI_PAIR else Kind.BP if half else Kind.PD
             found.append(_overshot(orbit, kind, before, after, beyond, settings))
+            if found[-1][1].lost:
+                return found  # the step is taken back: what else is in it is found again
     return [*found, *_tangencies(orbit, before, beyond, settings)]
 
 
@@ -268,8 +270,11 @@ def _overshot(
 
     A step as short as can be is not: then the event is reported as not located.
     """
-    bifurcation, point = _not_located(orbit, kind, before, beyond, settings)
-    return bifurcation, replace(point, lost=after.arc - before.arc > _SHORTEST_LEAP)
+    if after.arc - before.arc <= _SHORTEST_LEAP:
+        return _not_located(orbit, kind, before, beyond, settings)
+    here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    found = bifurcation_at(kind, here, before, beyond, before, settings)
+    return found, replace(before, lost=True)
 
 
 def _is_pole(value: float, a: float, b: float) -> bool:

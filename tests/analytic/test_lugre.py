@@ -14,8 +14,11 @@ from scipy.integrate import solve_ivp
 import contfric as cf
 from contfric.continuation.points import settings_of
 from contfric.continuation.side import first_point
+from contfric.continuation.smooth import smooth_events
 from contfric.continuation.trace import trace_side
+from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
+from contfric.orbit.system import build_system
 
 #: Integrated models from end to end: minutes of processor time, run by `make test-all`.
 pytestmark = pytest.mark.slow
@@ -229,6 +232,36 @@ def test_a_step_that_leaps_over_folds_is_taken_back(orbit):
     assert sorted(folds) == pytest.approx(FOLDS, abs=1e-11)
     assert len(branch.bifurcations) == 3
     assert all(b.located for b in branch.bifurcations)
+
+
+#: Orbits of four periods on two sheets, 2e-5 apart where both are (S = 0.32).
+SHEETS = {
+    0.490310037732409: [
+        [7.83502754982629, -1.3209512803985, 0.0667262718926827, 0.000341539942939076],
+        [14.2423869996125, 1.32096887176635, -0.0669386378117495, -0.000341447196490157],
+    ],
+    0.490264850409885: [
+        [7.83574969810305, -1.32099389560562, 0.066705186722161, 0.000341549277563862],
+        [14.2436997091289, 1.32099616892822, -0.0667449231321863, -0.000341531882206899],
+    ],
+}
+
+
+def test_a_step_to_another_sheet_that_is_solved_everywhere_is_taken_back(model):
+    """Newton fails nowhere between: a multiplier jumps from -1528 to 63 where the trials change the sheet."""
+    system = build_system(model, (("second", "phase"), ("first", "phase")), 4)
+    ends, arc = [], 0.0
+    for value, joints in SHEETS.items():
+        vector = model.vector({**WHERE, "S": 0.32, "Omega": value})
+        orbit = polish(Orbit(system, np.array(joints), vector, np.inf), damped=False)
+        settings = settings_of(orbit, "Omega", (0.46, 0.56), None, True, 20_000, None)
+        point = first_point(orbit, settings)
+        ends.append(replace(point if point.slope < 0.0 else point.reversed(), arc=arc))
+        arc += 1.16e-3
+    before, after = ends
+    assert before.mu[0].real < -1000.0 and after.mu[0].real > 10.0
+    found = smooth_events(orbit, before, after, settings, after)
+    assert [point.lost for _, point in found] == [True]
 
 
 def at(orbit, **changed):
