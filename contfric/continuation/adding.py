@@ -29,6 +29,7 @@ from contfric.continuation.trace import follow_orbit
 from contfric.errors import ConvergenceError, ParameterError, shown, whole_number
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.prescribed import follow_word
 from contfric.orbit.solve import polish
 from contfric.orbit.system import Margin, build_system
 from contfric.signature.cyclic import least_rotation, primitive_length
@@ -38,10 +39,8 @@ from contfric.signature.edits import concatenate
 #: few changes of sign for a word of six turns.
 _GRID = 48
 #: Rounds of the motion before Newton: a stable word contracts the error of 1e-3 to far below the length
-#: of its sticks. Most crossings of an exit surface looked at: one in the wrong sense, one in the right one.
-_ROUNDS, _PASSES = 4, 2
-#: A state is on a surface if it is this near: the starts of slides are solved to rounding.
-_ON_SURFACE = 1e-12
+#: of its sticks.
+_ROUNDS = 4
 #: Steps towards one change of sign, and the resolution of its place: the method needs about ten.
 _MOST_STEPS, _RESOLUTION = 60, 1e-15
 
@@ -224,34 +223,9 @@ def _at(orbit: Orbit, parameter: str, value: float) -> Orbit:
 
 def _settled(orbit: Orbit) -> Orbit:
     """Return an orbit with the joints of the motion that takes its outcomes, after some rounds."""
-    layout, joints = orbit.system.layout, orbit.joints.copy()
-    end = joints[0].copy()
-    for _ in range(_ROUNDS):
-        for i in range(len(joints)):
-            joints[i] = end
-            after = _next_joint(orbit, *orbit.system.word[i], layout.exit_signs[i], end)
-            if after is None:
-                return orbit
-            end = after
-        end[0] -= orbit.period
-    return replace(orbit, joints=joints)
-
-
-def _next_joint(
-    orbit: Orbit, mode: str, surface: str, sign: float, joint: FloatArray
-) -> FloatArray | None:
-    """Return where a segment meets its exit with the right sign of the rate; None if it does not."""
-    flow, observable = orbit.flow, orbit.model.surface_by_name[surface].observable
-    time, state, level = float(joint[0]), joint[1:], flow.level(surface)
-    on = abs(flow.observe(observable, time, state) - level) < _ON_SURFACE
-    for _ in range(_PASSES):
-        hit = flow.first(mode, observable, level, time, state, orbit.period, on=on)
-        if hit is None:
-            return None
-        time, state, on = time + hit[0], hit[1], True
-        if flow.rate(mode, observable, time, state) * sign > 0.0:
-            return np.array([time, *state])
-    return None
+    joints, end, system = orbit.joints.copy(), np.empty(orbit.joints.shape[1]), orbit.system
+    found = follow_word(system.functions(), system.layout, joints, orbit.vector, _ROUNDS, end)
+    return replace(orbit, joints=joints) if found else orbit
 
 
 def _bounds(
