@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from contfric.base.shown import Shown
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import candidates
 from contfric.continuation.events import Bifurcation
+from contfric.continuation.itineraries import words_with_ranges
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import follow_orbit
 from contfric.errors import ConvergenceError, ParameterError, shown, whole_number
@@ -32,7 +33,6 @@ from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.prescribed import follow_word
 from contfric.orbit.solve import polish
 from contfric.orbit.system import Margin, build_system
-from contfric.signature.cyclic import least_rotation, primitive_length
 from contfric.signature.edits import concatenate
 
 #: Places over the gap at which the margins of a word are looked at: they are smooth curves there, with a
@@ -120,21 +120,14 @@ def period_adding(bridge: Branch, longest: int = 6) -> tuple[Window, ...]:
         if end.bifurcation is None:
             raise ParameterError(f"the bridge does not end at an event: {end}")
         letters[letter] = _regular(end.bifurcation, bridge)
+    low, high = float(bridge.values.min()), float(bridge.values.max())
+    grid = np.linspace(low, high, _GRID + 2)[1:-1]
     windows = [
         window
-        for turns in _words(longest)
-        if (window := _window(turns, letters, bridge)) is not None
+        for turns, near in words_with_ranges(letters, bridge, grid, longest)
+        if (window := _window(turns, letters, bridge, near)) is not None
     ]
     return tuple(sorted(windows, key=lambda w: w.range))
-
-
-def _words(longest: int) -> Iterator[str]:
-    """Yield the words over a and b with both letters, each once up to rotation, none repeating itself."""
-    for length in range(2, longest + 1):
-        for letters in product("ab", repeat=length):
-            both = {"a", "b"} <= set(letters)
-            if both and least_rotation(letters) == 0 and primitive_length(letters) == length:
-                yield "".join(letters)
 
 
 def _regular(event: Bifurcation, bridge: Branch) -> Orbit:
@@ -176,10 +169,12 @@ def _rests(orbit: Orbit, mode: str) -> bool:
     return orbit.model.mode_by_name[mode].sliding
 
 
-def _window(turns: str, letters: dict[str, Orbit], bridge: Branch) -> Window | None:
-    """Return the window of a word, None if it has none."""
+def _window(
+    turns: str, letters: dict[str, Orbit], bridge: Branch, grid: FloatArray
+) -> Window | None:
+    """Return the window of a word over some parameters, None if it has none."""
     start = _in_turn([letters[letter] for letter in turns])
-    low, high = _bounds(start, turns, letters, bridge)
+    low, high = _bounds(start, turns, letters, bridge, grid)
     if not low < high:
         return None
     middle = _at(start, bridge.parameter, 0.5 * (low + high))
@@ -229,7 +224,7 @@ def _settled(orbit: Orbit) -> Orbit:
 
 
 def _bounds(
-    start: Orbit, turns: str, letters: dict[str, Orbit], bridge: Branch
+    start: Orbit, turns: str, letters: dict[str, Orbit], bridge: Branch, grid: FloatArray
 ) -> tuple[float, float]:
     """Return the range in which every turn follows its letter: its stops have positive margins.
 
@@ -237,7 +232,6 @@ def _bounds(
     other all of them keep their signs. At the ends of the bridge sticks of length zero solve every word.
     """
     stops = list(_stops(start, turns, letters, bridge))
-    grid = np.linspace(float(bridge.values.min()), float(bridge.values.max()), _GRID + 2)[1:-1]
     rows = np.array([_margins(start, bridge.parameter, x, stops) for x in grid])
     places = [grid[0], grid[-1]]
     for k in range(len(stops)):
