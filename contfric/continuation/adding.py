@@ -6,6 +6,8 @@ several turns, each of which follows one of the two, ``a-b``, ``a-b-b`` and so o
 follows the arithmetic of a circle map (period adding: V. Avrutin et al., Continuous and Discontinuous
 Piecewise-Smooth One-Dimensional Maps, World Scientific 2019, chapter 3).
 
+Words that the return map of the release excludes are not tried (:mod:`contfric.continuation.itineraries`).
+
 Each word is an ordinary boundary-value problem, solved from the two orbits run through one after the
 other: at the pinned stop their states nearly agree. The problem has a solution also where it is not
 admissible, so the window of a word is bounded by the parameters at which one of its stops meets the
@@ -82,7 +84,8 @@ def period_adding(bridge: Branch, longest: int = 6) -> tuple[Window, ...]:
     bridge : Branch
         A bridge between two SS ends, from :func:`contfric.explore`.
     longest : int
-        Most turns of a word.
+        Most turns of a word. The time doubles with each turn more where all words have to be tried
+        (docs/bridges.md, several periods).
 
     Returns
     -------

@@ -1,22 +1,22 @@
 """Which words over two orbits can have a window: a necessary condition from the map of their release.
 
-A stop of an orbit within D (:mod:`contfric.continuation.release_map`) whose last turns were ``w_1 ... w_k`` has a
-release in
+Let ``w_1 ... w_k`` be the last turns of an orbit in D (:mod:`contfric.continuation.release_map`). Its release
+is then in
 
     I(w_1 ... w_k) = F_{w_k}(I(w_1 ... w_{k-1}) on the side of w_k),      I() = D.
 
-If this set is empty, no orbit takes these turns one after the other: neither a word that contains them, nor one
-that begins with them. A word that comes to nothing when it is run through again and again has no window.
+If this set is empty, no orbit in D takes these turns one after the other: no word has them in it. A word that
+comes to nothing when it is run through again and again has no window.
 
-Nothing is assumed of the shape of F. If both branches increase and leave a gap between the images of the jump, F
-is a circle map with a gap. Then all orbits at a parameter have one rotation number p / q, and the words that
-are left are the balanced ones of the Farey tree. If one branch decreases, F is no longer one-to-one, and words
-``a^n b`` are left of which neighbours overlap (period incrementing). Below the bridge of Fig. 5 F_b has a maximum
-near the jump, where its stick is about to become short, and both kinds are met.
+Nothing is assumed of the shape of F. If both branches increase and leave a gap between the images of the
+jump, F is a circle map with a gap. Then all orbits at a parameter have one rotation number p / q, and the
+words that are left are the balanced ones, in the order of the Farey tree. If a branch decreases, F need not
+be one-to-one, and windows of words ``a^n b`` may overlap (period incrementing). Below the bridge of Fig. 5
+F_b has a maximum near the jump, and both kinds are met.
 
-Between the samples F is interpolated linearly, with an error below ``(d_ss + d_pp) / 8``, d the second differences
-over s and over the parameter; intervals are widened by twice that. For a range of the parameter the images
-contain those at its ends, and so those of the interpolation between them.
+Between the samples F is interpolated linearly, with an error below ``(d_ss + d_pp) / 8``, d the second
+differences over s and over the parameter. The intervals are widened by twice that. For a range of the
+parameter the image is that of the lesser, and of the greater, of the two interpolations at its ends.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ def words_with_ranges(
 ) -> Iterator[tuple[str, FloatArray]]:
     """Yield the words that can have a window, each with the parameters of the grid around it.
 
-    Words have both letters; each comes once up to rotation, and none repeats itself. All of them come, with the whole
-    grid, if the release is no map of an interval.
+    Words have both letters; each comes once up to rotation, and none repeats itself. All of them come, with
+    the whole grid, if the release is no map of an interval.
 
     Parameters
     ----------
@@ -78,6 +78,11 @@ def _is_word(turns: str) -> bool:
     return both and least_rotation(turns) == 0 and primitive_length(turns) == len(turns)
 
 
+def _may_be_least(turns: str) -> bool:
+    """Tell whether turns begin a word that is the least of its rotations."""
+    return all(turns[k:] >= turns[: len(turns) - k] for k in range(1, len(turns)))
+
+
 def _possible(branches: dict[str, _Images], longest: int) -> Iterator[tuple[str, IntArray]]:
     """Yield words that do not come to nothing, with the parts of the range in which they do not."""
     low = min(images.end for images in branches.values())
@@ -94,10 +99,10 @@ def _possible(branches: dict[str, _Images], longest: int) -> Iterator[tuple[str,
                 yield turns, again[0]
         if len(turns) == longest:
             continue
-        for letter in branches:
+        for letter, images in branches.items():
             longer = turns + letter
-            if all(longer[k:] >= longer[: len(longer) - k] for k in range(1, len(longer))):
-                behind = branches[letter].of(*left)
+            if _may_be_least(longer):
+                behind = images.of(*left)
                 if len(behind[0]):
                     waiting.append((longer, behind))
 
@@ -151,4 +156,5 @@ def _between(rows: FloatArray, x: FloatArray) -> FloatArray:
     """Return each row at a place between its samples, by linear interpolation."""
     k = np.minimum(x.astype(int), rows.shape[1] - 2)
     every, share = np.arange(len(rows)), x - k
-    return rows[every, k] * (1.0 - share) + rows[every, k + 1] * share
+    found: FloatArray = rows[every, k] * (1.0 - share) + rows[every, k + 1] * share
+    return found

@@ -1,13 +1,15 @@
 """The return map of a release, as a map of an interval with one jump, sampled.
 
-A rest of an oscillator with one displacement ends at a surface: its release has one number, the time t. Let the
-last segment of two orbits be the same such rest, and let the slide from its release end at the stop that tells
-them apart: above the surface a turn follows a, below it b, or the other way round. Let c be the release from
-which that stop is on the surface. With s = t - c the next release is
+A rest of an oscillator with one displacement ends at a surface: its release has one number, the time t. Let
+the last segment of two orbits be the same such rest, and let the slide from its release end at the stop that
+tells them apart: on one side of the surface a turn follows a, on the other b. Let c be the release from which
+that stop is on the surface. With s = t - c the next release is
 
     s' = F_a(s) on the side A of s = 0,      s' = F_b(s) on the other side B.
 
-Both are sampled over an interval D that they map into itself, and over a range of the parameter.
+Both are sampled over an interval D that they map into itself, and over a range of the parameter. All this is
+tested: the release has one number, the stop's distance from the surface is monotone in s over D, and
+both branches are defined on their sides and stay in D. (Orbits that are nowhere near the two are not in D.)
 """
 
 from __future__ import annotations
@@ -101,7 +103,10 @@ def _interval(
     few = np.linspace(0, len(grid) - 1, 3).astype(int)
     for _ in range(_MOST_ROUNDS):
         images = np.concatenate(
-            [release.over(k, end, _FEW, grid[few], jumps[few])[0].ravel() for k, end in ends.items()]
+            [
+                release.over(k, end, _FEW, grid[few], jumps[few])[0].ravel()
+                for k, end in ends.items()
+            ]
         )
         if not np.all(np.isfinite(images)):
             return None
@@ -121,7 +126,7 @@ class _Release:
 
     @cached_property
     def surfaces(self) -> tuple[str, str] | None:
-        """The surfaces that a release lies on: that of the rest, and its exit; None if it is more than a time."""
+        """The surfaces of a release: that of the rest, and its exit; None if it has more than one number."""
         a, b = (orbit.system.word for orbit in self.letters.values())
         model = self.bridge.model
         mode, exit_ = a[-1]
@@ -144,11 +149,12 @@ class _Release:
 
     def sign(self, letter: str) -> float:
         """Return on which side of its surface the stop is where a letter follows."""
-        rows, pin = self.letters[letter].system.layout.joint, self.bridge.model.surface_index[self.pin]
+        rows = self.letters[letter].system.layout.joint
+        pin = self.bridge.model.surface_index[self.pin]
         return float(next(row[2] for row in rows if row[0] == 0 and row[1] == pin and row[3] == 0))
 
     def jumps(self, grid: FloatArray) -> FloatArray:
-        """Return the release from which the stop is on the surface, at each parameter; nan if there is none."""
+        """Return the release to a stop on the surface at each parameter; nan if there is none."""
         found, time = np.empty(len(grid)), float(self.letters["a"].joints[0, 0])
         step = _STEP * self.period
         for k, value in enumerate(grid):
@@ -172,14 +178,14 @@ class _Release:
         return found[:, :, 0] - jumps[:, None], found[:, :, 1]
 
     def after(self, letter: str, value: float, time: float) -> tuple[float, float]:
-        """Return the next release, and how far the stop before it is above the surface; nan if there is none."""
+        """Return the next release and the height of the stop above its surface; nan where none is met."""
         start = self._start(letter, value, time)
         joints, end, system = start.joints, np.empty(3), start.system
+        joints[1] = np.nan  # written as soon as the stop is met
         found = follow_word(system.functions(), system.layout, joints, start.vector, 1, end)
-        if not found:
-            return np.nan, np.nan
         view = start.model.view(start.vector)
-        return float(end[0]), view.height(self.pin, float(joints[1, 0]), joints[1, 1:])
+        height = view.height(self.pin, float(joints[1, 0]), joints[1, 1:])
+        return (float(end[0]) if found else np.nan), height
 
     def _start(self, letter: str, value: float, time: float) -> Orbit:
         """Return a letter with its first joint the release at a time."""
@@ -193,6 +199,8 @@ class _Release:
             heights = [view.height(s, time, state) for s in on]
             if max(map(abs, heights)) < _NEAR:
                 break
-            slopes = [view.gradient(model.surface_by_name[s].observable, time, state)[1:] for s in on]
+            slopes = [
+                view.gradient(model.surface_by_name[s].observable, time, state)[1:] for s in on
+            ]
             state -= np.linalg.solve(np.array(slopes), heights)
         return replace(orbit, joints=joints, vector=vector)
