@@ -134,7 +134,11 @@ class _Release:
             return None
         under = surfaces_under(model, mode)
         on = [s.name for k, s in enumerate(model.surfaces) if under >> k & 1]
-        return (on[0], exit_) if model.mode_by_name[mode].sliding and len(on) == 1 else None
+        if len(on) != 1 or not model.mode_by_name[mode].sliding:
+            return None
+        orbit, found = self.letters["a"], (on[0], exit_)
+        slopes = self._slopes(found, orbit, float(orbit.joints[0, 0]), orbit.joints[0, 1:])
+        return found if np.linalg.matrix_rank(slopes) == 2 else None  # else its time is given
 
     @property
     def pin(self) -> str:
@@ -160,7 +164,7 @@ class _Release:
         for k, value in enumerate(grid):
             for _ in range(_STEPS):
                 height, beyond = (self.after("a", value, t)[1] for t in (time, time + step))
-                if abs(height) < _NEAR:
+                if not abs(height) >= _NEAR or beyond == height:
                     break
                 time -= height * step / (beyond - height)
             found[k] = time if abs(height) < _NEAR else np.nan
@@ -199,8 +203,13 @@ class _Release:
             heights = [view.height(s, time, state) for s in on]
             if max(map(abs, heights)) < _NEAR:
                 break
-            slopes = [
-                view.gradient(model.surface_by_name[s].observable, time, state)[1:] for s in on
-            ]
-            state -= np.linalg.solve(np.array(slopes), heights)
+            slopes = self._slopes(on, replace(orbit, vector=vector), time, state)
+            state -= np.linalg.solve(slopes, heights)
         return replace(orbit, joints=joints, vector=vector)
+
+    def _slopes(
+        self, on: tuple[str, str], orbit: Orbit, time: float, state: FloatArray
+    ) -> FloatArray:
+        """Return the derivatives by the state of the observables of two surfaces, shape (2, 2)."""
+        view, known = orbit.model.view(orbit.vector), orbit.model.surface_by_name
+        return np.array([view.gradient(known[s].observable, time, state)[1:] for s in on])
