@@ -6,6 +6,8 @@ several turns, each of which follows one of the two, ``a-b``, ``a-b-b`` and so o
 follows the arithmetic of a circle map (period adding: V. Avrutin et al., Continuous and Discontinuous
 Piecewise-Smooth One-Dimensional Maps, World Scientific 2019, chapter 3).
 
+Words that the return map of the release excludes are not tried (:mod:`contfric.continuation.itineraries`).
+
 Each word is an ordinary boundary-value problem, solved from the two orbits run through one after the
 other: at the pinned stop their states nearly agree. The problem has a solution also where it is not
 admissible, so the window of a word is bounded by the parameters at which one of its stops meets the
@@ -16,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,24 +26,23 @@ from contfric.base.shown import Shown
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import candidates
 from contfric.continuation.events import Bifurcation
+from contfric.continuation.itineraries import words_with_ranges
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import follow_orbit
 from contfric.errors import ConvergenceError, ParameterError, shown, whole_number
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.prescribed import follow_word
 from contfric.orbit.solve import polish
 from contfric.orbit.system import Margin, build_system
-from contfric.signature.cyclic import least_rotation, primitive_length
 from contfric.signature.edits import concatenate
 
 #: Places over the gap at which the margins of a word are looked at: they are smooth curves there, with a
 #: few changes of sign for a word of six turns.
 _GRID = 48
 #: Rounds of the motion before Newton: a stable word contracts the error of 1e-3 to far below the length
-#: of its sticks. Most crossings of an exit surface looked at: one in the wrong sense, one in the right one.
-_ROUNDS, _PASSES = 4, 2
-#: A state is on a surface if it is this near: the starts of slides are solved to rounding.
-_ON_SURFACE = 1e-12
+#: of its sticks.
+_ROUNDS = 4
 #: Steps towards one change of sign, and the resolution of its place: the method needs about ten.
 _MOST_STEPS, _RESOLUTION = 60, 1e-15
 
@@ -83,7 +84,8 @@ def period_adding(bridge: Branch, longest: int = 6) -> tuple[Window, ...]:
     bridge : Branch
         A bridge between two SS ends, from :func:`contfric.explore`.
     longest : int
-        Most turns of a word.
+        Most turns of a word. The time doubles with each turn more where all words have to be tried
+        (docs/bridges.md, several periods).
 
     Returns
     -------
@@ -121,21 +123,14 @@ def period_adding(bridge: Branch, longest: int = 6) -> tuple[Window, ...]:
         if end.bifurcation is None:
             raise ParameterError(f"the bridge does not end at an event: {end}")
         letters[letter] = _regular(end.bifurcation, bridge)
+    low, high = float(bridge.values.min()), float(bridge.values.max())
+    grid = np.linspace(low, high, _GRID + 2)[1:-1]
     windows = [
         window
-        for turns in _words(longest)
-        if (window := _window(turns, letters, bridge)) is not None
+        for turns, near in words_with_ranges(letters, bridge, grid, longest)
+        if (window := _window(turns, letters, bridge, near)) is not None
     ]
     return tuple(sorted(windows, key=lambda w: w.range))
-
-
-def _words(longest: int) -> Iterator[str]:
-    """Yield the words over a and b with both letters, each once up to rotation, none repeating itself."""
-    for length in range(2, longest + 1):
-        for letters in product("ab", repeat=length):
-            both = {"a", "b"} <= set(letters)
-            if both and least_rotation(letters) == 0 and primitive_length(letters) == length:
-                yield "".join(letters)
 
 
 def _regular(event: Bifurcation, bridge: Branch) -> Orbit:
@@ -177,10 +172,12 @@ def _rests(orbit: Orbit, mode: str) -> bool:
     return orbit.model.mode_by_name[mode].sliding
 
 
-def _window(turns: str, letters: dict[str, Orbit], bridge: Branch) -> Window | None:
-    """Return the window of a word, None if it has none."""
+def _window(
+    turns: str, letters: dict[str, Orbit], bridge: Branch, grid: FloatArray
+) -> Window | None:
+    """Return the window of a word over some parameters, None if it has none."""
     start = _in_turn([letters[letter] for letter in turns])
-    low, high = _bounds(start, turns, letters, bridge)
+    low, high = _bounds(start, turns, letters, bridge, grid)
     if not low < high:
         return None
     middle = _at(start, bridge.parameter, 0.5 * (low + high))
@@ -224,38 +221,13 @@ def _at(orbit: Orbit, parameter: str, value: float) -> Orbit:
 
 def _settled(orbit: Orbit) -> Orbit:
     """Return an orbit with the joints of the motion that takes its outcomes, after some rounds."""
-    layout, joints = orbit.system.layout, orbit.joints.copy()
-    end = joints[0].copy()
-    for _ in range(_ROUNDS):
-        for i in range(len(joints)):
-            joints[i] = end
-            after = _next_joint(orbit, *orbit.system.word[i], layout.exit_signs[i], end)
-            if after is None:
-                return orbit
-            end = after
-        end[0] -= orbit.period
-    return replace(orbit, joints=joints)
-
-
-def _next_joint(
-    orbit: Orbit, mode: str, surface: str, sign: float, joint: FloatArray
-) -> FloatArray | None:
-    """Return where a segment meets its exit with the right sign of the rate; None if it does not."""
-    flow, observable = orbit.flow, orbit.model.surface_by_name[surface].observable
-    time, state, level = float(joint[0]), joint[1:], flow.level(surface)
-    on = abs(flow.observe(observable, time, state) - level) < _ON_SURFACE
-    for _ in range(_PASSES):
-        hit = flow.first(mode, observable, level, time, state, orbit.period, on=on)
-        if hit is None:
-            return None
-        time, state, on = time + hit[0], hit[1], True
-        if flow.rate(mode, observable, time, state) * sign > 0.0:
-            return np.array([time, *state])
-    return None
+    joints, end, system = orbit.joints.copy(), np.empty(orbit.joints.shape[1]), orbit.system
+    found = follow_word(system.functions(), system.layout, joints, orbit.vector, _ROUNDS, end)
+    return replace(orbit, joints=joints) if found else orbit
 
 
 def _bounds(
-    start: Orbit, turns: str, letters: dict[str, Orbit], bridge: Branch
+    start: Orbit, turns: str, letters: dict[str, Orbit], bridge: Branch, grid: FloatArray
 ) -> tuple[float, float]:
     """Return the range in which every turn follows its letter: its stops have positive margins.
 
@@ -263,7 +235,6 @@ def _bounds(
     other all of them keep their signs. At the ends of the bridge sticks of length zero solve every word.
     """
     stops = list(_stops(start, turns, letters, bridge))
-    grid = np.linspace(float(bridge.values.min()), float(bridge.values.max()), _GRID + 2)[1:-1]
     rows = np.array([_margins(start, bridge.parameter, x, stops) for x in grid])
     places = [grid[0], grid[-1]]
     for k in range(len(stops)):
