@@ -138,5 +138,5 @@ def test_the_file_of_a_branch_holds_its_orbits_and_events(tmp_path: Path) -> Non
     data["checkable"][3]["joints"][0][1] += 1e-6
     assert not check_text(json.dumps(data)).yes
     bilinear = cf.find_orbit("impact")
-    with pytest.raises(ParameterError, match="coulomb"):
+    with pytest.raises(ParameterError, match="no proof of this branch"):
         cf.continue_orbit(bilinear, "w", (0.99, 1.01)).certify().save(tmp_path / "none.json")
