@@ -38,7 +38,8 @@ class GrowingTables:
         self._rules: list[dict[int, list[tuple[tuple[int, int], str]]]] = []
         self._sliding: list[int] = []
         self._under: list[int] = []
-        self._waiting: list[str] = []
+        self._waiting: dict[str, int] = {}  # the number of each, by its name in their order
+        self._names: list[str] = []
         self._tables: Tables | None = None
         self._size = 0, 0
 
@@ -54,7 +55,7 @@ class GrowingTables:
         """
         model = self._model
         if number < SOLVED:
-            return model.mode_index[self._waiting[SOLVED - 1 - number]]
+            return model.mode_index[self._names[SOLVED - 1 - number]]
         mode, surface = model.modes[last[0]].name, model.surfaces[last[1]].name
         place = model.mapping(vector), t, y.tolist()
         return model.mode_index[model.composition.after(mode, surface, place)]
@@ -119,8 +120,9 @@ class GrowingTables:
         if self._model.was_visited(name):
             return self._model.mode_index[name]
         if name not in self._waiting:
-            self._waiting.append(name)
-        return SOLVED - 1 - self._waiting.index(name)
+            self._waiting[name] = SOLVED - 1 - len(self._names)
+            self._names.append(name)
+        return self._waiting[name]
 
 
 @cache
