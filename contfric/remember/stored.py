@@ -112,8 +112,11 @@ class Writer:
             return ["error", _path(kind), str(value), self._node(getattr(value, "result", None))]
         if is_dataclass(value):
             names = [field.name for field in fields(value)]
-            return ["object", _path(kind), *([n, self._node(getattr(value, n))] for n in names)]
+            return ["object", _path(kind), *([n, self._field(value, n)] for n in names)]
         raise UnstorableError(f"{kind.__name__} is no plain data")
+
+    def _field(self, value: Any, name: str) -> Any:
+        return self._node(getattr(value, name))
 
     def _items(self, values: list[Any]) -> list[Any]:
         """Return the nodes of a list; many objects of one shape behind the first one are one node."""
@@ -216,8 +219,8 @@ class Reader:
     def _read_scalar(self, array: list[Any]) -> Any:
         return self._next_array(*array)[()]
 
-    def _read_array(self, dtype: str, shape: list[int], order: str) -> Any:
-        return self._new(self._next_array(dtype, shape, order))
+    def _read_array(self, *array: Any) -> Any:
+        return self._new(self._next_array(*array))
 
     def _next_array(self, dtype: str, shape: list[int], order: str) -> Any:
         kind, count = np.dtype(dtype), int(np.prod(shape, dtype=np.int64))

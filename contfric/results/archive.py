@@ -3,7 +3,8 @@
 Nothing in it is executed when it is read (no pickle). A list of digests of all arrays and of the header is
 among them: what is not as it was written is refused. The header says what the file holds, the
 version of the format, and the name of the model, from which the equations are rebuilt; of a user's model
-it has the definition, too.
+it has the definition, too. The result itself is in ``content`` and, what is large, in arrays that have the
+names of its fields (:mod:`contfric.results.codec`).
 """
 
 from __future__ import annotations
@@ -32,42 +33,12 @@ from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.simulation import Trajectory
+from contfric.remember.stored import UnstorableError
 from contfric.response.basins import Basins
 from contfric.response.returns import ReleaseMap, Returns
 from contfric.response.stable_set import StableSet
 from contfric.response.sweep import Sweep
-from contfric.results.curves import (
-    pack_curve,
-    pack_held,
-    pack_plane,
-    unpack_curve,
-    unpack_held,
-    unpack_plane,
-)
-from contfric.results.ensemble import pack_ensemble, unpack_ensemble
-from contfric.results.equilibria import (
-    pack_equilibria,
-    pack_equilibrium_branch,
-    unpack_equilibria,
-    unpack_equilibrium_branch,
-)
-from contfric.results.lyapunov import pack_map, unpack_map
-from contfric.results.pack import Arrays, Header, Packer
-from contfric.results.response import (
-    pack_basins,
-    pack_releases,
-    pack_returns,
-    pack_stable_set,
-    pack_sweep,
-    pack_trajectory,
-    unpack_basins,
-    unpack_releases,
-    unpack_returns,
-    unpack_stable_set,
-    unpack_sweep,
-    unpack_trajectory,
-)
-from contfric.results.unpack import Unpacker
+from contfric.results.codec import Arrays, ResultReader, ResultWriter
 
 Saveable: TypeAlias = (
     Orbit
@@ -88,18 +59,17 @@ Saveable: TypeAlias = (
     | Ensemble
 )
 
-#: Version of the format; it grows when an older contfric could not read what is written. Files of version 1
-#: have no digests: that they are as they were written is not known.
-FORMAT, _WITHOUT_DIGESTS = 2, 1
+#: Version of the format; it grows when this contfric cannot read what an earlier one has written.
+FORMAT = 3
 
 _MARK = "contfric result"
-_HEADER, _DIGESTS = "header", "digests"
+_HEADER, _CONTENT, _DIGESTS = "header", "content", "digests"
 #: Bytes of a digest: damage by chance is missed once in 2**128 times.
 _SIZE = 16
 #: Arrays that a message names.
 _NAMED = 3
-#: What reading a header that is not ours, or entries that do not fit each other, ends in.
-_DAMAGE = (ValueError, LookupError, TypeError, AttributeError, AssertionError)
+#: What reading a header that is not ours ends in.
+_DAMAGE = (ValueError, LookupError, TypeError, AttributeError)
 
 
 def save(x: Saveable, path: str | Path) -> None:
@@ -126,19 +96,20 @@ def save(x: Saveable, path: str | Path) -> None:
             f"got {type(x).__name__}"
         )
     place = path_of("the file of a result", path)
-    packer = Packer(x.model)
-    content = _content(x, packer)
-    header: Header = {
+    writer = ResultWriter(x.model)
+    try:
+        content = writer.bytes_of(x)
+    except UnstorableError as error:
+        raise ResultFileError(f"this {type(x).__name__} cannot be saved: {error}") from None
+    header = {
         "mark": _MARK,
         "format": FORMAT,
-        "model": x.model.name,
+        "kind": type(x).__name__,
         "definition": x.model.definition,
-        "parameters": list(x.model.parameter_names),
-        "states": list(x.model.states),
-        "content": content,
-        "pool": packer.finish(),
+        **_told_apart(x.model),
     }
-    arrays = {_HEADER: _as_array(header), **packer.arrays}
+    arrays = {_HEADER: _as_array(header), _CONTENT: np.frombuffer(content, dtype=np.uint8)}
+    arrays |= writer.large
     arrays[_DIGESTS] = _as_array(_digests(arrays))
     with replacing(place) as temporary:
         _write(temporary, arrays)
@@ -189,40 +160,6 @@ def _changed(arrays: Arrays) -> str:
     )
 
 
-def _content(x: Saveable, packer: Packer) -> Header:
-    if isinstance(x, Orbit):
-        return {"kind": "orbit", "index": packer.orbit(x)}
-    if isinstance(x, Branch):
-        return {"kind": "branch", "index": packer.branch(x)}
-    if isinstance(x, Curve):
-        return {"kind": "curve", **pack_curve(x, packer, 0)}
-    if isinstance(x, QuantityCurve):
-        return {"kind": "curve of a quantity", **pack_held(x, packer)}
-    if isinstance(x, Plane):
-        return {"kind": "plane", **pack_plane(x, packer)}
-    if isinstance(x, LyapunovMap):
-        return {"kind": "lyapunov map", **pack_map(x, packer.arrays)}
-    if isinstance(x, Trajectory):
-        return {"kind": "trajectory", **pack_trajectory(x, packer.arrays)}
-    if isinstance(x, Sweep):
-        return {"kind": "sweep", **pack_sweep(x, packer.arrays)}
-    if isinstance(x, Returns):
-        return {"kind": "returns", **pack_returns(x, packer.arrays)}
-    if isinstance(x, ReleaseMap):
-        return {"kind": "release map", **pack_releases(x, packer.arrays)}
-    if isinstance(x, StableSet):
-        return {"kind": "stable set", **pack_stable_set(x, packer)}
-    if isinstance(x, Basins):
-        return {"kind": "basins", **pack_basins(x, packer)}
-    if isinstance(x, EquilibriumBranch):
-        return {"kind": "equilibrium branch", **pack_equilibrium_branch(x, packer.arrays)}
-    if isinstance(x, EquilibriumDiagram):
-        return {"kind": "equilibria", **pack_equilibria(x, packer.arrays)}
-    if isinstance(x, Ensemble):
-        return {"kind": "ensemble", **pack_ensemble(x, packer.arrays)}
-    return {"kind": "diagram", **packer.diagram(x)}
-
-
 def load(path: str | Path, model: Model | None = None) -> Saveable:
     """Read what :func:`save` wrote.
 
@@ -239,66 +176,32 @@ def load(path: str | Path, model: Model | None = None) -> Saveable:
     path = path_of("the file of a result", path)
     arrays = _read(path)
     listed = _DIGESTS in arrays
-    wrong = _changed(arrays)
-    if listed and wrong:
-        raise ResultFileError(_damaged(path, wrong))
+    changed = _changed(arrays)
+    if listed and changed:
+        raise ResultFileError(_damaged(path, changed))
     try:
-        header: Header = json.loads(bytes(arrays.pop(_HEADER)).decode())
+        header = json.loads(bytes(arrays.pop(_HEADER)).decode())
         if header["mark"] != _MARK:
             raise ValueError("the header is not one of contfric")
     except _DAMAGE:
         raise ResultFileError(
             f"{path} was not written by contfric: give a file of cf.save"
         ) from None
-    if header.get("format") not in (FORMAT, _WITHOUT_DIGESTS):
+    if header.get("format") != FORMAT:
         raise ResultFileError(
-            f"{path} is in format {header.get('format')}, this contfric reads formats "
-            f"{_WITHOUT_DIGESTS} and {FORMAT}: read it with the version that wrote it, or run its study again"
+            f"{path} is in format {header.get('format')}, this contfric reads format {FORMAT}: "
+            "read it with the version that wrote it, or run its study again"
         )
-    if wrong and header["format"] != _WITHOUT_DIGESTS:
-        raise ResultFileError(_damaged(path, wrong))
+    if changed:
+        raise ResultFileError(_damaged(path, changed))
+    owner = _owner(path, header, model)
     try:
-        owner = _owner(path, header, model)
-        return _restored(header["content"], Unpacker(owner, header["pool"], arrays))
-    except _DAMAGE as error:
-        raise ResultFileError(_damaged(path, _told(error))) from None
-
-
-def _restored(content: Header, pool: Unpacker) -> Saveable:
-    kind = content["kind"]
-    if kind == "orbit":
-        return pool.orbits[content["index"]]
-    if kind == "branch":
-        return pool.branches[content["index"]]
-    if kind == "diagram":
-        return pool.diagram(content)
-    if kind == "curve":
-        return unpack_curve(content, pool, 0)
-    if kind == "curve of a quantity":
-        return unpack_held(content, pool)
-    if kind == "plane":
-        return unpack_plane(content, pool)
-    if kind == "lyapunov map":
-        return unpack_map(pool.model, content, pool.arrays)
-    if kind == "trajectory":
-        return unpack_trajectory(pool.model, content, pool.arrays)
-    if kind == "sweep":
-        return unpack_sweep(pool.model, content, pool.arrays)
-    if kind == "returns":
-        return unpack_returns(pool.model, content, pool.arrays)
-    if kind == "release map":
-        return unpack_releases(pool.model, content, pool.arrays)
-    if kind == "stable set":
-        return unpack_stable_set(content, pool.arrays, pool.orbits)
-    if kind == "basins":
-        return unpack_basins(pool.model, content, pool.arrays, pool.orbits)
-    if kind == "equilibrium branch":
-        return unpack_equilibrium_branch(pool.model, content, pool.arrays)
-    if kind == "equilibria":
-        return unpack_equilibria(pool.model, content, pool.arrays)
-    if kind == "ensemble":
-        return unpack_ensemble(pool.model, content, pool.arrays)
-    raise ValueError(f"unknown kind of result {kind!r}")
+        found = ResultReader(bytes(arrays.pop(_CONTENT)), owner, arrays).value()
+    except (UnstorableError, LookupError) as error:
+        raise ResultFileError(_damaged(path, str(error))) from None
+    if not isinstance(found, Saveable):
+        raise ResultFileError(_damaged(path, "it holds no result"))
+    return found
 
 
 def _read(path: Path) -> Arrays:
@@ -327,7 +230,7 @@ def _damaged(path: Path, what: str) -> str:
     return f"{path} is damaged or incomplete ({text}): restore a copy, or run its study again"
 
 
-def _model_of(header: Header) -> Model:
+def _model_of(header: dict[str, Any]) -> Model:
     """Return the model of a file: from its own definition if it has one, else by its name."""
     definition = header.get("definition")
     if not definition:
@@ -337,7 +240,7 @@ def _model_of(header: Header) -> Model:
     return model_of(definition)
 
 
-def _owner(path: Path, header: Header, model: Model | None) -> Model:
+def _owner(path: Path, header: dict[str, Any], model: Model | None) -> Model:
     name = header["model"]
     try:
         owner = _model_of(header) if model is None else model
@@ -351,15 +254,19 @@ def _owner(path: Path, header: Header, model: Model | None) -> Model:
             f"{path} holds results of the model '{name}', which is not installed ({error}): "
             "install the package that offers it, or pass load(..., model=...)"
         ) from None
-    known: dict[str, Any] = {
-        "model": owner.name,
-        "parameters": list(owner.parameter_names),
-        "states": list(owner.states),
-    }
-    for key, value in known.items():
+    for key, value in _told_apart(owner).items():
         if header[key] != value:
             raise ResultFileError(
                 f"{path} was written for {key} {header[key]}, the model has {value}: run its study "
                 "again"
             )
     return owner
+
+
+def _told_apart(model: Model) -> dict[str, Any]:
+    """Return what a file says of its model."""
+    return {
+        "model": model.name,
+        "parameters": list(model.parameter_names),
+        "states": list(model.states),
+    }
