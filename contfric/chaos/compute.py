@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from contfric.base.memory import must_fit
 from contfric.chaos.exponents import checked_time, limits_of
 from contfric.chaos.map import LyapunovMap, points_of
 from contfric.chaos.rows import Limits
-from contfric.chaos.running import Progress, Timer, check_executor, compute_all
+from contfric.chaos.running import Progress, check_executor
 from contfric.chaos.starts import StateLike, given_states, number_of_starts
 from contfric.chaos.store import TileFolder, digest, open_tiles, versions
 from contfric.chaos.tiles import (
@@ -27,6 +28,7 @@ from contfric.chaos.tiles import (
     inside,
     places,
 )
+from contfric.chaos.work import Work
 from contfric.errors import ParameterError, function_of, mapping_of, shown, whole_number
 from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
@@ -177,40 +179,19 @@ def check_size(shape: tuple[int, ...], starts: int, n: int) -> None:
 def _computed(
     job: _Job, executor: Executor | None, kept: TileFolder | None, progress: Progress | None
 ) -> TileRows:
-    rows = empty_tile((*job.shape, job.starts), len(job.model.states))
-    cut, tiles = job.places(), {}
-    for number, place in enumerate(cut):
-        tile = job.tile(place)
-        finished = _finished(kept, number, tile) if kept is not None else None
-        if finished is None:
-            tiles[number] = tile
-        else:
-            _put(rows, place, finished)
-    timer = Timer(len(cut), len(cut) - len(tiles), progress)
-    if kept is not None and timer.done:
-        timer.say(f"{timer.done} of {len(cut)} tiles are in {kept.path} already")
-    try:
-        if tiles:
-            _compile(job.model)
-        for number, found in compute_all(tiles, executor, timer.say, compute_tile):
-            if kept is not None:
-                kept.write(number, vars(found))
-            _put(rows, cut[number], found)
-            timer.tick()
-    except KeyboardInterrupt:
-        timer.say(f"interrupted: {timer.done} of {len(cut)} tiles are finished")
+    rows, cut = empty_tile((*job.shape, job.starts), len(job.model.states)), job.places()
+    work: Work[Tile, TileRows] = Work(
+        "Lyapunov map",
+        TileRows,
+        compute_tile,
+        kept,
+        executor,
+        progress,
+        prepare=lambda: _compile(job.model),
+    )
+    with suppress(KeyboardInterrupt):
+        work.finish([job.tile(place) for place in cut], lambda k, found: _put(rows, cut[k], found))
     return rows
-
-
-def _finished(kept: TileFolder, number: int, tile: Tile) -> TileRows | None:
-    """Return a finished tile; None if it has not been finished, or does not fit."""
-    found, like = kept.read(number), empty_tile(tile.shape, len(tile.model.states))
-    if found is None or found.keys() != vars(like).keys():
-        return None
-    for name, wanted in vars(like).items():
-        if found[name].shape != wanted.shape or found[name].dtype != wanted.dtype:
-            return None
-    return TileRows(**found)
 
 
 def _put(rows: TileRows, place: Place, found: TileRows) -> None:

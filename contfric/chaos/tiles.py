@@ -1,16 +1,9 @@
-"""A tile of a map: an independent task that any process can compute, to the same bits.
-
-A task carries numbers and the model's name, and the cells of a tile do not know of each other. A model that
-is not known by its name is carried as it is; each process keeps it, so that what belongs to it (the
-tables of its transitions) is made once.
-"""
+"""A tile of a map: an independent task; its cells do not know of each other."""
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,8 +12,7 @@ from numpy.typing import NDArray
 from contfric.chaos.rows import Limits, follow
 from contfric.chaos.starts import default_states
 from contfric.chaos.status import Motion
-from contfric.errors import ParameterError
-from contfric.models import load_model
+from contfric.chaos.work import Task
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray
 
@@ -55,7 +47,7 @@ def empty_tile(shape: tuple[int, int, int], n: int) -> TileRows:
 
 
 @dataclass(frozen=True, eq=False)
-class Tile:
+class Tile(Task):
     """A task: the cells of a rectangle of the grid.
 
     Attributes
@@ -86,10 +78,6 @@ class Tile:
     states: FloatArray | None
     time: float
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        rest = (self.vector, self.varied, self.values, self.starts, self.states, self.time)
-        return _rebuilt, (packed(self.model), tuple(self.limits), *rest)
-
     @property
     def shape(self) -> tuple[int, int, int]:
         """Rows, columns and starts."""
@@ -103,27 +91,11 @@ class Tile:
         vectors[:, :, self.varied[1]] = self.values[1][None, :]
         return vectors.reshape(rows * columns, -1)
 
-
-def packed(model: Model) -> str | bytes:
-    """Return a model as a task carries it: by its name, or as it is."""
-    try:
-        if load_model(model.name) is model:
-            return model.name
-    except ParameterError:
-        pass
-    return pickle.dumps(model)
-
-
-@lru_cache(maxsize=16)
-def unpacked(model: str | bytes) -> Model:
-    """Return the model of a task."""
-    found = load_model(model) if isinstance(model, str) else pickle.loads(model)
-    assert isinstance(found, Model)
-    return found
-
-
-def _rebuilt(model: str | bytes, limits: tuple[int, int, float, int], *rest: Any) -> Tile:
-    return Tile(unpacked(model), Limits(*limits), *rest)
+    def fits(self, rows: TileRows) -> bool:
+        """Tell whether rows that were kept are of its size."""
+        like = empty_tile(self.shape, len(self.model.states))
+        pairs = ((getattr(rows, name), wanted) for name, wanted in vars(like).items())
+        return all(a.shape == b.shape and a.dtype == b.dtype for a, b in pairs)
 
 
 def inside(model: Model, named: Mapping[str, Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -13,8 +14,9 @@ from numpy.typing import ArrayLike
 
 from contfric.base.memory import must_fit
 from contfric.chaos.compute import ascending
-from contfric.chaos.running import Progress, Timer, check_executor, compute_all
+from contfric.chaos.running import Progress, check_executor
 from contfric.chaos.store import TileFolder, digest, open_tiles, versions
+from contfric.chaos.work import Work
 from contfric.ensembles.drawing import Varied, checked_distributions
 from contfric.ensembles.ensemble import Ensemble
 from contfric.ensembles.rows import Rows, joined
@@ -232,29 +234,12 @@ def _vector(
 def _computed(
     job: _Job, executor: Executor | None, kept: TileFolder | None, progress: Progress | None
 ) -> Rows:
-    parts, tiles, found = job.parts(), {}, {}
-    for number, part in enumerate(parts):
-        finished = None
-        if kept is not None:
-            finished = Rows.checked(kept.read(number), part.stop - part.start)
-        if finished is None:
-            tiles[number] = job.tile(part)
-        else:
-            found[number] = finished
-    timer = Timer(len(parts), len(found), progress, "ensemble")
-    if found and kept is not None:
-        timer.say(f"{timer.done} of {len(parts)} tiles are in {kept.path} already")
-    try:
-        for number, rows in compute_all(tiles, executor, timer.say, compute_ensemble_tile, 1):
-            if kept is not None:
-                kept.write(number, vars(rows))
-            found[number] = rows
-            timer.tick()
-    except KeyboardInterrupt:
-        timer.say(f"interrupted: {timer.done} of {len(parts)} tiles are finished")
-    return joined(
-        [
-            found[number] if number in found else Rows.empty(part.stop - part.start)
-            for number, part in enumerate(parts)
-        ]
+    parts = job.parts()
+    rows = [Rows.empty(part.stop - part.start) for part in parts]
+    # a tile is Python, which holds the lock
+    work: Work[EnsembleTile, Rows] = Work(
+        "ensemble", Rows, compute_ensemble_tile, kept, executor, progress, threads=1
     )
+    with suppress(KeyboardInterrupt):
+        work.finish([job.tile(part) for part in parts], rows.__setitem__)
+    return joined(rows)

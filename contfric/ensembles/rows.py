@@ -54,25 +54,15 @@ class Rows:
     orbit_stable: NDArray[np.int8]
     orbit_row: NDArray[np.float64]
 
-    @classmethod
-    def checked(cls, arrays: dict[str, Array] | None, count: int) -> Rows | None:
-        """Return the rows that were kept of ``count`` samples; None if they do not fit."""
-        if arrays is None or arrays.keys() != {field.name for field in fields(cls)}:
-            return None
-        like = cls.empty(0)
-        found = cls(**arrays)
-        tables = (
-            ("outcomes", "branches", "loose", "reasons"),
-            ("event_sample", "event_label", "event_value"),
-            ("orbit_sample", "orbit_name", "orbit_index", "orbit_stable", "orbit_row"),
+    def fits(self, count: int) -> bool:
+        """Tell whether these are the rows of ``count`` samples."""
+        like = vars(Rows.empty(0))
+        lengths = {"event": len(self.event_sample), "orbit": len(self.orbit_sample)}
+        return all(
+            array.shape == (lengths.get(name.split("_")[0], count),)
+            and array.dtype.kind == like[name].dtype.kind
+            for name, array in vars(self).items()
         )
-        lengths = (count, len(found.event_sample), len(found.orbit_sample))
-        for names, length in zip(tables, lengths, strict=True):
-            for name in names:
-                array, wanted = getattr(found, name), getattr(like, name)
-                if array.shape != (length,) or array.dtype.kind != wanted.dtype.kind:
-                    return None
-        return found
 
     @classmethod
     def empty(cls, count: int) -> Rows:

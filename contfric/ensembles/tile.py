@@ -9,7 +9,7 @@ import numpy as np
 
 from contfric.atlas.diagram import Diagram
 from contfric.atlas.explore import explore
-from contfric.chaos.tiles import packed, unpacked
+from contfric.chaos.work import Task
 from contfric.continuation.events import EndReason
 from contfric.ensembles.reading import events_of, named_crossings
 from contfric.ensembles.rows import Drawn, Rows
@@ -32,7 +32,7 @@ _LIMITS = (EndReason.POINTS, EndReason.WORK)
 
 
 @dataclass(frozen=True, eq=False)
-class EnsembleTile:
+class EnsembleTile(Task):
     """A task: some samples of an ensemble.
 
     Attributes
@@ -53,13 +53,9 @@ class EnsembleTile:
     values: FloatArray
     options: dict[str, Any]
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        rest = (self.vectors, self.parameter, self.range, self.row, self.values, self.options)
-        return _rebuilt, (packed(self.model), *rest)
-
-
-def _rebuilt(model: str | bytes, *rest: Any) -> EnsembleTile:
-    return EnsembleTile(unpacked(model), *rest)
+    def fits(self, rows: Rows) -> bool:
+        """Tell whether rows that were kept are of its size."""
+        return rows.fits(len(self.vectors))
 
 
 def compute_ensemble_tile(tile: EnsembleTile, stop: IntArray | None = None) -> Rows:

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.base.memory import must_fit
-from contfric.chaos.running import Progress, Timer, check_executor, compute_all
+from contfric.chaos.running import Progress, check_executor
 from contfric.chaos.status import Motion
 from contfric.chaos.store import TileFolder, digest, open_tiles, versions
+from contfric.chaos.work import Work
 from contfric.errors import (
     ParameterError,
     did_you_mean,
@@ -254,19 +255,12 @@ def _label(
     job: _Job, attractors: Attractors, chosen: IntArray, rows: BasinRows, kept: TileFolder | None
 ) -> None:
     """Label some starts, tile by tile, as any executor computes them."""
-    parts, tiles = job.parts(chosen), {}
-    for number, part in enumerate(parts):
-        finished = BasinRows.checked(kept.read(number), len(part)) if kept is not None else None
-        if finished is None:
-            tiles[number] = job.tile(attractors, part)
-        else:
-            _put(rows, part, finished)
-    timer = Timer(len(parts), len(parts) - len(tiles), job.progress, "basins")
-    for number, found in compute_all(tiles, job.executor, timer.say, compute_basin_tile):
-        if kept is not None:
-            kept.write(number, vars(found))
-        _put(rows, parts[number], found)
-        timer.tick()
+    parts = job.parts(chosen)
+    work: Work[BasinTile, BasinRows] = Work(
+        "basins", BasinRows, compute_basin_tile, kept, job.executor, job.progress
+    )
+    tiles = [job.tile(attractors, part) for part in parts]
+    work.finish(tiles, lambda k, found: _put(rows, parts[k], found))
 
 
 def _put(rows: BasinRows, part: IntArray, found: BasinRows) -> None:

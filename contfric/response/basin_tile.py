@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contfric.chaos.rows import Limits, follow, new_stop, starting, until_interrupted
 from contfric.chaos.status import Motion
-from contfric.chaos.tiles import packed, unpacked
+from contfric.chaos.work import Task
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import tables
@@ -35,18 +33,9 @@ class BasinRows:
     labels: NDArray[np.int32]
     motions: NDArray[np.uint8]
 
-    @classmethod
-    def checked(cls, arrays: Mapping[str, Any] | None, starts: int) -> BasinRows | None:
-        """Return rows of these arrays; None if the arrays are not those of rows."""
-        if arrays is None or arrays.keys() != cls.__dataclass_fields__.keys():
-            return None
-        rows = cls(**arrays)
-        fits = rows.labels.shape == rows.motions.shape == (starts,)
-        return rows if fits and rows.labels.dtype == np.int32 else None
-
 
 @dataclass(frozen=True, eq=False)
-class BasinTile:
+class BasinTile(Task):
     """A task: some starts of the same parameters.
 
     Attributes
@@ -65,15 +54,10 @@ class BasinTile:
     states: FloatArray
     periods: int
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        rest = (self.time, self.states, self.periods)
-        return _rebuilt, (packed(self.model), self.vector, tuple(self.targets), *rest)
-
-
-def _rebuilt(
-    model: str | bytes, vector: FloatArray, targets: tuple[Any, ...], *rest: Any
-) -> BasinTile:
-    return BasinTile(unpacked(model), vector, Targets(*targets), *rest)
+    def fits(self, rows: BasinRows) -> bool:
+        """Tell whether rows that were kept are of its size."""
+        shaped = rows.labels.shape == rows.motions.shape == (len(self.states),)
+        return shaped and rows.labels.dtype == np.int32
 
 
 def compute_basin_tile(task: BasinTile, stop: IntArray | None = None) -> BasinRows:

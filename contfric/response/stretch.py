@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from contfric.chaos.tiles import packed, unpacked
+from contfric.chaos.work import Task
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray
 from contfric.response.collecting import collect
@@ -39,23 +37,9 @@ class StretchRows:
     states: FloatArray
     last: FloatArray
 
-    @classmethod
-    def checked(cls, arrays: Mapping[str, Any] | None, values: int, n: int) -> StretchRows | None:
-        """Return rows of these arrays; None if the arrays are not those of rows."""
-        if arrays is None or arrays.keys() != cls.__dataclass_fields__.keys():
-            return None
-        rows = cls(**arrays)
-        count = int(rows.upto[-1]) if rows.upto.shape == (values,) else -1
-        fits = all(
-            a.shape == (values,) and a.dtype == np.int64 for a in (rows.outcomes, rows.periods)
-        )
-        fits &= all(a.shape == (count,) for a in (rows.cycles, rows.modes, rows.times))
-        fits &= rows.states.shape == (count, n) and rows.last.shape == (n,)
-        return rows if fits else None
-
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class Stretch(Task):
     """A task: some values of a sweep, one after the other.
 
     Attributes
@@ -72,19 +56,19 @@ class Stretch:
     vectors: FloatArray
     state: FloatArray
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        parts = (packed(self.model), tuple(self.cut), tuple(self.how), self.vectors, self.state)
-        return _rebuilt, parts
-
-
-def _rebuilt(
-    model: str | bytes,
-    cut: tuple[Any, ...],
-    how: tuple[Any, ...],
-    vectors: FloatArray,
-    state: FloatArray,
-) -> Stretch:
-    return Stretch(unpacked(model), Cut(*cut), Following(*how), vectors, state)
+    def fits(self, rows: StretchRows) -> bool:
+        """Tell whether rows that were kept are of its size."""
+        values, n = (len(self.vectors),), self.state.shape
+        if rows.upto.shape != values:
+            return False
+        points = (int(rows.upto[-1]),)
+        whole = (rows.outcomes, rows.periods)
+        return (
+            all(a.shape == values and a.dtype == np.int64 for a in whole)
+            and all(a.shape == points for a in (rows.cycles, rows.modes, rows.times))
+            and rows.states.shape == (*points, *n)
+            and rows.last.shape == n
+        )
 
 
 def compute_stretch(task: Stretch, stop: IntArray | None = None) -> StretchRows:

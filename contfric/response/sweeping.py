@@ -16,6 +16,7 @@ from contfric.chaos.compute import ascending
 from contfric.chaos.running import Progress, Timer, check_executor, compute_chains
 from contfric.chaos.store import TileFolder, digest, open_tiles, versions
 from contfric.chaos.tiles import inside
+from contfric.chaos.work import kept_rows
 from contfric.errors import (
     ParameterError,
     function_of,
@@ -214,12 +215,13 @@ def _computed(
 ) -> dict[str, SweepRun]:
     parts = -(-len(job.defined) // STRETCH)
     done: dict[str, list[StretchRows]] = {name: [] for name in job.directions}
-    states = len(job.model.states)
     for place, name in enumerate(job.directions):
         while kept is not None and len(done[name]) < parts:
             number = len(done[name])
-            size = len(job.numbers(name, number))
-            rows = StretchRows.checked(kept.read(place * parts + number), size, states)
+            state = done[name][-1].last if done[name] else job.starts[name]
+            task = job.stretch(name, number, state)
+            assert task is not None
+            rows = kept_rows(StretchRows, kept.read(place * parts + number), task.fits)
             if rows is None:
                 break
             done[name].append(rows)
