@@ -10,8 +10,8 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
 from contfric.plot.lyapunov import edges_of
-from contfric.plot.save import axes_or_new
-from contfric.plot.style import BESIDE, GREY, SMALL, TEXT, branch_colours, lighter, sized
+from contfric.plot.save import axes_or_new, name_axes
+from contfric.plot.style import BESIDE, GREY, SMALL, branch_colours, lighter, sized
 
 if TYPE_CHECKING:
     from contfric.response.basins import Basins
@@ -60,11 +60,9 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     names = [f"{s.name}: {s.share:.1%}" for s in found.shares]
     handles = [Patch(color=c, label=n) for c, n in zip(_shown(found, colours), names, strict=False)]
     ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **BESIDE)
-    ax.set_xlabel(f"${first}$", fontsize=sized(TEXT + 1))
-    ax.set_ylabel(f"${second}$", fontsize=sized(TEXT + 1))
+    name_axes(ax, f"${first}$", f"${second}$")
     ax.set_xlim(edges_of(across)[0], edges_of(across)[-1])
     ax.set_ylim(edges_of(up)[0], edges_of(up)[-1])
-    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
     return ax
 
 
@@ -103,6 +101,5 @@ def plot_stable_set(found: StableSet, ax: Axes | None = None) -> Axes:
             ax.plot(*part.T, color="black", lw=1.0, gid=f"stable set of {found.orbit.name}")
     ax.plot(*found.states[0][0], "s", color="white", mec="black", ms=5)
     if not ax.get_xlabel():
-        ax.set_xlabel(f"${first}$", fontsize=sized(TEXT + 1))
-        ax.set_ylabel(f"${second}$", fontsize=sized(TEXT + 1))
+        name_axes(ax, f"${first}$", f"${second}$")
     return ax

@@ -15,7 +15,7 @@ from contfric.plot.legend import handles_of
 from contfric.plot.look import LineStyle, Look
 from contfric.plot.response import draw_overlay
 from contfric.plot.runs import stability_runs
-from contfric.plot.save import axes_or_new, figure_or_new, for_journal, legend_of
+from contfric.plot.save import axes_or_new, figure_or_new, for_journal, legend_of, name_axes
 from contfric.plot.style import (
     BESIDE,
     BRIDGE_COLOUR,
@@ -190,9 +190,8 @@ def plot_diagram(
     axes[0].set_xlim(*diagram.range)
     draw_overlay(axes, rows, diagram.parameter, overlay)
     fixed = fixed_parameters(diagram.branches)
-    text = ", ".join(f"{parameter_label(n)} = {v:.6g}" for n, v in fixed.items())
-    if title:
-        text = full_title(title, diagram.model.parameter_names, fixed)
+    names_of = diagram.model.parameter_names if title else ()
+    text = full_title(title, names_of, fixed)
     axes[0].set_title(text, fontsize=sized(TEXT))
     marks = [
         marks_of(diagram.bifurcations, diagram.branches, row, diagram.parameter) for row in rows
@@ -283,12 +282,10 @@ def _draw_row(
     draw_marks(ax, marks)
     ax.margins(y=0.12)
     displacement = branches[0].model.states[0] if branches else "x"
-    ax.set_ylabel(label.name(displacement), fontsize=sized(TEXT + 1))
-    if branches:
-        ax.set_xlabel(parameter_label(branches[0].parameter), fontsize=sized(TEXT + 1))
+    across = parameter_label(branches[0].parameter) if branches else None
+    name_axes(ax, across, label.name(displacement))
     if ax.figure.bbox.width / ax.figure.dpi < _COLUMN:
         ax.locator_params(axis="x", nbins=_TICKS)
-    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
 
 
 def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> None:

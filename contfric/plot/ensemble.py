@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from contfric.plot.save import axes_or_new
+from contfric.plot.save import axes_or_new, name_axes
 from contfric.plot.style import (
     BESIDE,
     LINE_WIDTH,
     SMALL,
     STABLE,
-    TEXT,
     UNSTABLE,
     branch_colours,
     event_label,
@@ -72,11 +71,9 @@ def plot_ensemble(found: Ensemble, ax: Axes | None = None, *, bridges: bool = Fa
         ax.plot(found.values, middle, color=colour, ls=style, lw=LINE_WIDTH, label=label)
     _draw_events(ax, found)
     ax.set_xlim(*found.range)
-    ax.set_xlabel(parameter_label(found.parameter), fontsize=sized(TEXT + 1))
     label = row_of(found.row, found.model).name(found.model.states[0])
-    ax.set_ylabel(label, fontsize=sized(TEXT + 1))
+    name_axes(ax, parameter_label(found.parameter), label)
     ax.legend(fontsize=sized(SMALL), frameon=False, **BESIDE)
-    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
     return ax
 
 

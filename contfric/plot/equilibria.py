@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from contfric.plot.save import axes_or_new
+from contfric.plot.save import axes_or_new, name_axes
 from contfric.plot.style import (
     BLACK,
     GREY,
@@ -77,10 +77,7 @@ def plot_equilibria(
         )
         first = last
     _draw_events(ax, branch, branch.model.states.index(name))
-    ax.set_xlabel(parameter_label(branch.parameter), fontsize=sized(TEXT + 1))
-    if not ax.get_ylabel():
-        ax.set_ylabel(parameter_label(name), fontsize=sized(TEXT + 1))
-    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
+    name_axes(ax, parameter_label(branch.parameter), ax.get_ylabel() or parameter_label(name))
     return ax
 
 

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 
-from contfric.plot.save import axes_or_new
+from contfric.plot.save import axes_or_new, name_axes
 from contfric.plot.style import (
     BLUE,
     LINE_WIDTH,
     SMALL,
     STABLE,
-    TEXT,
     UNSTABLE,
     parameter_label,
     sized,
@@ -40,8 +39,6 @@ def plot_quantity_curve(curve: QuantityCurve, ax: Axes | None = None) -> Axes:
         look = STABLE if stable else UNSTABLE
         ax.plot(*part.T, linestyle=look, color=BLUE, linewidth=LINE_WIDTH, label=label)
         label = None
-    ax.set_xlabel(parameter_label(curve.parameters[0]), fontsize=sized(TEXT + 1))
-    ax.set_ylabel(parameter_label(curve.parameters[1]), fontsize=sized(TEXT + 1))
-    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
+    name_axes(ax, parameter_label(curve.parameters[0]), parameter_label(curve.parameters[1]))
     ax.legend(fontsize=sized(SMALL), loc="best")
     return ax

@@ -10,8 +10,16 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
 from contfric.models.definition import FloatArray
-from contfric.plot.save import axes_or_new
-from contfric.plot.style import GREY, SMALL, TEXT, lighter, parameter_label, sized
+from contfric.plot.save import axes_or_new, name_axes
+from contfric.plot.style import (
+    GREY,
+    SMALL,
+    TEXT,
+    fixed_text,
+    lighter,
+    parameter_label,
+    sized,
+)
 
 if TYPE_CHECKING:
     from contfric.chaos.map import LyapunovMap
@@ -57,11 +65,8 @@ def plot_lyapunov_map(lmap: LyapunovMap, ax: Axes | None = None) -> Axes:
         bar.ax.tick_params(labelsize=sized(SMALL + 1))
     ax.set_xlim(edges[0][0], edges[0][-1])
     ax.set_ylim(edges[1][0], edges[1][-1])
-    ax.set_xlabel(parameter_label(first), fontsize=sized(TEXT + 1))
-    ax.set_ylabel(parameter_label(second), fontsize=sized(TEXT + 1))
-    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
-    fixed = ", ".join(f"{parameter_label(n)} = {v:.6g}" for n, v in lmap.params.items() if v != 0.0)
-    ax.set_title(fixed, fontsize=sized(TEXT))
+    name_axes(ax, parameter_label(first), parameter_label(second))
+    ax.set_title(fixed_text(lmap.params), fontsize=sized(TEXT))
     return ax
 
 

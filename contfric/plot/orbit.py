@@ -23,11 +23,10 @@ from contfric.plot.orbit_artists import (
     draw_stops,
     draw_surfaces,
     legend_handles,
-    name_axes,
 )
 from contfric.plot.pieces import Piece, pieces_of, rest_bounds
-from contfric.plot.save import axes_or_new, figure_or_new
-from contfric.plot.style import BESIDE, SMALL, TEXT, parameter_label, sized
+from contfric.plot.save import axes_or_new, figure_or_new, name_axes
+from contfric.plot.style import BESIDE, SMALL, TEXT, fixed_text, parameter_label, sized
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
@@ -200,10 +199,7 @@ def plot_orbit_panels(orbit: Orbit, fig: Figure | None = None) -> list[Axes]:
     plot_orbit_in_time(orbit, right)
     for ax in right[:-1]:
         ax.tick_params(labelbottom=False)
-    values = ", ".join(
-        f"{parameter_label(n)} = {v:.6g}" for n, v in orbit.params.items() if v != 0.0
-    )
-    fig.suptitle(f"{orbit.name}:  {values}", fontsize=sized(TEXT))
+    fig.suptitle(f"{orbit.name}:  {fixed_text(orbit.params)}", fontsize=sized(TEXT))
     handles = legend_handles(orbit, pieces_of(orbit, points=40))
     fig.legend(
         handles=handles,

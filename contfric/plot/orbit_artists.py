@@ -27,7 +27,6 @@ from contfric.plot.style import (
     BLACK,
     GREY,
     SMALL,
-    TEXT,
     domain_colours,
     domain_labels,
     parameter_label,
@@ -220,13 +219,6 @@ def _stop_marker(sticks: bool, x: Sequence[float] = (), y: Sequence[float] = ())
         zorder=5,
         label="stop: sticks" if sticks else "stop: reverses",
     )
-
-
-def name_axes(ax: Axes, across: str, up: str) -> None:
-    """Label both axes and set the look of their ticks."""
-    ax.set_xlabel(across, fontsize=sized(TEXT + 1))
-    ax.set_ylabel(up, fontsize=sized(TEXT + 1))
-    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
 
 
 def legend_handles(orbit: Orbit, pieces: Sequence[Piece]) -> list[Line2D | Patch]:

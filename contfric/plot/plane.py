@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from contfric.errors import either
 from contfric.models.definition import FloatArray
 from contfric.plot.labels import Anchor, place_labels, settle
-from contfric.plot.save import axes_or_new
+from contfric.plot.save import axes_or_new, name_axes
 from contfric.plot.style import (
     BESIDE,
     BLACK,
@@ -25,7 +25,6 @@ from contfric.plot.style import (
     SKY,
     SMALL,
     STABLE,
-    TEXT,
     UNSTABLE,
     VERMILLION,
     event_label,
@@ -133,9 +132,7 @@ def _draw(
                 (line,) = ax.plot(*values.T, color=colour, linewidth=width, linestyle=style)
                 line.set_gid(curve.label)
     names = curves[0].parameters if curves else ("", "")
-    ax.set_xlabel(parameter_label(names[0]), fontsize=sized(TEXT + 1))
-    ax.set_ylabel(parameter_label(names[1]), fontsize=sized(TEXT + 1))
-    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
+    name_axes(ax, parameter_label(names[0]), parameter_label(names[1]))
     _mark(ax, special, names)
     _legend(ax, curves, special, legend)
     settle(ax)

@@ -9,8 +9,16 @@ from matplotlib.axes import Axes
 
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray
-from contfric.plot.save import axes_or_new
-from contfric.plot.style import GREY, SMALL, TEXT, lighter, parameter_label, sized
+from contfric.plot.save import axes_or_new, name_axes
+from contfric.plot.style import (
+    GREY,
+    SMALL,
+    TEXT,
+    fixed_text,
+    lighter,
+    parameter_label,
+    sized,
+)
 
 if TYPE_CHECKING:
     from contfric.quantities.registry import QuantityLike
@@ -44,11 +52,8 @@ def plot_sweep(sweep: Sweep, ax: Axes | None = None, state: str | None = None) -
     for direction in sweep.runs:
         x, y = sweep.points(direction, state)
         _draw(ax, x, y, _COLOURS[direction], 2.0, direction)
-    ax.set_xlabel(parameter_label(sweep.parameter), fontsize=sized(TEXT + 1))
-    ax.set_ylabel(f"${name}$ at {_section(sweep.section)}", fontsize=sized(TEXT + 1))
-    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
-    fixed = (f"{parameter_label(n)} = {v:.6g}" for n, v in sweep.params.items() if v != 0.0)
-    ax.set_title(", ".join(fixed), fontsize=sized(TEXT))
+    name_axes(ax, parameter_label(sweep.parameter), f"${name}$ at {_section(sweep.section)}")
+    ax.set_title(fixed_text(sweep.params), fontsize=sized(TEXT))
     if len(sweep.runs) > 1:
         ax.legend(fontsize=sized(SMALL), markerscale=4.0, loc="best")
     return ax

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from contfric.models.definition import FloatArray
-from contfric.plot.save import axes_or_new
-from contfric.plot.style import GREY, LINE_WIDTH, SMALL, TEXT, branch_colours, lighter, sized
+from contfric.plot.save import axes_or_new, name_axes
+from contfric.plot.style import GREY, LINE_WIDTH, branch_colours, lighter
 
 if TYPE_CHECKING:
     from contfric.response.returns import ReleaseMap, Returns
@@ -45,8 +45,7 @@ def plot_returns(
     name = coordinate or found.model.states[0]
     ax.plot(x, y, linestyle="none", marker=".", markersize=_POINT, color="#1F4E79")
     _draw_diagonal(ax, np.concatenate([x, y]))
-    ax.set_xlabel(f"${name}_{{k}}$", fontsize=sized(TEXT + 1))
-    ax.set_ylabel(f"${name}_{{k+{step}}}$", fontsize=sized(TEXT + 1))
+    name_axes(ax, f"${name}_{{k}}$", f"${name}_{{k+{step}}}$")
     return ax
 
 
@@ -82,8 +81,7 @@ def plot_release_map(
         ax.plot(np.repeat(web, 2)[:-1], np.repeat(web, 2)[1:], color=GREY, linewidth=0.6)
     ax.set_xlim(0.0, found.period)
     ax.set_ylim(0.0, found.period)
-    ax.set_xlabel(r"phase of a release, $t_{k}$", fontsize=sized(TEXT + 1))
-    ax.set_ylabel(r"phase of the next release, $t_{k+1}$", fontsize=sized(TEXT + 1))
+    name_axes(ax, r"phase of a release, $t_{k}$", r"phase of the next release, $t_{k+1}$")
     return ax
 
 
@@ -91,4 +89,3 @@ def _draw_diagonal(ax: Axes, values: FloatArray) -> None:
     if len(values):
         ends = [float(np.nanmin(values)), float(np.nanmax(values))]
         ax.plot(ends, ends, color=lighter(GREY), linewidth=0.8, zorder=0.5)
-    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))

@@ -17,7 +17,7 @@ from PIL import Image
 
 from contfric.base.interrupts import held_back
 from contfric.errors import ParameterError, did_you_mean
-from contfric.plot.style import SMALL, sized
+from contfric.plot.style import SMALL, TEXT, sized
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -178,3 +178,11 @@ def figure_or_new(fig: Figure | None, width: float, height: float) -> Figure:
         from matplotlib import pyplot
 
     return pyplot.figure(figsize=_size(width, height), layout="constrained")
+
+
+def name_axes(ax: Axes, across: str | None, up: str) -> None:
+    """Label both axes (None leaves a label as it is) and set the look of their ticks."""
+    if across is not None:
+        ax.set_xlabel(across, fontsize=sized(TEXT + 1))
+    ax.set_ylabel(up, fontsize=sized(TEXT + 1))
+    ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))

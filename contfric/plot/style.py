@@ -199,13 +199,18 @@ def full_title(title: str, names: Sequence[str], fixed: Mapping[str, float]) -> 
     >>> full_title("S at Omega = 0.5", ["S", "Omega", "h"], {"Omega": 0.5, "h": 0.1})
     'S at $\\Omega$ = 0.5\n$h$ = 0.1'
     """
-    missing = [
-        f"{parameter_label(name)} = {value:.6g}"
+    missing = {
+        name: value
         for name, value in fixed.items()
-        if value != 0.0 and not re.search(rf"(?<!\w){name}\s*=\s*{value:.6g}(?!\d)", title)
-    ]
-    lines = [title_label(title, names), ", ".join(missing)]
+        if not re.search(rf"(?<!\w){name}\s*=\s*{value:.6g}(?!\d)", title)
+    }
+    lines = [title_label(title, names), fixed_text(missing)]
     return "\n".join(filter(None, lines))
+
+
+def fixed_text(fixed: Mapping[str, float]) -> str:
+    """Return parameters and their values as a title; those that are 0 are left out."""
+    return ", ".join(f"{parameter_label(n)} = {v:.6g}" for n, v in fixed.items() if v != 0.0)
 
 
 def surface_label(name: str) -> str:
