@@ -10,15 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.extras import need_pandas, need_xarray
-from contfric.base.shown import Shown
+from contfric.base.extras import need_xarray
+from contfric.base.tabled import Columns, Tabled
 from contfric.chaos.exponents import lyapunov_dimension
 from contfric.chaos.status import Motion
 from contfric.chaos.tiles import TileRows
 from contfric.models.definition import FloatArray, Model
 
 if TYPE_CHECKING:
-    import pandas as pd
     import xarray as xr
     from matplotlib.axes import Axes
 
@@ -28,7 +27,7 @@ _DIFFERENT = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class LyapunovMap(Shown):
+class LyapunovMap(Tabled):
     """Lyapunov exponents on a grid of two parameters; the result of :func:`contfric.lyapunov_map`.
 
     Attributes
@@ -176,26 +175,21 @@ class LyapunovMap(Shown):
 
     # --------------------------------------------------------------------- out
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return one row for each motion: parameters, start, exponents, what it is (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
+    def columns(self) -> Columns:
+        """Return one row for each motion: parameters, start, exponents, what it is."""
         first, second = self.axes
         index = np.indices(self.motions.shape).reshape(3, -1)
-        columns: dict[str, object] = {
+        n = self.exponents.shape[-1]
+        return {
             first: self.axes[first][index[0]],
             second: self.axes[second][index[1]],
             "start": index[2] + 1,
+            **{f"exponent_{k + 1}": self.exponents[..., k].ravel() for k in range(n)},
+            "error": self.errors.ravel(),
+            "motion": Motion.words()[self.motions.ravel()],
+            "periods": self.periods.ravel(),
+            "followed": self.followed.ravel(),
         }
-        for k in range(self.exponents.shape[-1]):
-            columns[f"exponent_{k + 1}"] = self.exponents[..., k].ravel()
-        columns["error"] = self.errors.ravel()
-        names = np.array([motion.name.lower() for motion in Motion])
-        columns["motion"] = names[self.motions.ravel()]
-        columns["periods"] = self.periods.ravel()
-        columns["followed"] = self.followed.ravel()
-        return pd.DataFrame(columns)
 
     def to_xarray(self) -> xr.Dataset:
         """Return exponents, their errors and kinds over parameters and starts as a dataset (needs xarray)."""
@@ -203,12 +197,11 @@ class LyapunovMap(Shown):
         import xarray as xr
 
         dims = (*self.axes, "start")
-        names = np.array([motion.name.lower() for motion in Motion])
         return xr.Dataset(
             {
                 "exponents": ((*dims, "exponent"), self.exponents),
                 "error": (dims, self.errors),
-                "motion": (dims, names[self.motions]),
+                "motion": (dims, Motion.words()[self.motions]),
                 "periods": (dims, self.periods),
                 "followed": (dims, self.followed),
             },

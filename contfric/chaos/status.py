@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from enum import Enum
+from contfric.base.tabled import Coded
 
 
-class Motion(str, Enum):
+class Motion(Coded):
     """What a motion turned out to be; the text says what its exponents mean.
 
     The order is that of the numbers in the arrays of a :class:`~contfric.chaos.map.LyapunovMap`.
@@ -31,11 +31,6 @@ class Motion(str, Enum):
     BROKEN = "the integration of the motion or of its tangent broke off; there are no exponents"
     CHATTER = "impacts follow each other faster and faster, and motion does not go on; no exponents"
     UNCUT = "the motion meets no surface any more and does not converge: the model needs a section"
-
-    @property
-    def code(self) -> int:
-        """Its number in arrays."""
-        return list(Motion).index(self)
 
     @property
     def exact(self) -> bool:

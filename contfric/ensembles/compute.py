@@ -148,14 +148,9 @@ def ensemble(
     if parameter is None or isinstance(parameter, int):
         from contfric.study.tasks.ensemble import ensemble_of
 
+        asked = {"executor": executor, "folder": folder, "progress": progress}
         given = parameter if samples is None else samples
-        return ensemble_of(
-            cast("Study | str | Path", model),
-            given,
-            executor=executor,
-            folder=folder,
-            progress=progress,
-        )
+        return ensemble_of(cast("Study | str | Path", model), given, **asked)
     if range is None or distributions is None:
         raise ParameterError(
             "an ensemble of a model takes parameter, range and distributions: ensemble(model, 'Omega', "
@@ -171,19 +166,11 @@ def ensemble(
     count = whole_number("samples", 1000 if samples is None else samples, least=1)
     grid = _values(parameter, bounds, values)
     must_fit(f"an ensemble of {count} diagrams at {len(grid)} values", count * len(grid) * _BYTES)
-    whole = {
-        "max_periods": max_periods,
-        "copies": copies,
-        "max_branches": max_branches,
-        "max_points": max_points,
-    }
-    options: dict[str, Any] = {"bridges": truth("bridges", bridges)}
-    options |= {k: whole_number(k, v, least=1) for k, v in whole.items() if v is not None}
-    if max_step is not None:
-        options["max_step"] = real_number("max_step", max_step)
+    limits = {"max_periods": max_periods, "copies": copies}
+    limits |= {"max_branches": max_branches, "max_points": max_points}
+    options = _options(bridges, limits, max_step)
     vector = _vector(model, params, parameter, bounds, varied)
-    whole_number("seed", seed, least=0)
-    drawn = varied.draw(seed, count)
+    drawn = varied.draw(whole_number("seed", seed, least=0), count)
     vectors = np.tile(vector, (count, 1))
     vectors[:, [model.index_of(name) for name in varied.names]] = drawn
     side = whole_number("tile", tile, least=1)
@@ -192,6 +179,17 @@ def ensemble(
     rows = _computed(job, executor, kept, progress)
     texts = dict(zip(varied.names, varied.texts, strict=True))
     return Ensemble(model, parameter, bounds, vector, row, grid, texts, seed, drawn, rows)
+
+
+def _options(
+    bridges: bool, limits: Mapping[str, int | None], max_step: float | None
+) -> dict[str, Any]:
+    """Return arguments of the explorations, those that were given."""
+    options: dict[str, Any] = {"bridges": truth("bridges", bridges)}
+    options |= {k: whole_number(k, v, least=1) for k, v in limits.items() if v is not None}
+    if max_step is not None:
+        options["max_step"] = real_number("max_step", max_step)
+    return options
 
 
 def _values(parameter: str, bounds: tuple[float, float], given: Any) -> FloatArray:

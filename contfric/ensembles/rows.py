@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
-from enum import Enum
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.tabled import Coded
+
 Array: TypeAlias = NDArray[Any]
 
 
-class Drawn(Enum):
+class Drawn(Coded):
     """What became of a sample."""
 
     COMPLETE = "a whole diagram"
@@ -21,11 +22,6 @@ class Drawn(Enum):
     FAILED = "no orbit to begin with was found"
     OUTSIDE = "the model is not defined there"
     MISSING = "not computed"
-
-    @property
-    def code(self) -> int:
-        """Its number in arrays."""
-        return list(Drawn).index(self)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray
+from contfric.response.basins import wilson
 
-#: Quantile of the normal distribution for intervals of 95 percent.
-_QUANTILE = 1.959963984540054
 #: Resamples for the intervals of Sobol indices: their ends are the 10th of each side, good to a third of the
 #: interval's own width at most.
 _RESAMPLES = 400
@@ -73,16 +71,7 @@ def share_of(members: NDArray[np.bool_], counted: NDArray[np.bool_], block: int)
     spread = float(np.sum((y - share * m) ** 2)) * blocks / max(blocks - 1, 1) / total**2
     # a block is at least one sample, and no more than all of its own
     like = share * (1.0 - share) / spread if spread > 0.0 else float(blocks)
-    return Interval(share, *_wilson(share, float(np.clip(like, blocks, total))))
-
-
-def _wilson(share: float, total: float) -> tuple[float, float]:
-    """Return the 95 % interval of a share of independent samples (E. B. Wilson, 1927)."""
-    square = _QUANTILE**2
-    middle = (share + square / (2 * total)) / (1 + square / total)
-    half = _QUANTILE * sqrt(share * (1 - share) / total + square / (4 * total**2))
-    half /= 1 + square / total
-    return max(0.0, middle - half), min(1.0, middle + half)
+    return Interval(share, *wilson(share, float(np.clip(like, blocks, total))))
 
 
 def sobol_indices(values: FloatArray, names: tuple[str, ...], seed: int) -> SobolIndices | None:

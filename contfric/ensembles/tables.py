@@ -23,7 +23,7 @@ def frame_of(found: Ensemble, table: str) -> pd.DataFrame:
 
     make: dict[str, Callable[[Ensemble], Any]] = {
         "samples": _samples,
-        "events": _events,
+        "events": events_table,
         "bands": _bands,
         "classes": _classes,
     }
@@ -35,13 +35,13 @@ def _varied(found: Ensemble) -> dict[str, Any]:
 
 
 def _samples(found: Ensemble) -> dict[str, Any]:
-    outcomes = np.array([drawn.name.lower() for drawn in Drawn])
     rows = found.rows
     counts = {"branches": rows.branches, "loose_ends": rows.loose, "reason": rows.reasons}
-    return {**_varied(found), "outcome": outcomes[rows.outcomes], **counts}
+    return {**_varied(found), "outcome": Drawn.words()[rows.outcomes], **counts}
 
 
-def _events(found: Ensemble) -> dict[str, Any]:
+def events_table(found: Ensemble) -> dict[str, Any]:
+    """Return one row for each event of each sample."""
     at = found.rows.event_sample
     columns = {name: values[at] for name, values in _varied(found).items()}
     places = {"event": found.rows.event_label, found.parameter: found.rows.event_value}
@@ -88,7 +88,7 @@ def dataset_of(found: Ensemble) -> xr.Dataset:
     orbits = np.array([b.orbits for b in bands]).reshape(-1, size[1])
     places = np.array([event.values for event in events]).reshape(-1, len(found))
     varied = {name: ("sample", values) for name, values in _varied(found).items()}
-    outcomes = np.array([drawn.name.lower() for drawn in Drawn])[found.rows.outcomes]
+    outcomes = Drawn.words()[found.rows.outcomes]
     return xr.Dataset(
         {
             **varied,

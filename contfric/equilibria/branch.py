@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.extras import need_pandas
-from contfric.base.shown import Shown
+from contfric.base.tabled import Columns, Tabled
 from contfric.equilibria.events import EquilibriumEvent
 from contfric.equilibria.regions import Region
 from contfric.equilibria.result import Equilibrium, Location
@@ -18,7 +17,6 @@ from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import FloatArray, Model
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
 
 
@@ -35,7 +33,7 @@ class BranchEnd(str, Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class EquilibriumBranch(Shown):
+class EquilibriumBranch(Tabled):
     """Equilibria along a parameter; the result of :func:`contfric.continue_equilibrium`.
 
     Attributes
@@ -123,15 +121,11 @@ class EquilibriumBranch(Shown):
         """Return the events of one kind: "SN", "BP", "H" or "BE"."""
         return [event for event in self.events if event.kind.value == kind]
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return one row for each point (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
-        columns: dict[str, object] = {self.parameter: self.values, "mode": self.modes}
-        columns |= {name: self.states[:, k] for k, name in enumerate(self.model.states)}
-        columns |= {"stable": self.stable, "admissible": self.admissible}
-        return pd.DataFrame(columns)
+    def columns(self) -> Columns:
+        """Return one row for each point: parameter, mode, state, stable, admissible."""
+        states = dict(zip(self.model.states, self.states.T, strict=True))
+        looks = {"stable": self.stable, "admissible": self.admissible}
+        return {self.parameter: self.values, "mode": np.array(self.modes), **states, **looks}
 
     def plot(self, ax: Axes | None = None, state: str | None = None) -> Axes:
         """Draw one state along the parameter: stable solid, unstable dashed, events marked.

@@ -10,15 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.extras import need_pandas, need_xarray
-from contfric.base.shown import Shown
+from contfric.base.extras import need_xarray
+from contfric.base.tabled import Columns, Tabled
 from contfric.chaos.status import Motion
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.response.attractors import named
 
 if TYPE_CHECKING:
-    import pandas as pd
     import xarray as xr
     from matplotlib.axes import Axes
 
@@ -47,7 +46,7 @@ class Share:
 
 
 @dataclass(frozen=True, eq=False)
-class Basins(Shown):
+class Basins(Tabled):
     """What starts on a grid converge to; the result of :func:`contfric.basins`.
 
     Attributes
@@ -130,41 +129,34 @@ class Basins(Shown):
             if motion is not Motion.MISSING
         ]
         return tuple(
-            Share(name, k, count, count / total, *wilson(count, total))
+            Share(name, k, count, count / total, *wilson(count / total, total))
             for name, k, count in found
             if count
         )
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return one row for each start: its two states, orbit, name, kind of motion (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
+    def columns(self) -> Columns:
+        """Return one row for each start: its two states, orbit, name, kind of motion."""
         (first, rows), (second, columns) = self.axes.items()
-        names = np.array([*self.names, ""])
-        motions = np.array([motion.name.lower() for motion in Motion])
-        return pd.DataFrame(
-            {
-                first: np.repeat(rows, len(columns)),
-                second: np.tile(columns, len(rows)),
-                "orbit": self.labels.ravel(),
-                "name": names[self.labels.ravel()],
-                "motion": motions[self.motions.ravel()],
-            }
-        )
+        return {
+            first: np.repeat(rows, len(columns)),
+            second: np.tile(columns, len(rows)),
+            "orbit": self.labels.ravel(),
+            "name": np.array([*self.names, ""])[self.labels.ravel()],
+            "motion": Motion.words()[self.motions.ravel()],
+        }
 
     def to_xarray(self) -> xr.Dataset:
         """Return labels and kinds over the two states as a dataset (needs xarray)."""
         need_xarray()
         import xarray as xr
 
-        dims, motions = tuple(self.axes), np.array([motion.name.lower() for motion in Motion])
+        dims = tuple(self.axes)
         names = np.array([*self.names, ""])
         return xr.Dataset(
             {
                 "orbit": (dims, self.labels),
                 "name": (dims, names[self.labels]),
-                "motion": (dims, motions[self.motions]),
+                "motion": (dims, Motion.words()[self.motions]),
             },
             coords=dict(self.axes),
             attrs={"model": self.model.name, **self.params, **self.at},
@@ -182,15 +174,15 @@ class Basins(Shown):
         return f"<Basins of {self.model.name}: {shape} starts in {', '.join(self.axes)}; {found}>"
 
 
-def wilson(count: int, total: int) -> tuple[float, float]:
+def wilson(share: float, total: float) -> tuple[float, float]:
     """Return the 95 % interval of a share (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212).
 
     Examples
     --------
-    >>> [round(x, 4) for x in wilson(8, 10)]
+    >>> [round(x, 4) for x in wilson(0.8, 10)]
     [0.4902, 0.9433]
     """
-    share, square = count / total, _QUANTILE**2
+    square = _QUANTILE**2
     middle = (share + square / (2 * total)) / (1 + square / total)
     half = _QUANTILE * sqrt(share * (1 - share) / total + square / (4 * total**2))
     half /= 1 + square / total

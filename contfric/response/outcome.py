@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from enum import Enum
+from contfric.base.tabled import Coded
 
 
-class Outcome(str, Enum):
+class Outcome(Coded):
     """What a solution came to; the text says what its points are.
 
     The order is that of the numbers in arrays.
@@ -25,8 +25,3 @@ class Outcome(str, Enum):
     QUIET = "it meets no surface any more"
     OUTSIDE = "the model is not defined there"
     MISSING = "not computed: the computation was interrupted"
-
-    @property
-    def code(self) -> int:
-        """Its number in arrays."""
-        return list(Outcome).index(self)

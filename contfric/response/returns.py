@@ -8,21 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.extras import need_pandas
-from contfric.base.shown import Shown
+from contfric.base.tabled import Columns, Tabled
 from contfric.errors import ParameterError, shown, whole_number
 from contfric.models.definition import FloatArray, Model
 from contfric.response.outcome import Outcome
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
 
     from contfric.certify.horseshoe import Horseshoe
 
 
 @dataclass(frozen=True, eq=False)
-class Returns(Shown):
+class Returns(Tabled):
     """Points of a solution on a section, in order; the result of :func:`contfric.poincare`.
 
     Attributes
@@ -90,19 +88,11 @@ class Returns(Shown):
         step = whole_number("step", step, least=1)
         return values[:-step], values[step:]
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return one row for each point: period, phase, mode, state (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
+    def columns(self) -> Columns:
+        """Return one row for each point: period, phase, mode, state."""
         modes = np.array([mode.name for mode in self.model.modes])
-        columns: dict[str, object] = {
-            "cycle": self.cycles,
-            "t": self.times,
-            "mode": modes[self.modes],
-        }
-        columns |= {name: self.states[:, k] for k, name in enumerate(self.model.states)}
-        return pd.DataFrame(columns)
+        states = dict(zip(self.model.states, self.states.T, strict=True))
+        return {"cycle": self.cycles, "t": self.times, "mode": modes[self.modes], **states}
 
     def plot(self, ax: Axes | None = None, coordinate: str | None = None, step: int = 1) -> Axes:
         """Draw the return map of one coordinate, the displacement by default."""
@@ -119,7 +109,7 @@ class Returns(Shown):
 
 
 @dataclass(frozen=True, eq=False)
-class ReleaseMap(Shown):
+class ReleaseMap(Tabled):
     """The map from the phase of one release to that of the next; the result of :func:`contfric.release_map`.
 
     Attributes
@@ -229,19 +219,11 @@ class ReleaseMap(Shown):
 
         return horseshoe_of(self, whole_number("most", most, least=1))
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return one row for each release: phase, image, time between, branch, state (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
-        columns: dict[str, object] = {
-            "phase": self.phases,
-            "image": self.images,
-            "time": self.returns,
-            "branch": self.branch,
-        }
-        columns |= {name: self.states[:, k] for k, name in enumerate(self.model.states)}
-        return pd.DataFrame(columns)
+    def columns(self) -> Columns:
+        """Return one row for each release: phase, image, time between, branch, state."""
+        found = {"phase": self.phases, "image": self.images, "time": self.returns}
+        states = dict(zip(self.model.states, self.states.T, strict=True))
+        return {**found, "branch": self.branch, **states}
 
     def plot(self, ax: Axes | None = None, start: float | None = None, count: int = 50) -> Axes:
         """Draw the map with its branches; from a start the cobweb of the releases that follow it."""

@@ -23,8 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.base.extras import need_pandas
-from contfric.base.shown import Shown
+from contfric.base.tabled import Columns, Tabled
 from contfric.errors import ParameterError, real_number, shown, whole_number
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
@@ -33,7 +32,6 @@ from contfric.orbit.starts import start_of
 from contfric.orbit.system import IntArray
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
 
 #: Step of the differences that make the derivative of f: the cube root of rounding, in sizes of the orbit.
@@ -69,7 +67,7 @@ class StableEnd(str, Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class StableSet(Shown):
+class StableSet(Tabled):
     """The stable set of an unstable orbit; the result of :func:`contfric.stable_set`.
 
     Attributes
@@ -101,14 +99,11 @@ class StableSet(Shown):
         one, other = self.states
         return np.concatenate([one[:0:-1], other])
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return the points as a table: both states, and the half (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
+    def columns(self) -> Columns:
+        """Return one row for each point: both states, and the half."""
         names = self.orbit.model.states
         half = np.repeat([0, 1], [len(self.states[0]) - 1, len(self.states[1])])
-        return pd.DataFrame({**dict(zip(names, self.points.T, strict=True)), "half": half})
+        return {**dict(zip(names, self.points.T, strict=True)), "half": half}
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the set in the plane of the two states, as over basins, with the orbit on it."""

@@ -10,15 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.extras import need_pandas, need_xarray
-from contfric.base.shown import Shown
+from contfric.base.extras import need_xarray
+from contfric.base.tabled import Columns, Tabled
 from contfric.errors import ParameterError, shown
 from contfric.models.definition import FloatArray, Model
 from contfric.response.outcome import Outcome
 from contfric.response.sections import STOPS
 
 if TYPE_CHECKING:
-    import pandas as pd
     import xarray as xr
     from matplotlib.axes import Axes
 
@@ -59,7 +58,7 @@ class SweepRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep(Shown):
+class Sweep(Tabled):
     """Points of simulated solutions along a parameter; the result of :func:`contfric.sweep`.
 
     Attributes
@@ -189,47 +188,34 @@ class Sweep(Shown):
         """Periods after which the solution repeats itself, for each direction."""
         return {name: run.periods for name, run in self.runs.items()}
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return one row for each point: direction, parameter, period, phase, state (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
-        tables = []
-        outcomes = np.array([outcome.name.lower() for outcome in Outcome])
-        modes = np.array([mode.name for mode in self.model.modes])
-        for name, run in self.runs.items():
-            columns: dict[str, object] = {
-                "direction": np.full(len(run), name),
-                self.parameter: self.values[run.index],
-                "outcome": outcomes[run.outcomes[run.index]],
-                "period": run.periods[run.index],
-                "mode": modes[run.modes],
-                "t": run.times,
-            }
-            columns |= {state: run.states[:, k] for k, state in enumerate(self.model.states)}
-            tables.append(pd.DataFrame(columns))
-        return pd.concat(tables, ignore_index=True)
+    def columns(self) -> Columns:
+        """Return one row for each point: direction, parameter, outcome, period, mode, phase, state."""
+        modes, runs = np.array([mode.name for mode in self.model.modes]), self.runs.values()
+        states = np.concatenate([run.states for run in runs])
+        return {
+            "direction": np.repeat(list(self.runs), [len(run) for run in runs]),
+            self.parameter: np.concatenate([self.values[run.index] for run in runs]),
+            "outcome": np.concatenate([Outcome.words()[run.outcomes[run.index]] for run in runs]),
+            "period": np.concatenate([run.periods[run.index] for run in runs]),
+            "mode": modes[np.concatenate([run.modes for run in runs])],
+            "t": np.concatenate([run.times for run in runs]),
+            **dict(zip(self.model.states, states.T, strict=True)),
+        }
 
     def to_xarray(self) -> xr.Dataset:
         """Return outcomes and periods over direction and parameter, and all points, as a dataset (xarray)."""
         need_xarray()
         import xarray as xr
 
-        runs, outcomes = self.runs.values(), np.array([o.name.lower() for o in Outcome])
-        modes = np.array([mode.name for mode in self.model.modes])
-        grid, at = ("direction", self.parameter), "point"
-        lengths = [len(run) for run in runs]
+        grid, runs = ("direction", self.parameter), self.runs.values()
         points = {
-            "point_direction": (at, np.repeat(list(self.runs), lengths)),
-            f"point_{self.parameter}": (at, np.concatenate([self.values[r.index] for r in runs])),
-            "mode": (at, modes[np.concatenate([run.modes for run in runs])]),
-            "t": (at, np.concatenate([run.times for run in runs])),
+            f"point_{name}" if name in grid else name: ("point", values)
+            for name, values in self.columns().items()
+            if name not in ("outcome", "period")
         }
-        states = np.concatenate([run.states for run in runs])
-        points |= {name: (at, states[:, k]) for k, name in enumerate(self.model.states)}
         return xr.Dataset(
             {
-                "outcome": (grid, np.array([outcomes[run.outcomes] for run in runs])),
+                "outcome": (grid, np.array([Outcome.words()[run.outcomes] for run in runs])),
                 "period": (grid, np.array([run.periods for run in runs])),
                 **points,
             },

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contfric.base.files import replacing
 from contfric.study.wanted import Want
@@ -23,6 +24,19 @@ class Table(NamedTuple):
 
     header: Sequence[str]
     rows: Iterable[Sequence[Any]]
+
+
+#: Rows of an array that are made numbers at once.
+_ROWS = 4096
+
+
+def table_of(columns: Mapping[str, NDArray[Any]]) -> Table:
+    """Return the table of columns of one length."""
+    arrays = list(columns.values())
+    parts = (
+        [array[k : k + _ROWS].tolist() for array in arrays] for k in range(0, len(arrays[0]), _ROWS)
+    )
+    return Table(list(columns), (row for part in parts for row in zip(*part, strict=True)))
 
 
 def points(study: Study, sources: Sequence[Branch | Orbit]) -> Table:

@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import Field
 
 from contfric.base.shown import aligned
-from contfric.study.tables import Table
 from contfric.study.tasks.response import Response
 from contfric.study.tasks.task import (
     FigureKind,
@@ -87,10 +86,6 @@ class BasinsTask(Response):
             **self.options(),
         )
 
-    def table(self, file: str, study: Study, found: Basins) -> Table:
-        """Return one row for each start."""
-        return Table([*found.axes, "orbit", "name", "motion"], _rows(found))
-
     def entry(self, found: Basins) -> dict[str, Any]:
         """Return the grid and the share of each orbit."""
         return {
@@ -110,14 +105,3 @@ class BasinsTask(Response):
             rows.append([s["name"], str(s["count"]), f"{s['share']:.2%}", interval])
         yield from aligned(rows)
         yield from incomplete(entry)
-
-
-def _rows(found: Basins) -> Iterator[tuple[Any, ...]]:
-    from contfric.chaos.status import Motion
-
-    motions, names = [motion.name.lower() for motion in Motion], [*found.names, ""]
-    rows, columns = (values.tolist() for values in found.axes.values())
-    for i, a in enumerate(rows):
-        for j, b in enumerate(columns):
-            label = int(found.labels[i, j])
-            yield a, b, label, names[label], motions[found.motions[i, j]]

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from contfric.base.shown import aligned
 from contfric.errors import ParameterError, StudyError, checked_range, did_you_mean
-from contfric.study.tables import Table
+from contfric.study.tables import Table, table_of
 from contfric.study.tasks.response import Response
 from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Job, attempt, incomplete
 
@@ -142,13 +142,9 @@ class EnsembleTask(Response):
 
     def table(self, file: str, study: Study, found: Ensemble) -> Table:
         """Return one row for each event of each sample."""
-        places = found.rows
-        events = zip(places.event_label.tolist(), places.event_value.tolist(), strict=True)
-        rows = (
-            (sample, *found.samples[sample].tolist(), *event)
-            for sample, event in zip(places.event_sample.tolist(), events, strict=True)
-        )
-        return Table(["sample", *found.distributions, "event", found.parameter], rows)
+        from contfric.ensembles.tables import events_table
+
+        return table_of(events_table(found))
 
     def entry(self, found: Ensemble) -> dict[str, Any]:
         """Return events and classes with their shares."""

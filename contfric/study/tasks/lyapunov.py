@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from contfric.study.tables import Table
 from contfric.study.tasks.task import (
     STATE,
     FigureKind,
@@ -99,29 +98,6 @@ class LyapunovTask(Task):
             progress=job.told(self.name),
             **self.options(),
         )
-
-    def table(self, file: str, study: Study, found: LyapunovMap) -> Table:
-        """Return one row for each trajectory."""
-        from contfric.chaos.status import Motion
-
-        (first, across), (second, up) = found.axes.items()
-        names = [motion.name.lower() for motion in Motion]
-        rows = (
-            (
-                across[i].item(),
-                up[j].item(),
-                k + 1,
-                *found.exponents[i, j, k].tolist(),
-                found.errors[i, j, k].item(),
-                names[found.motions[i, j, k]],
-                found.periods[i, j, k].item(),
-                found.followed[i, j, k].item(),
-            )
-            for i, j, k in np.ndindex(*found.motions.shape)
-        )
-        exponents = [f"exponent_{k + 1}" for k in range(found.exponents.shape[-1])]
-        tail = ["error", "motion", "periods", "followed"]
-        return Table([first, second, "start", *exponents, *tail], rows)
 
     def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
         """Draw the map."""

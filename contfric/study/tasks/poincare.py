@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
-from contfric.study.tables import Table
 from contfric.study.tasks.response import Section
 from contfric.study.tasks.task import FigureKind, Job
 
@@ -36,20 +35,6 @@ class PoincareTask(Section):
         from contfric.response.poincare import poincare
 
         return poincare(job.study.model, job.study.params, **self.options())
-
-    def table(self, file: str, study: Study, found: Returns) -> Table:
-        """Return one row for each point."""
-        modes = [mode.name for mode in found.model.modes]
-        rows = (
-            (
-                found.cycles[k].item(),
-                found.times[k].item(),
-                modes[found.modes[k]],
-                *found.states[k].tolist(),
-            )
-            for k in range(len(found))
-        )
-        return Table(["cycle", "t", "mode", *found.model.states], rows)
 
     def entry(self, found: Returns) -> dict[str, Any]:
         """Return the section and how the solution ended."""

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from contfric.study.tables import Table
 from contfric.study.tasks.response import Section
 from contfric.study.tasks.task import PARAMETER, FigureKind, Job, attempt, check_axis, incomplete
 
@@ -78,11 +77,6 @@ class SweepTask(Section):
             **self.options(),
         )
 
-    def table(self, file: str, study: Study, found: Sweep) -> Table:
-        """Return one row for each point."""
-        columns = ["direction", found.parameter, "outcome", "period", "mode", "t"]
-        return Table([*columns, *found.model.states], _rows(found))
-
     def entry(self, found: Sweep) -> dict[str, Any]:
         """Return the values and what the trajectory converged to at each."""
         return {
@@ -104,21 +98,3 @@ class SweepTask(Section):
         yield f"sweep at {count} values of {entry['parameter']} from {low:g} to {high:g}: {found}"
         yield f"points    {points}"
         yield from incomplete(entry, "the same command goes on from what was found")
-
-
-def _rows(found: Sweep) -> Iterator[tuple[Any, ...]]:
-    from contfric.response.outcome import Outcome
-
-    outcomes = [outcome.name.lower() for outcome in Outcome]
-    modes = [mode.name for mode in found.model.modes]
-    for name, run in found.runs.items():
-        for i, value in enumerate(run.index.tolist()):
-            yield (
-                name,
-                found.values[value].item(),
-                outcomes[run.outcomes[value]],
-                run.periods[value].item(),
-                modes[run.modes[i]],
-                run.times[i].item(),
-                *run.states[i].tolist(),
-            )

@@ -150,8 +150,10 @@ class Task(Part):
         return found
 
     def table(self, file: str, study: Study, found: Any) -> Table:
-        """Return one of its tables."""
-        raise NotImplementedError
+        """Return one of its tables; by default the result is one."""
+        from contfric.study.tables import table_of
+
+        return table_of(found.columns())
 
     def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
         """Draw a figure of one of its kinds."""

@@ -1,0 +1,47 @@
+"""Results that are tables, and enumerations whose members are numbers in arrays."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contfric.base.extras import need_pandas
+from contfric.base.shown import Shown
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Arrays of one length by the names of the columns.
+Columns: TypeAlias = dict[str, NDArray[Any]]
+
+
+class Tabled(Shown):
+    """A result that is a table, for pandas and for the CSV file of a run."""
+
+    def columns(self) -> Columns:
+        """Return arrays of one length by the names of the columns."""
+        raise NotImplementedError
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the columns as a table (needs pandas)."""
+        need_pandas()
+        import pandas as pd
+
+        return pd.DataFrame(self.columns())
+
+
+class Coded(str, Enum):
+    """An enumeration; the order of its members is that of their numbers in arrays."""
+
+    @property
+    def code(self) -> int:
+        """Its number in arrays."""
+        return list(type(self)).index(self)
+
+    @classmethod
+    def words(cls) -> NDArray[np.str_]:
+        """Return the names of the members as words, by their numbers."""
+        return np.array([member.name.lower() for member in cls])
