@@ -188,7 +188,9 @@ def figure(parameter: str) -> cf.Diagram:
 
 
 def test_bridges_and_asymmetric_branches_from_event_to_event() -> None:
-    for branch in figure("Omega").branches:
+    branches = figure("Omega").branches
+    image = next(b for b in branches if b.mirrored)
+    for branch in [*(b for b in branches if not b.mirrored), image]:
         certificate = branch.certify()
         assert certificate.complete, (branch, certificate.gaps, certificate.open)
 

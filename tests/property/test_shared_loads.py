@@ -45,7 +45,7 @@ def all_solutions(rest: Rest) -> list[str]:
 def test_states_are_those_of_enumeration() -> None:
     rng = np.random.default_rng(15)
     several = 0
-    for case in range(1000):
+    for case in range(400):
         rest = rest_of(rng, 1.0 if case % 2 else float(rng.uniform(1.0, 1.6)))
         letters, every = rest.states(" " * len(rest.free)), all_solutions(rest)
         if case % 2:  # exactly one where static and kinetic limits agree
@@ -55,7 +55,7 @@ def test_states_are_those_of_enumeration() -> None:
         assert letters in every
         stuck = "s" * len(rest.free)
         assert letters == stuck or stuck not in every
-    assert several > 50
+    assert several > 20
 
 
 def structure(seed: int, static: float = 1.0) -> tuple[cf.Model, Any]:
@@ -151,12 +151,12 @@ def test_diagrams_have_no_loose_ends(seed: int) -> None:
 
 def test_static_friction_above_kinetic() -> None:
     found = 0
-    for seed in range(8):
+    for seed in range(4):
         model, _ = structure(seed, static=1.2)
         orbit = cf.find_orbit(model)
         assert orbit.residual < 1e-12 and np.min(orbit.margins) > -1e-9
         found += len(orbit.word) > 4
-    assert found >= 4
+    assert found >= 2
 
 
 def test_models_come_back_with_their_surfaces(tmp_path: Any) -> None:
