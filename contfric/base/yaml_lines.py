@@ -166,7 +166,7 @@ def comma_hint(key: str, value: object = "") -> str:
 
     Parameters
     ----------
-    value : what it is the key of; what is behind a comma inside { } has none
+    value : what it is the key of; what follows a comma inside { } has none
 
     Examples
     --------

@@ -222,7 +222,7 @@ class Grid:
             setattr(self, name, larger)
 
     def _codes(self, done: Sweep) -> IntArray:
-        """Return the letters of the events within the limits, -1 behind them."""
+        """Return the letters of the events within the limits, -1 after them."""
         stop, here = self._letters
         count, events = done.joints.shape[:2]
         place = np.arange(events)

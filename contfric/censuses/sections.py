@@ -65,7 +65,7 @@ class Section:
 
 
 def joint_indices(model: Model, pair: ReducedPair, after: str) -> tuple[int, int, int]:
-    """Return a segment's mode, exit and the mode behind it as the engine numbers them."""
+    """Return a segment's mode, exit and the mode after it as the engine numbers them."""
     return model.mode_index[pair[0]], model.surface_index[pair[1]], model.mode_index[after]
 
 

@@ -13,7 +13,7 @@ from contfric.errors import ResultFileError
 
 
 def certify(options: argparse.Namespace) -> int:
-    """Write the certificate beside the results, a column into their table; the summary to stdout."""
+    """Write the certificate next to the results, a column into their table; the summary to stdout."""
     from contfric.base.extras import need_flint
 
     need_flint()  # before anything is read

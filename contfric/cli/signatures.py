@@ -49,7 +49,7 @@ def show(options: argparse.Namespace) -> int:
 
 
 def check(options: argparse.Namespace) -> int:
-    """``contfric signatures check FILE...``: every file is checked, also behind a wrong one."""
+    """``contfric signatures check FILE...``: every file is checked, also after a wrong one."""
     from contfric.signature.schema import read_signature
 
     wrong = 0

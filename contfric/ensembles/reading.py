@@ -27,7 +27,7 @@ IMAGE = " (image)"
 
 
 def names_of(diagram: Diagram) -> list[str]:
-    """Return the names of the branches; a mirror image stands behind its branch, and is called the same."""
+    """Return the names of the branches; a mirror image follows its branch, and is called the same."""
     names: list[str] = []
     for branch in diagram.branches:
         names.append(names[-1] if branch.mirrored and names else branch.name)
@@ -119,7 +119,7 @@ def _nodes(
     order = np.argsort(arc, kind="stable")
     order = order[np.concatenate([[True], np.diff(arc[order]) > 0.0])]
     arc, at, row, stable = arc[order], at[order], row[order], stable[order]
-    # behind an event a branch is as stable as at its next point
+    # after an event a branch is as stable as at its next point
     points = np.flatnonzero(stable != -2)
     following = points[np.minimum(np.searchsorted(points, np.arange(len(arc))), len(points) - 1)]
     stable = stable[following]

@@ -62,7 +62,7 @@ class Run:
 
 
 def march(arc: Arc, start: CurvePoint, limits: Limits) -> Run:
-    """Follow a curve from a point along its tangent; it ends behind the first boundary of its region."""
+    """Follow a curve from a point along its tangent; it ends after the first boundary of its region."""
     run, step = Run(arc, [start]), _FIRST
     closes = _Closing(start)
     while len(run.places) < limits.max_points:
@@ -179,7 +179,7 @@ def _real_part(arc: Arc, k: int, at: CurvePoint) -> float:
 
 
 def _tests(arc: Arc, before: CurvePoint) -> Iterator[tuple[str, Callable[[CurvePoint], float]]]:
-    """Yield the test functions that are watched behind a point, by their names."""
+    """Yield the test functions that are watched after a point, by their names."""
     yield "SN", lambda at: float(at.tangent[-1])
     yield "BP", arc.orientation
     region = arc.region

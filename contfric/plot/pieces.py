@@ -25,7 +25,7 @@ _BISECTIONS = 45
 class Piece:
     """Part of an orbit inside one domain: times (k,) and states (k, n), both ends included.
 
-    Behind an impact the first two rows are the states before and behind it, at the same time.
+    After an impact the first two rows are the states before and after it, at the same time.
     ``exit`` is the surface through which it leaves; ``segment`` counts the orbit's own segments.
     """
 

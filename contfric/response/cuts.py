@@ -99,7 +99,7 @@ class Ends(NamedTuple):
     states: FloatArray
 
     def behind(self, done: int) -> Ends:
-        """Return the rows behind those that are done, as views."""
+        """Return the rows after those that are done, as views."""
         return Ends(
             self.outcomes[done:],
             self.turns[done:],

@@ -345,7 +345,7 @@ class _Half:
         return None
 
     def _go_on_behind(self, found: FloatArray, step: float) -> None:
-        """Take a point behind a break, and the direction of the set there: the one that leads away."""
+        """Take a point beyond a break, and the direction of the set there: the one that leads away."""
         self.direction = found - self.points[-1]
         self.breaks.append(len(self.points))
         self.points.append(found)

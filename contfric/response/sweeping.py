@@ -61,7 +61,7 @@ class _Job:
         return order[part * STRETCH : (part + 1) * STRETCH]
 
     def stretch(self, direction: str, part: int, state: FloatArray) -> Stretch | None:
-        """Return a stretch; None behind the last one."""
+        """Return a stretch; None after the last one."""
         numbers = self.numbers(direction, part)
         if not len(numbers):
             return None
@@ -104,7 +104,7 @@ def sweep(
     """Compute a brute-force bifurcation diagram: simulate along a parameter, the state carried over.
 
     At each value the solution goes on from the state at the value before. Its points on the section are
-    collected behind a transient. One that repeats itself to rounding is left at once, and has the points
+    collected after a transient. One that repeats itself to rounding is left at once, and has the points
     of one period. Where nothing can be carried over (the solution grew, or no solution starts there) the
     next value begins with the model's start. Ctrl-C ends the computation; what was found is returned.
 

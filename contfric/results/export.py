@@ -59,9 +59,9 @@ def export(x: Exported, path: str | Path) -> tuple[Path, ...]:
     _write_csv(place, points)
     if events is None:
         return (place,)
-    beside = place.with_name(f"{place.stem}-events.csv")
-    _write_csv(beside, events)
-    return place, beside
+    other = place.with_name(f"{place.stem}-events.csv")
+    _write_csv(other, events)
+    return place, other
 
 
 def _check_kind(x: object) -> None:

@@ -63,7 +63,7 @@ class Figure(Part):
 
 
 class StudyFile(Part):
-    """The content of a study file: what it has beside its tasks, and those that it asks for."""
+    """The content of a study file: the tasks that it asks for, and the rest."""
 
     known: ClassVar[tuple[type[Task], ...]] = ()
 
