@@ -132,11 +132,13 @@ def test_doctor_writes_bytecode_where_it_is_missing_or_old(tmp_path, monkeypatch
     monkeypatch.setattr(sys, "pycache_prefix", str(tmp_path))  # a place without any
     stale, count = stale_bytecode()
     assert len(stale) == count > 300
-    package = [file for file in stale if file in package_files()]
+    own = package_files()
+    package = [file for file in stale if file in own][:20]
+    assert len(package) == 20
     write_bytecode(package)
     left, again = stale_bytecode()
     assert again == count and len(left) == count - len(package)
-    assert not set(left) & set(package_files())
+    assert not set(left) & set(package)
     kept = Path(cache_from_source(str(package[0])))
     os.utime(kept, (0, 0))
     assert package[0] in stale_bytecode()[0]
