@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 from contfric.base.memory import must_fit
 from contfric.chaos.exponents import checked_time, limits_of
 from contfric.chaos.map import LyapunovMap, points_of
-from contfric.chaos.rows import Limits
 from contfric.chaos.running import Progress, check_executor
 from contfric.chaos.starts import StateLike, given_states, number_of_starts
 from contfric.chaos.store import TileFolder, digest, open_tiles, versions
@@ -36,55 +35,6 @@ from contfric.models.tied import tied
 
 #: Bytes of a motion in a map beyond its exponents and its initial state.
 _BYTES = 24
-
-
-@dataclass(frozen=True, eq=False)
-class _Job:
-    """A map to be computed."""
-
-    model: Model
-    axes: dict[str, FloatArray]
-    vector: FloatArray
-    starts: int
-    states: FloatArray | None
-    time: float
-    limits: Limits
-    side: int
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        rows, columns = self.axes.values()
-        return len(rows), len(columns)
-
-    def places(self) -> list[Place]:
-        return list(places(self.shape, self.side))
-
-    def tile(self, place: Place) -> Tile:
-        (first, rows), (second, columns) = self.axes.items()
-        return Tile(
-            self.model,
-            self.limits,
-            self.vector,
-            (self.model.index_of(first), self.model.index_of(second)),
-            (rows[place[0]], columns[place[1]]),
-            self.starts,
-            None if self.states is None else self.states[place],
-            self.time,
-        )
-
-    def record(self) -> dict[str, Any]:
-        """Describe the map, so that tiles of another one, or of another version, are not taken for its."""
-        return {
-            **versions(self.model),
-            "params": self.model.mapping(self.vector),
-            "axes": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in self.axes.items()},
-            "grid": digest(*self.axes.values()),
-            "starts": self.starts,
-            "states": digest(self.states) if self.states is not None else "default",
-            "time": self.time,
-            "limits": list(self.limits),
-            "tile": self.side,
-        }
 
 
 def lyapunov_map(
@@ -155,9 +105,27 @@ def lyapunov_map(
     count = number_of_starts(model, state, starts, example)
     check_size(shape, count, len(model.states))
     states = None if state is None else _all_states(model, grid, vector, state, count)
-    job = _Job(model, grid, vector, count, states, checked_time(time), limits, tile)
-    kept = None if folder is None else open_tiles(Path(folder), job.record())
-    return LyapunovMap(model, grid, vector, _computed(job, executor, kept, progress))
+    names, values = zip(*grid.items(), strict=True)
+    varied = model.index_of(names[0]), model.index_of(names[1])
+    at = checked_time(time)
+    whole = Tile(model, limits, vector, varied, (values[0], values[1]), count, states, at)
+    kept = None if folder is None else open_tiles(Path(folder), _record(whole, grid, tile))
+    return LyapunovMap(model, grid, vector, _computed(whole, tile, executor, kept, progress))
+
+
+def _record(whole: Tile, grid: Mapping[str, FloatArray], side: int) -> dict[str, Any]:
+    """Describe the map, so that tiles of another one, or of another version, are not taken for its."""
+    return {
+        **versions(whole.model),
+        "params": whole.model.mapping(whole.vector),
+        "axes": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in grid.items()},
+        "grid": digest(*grid.values()),
+        "starts": whole.starts,
+        "states": digest(whole.states) if whole.states is not None else "default",
+        "time": whole.time,
+        "limits": list(whole.limits),
+        "tile": side,
+    }
 
 
 def check_size(shape: tuple[int, ...], starts: int, n: int) -> None:
@@ -177,9 +145,13 @@ def check_size(shape: tuple[int, ...], starts: int, n: int) -> None:
 
 
 def _computed(
-    job: _Job, executor: Executor | None, kept: TileFolder | None, progress: Progress | None
+    whole: Tile,
+    side: int,
+    executor: Executor | None,
+    kept: TileFolder | None,
+    progress: Progress | None,
 ) -> TileRows:
-    rows, cut = empty_tile((*job.shape, job.starts), len(job.model.states)), job.places()
+    rows, cut = empty_tile(whole.shape, len(whole.model.states)), list(places(whole.shape, side))
     work: Work[Tile, TileRows] = Work(
         "Lyapunov map",
         TileRows,
@@ -187,10 +159,12 @@ def _computed(
         kept,
         executor,
         progress,
-        prepare=lambda: _compile(job.model),
+        prepare=lambda: _compile(whole.model),
     )
     with suppress(KeyboardInterrupt):
-        work.finish([job.tile(place) for place in cut], lambda k, found: _put(rows, cut[k], found))
+        work.finish(
+            [whole.part(place) for place in cut], lambda k, found: _put(rows, cut[k], found)
+        )
     return rows
 
 

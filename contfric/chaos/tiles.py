@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from contfric.chaos.status import Motion
 from contfric.chaos.work import Task
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray
+
+#: Rows and columns of a rectangle.
+Place: TypeAlias = tuple[slice, slice]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +85,12 @@ class Tile(Task):
     def shape(self) -> tuple[int, int, int]:
         """Rows, columns and starts."""
         return len(self.values[0]), len(self.values[1]), self.starts
+
+    def part(self, place: Place) -> Tile:
+        """Return a rectangle of it."""
+        values = self.values[0][place[0]], self.values[1][place[1]]
+        states = None if self.states is None else self.states[place]
+        return replace(self, values=values, states=states)
 
     def vectors(self) -> FloatArray:
         """Return the parameters of each cell, shape (rows * columns, parameters)."""
@@ -153,10 +162,7 @@ def reshaped(rows: TileRows, shape: tuple[int, int, int]) -> TileRows:
     )
 
 
-Place = tuple[slice, slice]
-
-
-def places(shape: tuple[int, int], side: int) -> Iterator[Place]:
+def places(shape: tuple[int, ...], side: int) -> Iterator[Place]:
     """Yield the rectangles that a grid is cut into, row by row.
 
     Examples

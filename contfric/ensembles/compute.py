@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -42,42 +42,6 @@ if TYPE_CHECKING:
 _BYTES = 410
 #: Most branches of a diagram: Fig. 5 has 8, with mirror images; one that reaches this has a cascade.
 _MAX_BRANCHES = 100
-
-
-@dataclass(frozen=True, eq=False)
-class _Job:
-    """An ensemble to be computed."""
-
-    model: Model
-    vectors: FloatArray
-    parameter: str
-    range: tuple[float, float]
-    row: str
-    values: FloatArray
-    options: dict[str, Any]
-    side: int
-
-    def parts(self) -> list[slice]:
-        count = len(self.vectors)
-        return [slice(k, min(k + self.side, count)) for k in range(0, count, self.side)]
-
-    def tile(self, part: slice) -> EnsembleTile:
-        rest = (self.parameter, self.range, self.row, self.values, self.options)
-        return EnsembleTile(self.model, self.vectors[part], *rest)
-
-    def record(self) -> dict[str, Any]:
-        """Describe the ensemble, so that tiles of another one are not taken for its."""
-        return {
-            **versions(self.model),
-            "kind": "ensemble",
-            "samples": digest(self.vectors),
-            "parameter": self.parameter,
-            "range": list(self.range),
-            "row": self.row,
-            "values": digest(self.values),
-            "options": self.options,
-            "tile": self.side,
-        }
 
 
 def ensemble(
@@ -174,9 +138,9 @@ def ensemble(
     vectors = np.tile(vector, (count, 1))
     vectors[:, [model.index_of(name) for name in varied.names]] = drawn
     side = whole_number("tile", tile, least=1)
-    job = _Job(model, vectors, parameter, bounds, row, grid, options, side)
-    kept = None if folder is None else open_tiles(Path(folder), job.record())
-    rows = _computed(job, executor, kept, progress)
+    whole = EnsembleTile(model, vectors, parameter, bounds, row, grid, options)
+    kept = None if folder is None else open_tiles(Path(folder), _record(whole, side))
+    rows = _computed(whole, side, executor, kept, progress)
     texts = dict(zip(varied.names, varied.texts, strict=True))
     return Ensemble(model, parameter, bounds, vector, row, grid, texts, seed, drawn, rows)
 
@@ -229,15 +193,34 @@ def _vector(
     return vector
 
 
+def _record(whole: EnsembleTile, side: int) -> dict[str, Any]:
+    """Describe the ensemble, so that tiles of another one are not taken for its."""
+    return {
+        **versions(whole.model),
+        "kind": "ensemble",
+        "samples": digest(whole.vectors),
+        "parameter": whole.parameter,
+        "range": list(whole.range),
+        "row": whole.row,
+        "values": digest(whole.values),
+        "options": whole.options,
+        "tile": side,
+    }
+
+
 def _computed(
-    job: _Job, executor: Executor | None, kept: TileFolder | None, progress: Progress | None
+    whole: EnsembleTile,
+    side: int,
+    executor: Executor | None,
+    kept: TileFolder | None,
+    progress: Progress | None,
 ) -> Rows:
-    parts = job.parts()
-    rows = [Rows.empty(part.stop - part.start) for part in parts]
+    vectors = np.split(whole.vectors, range(side, len(whole.vectors), side))
+    rows = [Rows.empty(len(part)) for part in vectors]
     # a tile is Python, which holds the lock
     work: Work[EnsembleTile, Rows] = Work(
         "ensemble", Rows, compute_ensemble_tile, kept, executor, progress, threads=1
     )
     with suppress(KeyboardInterrupt):
-        work.finish([job.tile(part) for part in parts], rows.__setitem__)
+        work.finish([replace(whole, vectors=part) for part in vectors], rows.__setitem__)
     return joined(rows)
