@@ -20,6 +20,7 @@ import contfric as cf
 from contfric.cli import main
 from contfric.models import functions
 from contfric.models.functions import where
+from contfric.results.archive import _digests
 
 YAML = """\
 name: {name}
@@ -184,16 +185,16 @@ def test_results_carry_their_model(orbit: cf.Orbit, tmp_path: Path) -> None:
 
 
 def test_damaged_definition_is_reported(orbit: cf.Orbit, tmp_path: Path) -> None:
-    """In a file of the format before digests; with them it is refused before it is read."""
+    """With its digests made anew; with the old ones it is refused before it is read."""
     path = tmp_path / "orbit.npz"
     cf.save(orbit, path)
     with np.load(path) as archive:
         arrays = {name: archive[name] for name in archive.files}
     header = json.loads(bytes(arrays["header"]).decode())
     header["definition"] = header["definition"].replace("sign(v)", "sing(v)")
-    header["format"] = 1
     del arrays["digests"]
     arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    arrays["digests"] = np.frombuffer(json.dumps(_digests(arrays)).encode(), dtype=np.uint8)
     np.savez(path, **arrays)
     with pytest.raises(cf.ResultFileError, match=r"did you mean 'sin'\?"):
         cf.load(path)
