@@ -24,7 +24,7 @@ _BESIDE = 0.3
 #: Size of an inset, its distance from the frame and what is too near to it, as shares of the axes; space on
 #: its left and beneath it for its numbers, at least, and in heights of their letters.
 WIDTH, _HEIGHT, _EDGE, _NEAR = 0.3, 0.4, 0.06, 0.03
-_LEFT, _BENEATH = (0.03, 5.0), (0.06, 1.5)
+_LEFT, _BENEATH = (0.03, 4.3), (0.06, 1.5)
 
 
 def checked_inset(inset: object) -> Inset:
