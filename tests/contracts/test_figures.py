@@ -258,6 +258,14 @@ def test_legend_says_branches_lines_and_events(diagram: Any) -> None:
         assert (f"{bif.kind.value}: {bif.kind.meaning}" in known) == (bif.kind.value != "T")
 
 
+def test_of_a_part_of_a_figure_all_of_it_is_written(orbit: Any, tmp_path: Path) -> None:
+    whole = new_figure(4.0, 3.0)
+    ax = whole.subfigures(1, 2)[0].subplots()
+    ax.plot([0, 1], [0, 1])
+    written = pyplot.imread(save_figure(ax.figure, tmp_path / "part.png", dpi=100))
+    assert written.shape[:2] == (300, 400)
+
+
 def test_the_legend_names_the_widest_of_many_branches(
     diagram: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
