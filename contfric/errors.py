@@ -21,31 +21,101 @@ _SHOWN = 80
 
 
 class ContfricError(Exception):
-    """Base of every error that contfric raises on purpose; its text is one clear message."""
+    """Base of every error that contfric raises on purpose; its text is one clear message.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> try:
+    ...     cf.load("missing.npz")
+    ... except cf.ContfricError as error:
+    ...     print(error)
+    cannot read missing.npz: No such file or directory
+    """
 
 
 class ParameterError(ContfricError):
-    """A parameter is unknown, missing, not finite, or outside of the model's domain of validity."""
+    """A parameter is unknown, missing, not finite, or outside of the model's domain of validity.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> try:
+    ...     cf.find_orbit("coulomb", {"S": 0.5, "S0": 0.4})
+    ... except cf.ParameterError as error:
+    ...     print(str(error)[:46])
+    model 'coulomb' needs S0 >= S, got S0 = 0.4, S
+    """
 
 
 class ModelError(ParameterError):
-    """A user's model cannot be read or built: the message says where and what would be valid."""
+    """A user's model cannot be read or built: the message says where and what would be valid.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> try:
+    ...     cf.load_model("missing.yaml")
+    ... except cf.ModelError as error:
+    ...     print(str(error)[:29])
+    there is no file missing.yaml
+    """
 
 
 class NotationError(ContfricError):
-    """A signature text, file or segment list cannot be read, or is no closed walk."""
+    """A signature text, file or segment list cannot be read, or is no closed walk.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> try:
+    ...     cf.solve_orbit("coulomb", "5a", {})
+    ... except cf.NotationError as error:
+    ...     print(str(error)[:21])
+    unknown signature '5a
+    """
 
 
 class StudyError(ContfricError):
-    """A study file cannot be read or asks for something that does not exist."""
+    """A study file cannot be read or asks for something that does not exist.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> try:
+    ...     cf.run_study("missing.yaml")
+    ... except cf.StudyError as error:
+    ...     print(str(error)[:29])
+    there is no file missing.yaml
+    """
 
 
 class ResultFileError(ContfricError):
-    """A result file or folder is damaged, missing, or would be overwritten."""
+    """A result file or folder is damaged, missing, or would be overwritten.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> try:
+    ...     cf.load("missing.npz")
+    ... except cf.ResultFileError as error:
+    ...     print(error)
+    cannot read missing.npz: No such file or directory
+    """
 
 
 class ConvergenceError(ContfricError):
-    """No orbit was found; ``result`` holds the last iterate and its residual when there is one."""
+    """No orbit was found; ``result`` holds the last iterate and its residual when there is one.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> try:
+    ...     cf.solve_orbit("coulomb", "1a", {"Omega": 0.8, "S": 0.32, "S0": 0.4})
+    ... except cf.ConvergenceError as error:
+    ...     print(str(error)[:32])
+    no admissible orbit '1a' was fou
+    """
 
     def __init__(self, message: str, result: object | None = None) -> None:
         super().__init__(message)
@@ -53,7 +123,17 @@ class ConvergenceError(ContfricError):
 
 
 class AperiodicError(ConvergenceError):
-    """The simulation did not converge to a periodic orbit within its allowance."""
+    """The simulation did not converge to a periodic orbit within its allowance.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> try:
+    ...     cf.find_orbit("coulomb", {"Omega": 0.35, "S": 0.05, "S0": 0.4}, longest=200)
+    ... except cf.AperiodicError:
+    ...     print("chaos, or a period beyond 64")
+    chaos, or a period beyond 64
+    """
 
 
 #: More valid names than these are no line to read: then the nearest ones.

@@ -15,30 +15,71 @@ import contfric as cf
 
 INTRODUCTION = """# Stress runs
 
-What random cases, far more than `make test` has time for, have found: each is drawn from a seed and its
-index, compared with a reference that shares nothing with the library but the equation of motion, and
-counted. An error is compared with what rounding of the arguments alone explains at the condition of the
-problem (a ratio of 1 is the most that is allowed; below 1 the result is as exact as doubles permit).
+A stress run tries many random cases and compares each with a second computation. There are far more cases
+than `make test` has time for. This page has the results of six runs: how much was tried, how large the
+errors are, and which cases failed.
 
-A failure stays on the page with its scene. Those that remain are of two degenerate
-kinds, each a limitation (see [numerics](numerics.md#conditioning)): scenes with
-S = S0, where several conditions vanish together at an end, so that its name may depend on the step; and
-ends at Omega = 1/2, where a stick vanishes just as its release becomes tangential and the orbit is one of
-a continuum.
+**What is compared.** The second computation uses 50 digits. It shares nothing with contfric but the
+equation of motion. Two runs need no digits: they compute a branch or a diagram again, with another step
+or from another start, and expect the same result.
 
-Of the restarts: a diagram explored again from another of its branches is to have the same events and
-branches. What is excused was fixed before the run: by the scene (S = S0; Omega = 1/n without damping), or
-by its events (`contfric/atlas/degenerate.py`): two in one place with one motion, or a second condition
-that fails at a smooth one. Scenes with more branches than the limit, or that take longer than a minute,
-are counted as cut. What is left failed are, by kind: orbits beside a continuum at a value of Omega that is
-no 1/n, folds of bridges of many segments, and events on orbits of many periods that are nearer to each other
-than 1e-7 of the range.
+**What counts as an error.** No program can be more exact than its input: each number is rounded to 16
+digits, and the problem may amplify this. The tables compare an error with what rounding of the input
+alone explains. Up to 1 it is as exact as possible.
 
-`make stress` repeats all runs; one of them and the page:
+**What failed.** A failure stays on this page, with all numbers that are needed to repeat it. All failures
+of events and branches but one (case 175, a tangency) are degenerate cases (see
+[conditioning](numerics.md#conditioning)):
+
+* S = S0. Several conditions vanish at the same point there, so that the name of an event may depend on
+  the step.
+* Omega = 1/2, where a stick vanishes just where its release becomes tangential, and orbits are not
+  isolated.
+
+In restarts, what is left are orbits next to a family of orbits that are not isolated (at a value of Omega
+that is no 1/n), folds of bridges of many segments, and events on orbits of many periods that are closer
+to each other than 1e-7 of the range.
+
+**What is excused, and what is cut.** Before the run it was fixed which differences are not counted as
+failures: all cases with S = S0, or with Omega = 1/n and no damping; two events at one point with the same
+motion; and smooth events at which a second condition fails (`contfric/atlas/degenerate.py`). Cases with
+too many branches, or of more than a minute, are cut. The tables show how many there are.
+
+**To repeat.** `make stress` repeats everything. One run, and the page:
 
     python benchmarks/stress/<name>.py --count N --seed K --out <name>.json
     python benchmarks/stress/write_page.py *.json --out docs/stress.md
 """
+#: What each run looks at, for readers who do not know its code.
+EXPLANATIONS = {
+    "sequences": (
+        "A mass is simulated for many periods. Each slide, stick, stop and release must happen in the "
+        "right order, at the right time and place. *Undecidable* cases are left out: rounding of the "
+        "input alone decides what happens next. *sigma* is the error that rounding is expected to "
+        "cause."
+    ),
+    "segments": (
+        "One segment of motion at a time: where does it end, and how does the end depend on the start "
+        "and on each parameter? Some cases are made to graze a level."
+    ),
+    "orbits": (
+        "Periodic orbits are found by simulation and by signature, and moved to late times. *Joints* "
+        "are the states at which segments meet."
+    ),
+    "events": (
+        "The parameter value of each event, and orbits just beside it: at a distance of 1e-10 in the "
+        "parameter, and where a branch is stopped 1e-12 before it."
+    ),
+    "continuation": (
+        "A branch must not depend on the step. *Ends* are listed with their reasons: RANGE is the end "
+        "of the range of the parameter, LIMIT a limit of the model."
+    ),
+    "restarts": (
+        "A diagram must not depend on its start. Each is explored again from up to six of its "
+        "branches, and must have the same branches and events. *Indices* are numbers of orbits, "
+        "counted with a sign, that must be the same on both sides of an event."
+    ),
+}
 #: Order of the sections; others follow by name.
 ORDER = ("sequences", "segments", "orbits", "events", "continuation", "restarts")
 
@@ -59,9 +100,20 @@ def page(reports: list[Report]) -> str:
         lines.append("")
         if report.name not in named:
             lines += [f"## {report.name}", ""]
+            if report.name in EXPLANATIONS:
+                lines += [EXPLANATIONS[report.name], ""]
             named.add(report.name)
-        lines += report.lines()
+        lines += _folded(report.lines())
     return "\n".join(lines) + "\n"
+
+
+def _folded(lines: list[str]) -> list[str]:
+    """Return the lines of a report with its failures, which are long, behind a click."""
+    first = next((k for k, line in enumerate(lines) if line.startswith("* case ")), len(lines))
+    if first == len(lines):
+        return lines
+    head = ['<details markdown="1"><summary>What failed, and how to repeat it</summary>', ""]
+    return [*lines[:first], *head, *lines[first:], "", "</details>"]
 
 
 def _place(name: str) -> tuple[int, str]:

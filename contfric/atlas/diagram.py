@@ -123,6 +123,14 @@ class Diagram(Shown):
         What the user should know of the run.
     settings : Asked
         What was asked for.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> diagram = cf.explore(orbit, "Omega", (0.5, 0.55))
+    >>> [event.label for event in diagram.bifurcations], diagram.loose_ends
+    (['CS_s', 'SN_1a'], ())
     """
 
     model: Model

@@ -90,6 +90,15 @@ class Plane(Shown):
     complete : bool
         False if the exploration was stopped before it was done.
     notes : tuple of str
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> ranges = {"Omega": (0.53, 0.55), "S": (0.31, 0.33)}
+    >>> plane = cf.explore_plane(orbit, ("Omega", "S"), ranges, max_sections=1)
+    >>> sorted({curve.label for curve in plane.curves})
+    ['CS_s', 'SN_1a']
     """
 
     model: Model

@@ -41,6 +41,14 @@ class Seeds:
     ------
     ParameterError
         If a number is not a whole one >= 1 (seed: >= 0).
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> found = cf.explore(orbit, "Omega", (0.5, 0.55), seeds=cf.Seeds(values=2))
+    >>> len(found.branches)
+    4
     """
 
     values: int = 20

@@ -68,6 +68,13 @@ class CensusCertificate:
         Undecided phases: orbits that are released at no other phase than these are not excluded.
     intervals : int
         On so many intervals of phases it was decided.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> found = cf.certify_census("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> found.proved, len(found.orbits)
+    (True, 2)
     """
 
     params: dict[str, float]

@@ -40,6 +40,13 @@ class LyapunovExponents(Shown):
         Periods that the motion was followed.
     tolerance : float
         Relative error that was asked for.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> found = cf.lyapunov_exponent("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> found.motion.name, round(found.largest, 6)  # per unit of time
+    ('PERIODIC', -0.026609)
     """
 
     model: Model

@@ -59,6 +59,16 @@ class Window(Shown):
         The same in letters, a and b.
     branch : Branch
         The branch of the word; its range is the window.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> found = cf.explore(orbit, "Omega", (0.48, 0.55))
+    >>> bridge = next(branch for branch in found.branches if branch.bridge)
+    >>> window = cf.period_adding(bridge, longest=2)[0]
+    >>> window.word, round(window.range[0], 6)
+    ('1a-2a', 0.491752)
     """
 
     word: str

@@ -63,6 +63,14 @@ class Branch(Shown):
         Whether this is the mirror image of a computed branch.
     notes : tuple of str
         What was met on it that is no event: a test that changed sign with no multiplier on the unit circle.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> branch = cf.continue_orbit(orbit, "Omega", (0.45, 0.51))
+    >>> branch.bifurcations[0].label, branch[0].name, branch.ends[1].reason.name
+    ('SS_a', '1a', 'RANGE')
     """
 
     system: System

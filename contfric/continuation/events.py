@@ -57,7 +57,14 @@ if TYPE_CHECKING:
 
 
 class Kind(str, Enum):
-    """Kinds of bifurcation."""
+    """Kinds of bifurcation.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> cf.Kind.SS.meaning, cf.Kind("SN") is cf.Kind.SN
+    ('switching-sliding', True)
+    """
 
     SN = "SN"
     BP = "BP"
@@ -114,14 +121,21 @@ _SYMMETRIC = 1e-7
 
 
 class EndReason(str, Enum):
-    """Why a branch ends; the text says it to the user."""
+    """Why a branch ends; the text says it to the user.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> cf.EndReason.RANGE.value
+    'end of the range asked for'
+    """
 
     RANGE = "end of the range asked for"
     LIMIT = "physical limit of the parameter"
     CS = "crossing-sliding: the signature changes, the motion is continuous"
-    SS = "switching-sliding: the flow jumps"
-    AS = "adding-sliding: the flow jumps"
-    GS = "grazing-sliding: the flow jumps"
+    SS = "switching-sliding: the Poincare map is discontinuous"
+    AS = "adding-sliding: the Poincare map is discontinuous"
+    GS = "grazing-sliding: the Poincare map is discontinuous"
     REST = "the mass stays at rest for ever beyond this point"
     CONTINUUM = "its orbits go on as a continuum, at this one value of the parameter"
     PERIOD = "the period grows without bound: the orbit comes to an equilibrium (homoclinic), or slows down"
@@ -204,6 +218,14 @@ class Bifurcation(MeasuredEvent):
         The accuracy, or what returns it when it is asked for.
     proposals : tuple of Proposal
         What an exploration proposed to follow it, in order, and what became of it.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> fold = cf.continue_orbit(orbit, "Omega", (0.5, 0.6)).bifurcations[0]
+    >>> fold.label, fold.kind.name, round(fold.params["Omega"], 9)
+    ('SN_1a', 'SN', 0.541912817)
     """
 
     kind: Kind

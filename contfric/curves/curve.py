@@ -105,6 +105,16 @@ class Curve(Shown):
         Points of codimension two, in order.
     ends : (CurveEnd, CurveEnd)
         Why it ends at its first and at its last point.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> fold = cf.continue_orbit(orbit, "Omega", (0.5, 0.6)).bifurcations[0]
+    >>> ranges = {"Omega": (0.53, 0.55), "S": (0.31, 0.33)}
+    >>> curve = cf.continue_bifurcation(fold, ("Omega", "S"), ranges)
+    >>> curve.label, str(curve.ends[1])
+    ('SN_1a', 'end of the range asked for')
     """
 
     parameters: tuple[str, str]

@@ -45,7 +45,17 @@ _SECANTS = 6
 
 @dataclass(frozen=True, eq=False)
 class ExtremumCurve(QuantityCurve):
-    """Orbits at which a quantity is stationary in all parameters that vary but the last one."""
+    """Orbits at which a quantity is stationary in all parameters that vary but the last one.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("jenkins", {"muN": 1.4, "W": 1.3})
+    >>> ranges = {"W": (1.0, 2.0), "muN": (1.2, 1.8)}
+    >>> peaks = cf.continue_extremum(orbit, "x_max", ("W", "muN"), ranges)
+    >>> bool(abs(peaks[3].gradient("x_max")["W"]) < 1e-10)  # each point is an orbit
+    True
+    """
 
     @property
     def extrema(self) -> FloatArray:

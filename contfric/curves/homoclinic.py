@@ -22,7 +22,17 @@ from contfric.errors import ParameterError, real_number
 
 @dataclass(frozen=True, eq=False)
 class HomoclinicCurve(QuantityCurve):
-    """Orbits of one long period near a homoclinic end, in the plane of two parameters."""
+    """Orbits of one long period near a homoclinic end, in the plane of two parameters.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> branch = cf.continue_orbit(cf.find_orbit("rimless-wheel"), "slope", (0.001, 0.25))
+    >>> ranges = {"slope": (0.001, 0.25), "alpha": (0.25, 0.35)}
+    >>> curve = cf.continue_homoclinic(branch, ("slope", "alpha"), ranges, period=12.0)
+    >>> round(curve[0].period, 9)
+    12.0
+    """
 
     @property
     def label(self) -> str:

@@ -48,6 +48,15 @@ class QuantityCurve(Shown):
     stable : ndarray of bool, shape (k,)
     ends : (CurveEnd, CurveEnd)
         Why it ends at its first and at its last point.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> ranges = {"Omega": (0.48, 0.55), "S": (0.25, 0.35)}
+    >>> curve = cf.continue_quantity(orbit, "x_max", 1.43, ("Omega", "S"), ranges)
+    >>> curve.quantity, curve.value
+    ('x_max', 1.43)
     """
 
     quantity: str

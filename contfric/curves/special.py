@@ -12,7 +12,14 @@ from contfric.orbit.system import Test
 
 
 class CodimTwo(str, Enum):
-    """Kinds of points of codimension two; the text says what happens there."""
+    """Kinds of points of codimension two; the text says what happens there.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> cf.CodimTwo.R1.value
+    'strong resonance 1:1, two multipliers 1'
+    """
 
     CUSP = "cusp: two folds meet, the parameters turn back"
     GPD = "degenerate period doubling: a fold curve of doubled orbits begins"

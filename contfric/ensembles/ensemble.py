@@ -145,6 +145,15 @@ class Ensemble(Shown):
         What was drawn.
     rows : Rows
         What is kept of each diagram.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> box = {"S": (0.30, 0.34)}
+    >>> params = {"Omega": 0.5, "S0": 0.4}
+    >>> found = cf.ensemble("coulomb", "Omega", (0.5, 0.55), box, params, samples=4)
+    >>> found.samples.shape
+    (4, 1)
     """
 
     model: Model

@@ -36,6 +36,14 @@ class EquilibriumEvent(Shown):
         Where it happens.
     stable_before, stable_after : bool or None
         Stability on the branch before and after it, in the order of the points.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> found = cf.explore_equilibria("popp", "a2", (0.3, 0.8), {"F": 0.0})
+    >>> hopf = found.events[0]
+    >>> hopf.kind.value, hopf.parameter
+    ('H', 'a2')
     """
 
     kind: EquilibriumKind
@@ -96,6 +104,14 @@ class HopfPoint(EquilibriumEvent):
     ----------
     centre : Centre
         Its normal form: ``frequency``, first Lyapunov coefficient ``lyapunov``, ``rate`` of the real part.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> found = cf.explore_equilibria("popp", "a2", (0.3, 0.8), {"F": 0.0})
+    >>> hopf = found.events[0]
+    >>> type(hopf).__name__, hopf.centre.lyapunov < 0
+    ('HopfPoint', True)
     """
 
     centre: Centre

@@ -43,6 +43,13 @@ class EquilibriumDiagram(Shown):
     complete : bool
         False after an interrupt. Branches between those values, and equilibria that Newton's method did not
         find, may be missing even so.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> found = cf.explore_equilibria("popp", "a2", (0.3, 0.8), {"F": 0.0})
+    >>> [event.kind.value for event in found.events]
+    ['H']
     """
 
     model: Model

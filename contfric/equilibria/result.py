@@ -178,6 +178,13 @@ class Equilibria(Shown):
     complete : mapping of mode to bool
         Whether all equilibria of a mode are known: where its field is affine. Else those are that Newton's
         method found from many starts.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> found = cf.find_equilibria("popp", {"F": 0.0})
+    >>> [point.stable for point in found.points]
+    [False, False]
     """
 
     model: Model

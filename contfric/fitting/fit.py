@@ -63,6 +63,14 @@ class Fit(Shown):
         Whether the search ended at a minimum.
     message : str
         How the search ended.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> data = [cf.Measured("x_max", 1.42, 0.01, {"Omega": 0.5})]
+    >>> found = cf.fit("coulomb", data, {"S": 0.31, "S0": 0.4}, ["S"])
+    >>> found.free, found.converged
+    (('S',), True)
     """
 
     params: dict[str, float]

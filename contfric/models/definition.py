@@ -125,6 +125,13 @@ class Model(Shown, TransitionMaps):
         The unit of each state, and of the time ``t``, that has one: results are numbers in these units.
     definition : str
         Text from which the model can be built; empty if it is known by its name only.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> model = cf.load_model("coulomb")
+    >>> model.states, model.defaults["S0"]
+    (('x', 'v'), 0.4)
     """
 
     name: str

@@ -80,6 +80,13 @@ class Orbit(MeasuredOrbit):
         Largest residual of the equations, relative to 1 + the size of the unknown.
     status : Status
         Whether the orbit is solved; an orbit that is not carries the last iterate.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> orbit.name, orbit.stable, round(orbit.x_max, 6)
+    ('1a', True, 1.424217)
     """
 
     system: System

@@ -22,9 +22,9 @@ _CROWD, _WINDOW = 4, 0.08
 #: Space on both sides of the first and last of them, as a share of their distance.
 _BESIDE = 0.3
 #: Size of an inset, its distance from the frame and what is too near to it, as shares of the axes; space on
-#: its left and beneath it for its numbers.
+#: its left and beneath it for its numbers, at least, and in heights of their letters.
 WIDTH, _HEIGHT, _EDGE, _NEAR = 0.3, 0.4, 0.06, 0.03
-_LEFT, _BENEATH = 0.03, 0.06
+_LEFT, _BENEATH = (0.03, 4.3), (0.06, 1.5)
 
 
 def checked_inset(inset: object) -> Inset:
@@ -101,25 +101,35 @@ def _extent(ax: Axes, marks: Sequence[Mark], low: float, high: float) -> tuple[f
 
 def _place(ax: Axes) -> tuple[float, float, float, float]:
     """Return a place in which nothing is drawn, as a share of the axes, which grow upwards if need be."""
+    aside, beneath = _numbers(ax)
     found = _empty_place(ax)
     if found is None:
         low, high = ax.get_ylim()
-        drawn = (
-            1.0 - _HEIGHT - _EDGE - _BENEATH - 2.0 * _NEAR
-        )  # the share that is left to the lines
+        drawn = 1.0 - _HEIGHT - _EDGE - beneath - 2.0 * _NEAR  # the share that is left to the lines
         ax.set_ylim(low, low + (high - low) / drawn)
         found = _empty_place(ax)
-    return found or (_EDGE + _LEFT, 1.0 - _EDGE - _HEIGHT, WIDTH, _HEIGHT)
+    return found or (_EDGE + aside, 1.0 - _EDGE - _HEIGHT, WIDTH, _HEIGHT)
+
+
+def _numbers(ax: Axes) -> tuple[float, float]:
+    """Return the space for the numbers of an inset, on its left and beneath it, as shares of the axes."""
+    frame = ax.get_window_extent()
+    letter = sized(SMALL - 1.5) * ax.figure.dpi / 72.0
+    return (
+        max(_LEFT[0], _LEFT[1] * letter / frame.width - _EDGE),
+        max(_BENEATH[0], _BENEATH[1] * letter / frame.height),
+    )
 
 
 def _empty_place(ax: Axes) -> tuple[float, float, float, float] | None:
     """Return a corner, or the middle of a side, in which nothing is drawn."""
+    aside, beneath = _numbers(ax)
     points = np.vstack([line_pixels(ax), marker_pixels(ax)])
     shares = ax.transAxes.inverted().transform(points) if len(points) else points
-    for left in (_EDGE + _LEFT, 0.5 * (1.0 - WIDTH), 1.0 - _EDGE - WIDTH):
-        for bottom in (1.0 - _EDGE - _HEIGHT, _EDGE + _BENEATH):
+    for left in (_EDGE + aside, 0.5 * (1.0 - WIDTH), 1.0 - _EDGE - WIDTH):
+        for bottom in (1.0 - _EDGE - _HEIGHT, _EDGE + beneath):
             box = Bbox.from_bounds(
-                left - _LEFT, bottom - _BENEATH, WIDTH + _LEFT, _HEIGHT + _BENEATH
+                left - aside, bottom - beneath, WIDTH + aside, _HEIGHT + beneath
             ).padded(_NEAR)
             if not np.any(np.all((shares > box.min) & (shares < box.max), axis=1)):
                 return left, bottom, WIDTH, _HEIGHT

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 #: A bridge that is shorter than this share of the axis lies beneath the markers of its ends, and so does a
 #: tangency that is this near to an event.
 _SMALLEST = 0.01
+#: More branches than this are not all named: colours do not tell them apart, and the list would be longer
+#: than the figure.
+_MOST = 12
 
 
 def handles_of(
@@ -42,10 +45,11 @@ def handles_of(
     Where all rows are even, ``mirrors`` is false: images lie on their originals.
     """
     styles = look.styles
-    handles = [
-        _line(look.names[name], colour, style=styles["stable"])
-        for name, colour in look.colours.items()
-    ]
+    named = _named(branches, list(look.colours))
+    handles = [_line(look.names[name], look.colours[name], styles["stable"]) for name in named]
+    if len(named) < len(look.colours):
+        left = len(look.colours) - len(named)
+        handles.append(Line2D([], [], linestyle="none", label=f"and {left} more branches"))
     if mirrors and any(b.mirrored for b in branches):
         handles.append(
             _line("mirror image: lighter", lighter(GREY), styles["stable"], MIRROR_WIDTH)
@@ -69,6 +73,16 @@ def handles_of(
         kinds[m.kind.value] = either(kinds.get(m.kind.value, ""), m.meaning)
     order = [*MARKERS, *(k for k in kinds if k not in MARKERS)]
     return handles + [_marker(k, kinds[k]) for k in order if k in kinds]
+
+
+def _named(branches: Sequence[Branch], names: list[str]) -> list[str]:
+    """Return the names that the legend has, in their order: if there are too many, the widest."""
+    widths = dict.fromkeys(names, 0.0)
+    for branch in branches:
+        if branch.name in widths:
+            widths[branch.name] = max(widths[branch.name], float(np.ptp(branch.values)))
+    widest = sorted(names, key=lambda name: -widths[name])[:_MOST]
+    return [name for name in names if name in widest]
 
 
 def _line(label: str, colour: str, style: Any, width: float = LINE_WIDTH) -> Line2D:

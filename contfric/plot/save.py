@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib import rc_context, rcParams, rcParamsDefault
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from PIL import Image
 
 from contfric.base.interrupts import held_back
@@ -117,11 +117,13 @@ def new_figure(width: float = 7.0, height: float = 4.3) -> Figure:
     return figure
 
 
-def save_figure(fig: Figure, path: str | PathLike[str], dpi: float = DPI) -> Path:
+def save_figure(fig: Figure | SubFigure, path: str | PathLike[str], dpi: float = DPI) -> Path:
     """Write a figure to a file; the same figure gives the same bytes.
 
     Parameters
     ----------
+    fig : Figure or SubFigure
+        Such as ``ax.figure``; of a part of a figure, all of it is written.
     path : path
         Its ending decides on the format: png, pdf, svg and others that matplotlib knows.
     dpi : float
@@ -133,6 +135,8 @@ def save_figure(fig: Figure, path: str | PathLike[str], dpi: float = DPI) -> Pat
         The file.
     """
     file = Path(path)
+    while not isinstance(fig, Figure):
+        fig = fig.figure
     if file.suffix.lower() == ".png" and _as_drawn(fig, dpi):
         return _save_pixels(fig, file)
     metadata = _ANONYMOUS.get(file.suffix.lower())

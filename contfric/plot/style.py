@@ -24,7 +24,7 @@ GREY = "#6E6E6E"
 _TYPICAL = {"2s": "#005A9C", "0s": BLACK, "1a": VERMILLION, "2a": "#3DBE95"}
 #: Brightness of a colour that is used a second time.
 _DARKER = 0.6
-_OTHERS = ("#8000E6", "#66331A", "#CC99FF", ORANGE, "#1A1A8C", "#A50F15", GREY)
+_OTHERS = ("#8000E6", "#66331A", "#CC99FF", ORANGE, "#1A1A8C", "#A50F15", SKY)
 
 #: Dark and light of one hue for a domain and its mirror image.
 _DOMAIN_PAIRS = ((BLUE, SKY), (VERMILLION, "#F2A45C"), (GREEN, "#7BCBA9"), (PURPLE, "#EBC3D8"))

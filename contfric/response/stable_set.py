@@ -80,6 +80,14 @@ class StableSet(Tabled):
     breaks : tuple of ndarray of int
         Of both halves, the points that a break leads to: the set has a gap before them.
     ends : (StableEnd, StableEnd)
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> saddle = cf.solve_orbit("coulomb", "2s", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> found = cf.stable_set(saddle, {"x": (-2, 2), "v": (-1, 1)}, max_step=0.1)
+    >>> found.points.shape[1]
+    2
     """
 
     orbit: Orbit

@@ -172,6 +172,17 @@ def load(path: str | Path, model: Model | None = None) -> Saveable:
     ------
     ResultFileError
         If the file is missing, damaged, of another program, or of a newer contfric.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> import pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "orbit.npz"
+    ...     cf.save(orbit, file)
+    ...     print(cf.load(file).name)
+    1a
     """
     path = path_of("the file of a result", path)
     arrays = _read(path)

@@ -258,6 +258,24 @@ def test_legend_says_branches_lines_and_events(diagram: Any) -> None:
         assert (f"{bif.kind.value}: {bif.kind.meaning}" in known) == (bif.kind.value != "T")
 
 
+def test_of_a_part_of_a_figure_all_of_it_is_written(orbit: Any, tmp_path: Path) -> None:
+    whole = new_figure(4.0, 3.0)
+    ax = whole.subfigures(1, 2)[0].subplots()
+    ax.plot([0, 1], [0, 1])
+    written = pyplot.imread(save_figure(ax.figure, tmp_path / "part.png", dpi=100))
+    assert written.shape[:2] == (300, 400)
+
+
+def test_the_legend_names_the_widest_of_many_branches(
+    diagram: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("contfric.plot.legend._MOST", 2)
+    known = entries(plot_diagram(diagram)[0].figure.legends[0])
+    names = {b.name for b in diagram.branches if not b.bridge}
+    assert names & set(known) == {"2s", "0s"}
+    assert f"and {len(names) - 2} more branches" in known
+
+
 @pytest.mark.parametrize("row", ROWS)
 def test_events_of_a_diagram_are_labelled_once(diagram: Any, row: str) -> None:
     ax = plot_diagram_row(diagram, row)

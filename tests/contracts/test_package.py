@@ -95,9 +95,16 @@ def test_the_animation_is_small_and_moves() -> None:
 
 USER = """
 import contfric as cf
+import contfric.plot as cplot
 
 orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
-diagram = cf.explore(orbit, "Omega", (0.4, 0.6))
+diagram: cf.Diagram = cf.explore(orbit, "Omega", (0.4, 0.6))
+with cplot.journal("single"):
+    cplot.save_figure(diagram.plot(row="psi").figure, "diagram.pdf")
+page, live = diagram.to_html("diagram.html"), diagram.live()
+shown: dict[cf.Kind, float] = {event.kind: event.params["Omega"] for event in diagram.bifurcations}
+ranges = {"Omega": (0.4, 0.6), "S": (0.2, 0.4)}
+curve: cf.Curve = cf.continue_bifurcation(diagram.bifurcations[0], ("Omega", "S"), ranges)
 peak: float = max(float(b.x_max.max()) for b in diagram.branches)
 names: list[str] = [event.label for event in diagram.bifurcations]
 reveal_type(orbit)
@@ -122,6 +129,6 @@ def test_a_user_with_strict_mypy_sees_our_types(tmp_path: Path) -> None:
         env={"MYPYPATH": str(ROOT), "PATH": "/usr/bin:/bin"},
     )
     errors = [line for line in done.stdout.splitlines() if "error:" in line]
-    assert len(errors) == 1 and "user.py:10" in errors[0] and '"str"' in errors[0], done.stdout
+    assert len(errors) == 1 and "user.py:17" in errors[0] and '"str"' in errors[0], done.stdout
     assert 'Revealed type is "contfric.orbit.orbit.Orbit"' in done.stdout
     assert done.stdout.count("contfric.orbit.orbit.Orbit") == 2

@@ -219,7 +219,10 @@ def test_plan_says_what_is_skipped(write) -> None:
 def test_bridges_are_switched_off(tmp_path, write) -> None:
     path = write(HEAD + EXPLORE.replace("}", ", bridges: false, max_periods: 16}"))
     text = str(make_plan(read_study(path)))
-    assert "- bridges: branches end where the flow jumps: switched off (bridges: false)" in text
+    assert (
+        "- bridges: branches end where the Poincare map is discontinuous: switched off (bridges: false)"
+        in text
+    )
     assert "Omega from 0.45 to 0.56, of up to 16 period(s)" in text
     record = cf.run_study(path, tmp_path / "out").info
     assert not any(branch["bridge"] for branch in record["branches"])

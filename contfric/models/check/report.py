@@ -60,6 +60,12 @@ class ModelReport(Shown):
     findings : what is wrong, errors and warnings, and what is of use to know, notes
     closed : modes whose motion is a closed form, of a model that is declared by its equations
     integrated : modes whose motion is integrated, each with the reason
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> cf.check_model("coulomb").ok
+    True
     """
 
     model: str

@@ -249,9 +249,14 @@ def _orbit_glyphs(phase: Any, series: Any) -> dict[str, Any]:
     """Add the curves of an orbit: in the phase plane by domain, against time by state."""
     from bokeh.models import ColumnDataSource, HoverTool
 
-    parts = ColumnDataSource(data={"x": [], "y": [], "colour": [], "domain": []}, name="parts")
+    until = {
+        "x": [[0.0, 1.0]],
+        "y": [[0.0, 1.0]],
+        "colour": ["white"],
+    }  # bokeh warns of axes without data
+    parts = ColumnDataSource(data={**until, "domain": [""]}, name="parts")
     joints = ColumnDataSource(data={"x": [], "y": [], "colour": [], "domain": []}, name="joints")
-    curves = ColumnDataSource(data={"x": [], "y": [], "colour": [], "state": []}, name="curves")
+    curves = ColumnDataSource(data={**until, "state": [""]}, name="curves")
     line = phase.multi_line("x", "y", source=parts, line_color="colour", line_width=2)
     dots = phase.scatter("x", "y", source=joints, size=7, color="colour")
     phase.add_tools(HoverTool(renderers=[line, dots], tooltips=[("domain", "@domain")]))

@@ -81,42 +81,46 @@ def serve(diagram: Diagram, again: Again, height: int = 950) -> Live:
         again(diagram, {s["name"]: s["value"] for s in _sliders(diagram)})
 
     def page(document: Any) -> None:
-        _steered(document, diagram, again)
+        _steered(document, diagram)
 
-    server = Server({"/": page}, port=0, address="127.0.0.1")
+    answering = _answering(lambda question: answered(diagram, again, question))
+    server = Server(
+        {"/": page}, port=0, address="127.0.0.1", extra_patterns=[("/again", answering)]
+    )
     server.start()
     return Live(f"http://localhost:{server.port}/", server, height)  # the origin that bokeh accepts
 
 
-def _steered(document: Any, diagram: Diagram, again: Again) -> None:
+def _steered(document: Any, diagram: Diagram) -> None:
     """Fill the page of one visitor."""
-    from bokeh.models import ColumnDataSource, CustomJS
+    from bokeh.models import CustomJS
 
     fill(document, diagram, collect(diagram, _FULL, {}) | {"steer": _sliders(diagram)})
-    request = ColumnDataSource(data={"json": []}, name="request")
-    reply = ColumnDataSource(data={"json": []}, name="reply")
-    draw = "window.contfric.answer(JSON.parse(cb_obj.data.json[0]))"
-    reply.js_on_change("data", CustomJS(code=draw))
-    document.roots[0].tags = [request, reply]  # part of the document, and drawn nowhere
-    script = CustomJS(args={"request": request}, code=resource("steer.js"))
-    document.js_on_event("document_ready", script)
-    last = [diagram]
-
-    def answer(_attr: str, _old: Any, new: Any) -> None:
-        question = json.loads(new["json"][0])
-        found = answered(last, again, question) | {"number": question["number"]}
-        reply.data = {"json": [json.dumps(found, allow_nan=False)]}
-
-    request.on_change("data", answer)
+    document.js_on_event("document_ready", CustomJS(code=resource("steer.js")))
 
 
-def answered(last: list[Diagram], again: Again, question: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the page shows for other parameters, or what is wrong with them.
+def _answering(answer: Callable[[dict[str, Any]], dict[str, Any]]) -> type:
+    """Return the handler of the questions that the page asks.
 
-    ``last`` holds the diagram that was shown last, and takes the new one.
+    They do not go through bokeh's socket: its messages have three parts, and Nagle's algorithm holds the
+    second one back until the browser acknowledges the first. That takes 40 ms, longer than the exploration.
     """
+    from tornado.web import HTTPError, RequestHandler
+
+    class Answering(RequestHandler):
+        def post(self) -> None:
+            port = self.request.host.rpartition(":")[2]
+            if self.request.headers.get("Origin") != f"http://localhost:{port}":
+                raise HTTPError(403)  # a page of somebody else
+            self.write(json.dumps(answer(json.loads(self.request.body)), allow_nan=False))
+
+    return Answering
+
+
+def answered(diagram: Diagram, again: Again, question: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the page shows for other parameters, or what is wrong with them."""
     try:
-        last[0] = found = again(last[0], question["params"])
+        found = again(diagram, question["params"])
     except ContfricError as error:
         return {"trouble": str(error)}
     rows = tuple(ROWS)

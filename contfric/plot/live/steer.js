@@ -3,27 +3,31 @@
 const {data, row, renew} = window.contfric;
 const at = (id) => document.getElementById(id);
 const params = {};
-let [waiting, next, asked] = [false, null, 0];
+let [waiting, next] = [false, null];
 window.contfric.redraws = 0;
 
 function ask(quick) {
-  next = {number: ++asked, params: {...params}, row: row().name, quick}; // what does not change is not sent
+  next = {params: {...params}, row: row().name, quick};
   if (!waiting) send();
 }
 
-function send() {
+async function send() {
   waiting = next !== null;
-  if (waiting) request.data = {json: [JSON.stringify(next)]};
+  if (!waiting) return;
+  const body = JSON.stringify(next);
   next = null;
-}
-
-window.contfric.answer = (found) => {
+  let found;
+  try {
+    found = await (await fetch("again", {method: "POST", body})).json();
+  } catch {
+    found = {trouble: "The server does not answer."};
+  }
   send(); // the next diagram is explored while this one is drawn
   at("trouble").textContent = found.trouble ?? "";
   if (found.trouble) return;
   renew(found);
   requestAnimationFrame(() => (window.contfric.redraws += 1));
-};
+}
 
 for (const {name, label, value, low, high} of data.steer) {
   params[name] = value;

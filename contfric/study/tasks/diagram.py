@@ -29,7 +29,8 @@ class ExploreTask(OneParameter):
     seeds: Seeds | None = Field(None, description=keys_of(Seeds))
     bridges: Truth | None = Field(
         None,
-        description="true or false: whether orbits with holds lead on where the flow jumps",
+        description="true or false: whether orbits with holds lead on where the Poincare map "
+        "is discontinuous",
     )
     max_periods: int | None = Field(
         None,
@@ -59,7 +60,7 @@ class ExploreTask(OneParameter):
     def skipped(self, study: Study) -> Iterator[Skipped]:
         """Yield bridges, if they are switched off."""
         if self.bridges is False:
-            what = "bridges: branches end where the flow jumps"
+            what = "bridges: branches end where the Poincare map is discontinuous"
             yield Skipped(what, "switched off (bridges: false)")
 
     def compute(self, job: Job) -> Diagram:
