@@ -53,6 +53,7 @@ class Event:
     final : why nothing is continued from it, if that is known: the mass stays at rest, or a continuum
     kinds : what the words of its motion call it
     begun : whether what leaves it has been begun in advance
+    paired : whether the branch that leaves the event before it may well end here
     """
 
     bifurcation: Bifurcation
@@ -62,6 +63,7 @@ class Event:
     final: EndReason | None = None
     kinds: set[Kind] = field(default_factory=set)
     begun: bool = False
+    paired: bool = False
 
 
 def collect(

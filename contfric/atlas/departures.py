@@ -110,12 +110,24 @@ def ends_at(end: End, event: Event, settings: Settings) -> bool:
     return same_place(last, b, settings.parameter, settings.width)
 
 
-def foresee_departures(state: Exploration) -> None:
-    """Begin on another core what the next events that wait will ask for."""
-    for event in state.waiting:
-        if not event.begun:
-            event.begun = foresee(_begin, state, event)
+def foresee_departures(state: Exploration, event: Event) -> None:
+    """Begin on another core what will be asked for after an event that is followed now.
+
+    Doublings and branch points of one branch come in pairs: between them the other branch is the stable one,
+    and mostly it joins them. The second one of a pair is not begun: it would be the same branch again.
+    """
+    before = event
+    for one in tuple(state.waiting):
+        one.paired = one.paired or (not before.paired and _alike(before, one))
+        if not (one.begun or one.paired):
+            one.begun = foresee(_begin, state, one)
             return
+        before = one
+
+
+def _alike(a: Event, b: Event) -> bool:
+    """Tell whether two events are of one kind and on one branch."""
+    return a.bifurcation.kind is b.bifurcation.kind and a.branches[:1] == b.branches[:1]
 
 
 def _begin(state: Exploration, event: Event) -> None:

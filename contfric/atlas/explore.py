@@ -199,5 +199,5 @@ def _follow_all(state: Exploration) -> None:
             state.complete = False
             return
         event = state.waiting.popleft()
-        foresee_departures(state)
+        foresee_departures(state, event)
         follow(state, event)

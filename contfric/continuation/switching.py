@@ -19,6 +19,7 @@ from contfric.continuation.side import first_point
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import assembled
 from contfric.orbit.orbit import Orbit
+from contfric.remember.advance import foreseeable
 
 #: Distance from the branch point to the first point of the branch that leaves, in the scaled product:
 #: the square root of it is well above the accuracy of a state at a singular point, and the branch is
@@ -64,6 +65,7 @@ def leave_branch_point(
     return leave_along(orbit, settings, Direction(null_vector(orbit), 0.0), reason, distance)
 
 
+@foreseeable()
 def leave_along(
     orbit: Orbit,
     settings: Settings,

@@ -36,6 +36,10 @@ _PATIENCE = 1.0
 _LOOKS = 0.1
 
 
+class _WantedAlreadyError(Exception):
+    """What is to be computed in advance has been asked for: the rest follows from it, where it is wanted."""
+
+
 class _Advance:
     """Calls that have been begun, by their keys; None for those that are computed where they are wanted."""
 
@@ -153,7 +157,7 @@ def foreseeable(*, without: tuple[str, ...] = ()) -> Callable[[Callable[P, R]], 
             except UnstorableError:
                 return function(*args, **kwargs)
             if _BESIDE.get():
-                return _begun(advance, key, lambda: function(*args, **kwargs))  # type: ignore[return-value]
+                return _begun(advance, key, lambda: function(*args, **kwargs))
             with advance.lock:
                 future = advance.begun.get(key)
                 advance.begun[key] = None  # a result is handed out once: it may be changed
@@ -166,13 +170,17 @@ def foreseeable(*, without: tuple[str, ...] = ()) -> Callable[[Callable[P, R]], 
     return mark
 
 
-def _begun(advance: _Advance, key: bytes, compute: Callable[[], R]) -> R | None:
-    """Compute a result in advance, unless somebody does; with what it adds to the counts."""
+def _begun(advance: _Advance, key: bytes, compute: Callable[[], R]) -> R:
+    """Compute a result in advance, with what it adds to the counts; no more where it is wanted already."""
     future: Future[Any] = Future()
     with advance.lock:
-        if key in advance.begun:
-            return None
-        advance.begun[key] = future
+        known = key in advance.begun
+        if known and advance.begun[key] is None:
+            raise _WantedAlreadyError
+        if not known:
+            advance.begun[key] = future
+    if known:
+        return compute()
     try:
         with count_apart() as added:
             result = compute()

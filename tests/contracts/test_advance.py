@@ -5,13 +5,19 @@ from __future__ import annotations
 import _thread
 import threading
 import time
+from collections import deque
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.atlas import departures
+from contfric.atlas.collect import Event
+from contfric.atlas.departures import foresee_departures
 from contfric.base.tally import tally
+from contfric.continuation.events import Kind
 from contfric.orbit.counts import Counts, counts
 from contfric.remember import advance
 from contfric.remember.advance import foresee, foreseeable, heed, in_advance
@@ -82,6 +88,44 @@ def test_what_is_being_computed_is_not_begun() -> None:
         assert square(4) == 16
         assert foresee(square, 4)
     assert [(4, threading.current_thread().name)] == CALLS
+
+
+@foreseeable()
+def twice(number: int) -> int:
+    return square(number) + square(number)
+
+
+def test_a_call_made_twice_in_advance_is_made_twice() -> None:
+    with in_advance():
+        assert foresee(twice, 3)
+        time.sleep(0.3)
+        assert twice(3) == 18
+    assert len(CALLS) == 2
+
+
+def test_what_follows_from_a_call_that_is_wanted_is_left_to_who_wants_it() -> None:
+    def both() -> None:
+        square(square(2))
+
+    with in_advance():
+        assert square(2) == 4
+        assert foresee(both)
+        time.sleep(0.2)
+    assert [number for number, _ in CALLS] == [2]
+
+
+def test_of_events_in_pairs_the_first_are_begun(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Event] = []
+    monkeypatch.setattr(
+        departures, "foresee", lambda begin, state, event: asked.append(event) or True
+    )
+    kinds = [Kind.PD] * 5 + [Kind.BP]
+    events = [Event(SimpleNamespace(kind=kind), [0]) for kind in kinds]  # type: ignore[arg-type]
+    waiting = deque(events)
+    while waiting:
+        followed = waiting.popleft()
+        foresee_departures(SimpleNamespace(waiting=waiting), followed)  # type: ignore[arg-type]
+    assert [events.index(e) for e in asked] == [2, 4, 5]
 
 
 def test_an_error_is_that_of_the_call_itself() -> None:
