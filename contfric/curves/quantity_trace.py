@@ -97,7 +97,9 @@ def continue_quantity(
     first = held.first()
     if first is None:
         raise ConvergenceError(
-            f"the orbits with {quantity} = {value:g} have no unique direction at the start", start
+            f"the orbits with {quantity} = {value:g} have no unique direction at the start: it may not "
+            f"depend on {' and '.join(box.names)}, or be extreme there",
+            start,
         )
     return both_sides(held, first, largest, max_points)
 
