@@ -11,6 +11,7 @@ SECONDS = {
     "contfric.continuation.bracket.locate": 14.1,
     "contfric.continuation.march.march": 8.4,
     "contfric.curves.bracket.locate_on_curve": 9.8,
+    "contfric.curves.held_march.march_held": 9.0,
     "contfric.curves.march.march_curve": 7.4,
     "contfric.flow.chattering.flow": 5.2,
     "contfric.flow.chattering.hit": 1.2,

@@ -58,6 +58,7 @@ class BorderedWorkspace(NamedTuple):
     Attributes
     ----------
     a, b : blocks of the Jacobian on both joints of each segment, shape (N, m, m)
+    columns : its derivatives by the free parameters, shape (N, m, q)
     v, u : null vectors of the chain and of its transpose, shape (N, m)
     even : second-order response of the orbit to its null vector, shape (N, m)
     work, d, e, s, close, close_w : for the elimination with one border row
@@ -71,6 +72,7 @@ class BorderedWorkspace(NamedTuple):
 
     a: FloatArray
     b: FloatArray
+    columns: FloatArray
     v: FloatArray
     u: FloatArray
     even: FloatArray
@@ -98,6 +100,7 @@ def bordered_workspace(count, m, free):  # type: ignore[no-untyped-def]
     return BorderedWorkspace(
         np.empty((count, m, m)),
         np.empty((count, m, m)),
+        np.empty((count, m, free)),
         np.empty((count, m)),
         np.empty((count, m)),
         np.empty((count, m)),
@@ -121,7 +124,7 @@ def bordered_workspace(count, m, free):  # type: ignore[no-untyped-def]
 
 @helper
 def fill_blocks(functions, layout, z, p, which, workspace):  # type: ignore[no-untyped-def]
-    """Write the blocks of the Jacobian on both joints of each segment."""
+    """Write the blocks of the Jacobian on both joints of each segment, and its columns of the parameters."""
     count, m = z.shape
     rows, bordered = workspace.elimination.rows, workspace.bordered
     for i in range(count):
@@ -135,6 +138,8 @@ def fill_blocks(functions, layout, z, p, which, workspace):  # type: ignore[no-u
             for k in range(m):
                 bordered.a[i, j, k] = rows[m + j, m + k]
                 bordered.b[i, j, k] = rows[m + j, 2 * m + k]
+            for k in range(which.shape[0]):
+                bordered.columns[i, j, k] = rows[m + j, 3 * m + k]
     return True
 
 

@@ -123,7 +123,12 @@ def locate_on_curve(  # type: ignore[no-untyped-def]
     """
     followed = min(index, 0)  # nothing, but no literal
     workspace = curve_workspace(
-        points.joints.shape[1], points.joints.shape[2], p.shape[0], followed, followed
+        points.joints.shape[1],
+        points.joints.shape[2],
+        p.shape[0],
+        followed,
+        followed,
+        which.shape[0],
     )
     way = AlongCurve(
         functions, second, layout, condition, border, p.copy(), which, scale, counts, workspace

@@ -96,20 +96,20 @@ class CurveWorkspace(NamedTuple):
 
 
 @allocating_helper
-def curve_workspace(count, m, parameters, rows, surfaces):  # type: ignore[no-untyped-def]
+def curve_workspace(count, m, parameters, rows, surfaces, free):  # type: ignore[no-untyped-def]
     """Return the workspace for a curve of chains; ``rows`` of stationary values are followed."""
-    free = max(2 - count, 2)  # two parameters, but no literal
+    right = max(2 - count, 2)  # correction and tangent, but no literal
     return CurveWorkspace(
         equation_workspace(count, m, free),
-        elimination_workspace(count, m, free, free),
+        elimination_workspace(count, m, free, right),
         spectral_workspace(m),
         stationary_workspace(),
         followed_values(rows, surfaces, m),
         bordered_workspace(count, m, free),
         np.empty((2, m, m)),
-        np.empty((2, count, m)),
-        np.empty((2, 2)),
-        np.empty((2, 2)),
+        np.empty((free, count, m)),
+        np.empty((free, free)),
+        np.empty((free, right)),
         np.empty((count, m)),
         np.empty(parameters),
     )

@@ -8,7 +8,8 @@ the total derivatives along the family of orbits (:mod:`contfric.orbit.gradient`
 of a resonance peak as the last parameter varies, with q = 3 the place where that peak is stationary in a
 second parameter.
 
-Values are exact. The slopes of the conditions are central differences at the start, and from then on
+Values are exact. Of an extremum over the orbit all of it is compiled (:mod:`contfric.curves.lagrangian`).
+Of any other quantity the slopes of the conditions are central differences at the start, and from then on
 secants (C. G. Broyden, Math. Comp. 19 (1965) 577-593): a point is as accurate as its gradient, and only the
 speed of Newton's method depends on the slopes.
 """
@@ -22,11 +23,11 @@ from typing import Any
 import numpy as np
 
 from contfric.continuation.extrema import Extremum
-from contfric.continuation.points import MOST_POINTS
+from contfric.continuation.points import MOST_POINTS, Point
 from contfric.continuation.trace import continue_orbit
 from contfric.curves.problem import Ranges, ranges_of
 from contfric.curves.quantity_curve import QuantityCurve
-from contfric.curves.quantity_step import Conditions, Held, Solved, solve_held
+from contfric.curves.quantity_step import Defects, Held
 from contfric.curves.quantity_trace import both_sides
 from contfric.curves.trace import largest_step
 from contfric.errors import ConvergenceError, ParameterError, items_of, shown, whole_number
@@ -41,6 +42,8 @@ from contfric.quantities.registry import Quantity, number_quantity
 _STEP = 6e-6
 #: Calls for one point after which secants are given up for differences: three or four are enough.
 _SECANTS = 6
+#: Derivatives this small (per width) are those of a point that is found: the next one begins.
+_FOUND = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,38 +94,51 @@ class Stationary(Held):
 
     secants: _Secants = field(default_factory=_Secants)
 
+    @property
+    def kind(self) -> int:
+        """What is asked of an extremum."""
+        from contfric.curves.held_conditions import STATIONARY
+
+        return STATIONARY
+
+    def solve(self, guess: Point) -> Point | None:
+        """Solve for a point; where secants fail, from differences."""
+        found = super().solve(guess)
+        if found is None and self.secants.rows is not None:
+            self.secants.rows = None
+            found = super().solve(guess)
+        return found
+
     def slopes(self, orbit: Orbit) -> FloatArray:
         """Return the derivatives of the quantity by all parameters that vary but the last, per width."""
         assert self.quantity is not None
         found = differentiated(self.quantity, orbit, by_parameters(orbit)).ahead
         return np.asarray(found[self.which[:-1]] * self.box.widths[:-1])
 
-    def conditions(self, orbit: Orbit, columns: FloatArray) -> Conditions:
-        """Return these derivatives, with their slopes in scaled directions by secants."""
+    def defects(self, orbit: Orbit) -> Defects:
+        """Return these derivatives, with their rows by secants."""
         x, values, known = self.scaled(orbit), self.slopes(orbit), self.secants
         known.calls += 1
         if known.rows is None or known.calls > _SECANTS:
-            known.rows, known.calls = self._differences(x, columns), 0
+            known.rows, known.calls = self._differences(x, orbit), 0
         elif known.x is not None and known.values is not None and np.any(x != known.x):
             step = x - known.x
             missed = values - known.values - known.rows @ step
             known.rows = known.rows + np.outer(missed, step) / (step @ step)
+        if np.max(np.abs(values)) < _FOUND:
+            known.calls = 0
         known.x, known.values = x, values
-        return Conditions(values, known.rows @ columns)
+        return Defects(values, known.rows)
 
-    def solved(self) -> None:
-        """Note that a point has been found: the next one may use as many secants."""
-        self.secants.calls = 0
-
-    def _differences(self, x: FloatArray, columns: FloatArray) -> FloatArray:
-        """Return rows with the slopes of the conditions in the plane of some directions."""
-        basis = np.linalg.qr(columns[:, 1:])[0]
+    def _differences(self, x: FloatArray, orbit: Orbit) -> FloatArray:
+        """Return rows with the slopes of the conditions in the tangent plane of the orbits."""
+        plane = self.in_plane(orbit)[:, 1:]
         slopes = [
             (self.slopes(self.at(x + _STEP * c)) - self.slopes(self.at(x - _STEP * c)))
             / (2 * _STEP)
-            for c in basis.T
+            for c in plane.T
         ]
-        return np.asarray(np.array(slopes).T @ basis.T)
+        return np.asarray(np.array(slopes).T @ plane.T)
 
 
 def continue_extremum(
@@ -194,10 +210,10 @@ def continue_extremum(
     held, first = _start(orbit, measured, box)
     found = both_sides(held, first, largest, max_points)
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(found)}
-    return ExtremumCurve(**{**values, "value": float(of_orbit(measured, first.orbit))})
+    return ExtremumCurve(**{**values, "value": float(of_orbit(measured, held.orbit_of(first)))})
 
 
-def _start(orbit: Orbit, quantity: Quantity, box: Ranges) -> tuple[Stationary, Solved]:
+def _start(orbit: Orbit, quantity: Quantity, box: Ranges) -> tuple[Stationary, Point]:
     """Return the problem and its first point: near the orbit, else by fewer parameters first."""
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
@@ -207,7 +223,7 @@ def _start(orbit: Orbit, quantity: Quantity, box: Ranges) -> tuple[Stationary, S
         raise ParameterError(f"the orbit is at {where}, outside of the ranges")
     near = _nearer(orbit, quantity, box)
     held = Stationary(canonical(near).as_half(), quantity, 0.0, box)
-    first = solve_held(held, held.scaled(held.orbit), None)
+    first = held.first()
     if first is None:
         raise ConvergenceError(
             f"no orbit near the start at which {quantity.name} is extreme in "
@@ -239,7 +255,7 @@ def _nearer(orbit: Orbit, quantity: Quantity, box: Ranges) -> Orbit:
         raise ConvergenceError(
             f"{quantity.name}, extreme in {', '.join(names[:-1])}, has no extremum along {last}: it "
             f"goes from {values[0]:.6g} to {values[-1]:.6g}",
-            first.orbit,
+            held.orbit_of(first),
         )
     start = orbit.params[last]
     return curve[int(min(turns, key=lambda k: abs(curve.params[last][k] - start)))]

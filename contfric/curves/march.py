@@ -78,7 +78,9 @@ def march_curve(  # type: ignore[no-untyped-def]
     """
     zs, scale = points.joints, 1.0 / box[2] ** 2
     rows, surfaces = count_followed(layout), layout.observables.shape[0]
-    workspace = curve_workspace(zs.shape[1], zs.shape[2], p.shape[0], rows, surfaces)
+    workspace = curve_workspace(
+        zs.shape[1], zs.shape[2], p.shape[0], rows, surfaces, which.shape[0]
+    )
     way = AlongCurve(
         functions, second, layout, condition, border, p.copy(), which, scale, counts, workspace
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from time import perf_counter
 
 import numpy as np
@@ -22,6 +23,30 @@ _PACE = Pace()
 _SAME_ORBIT = 1e-3
 
 
+def paced(
+    call: Callable[[FloatArray, int, int], tuple[int, int, float]],
+    k: int,
+    taken: int,
+    step: float,
+    largest: float,
+) -> tuple[int, int, float]:
+    """March on from row k by calls between which Ctrl-C is heard; (why it stopped, last row, next step).
+
+    ``call`` takes the options of a march, the last row, and the points since the curve began.
+    """
+    from contfric.continuation.march import BUDGET, MORE
+
+    why, last = MORE, k
+    # a step that is refused for its angle is halved, down to the least
+    options = np.array([min(step, largest), largest, SMALLEST_STEP, 0.0, 1.0, 0.0])
+    while why == MORE:
+        options[BUDGET], before, began = _PACE.budget, int(tally()[0]), perf_counter()
+        taken, k = taken + last - k, last
+        why, last, options[0] = call(options, k, taken)
+        _PACE.took(int(tally()[0]) - before, perf_counter() - began)
+    return int(why), int(last), float(options[0])
+
+
 def march_rows(
     problem: Problem,
     rows: Rows,
@@ -34,34 +59,19 @@ def march_rows(
     accuracy: float,
 ) -> tuple[int, int, float]:
     """March on from row k; return (why it stopped, last row, next step)."""
-    from contfric.continuation.march import BUDGET, MORE
     from contfric.curves.march import march_curve
 
-    box, why, last = problem.box, MORE, k
-    # a step that is refused for its angle is halved, down to the least
-    options = np.array([min(step, largest), largest, SMALLEST_STEP, 0.0, 1.0, 0.0])
-    while why == MORE:  # between the calls Ctrl-C is heard
-        options[BUDGET], before, began = _PACE.budget, int(tally()[0]), perf_counter()
-        taken, k = taken + last - k, last
-        why, last, options[0] = march_curve(
-            problem.system.functions(),
-            problem.model.flow.second_derivatives,
-            problem.system.layout,
-            problem.condition,
-            problem.vector,
-            problem.which,
-            accuracy,
-            options,
-            np.array([box.low, box.high, box.widths]),
-            k,
-            *start.as_start(),
-            taken,
-            border,
-            rows.arrays(),
-            tally(),
+    system, box, second = problem.system, problem.box, problem.model.flow.second_derivatives
+    corners, first = np.array([box.low, box.high, box.widths]), start.as_start()
+
+    def call(options: FloatArray, at: int, passed: int) -> tuple[int, int, float]:
+        return march_curve(  # type: ignore[no-any-return]
+            *(system.functions(), second, system.layout, problem.condition, problem.vector),
+            *(problem.which, accuracy, options, corners, at, *first, passed, border),
+            *(rows.arrays(), tally()),
         )
-        _PACE.took(int(tally()[0]) - before, perf_counter() - began)
-    return int(why), int(last), float(options[0])
+
+    return paced(call, k, taken, step, largest)
 
 
 def solve_point(

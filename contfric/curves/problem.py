@@ -106,18 +106,7 @@ class Problem:
     @cached_property
     def limits(self) -> FloatArray:
         """The model's constraints that bound the plane: rows (a, b, c) with ``a p + b q + c >= 0``."""
-        params = self.model.mapping(self.vector)
-        one, other = self.box.names
-        rows = [
-            [
-                constraint.coefficients.get(one, 0.0),
-                constraint.coefficients.get(other, 0.0),
-                constraint.value({**params, one: 0.0, other: 0.0}),
-            ]
-            for constraint in self.model.constraints
-            if one in constraint.coefficients or other in constraint.coefficients
-        ]
-        return np.array(rows, dtype=np.float64).reshape(len(rows), 3)
+        return limits_of(self.model, self.vector, self.box)
 
     def within_limits(self, values: FloatArray) -> FloatArray:
         """Return the least left-hand side of the model's constraints at points (k, 2) of the plane."""
@@ -174,6 +163,17 @@ def ranges_of(
     corners = [_range_of(name, ranges) for name in parameters]
     low, high = (np.array(side) for side in zip(*corners, strict=True))
     return Ranges(parameters, low, high)
+
+
+def limits_of(model: Model, vector: FloatArray, box: Ranges) -> FloatArray:
+    """Return the constraints that bound parameters: rows (a, c) with ``a . p + c >= 0``, shape (k, q + 1)."""
+    params, nothing = model.mapping(vector), dict.fromkeys(box.names, 0.0)
+    rows = [
+        [*(c.coefficients.get(name, 0.0) for name in box.names), c.value({**params, **nothing})]
+        for c in model.constraints
+        if any(name in c.coefficients for name in box.names)
+    ]
+    return np.array(rows, dtype=np.float64).reshape(len(rows), len(box.names) + 1)
 
 
 def _range_of(name: str, ranges: Mapping[str, tuple[float, float]]) -> tuple[float, float]:

@@ -1,46 +1,87 @@
-r"""One orbit of a curve on which a quantity is held: the equations, their null space, Newton's method.
+r"""Conditions on quantities of orbits, for the compiled march: what vanishes along a curve, and its points.
 
-The unknowns are the joints z and q parameters w (two for a quantity with one value); in the scaled product of
-:mod:`contfric.continuation.geometry` they are one vector x. The orbits F(x) = 0 form a surface. Its
-tangent plane, the null space of F', has q directions T, from a QR factorisation of the transpose. On the
-surface q - 1 conditions C(x) = 0 leave a curve. A correction is the shortest step to the surface and a step y
-in that plane,
+The unknowns are the joints z and q parameters w, of which q - 1 conditions leave a curve. An extremum over
+the orbit is differentiated in compiled code (:mod:`contfric.curves.lagrangian`). Any other quantity is a
+function of Python that the march calls. In the scaled product of :mod:`contfric.continuation.geometry` z and
+w are one vector x. The null space of F' has q directions T, from a QR factorisation of the transpose; with
+the shortest step :math:`\delta_0` to the orbits, :math:`F'\delta_0 = -F`, the row
 
-.. math:: \delta = \delta_0 + T y, \quad F'\delta_0 = -F, \qquad
-   C'T\,y = -C - C'\delta_0, \qquad t^T T\,y = -t^T (x + \delta_0 - x_0) ,
+.. math:: r = C'T\,T^T + \frac{C'\delta_0\,\delta_0^T}{\delta_0^T\delta_0}
 
-the last one Keller's plane normal to the tangent t through the prediction. So conditions are differentiated
-in q + 1 directions only, and folds of the orbits in any parameter are ordinary points.
+takes the place of C': both agree in all directions that a step of Newton's method may have. So conditions are
+differentiated in q + 1 directions only.
 """
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from contfric.curves.problem import Ranges
+from contfric.base.tally import tally
+from contfric.continuation.points import Point, Rows
+from contfric.curves.points import paced
+from contfric.curves.problem import Ranges, limits_of
 from contfric.curves.special import CurveEnd, CurveEndReason
+from contfric.errors import ConvergenceError
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import equations_at
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import IntArray
+from contfric.quantities.extreme import peak_of
 from contfric.quantities.measure import differentiated
 from contfric.quantities.motion import Directions
 from contfric.quantities.registry import Quantity
 
-#: Newton steps after which it has failed: it converges quadratically from a prediction, in three or four.
-_MOST = 12
-#: A correction this small (scaled), or this many units of the flow's rounding, is rounding; and after all
-#: steps one below the second is what can be had.
-_DONE, _UNITS, _AT_LAST = 1e-12, 10.0, 1e-9
+if TYPE_CHECKING:
+    from contfric.curves.held_conditions import Conditions
+    from contfric.orbit.peak import Extreme
+
+#: Size of a correction after which no other is asked for: that of branches.
+_ACCURACY = 3e-13
+#: A first point this near to the orbit (scaled) is the one that belongs to it.
+_NEAR = 0.02
 
 
-class Conditions(NamedTuple):
-    """What vanishes on the curve, shape (c,), and its slopes in D directions, shape (c, D)."""
+class Defects(NamedTuple):
+    """What vanishes on the curve, shape (c,), and its scaled rows, shape (c, N m + q)."""
 
     values: FloatArray
-    slopes: FloatArray
+    rows: FloatArray
+
+
+class _Called:
+    """A function of Python that compiled code calls by its address; what it raises is kept.
+
+    Parameters
+    ----------
+    fill : returns whether it has filled its arrays
+    """
+
+    def __init__(self, fill: Callable[[], bool]) -> None:
+        self.raised: BaseException | None = None
+        self._fill = fill
+        self._function = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(self._call)
+
+    @property
+    def address(self) -> int:
+        """Where it is called."""
+        return int(ctypes.cast(self._function, ctypes.c_void_p).value or 0)
+
+    def _call(self, _: int) -> int:
+        if self.raised is not None:
+            return 0
+        try:
+            return int(self._fill())
+        except ConvergenceError:  # at a fold: a shorter step may do
+            return 0
+        except BaseException as error:  # raised again when the compiled code has returned
+            self.raised = error
+            return 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +91,7 @@ class Held:
     Attributes
     ----------
     orbit : any orbit of the curve: its equations, and the parameters that do not vary
-    quantity, value : what is held, and at what; None where :meth:`conditions` are others
+    quantity, value : what is held, and at what; None where :meth:`defects` are others
     box : the parameters that vary
     """
 
@@ -59,17 +100,21 @@ class Held:
     value: float
     box: Ranges
 
-    @property
-    def which(self) -> list[int]:
+    @cached_property
+    def which(self) -> IntArray:
         """Indices of the parameters that vary."""
-        return [self.orbit.model.index_of(name) for name in self.box.names]
+        return np.array([self.orbit.model.index_of(n) for n in self.box.names], dtype=np.int64)
 
-    @property
+    @cached_property
+    def corners(self) -> FloatArray:
+        """Lower corner, upper corner and widths, shape (3, q)."""
+        return np.array([self.box.low, self.box.high, self.box.widths])
+
+    @cached_property
     def weights(self) -> FloatArray:
         """What the unknowns are divided by to become the scaled vector, shape (N m + q,)."""
-        size = self.orbit.joints.size
         root = np.sqrt(len(self.orbit.joints))
-        return np.concatenate([np.full(size, root), self.box.widths])
+        return np.concatenate([np.full(self.orbit.joints.size, root), self.box.widths])
 
     def scaled(self, orbit: Orbit) -> FloatArray:
         """Return an orbit as a scaled vector."""
@@ -78,11 +123,40 @@ class Held:
     def at(self, x: FloatArray) -> Orbit:
         """Return a scaled vector as an orbit."""
         plain, size = x * self.weights, self.orbit.joints.size
+        return self.orbit_at(plain[:size].reshape(self.orbit.joints.shape), plain[size:])
+
+    def orbit_at(self, joints: FloatArray, w: FloatArray) -> Orbit:
+        """Return the orbit with these joints and parameters."""
         vector = self.orbit.vector.copy()
-        vector[self.which] = plain[size:]
-        return replace(
-            self.orbit, joints=plain[:size].reshape(self.orbit.joints.shape), vector=vector
-        )
+        vector[self.which] = w
+        return replace(self.orbit, joints=joints, vector=vector)
+
+    def orbit_of(self, point: Point) -> Orbit:
+        """Return a point as an orbit."""
+        return self.orbit_at(point.joints, point.w)
+
+    # ------------------------------------------------------------------ what vanishes
+
+    def defects(self, orbit: Orbit) -> Defects:
+        """Return what vanishes along the curve, with its rows."""
+        assert self.quantity is not None
+        columns = self.in_plane(orbit)
+        found = differentiated(self.quantity, orbit, self.directions(columns))
+        return Defects(np.array([found.value - self.value]), found.ahead[None] @ spread(columns))
+
+    def in_plane(self, orbit: Orbit) -> FloatArray:
+        """Return the shortest step to the orbits and the plane of them, scaled, shape (N m + q, 1 + q)."""
+        left, on_joints, on_parameters = equations_at(orbit.system, orbit.joints, orbit.vector)
+        jacobian = np.hstack([on_joints, on_parameters[:, self.which]]) * self.weights
+        if not (np.all(np.isfinite(jacobian)) and np.all(np.isfinite(left))):
+            raise ConvergenceError("the equations of the orbit are not finite", orbit)
+        basis, upper = np.linalg.qr(jacobian.T, mode="complete")
+        rows = len(left)
+        try:
+            shortest = -basis[:, :rows] @ np.linalg.solve(upper[:rows].T, left)
+        except np.linalg.LinAlgError as error:
+            raise ConvergenceError("the orbits have no tangent plane", orbit) from error
+        return np.column_stack([shortest, basis[:, rows:]])
 
     def directions(self, columns: FloatArray) -> Directions:
         """Return scaled directions, shape (N m + q, D), as motions of joints and parameters."""
@@ -91,92 +165,146 @@ class Held:
         vector[self.which] = plain[size:]
         return Directions(plain[:size].reshape(*self.orbit.joints.shape, -1), vector)
 
-    def conditions(self, orbit: Orbit, columns: FloatArray) -> Conditions:
-        """Return what vanishes, with its slopes in scaled directions, shape (N m + q, D)."""
-        assert self.quantity is not None
-        found = differentiated(self.quantity, orbit, self.directions(columns))
-        return Conditions(np.array([found.value - self.value]), found.ahead[None])
+    @cached_property
+    def extreme(self) -> Extreme | None:
+        """The quantity as an extremum that compiled code differentiates, if it is one."""
+        peak = None if self.quantity is None else peak_of(self.quantity)
+        if peak is None:
+            return None
+        from contfric.orbit.peak import Extreme
 
-    def solved(self) -> None:
-        """Note that a point has been found."""
+        return Extreme(*peak, self.orbit.as_whole().system.layout)
 
-    def left(self, values: FloatArray) -> float:
-        """Return the largest of the conditions, relative to what is held."""
-        return float(np.max(np.abs(values))) / (1.0 + abs(self.value))
+    @property
+    def kind(self) -> int:
+        """What is asked of an extremum."""
+        from contfric.curves.held_conditions import AT_VALUE
 
-    def bounds(self, orbit: Orbit) -> FloatArray:
+        return AT_VALUE
+
+    @cached_property
+    def _compiled(self) -> tuple[Conditions, _Called, object]:
+        """The conditions as the march takes them, what it calls, and what keeps that alive."""
+        from contfric.curves.held_conditions import CALLED, FILL, Conditions
+        from contfric.handle import Block
+        from contfric.orbit.peak import Extreme
+
+        shape, q = self.orbit.joints.shape, len(self.box.names)
+        joints, vector = np.empty(shape), np.empty(len(self.orbit.vector))
+        values, on_joints, on_parameters = (
+            np.empty(q - 1),
+            np.empty((q - 1, *shape)),
+            np.empty((q - 1, q)),
+        )
+
+        def fill() -> bool:
+            found = self.defects(replace(self.orbit, joints=joints.copy(), vector=vector.copy()))
+            plain = found.rows / self.weights
+            values[:] = found.values
+            on_joints[:] = plain[:, : joints.size].reshape(on_joints.shape)
+            on_parameters[:] = plain[:, joints.size :]
+            return bool(np.all(np.isfinite(plain)))
+
+        called = _Called(fill)
+        block = Block(FILL, {"fill": called})
+        extreme = self.extreme or Extreme(-1, 0, 1.0, self.orbit.system.layout)
+        kind = CALLED if self.extreme is None else self.kind
+        arrays = joints, vector, values, on_joints, on_parameters
+        return Conditions(kind, self.value, extreme, block.address, *arrays), called, block
+
+    # ------------------------------------------------------------------ points of the curve
+
+    def march(
+        self, rows: Rows, k: int, start: Point, taken: int, step: float, largest: float
+    ) -> tuple[int, int, float]:
+        """March on from row k; return (why it stopped, last row, next step)."""
+        from contfric.curves.held_march import march_held
+
+        conditions, called, _ = self._compiled
+        system, first, arrays = self.orbit.system, start.as_start(), rows.arrays()
+
+        def call(options: FloatArray, at: int, passed: int) -> tuple[int, int, float]:
+            found = march_held(
+                *(system.functions(), system.layout, conditions, self.orbit.vector, self.which),
+                *(_ACCURACY, options, self.corners, at, *first, passed, arrays, tally()),
+            )
+            if called.raised is not None:
+                error, called.raised = called.raised, None
+                raise error
+            return found  # type: ignore[no-any-return]
+
+        return paced(call, k, taken, step, largest)
+
+    def solve(self, guess: Point) -> Point | None:
+        """Solve for the point normal to the tangent of a guess, through it; None if Newton fails."""
+        from contfric.continuation.march import BROKEN
+
+        rows = Rows.empty(self.orbit.system, 1, len(self.box.names))
+        rows.put(0, guess)
+        why, _, _ = self.march(rows, -1, guess, 0, 0.0, 1.0)
+        return None if why == BROKEN else rows.point(0)
+
+    def between(self, before: Point, after: Point, share: float, normal: Point) -> Point | None:
+        """Solve for the point at a share of the chord between two, normal to the tangent of a third."""
+        joints = before.joints + share * (after.joints - before.joints)
+        w = before.w + share * (after.w - before.w)
+        found = self.solve(replace(normal, joints=joints, w=w))
+        if found is not None:
+            found.arc = before.arc + self.apart(before, found)
+        return found
+
+    def first(self) -> Point | None:
+        """Return the point next to the orbit, with one of the parameters fixed: the last, if it goes."""
+        widths, best, gap = self.box.widths, None, np.inf
+        empty = Rows.empty(self.orbit.system, 1, len(widths)).point(0)
+        here = replace(
+            empty,
+            joints=self.orbit.joints,
+            w=self.orbit.vector[self.which],
+            tangent=0 * self.orbit.joints,
+        )
+        for k in reversed(range(len(widths))):
+            found = self.solve(replace(here, direction=np.eye(len(widths))[k] * widths))
+            away = np.inf if found is None else self.apart(here, found)
+            if away < gap:
+                best, gap = found, away
+            if gap < _NEAR:
+                break
+        return best
+
+    def apart(self, one: Point, other: Point) -> float:
+        """Return the distance of two points in the scaled product."""
+        joints = float(np.sum((one.joints - other.joints) ** 2)) / len(one.joints)
+        w = float(np.sum(((one.w - other.w) / self.box.widths) ** 2))
+        return float(np.sqrt(joints + w))
+
+    # ------------------------------------------------------------------ where it ends
+
+    @cached_property
+    def sides(self) -> tuple[FloatArray, FloatArray]:
+        """Rows (a, c) with ``a . w + c >= 0`` inside of the ranges, and inside of the model's limits."""
+        return self.box.edges, limits_of(self.orbit.model, self.orbit.vector, self.box)
+
+    def inside(self, point: Point) -> tuple[float, float, float, float]:
+        """Return the least distance to the ranges and to the model's limits, margin, and further bound."""
+        ends = [np.min(rows[:, :-1] @ point.w + rows[:, -1], initial=np.inf) for rows in self.sides]
+        margins = point.tests[: len(self.orbit.system.tests)]
+        found = (*ends, np.min(margins, initial=np.inf), self.bound(point))
+        a, b, c, d = (float(np.nan_to_num(value, nan=-1.0, posinf=1e3)) for value in found)
+        return a, b, c, d
+
+    def bound(self, point: Point) -> float:
         """Return what else has to be positive along the curve."""
-        return np.empty(0)
+        return np.inf
 
-    def end_at_bound(self, orbit: Orbit) -> CurveEnd:
-        """Return why the curve ends where one of these is zero."""
+    def end_at_bound(self, point: Point) -> CurveEnd:
+        """Return why the curve ends where that is zero."""
         return CurveEnd(CurveEndReason.LOST)
 
 
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """A solved point: the scaled vector, its unit tangent, and the orbit."""
-
-    x: FloatArray
-    tangent: FloatArray
-    orbit: Orbit
-
-
-def solve_held(held: Held, guess: FloatArray, tangent: FloatArray | None) -> Solved | None:
-    """Solve for the point of the curve normal to a tangent through a guess; None if Newton fails.
-
-    Without a tangent the nearest point is solved for, and the tangent may have either sign.
-    """
-    x, last, found = guess.copy(), np.inf, None
-    done = max(_DONE, _UNITS * held.orbit.model.rounding)
-    for _ in range(_MOST):
-        orbit = held.at(x)
-        left, on_joints, on_parameters = equations_at(held.orbit.system, orbit.joints, orbit.vector)
-        jacobian = np.hstack([on_joints, on_parameters[:, held.which]]) * held.weights
-        if not (np.all(np.isfinite(jacobian)) and np.all(np.isfinite(left))):
-            return None
-        basis, upper = np.linalg.qr(jacobian.T, mode="complete")
-        rows = len(left)
-        try:
-            shortest = -basis[:, :rows] @ np.linalg.solve(upper[:rows].T, left)
-        except np.linalg.LinAlgError:
-            return None
-        plane = basis[:, rows:]
-        values, slopes = held.conditions(orbit, np.column_stack([shortest, plane]))
-        slopes, missing = slopes[:, 1:], -values - slopes[:, 0]
-        step = shortest + plane @ _in_plane(slopes, missing, plane, tangent, x + shortest - guess)
-        size = float(np.linalg.norm(step))
-        if not np.isfinite(size):
-            return None
-        x = x + step
-        found = Solved(x, _tangent(slopes, plane, tangent), held.at(x))
-        if max(size, held.left(values)) < done:
-            return found
-        last = size
-    return found if last < _AT_LAST else None
-
-
-def _in_plane(
-    slopes: FloatArray,
-    missing: FloatArray,
-    plane: FloatArray,
-    tangent: FloatArray | None,
-    moved: FloatArray,
-) -> FloatArray:
-    """Return the step y in the tangent plane, shape (q,)."""
-    if not np.all(np.isfinite(slopes)):
-        return np.full(slopes.shape[1], np.nan)
-    try:
-        if tangent is None:
-            return np.asarray(np.linalg.lstsq(slopes, missing)[0])
-        both = np.vstack([slopes, tangent @ plane])
-        return np.asarray(np.linalg.solve(both, np.array([*missing, -tangent @ moved])))
-    except np.linalg.LinAlgError:
-        return np.full(slopes.shape[1], np.nan)
-
-
-def _tangent(slopes: FloatArray, plane: FloatArray, before: FloatArray | None) -> FloatArray:
-    """Return the unit direction in the tangent plane along which all conditions stand still."""
-    found = plane @ np.linalg.svd(slopes)[2][-1]
-    sign = 1.0 if before is None or found @ before >= 0.0 else -1.0
-    return np.asarray(sign * found)
+def spread(columns: FloatArray) -> FloatArray:
+    """Return what makes rows of slopes in a direction and in an orthonormal basis normal to it."""
+    square = float(columns[:, 0] @ columns[:, 0])
+    found = columns.T.copy()
+    found[0] /= square if square > 0.0 else 1.0
+    return found

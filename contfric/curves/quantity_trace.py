@@ -1,25 +1,24 @@
 """A quantity held at a value while two parameters vary: the curve of such orbits, both ways, to its ends.
 
-The march is that of :mod:`contfric.continuation.march`, step for step, with the corrector of
-:mod:`contfric.curves.quantity_step`. A curve ends at the edge of the ranges, at a limit of the model's
-parameters, and where a margin of its orbits vanishes; all three are zeros of one function, the least of
-what has to be positive, and are located by Brent's method.
+The march is that of :mod:`contfric.curves.held_march`. A curve ends at the edge of the ranges, at a limit of
+the model's parameters, and where a margin of its orbits vanishes; all three are zeros of one function, the
+least of what has to be positive, and are located by Brent's method.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from contfric.continuation.events import EndReason, kind_of_margin
-from contfric.continuation.points import MOST_POINTS, SMALLEST_STEP
+from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point, Rows
 from contfric.continuation.trace import continue_orbit
+from contfric.curves.points import CHUNK
 from contfric.curves.problem import Box, box_of
 from contfric.curves.quantity_curve import QuantityCurve
-from contfric.curves.quantity_step import Held, Solved, solve_held
+from contfric.curves.quantity_step import Held
 from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.curves.trace import largest_step
 from contfric.errors import ConvergenceError, ParameterError, real_number, whole_number
@@ -29,10 +28,6 @@ from contfric.orbit.sections import canonical
 from contfric.quantities.measure import differentiated
 from contfric.quantities.registry import Quantity, number_quantity
 
-#: Angle between tangents (rad), wanted and accepted, and most that a step grows by: as along branches.
-_WANTED, _MOST_ANGLE, _GROWTH = 0.12, 0.35, 2.5
-#: First step, in largest steps: the curvature is not known yet.
-_FIRST = 0.1
 #: A start whose quantity is this near to the value (relative to 1 + its size) is on the curve.
 _AT_VALUE = 1e-9
 
@@ -99,24 +94,48 @@ def continue_quantity(
     whole_number("max_points", max_points, least=2)
     start = _start(orbit, held_quantity, value, box)
     held = Held(start, held_quantity, value, box)
-    first = solve_held(held, held.scaled(start), None)
+    first = held.first()
     if first is None:
         raise ConvergenceError(
-            f"the orbits with {quantity} = {value:g} have no unique direction at the start", start
+            f"the orbits with {quantity} = {value:g} have no unique direction at the start: it may not "
+            f"depend on {' and '.join(box.names)}, or be extreme there",
+            start,
         )
     return both_sides(held, first, largest, max_points)
 
 
-def both_sides(held: Held, first: Solved, largest: float, max_points: int) -> QuantityCurve:
+def both_sides(held: Held, first: Point, largest: float, max_points: int) -> QuantityCurve:
     """Trace a curve from its first point both ways."""
+    points, arc, ends = trace_both(held, first, largest, max_points)
+    directions = held.orbit.model.directions
+    return QuantityCurve(
+        held.quantity.name if held.quantity else "",
+        held.value,
+        held.box.names,
+        held.orbit.system,
+        held.orbit.vector,
+        np.array([point.w for point in points]),
+        np.array([point.joints for point in points]),
+        arc,
+        np.array([np.all(np.abs(point.mu[:directions]) < 1.0) for point in points]),
+        ends,
+    )
+
+
+def trace_both(
+    held: Held, first: Point, largest: float, max_points: int
+) -> tuple[list[Point], FloatArray, tuple[CurveEnd, CurveEnd]]:
+    """Return the points of a curve with arclengths from its first one, and why it ends at both."""
     ahead = HeldSide(held, [first], largest)
     ahead.trace(max_points)
-    behind = HeldSide(held, [Solved(first.x, -first.tangent, first.orbit)], largest)
+    behind = HeldSide(held, [first.reversed()], largest)
     if ahead.end.reason in (CurveEndReason.CLOSED, CurveEndReason.INTERRUPTED):
-        behind.end = ahead.end
+        behind.end = CurveEnd(ahead.end.reason)
     else:
         behind.trace(max_points)
-    return _joined(held, behind, ahead)
+    arc = np.array([*(-p.arc for p in behind.points[:0:-1]), *(p.arc for p in ahead.points)])
+    points = [*behind.points[:0:-1], *ahead.points]
+    return points, arc - arc[0], (behind.end, ahead.end)
 
 
 def _start(orbit: Orbit, quantity: Quantity, value: float, box: Box) -> Orbit:
@@ -154,162 +173,118 @@ class HeldSide:
     """One side of a curve while it grows."""
 
     held: Held
-    points: list[Solved]
+    points: list[Point]
     largest: float
     end: CurveEnd = field(default_factory=lambda: CurveEnd(CurveEndReason.POINTS))
-    arc: list[float] = field(default_factory=lambda: [0.0])
 
     def trace(self, most: int) -> None:
         """March on until the curve ends; Ctrl-C ends it where it is."""
-        step = _FIRST * self.largest
+        step: float | None = FIRST_STEP * self.largest
         try:
-            while len(self.points) < most:
-                step, finished = self._advance(step)
-                if finished:
-                    return
+            while step is not None and len(self.points) < most:
+                step = self._advance(step, most)
         except KeyboardInterrupt:
             self.end = CurveEnd(CurveEndReason.INTERRUPTED)
 
-    def _advance(self, step: float) -> tuple[float, bool]:
-        """Take one step; (next step, whether the side is finished)."""
-        last = self.points[-1]
-        while True:
-            if step < SMALLEST_STEP:
-                self.end = CurveEnd(CurveEndReason.STEP)
-                return step, True
-            found = solve_held(self.held, self._predicted(step), last.tangent)
-            angle = np.inf if found is None else _angle(last, found)
-            if found is not None and angle <= _MOST_ANGLE:
-                break
-            step *= 0.5
-        taken = float(np.linalg.norm(found.x - last.x))
-        if inside(self.held, found) < 0.0:
-            self._finish(last, found)
-            return step, True
-        self.points.append(found)
-        self.held.solved()
-        self.arc.append(self.arc[-1] + taken * (1.0 + angle**2 / 24.0))
-        if len(self.points) > 4 and self._returned(taken):
-            self.end = CurveEnd(CurveEndReason.CLOSED)
-            return step, True
-        size = 1.0 + float(np.max(np.abs(found.orbit.joints[:, 1:])))
-        factor = min(_GROWTH, max(0.4, _WANTED / max(angle, 1e-6)))
-        return min(self.largest * size, step * factor), False
+    def _advance(self, step: float, most: int) -> float | None:
+        """March once and keep the points up to an end; return the next step, None if there is one."""
+        from contfric.continuation import march as codes
 
-    def _predicted(self, step: float) -> FloatArray:
-        """Return the prediction: along the tangent, bent as over the last step."""
-        last = self.points[-1]
-        guess = last.x + step * last.tangent
-        if len(self.points) > 1:
-            back = float(np.linalg.norm(last.x - self.points[-2].x))
-            guess = guess + 0.5 * step**2 / back * (last.tangent - self.points[-2].tangent)
-        return np.asarray(guess)
+        last, known = min(2, len(self.points)), len(self.points)
+        room = last + min(CHUNK, most - known)
+        rows = Rows.empty(self.held.orbit.system, room, len(self.held.box.names))
+        for k in range(last):
+            rows.put(k, self.points[known - last + k])
+        why, k, step = self.held.march(
+            rows, last - 1, self.points[0], known - 1, step, self.largest
+        )
+        for point in rows.points(last, k + 1):
+            if min(self.held.inside(point)) < 0.0:
+                self._finish(self.points[-1], point)
+                return None
+            self.points.append(point)
+            if len(self.points) > 4 and self._returned():
+                self.end = CurveEnd(CurveEndReason.CLOSED)
+                return None
+        ends = {
+            codes.STEP: CurveEndReason.STEP,
+            codes.BROKEN: CurveEndReason.STEP,
+            codes.CLOSED: CurveEndReason.CLOSED,
+            codes.UNBOUNDED: CurveEndReason.UNBOUNDED,
+            codes.ENDLESS: CurveEndReason.PERIOD,
+        }
+        if why in ends:
+            self.end = CurveEnd(ends[why])
+            return None
+        return step
 
-    def _returned(self, step: float) -> bool:
-        """Tell whether the last step has passed the start again, in its direction."""
-        first, turns = self.points[0], self._turns()
-        before, last = (self._folded(point, turns) for point in self.points[-2:])
-        if np.linalg.norm(last - first.x) > 1.5 * step:
-            return False
-        passed = [float(x @ first.tangent) for x in (before, first.x, last)]
-        return passed[0] < passed[1] <= passed[2]
-
-    def _turns(self) -> int:
-        """Return the whole periods by which the last point is later than the first.
+    def _returned(self) -> bool:
+        """Tell whether the last step has passed the start again, in its direction.
 
         Around a resonance the phase of the motion turns once, and the same orbit is met a period later.
         """
-        first, last = self.points[0].orbit, self.points[-1].orbit
-        if first.model.autonomous:
-            return 0
-        return round(float(last.joints[0, 0] - first.joints[0, 0]) / first.flow.period)
+        first, before, last = self.points[0], self.points[-2], self.points[-1]
+        near = 1.5 * self.held.apart(before, last)
+        if np.max(np.abs(last.w - first.w) / self.held.box.widths) > near:
+            return False
+        turns = 0
+        if not self.held.orbit.model.autonomous:
+            turns = round(float(last.joints[0, 0] - first.joints[0, 0]) / self._period(last))
+        before, last = (self._earlier(point, turns) for point in (before, last))
+        if self.held.apart(last, first) > near:
+            return False
+        passed = [self._along(point, first) for point in (before, first, last)]
+        return passed[0] < passed[1] <= passed[2]
 
-    def _folded(self, point: Solved, turns: int) -> FloatArray:
+    def _period(self, point: Point) -> float:
+        return float(self.held.orbit_of(point).flow.period)
+
+    def _earlier(self, point: Point, turns: int) -> Point:
         """Return a point so many of its own periods earlier: a period changes along the curve."""
         if not turns:
-            return point.x
-        joints = point.orbit.joints.copy()
-        joints[:, 0] -= turns * point.orbit.flow.period
-        return self.held.scaled(replace(point.orbit, joints=joints))
+            return point
+        joints = point.joints.copy()
+        joints[:, 0] -= turns * self._period(point)
+        return replace(point, joints=joints)
 
-    def _finish(self, before: Solved, after: Solved) -> None:
+    def _along(self, point: Point, first: Point) -> float:
+        """Return the scaled product of a point with the tangent of the first one."""
+        joints = float(np.sum(point.joints * first.tangent)) / len(point.joints)
+        return joints + float(np.sum(point.w * first.direction / self.held.box.widths**2))
+
+    def _finish(self, before: Point, after: Point) -> None:
         """Locate where the orbits leave what is allowed, and end there."""
         from scipy.optimize import brentq
 
-        chord = after.x - before.x
-
-        def solved_at(share: float) -> Solved:
-            found = solve_held(self.held, before.x + share * chord, before.tangent)
+        def solved_at(share: float) -> Point:
+            found = self.held.between(before, after, share, before)
             if found is None:
                 raise ArithmeticError
             return found
 
-        def inside_at(share: float) -> float:
-            return inside(self.held, solved_at(share)) if share < 1.0 else inside(self.held, after)
+        def least_at(share: float) -> float:
+            return min(self.held.inside(solved_at(share) if share < 1.0 else after))
 
         try:
-            if inside(self.held, before) > 0.0:
+            if min(self.held.inside(before)) > 0.0:
                 # to the last digits of a step
-                share = float(brentq(inside_at, 0.0, 1.0, xtol=1e-15, rtol=1e-14))
-                point = solved_at(share)
-                self.points.append(point)
-                self.arc.append(self.arc[-1] + float(np.linalg.norm(point.x - before.x)))
+                share = float(brentq(least_at, 0.0, 1.0, xtol=1e-15, rtol=1e-14))
+                self.points.append(solved_at(share))
         except ArithmeticError:
             self.end = CurveEnd(CurveEndReason.STEP)
             return
         self.end = _end_at(self.held, self.points[-1])
 
 
-def _angle(one: Solved, other: Solved) -> float:
-    return math.acos(min(1.0, max(-1.0, float(one.tangent @ other.tangent))))
-
-
-def _bounds(held: Held, point: Solved) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what has to be positive: distances to the edges, to the model's limits, and the margins."""
-    w = point.orbit.vector[held.which]
-    edges = held.box.edges[:, :-1] @ w + held.box.edges[:, -1]
-    params = point.orbit.params
-    varying = set(held.box.names)
-    constraints = held.orbit.model.constraints
-    limits = [c.value(params) for c in constraints if varying & set(c.coefficients)]
-    return edges, np.array(limits), point.orbit.margins
-
-
-def inside(held: Held, point: Solved) -> float:
-    """Return the least of what has to be positive."""
-    least = [np.min(part, initial=np.inf) for part in _bounds(held, point)]
-    least.append(np.min(held.bounds(point.orbit), initial=np.inf))
-    return float(np.nan_to_num(min(least), nan=-1.0, posinf=1e3))
-
-
-def _end_at(held: Held, point: Solved) -> CurveEnd:
+def _end_at(held: Held, point: Point) -> CurveEnd:
     """Return why a curve ends at a located point."""
-    edges, limits, margins = _bounds(held, point)
-    least = [float(np.min(part, initial=np.inf)) for part in (edges, limits, margins)]
+    least = held.inside(point)
     first = int(np.argmin(least))
     if first < 2:
         return CurveEnd((CurveEndReason.RANGE, CurveEndReason.LIMIT)[first])
-    if np.min(held.bounds(point.orbit), initial=np.inf) < least[2]:
-        return held.end_at_bound(point.orbit)
-    test = held.orbit.system.tests[int(np.argmin(margins))]
-    kind = kind_of_margin(held.orbit.system, test, point.orbit)
+    if first == 3:
+        return held.end_at_bound(point)
+    system = held.orbit.system
+    test = system.tests[int(np.argmin(point.tests[: len(system.tests)]))]
+    kind = kind_of_margin(system, test, held.orbit_of(point))
     return CurveEnd(CurveEndReason.MEETS, f"{kind.value}: beyond it the orbits are not admissible")
-
-
-def _joined(held: Held, behind: HeldSide, ahead: HeldSide) -> QuantityCurve:
-    """Return one curve from the two sides of its start."""
-    points = [*behind.points[:0:-1], *ahead.points]
-    arc = np.array([*(-a for a in behind.arc[:0:-1]), *ahead.arc])
-    orbits = [point.orbit for point in points]
-    return QuantityCurve(
-        held.quantity.name if held.quantity else "",
-        held.value,
-        held.box.names,
-        held.orbit.system,
-        held.orbit.vector,
-        np.array([orbit.vector[held.which] for orbit in orbits]),
-        np.array([orbit.joints for orbit in orbits]),
-        arc - arc[0],
-        np.array([orbit.stable for orbit in orbits]),
-        (behind.end, ahead.end),
-    )

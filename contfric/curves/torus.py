@@ -7,8 +7,8 @@ theta of the pair, the points theta = 2 pi / 3 and pi / 2 are the strong resonan
 everywhere on curves, multipliers are those of a turn: of the half map, for a symmetric orbit.
 
 The orbits and the march are those of a quantity that is held (:mod:`contfric.curves.quantity_step`).
-The value is computed from the multipliers to rounding; its slopes, in the three directions that Newton's
-method needs, are central differences: a point is as accurate as its multipliers, and only the speed of
+The value is computed from the multipliers to rounding; its slopes, in the tangent plane of the orbits,
+are central differences: a point is as accurate as its multipliers, and only the speed of
 convergence depends on the slopes.
 """
 
@@ -16,17 +16,17 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contfric.continuation.events import Bifurcation, Kind
-from contfric.continuation.points import MOST_POINTS
+from contfric.continuation.points import MOST_POINTS, Point
 from contfric.curves.curve import Curve, CurvePart
 from contfric.curves.problem import Box
-from contfric.curves.quantity_step import Conditions, Held, Solved, solve_held
-from contfric.curves.quantity_trace import HeldSide, inside
+from contfric.curves.quantity_step import Defects, Held
+from contfric.curves.quantity_trace import trace_both
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.errors import ConvergenceError, ParameterError
 from contfric.models.definition import FloatArray
@@ -62,15 +62,15 @@ class OnCircle(Held):
 
     box: Box
 
-    def conditions(self, orbit: Orbit, columns: FloatArray) -> Conditions:
-        """Return log(mu_1 mu_2) and its slopes in scaled directions."""
-        x = self.scaled(orbit)
+    def defects(self, orbit: Orbit) -> Defects:
+        """Return log(mu_1 mu_2) and its row."""
+        x, plane = self.scaled(orbit), self.in_plane(orbit)[:, 1:]
         slopes = [
             (self.defect(self.at(x + _STEP * c)) - self.defect(self.at(x - _STEP * c)))
             / (2.0 * _STEP)
-            for c in columns.T
+            for c in plane.T
         ]
-        return Conditions(np.array([self.defect(orbit)]), np.array([slopes]))
+        return Defects(np.array([self.defect(orbit)]), np.array([slopes]) @ plane.T)
 
     def defect(self, orbit: Orbit) -> float:
         """Return log(mu_1 mu_2) of the critical pair."""
@@ -78,15 +78,16 @@ class OnCircle(Held):
         one, other = critical_pair(mu)
         return math.log(abs(mu[one] * mu[other]))
 
-    def bounds(self, orbit: Orbit) -> FloatArray:
+    def bound(self, point: Point) -> float:
         """Return the discriminant of the pair, 1 - (trace / 2)^2 / determinant: positive if complex."""
-        mu = orbit.turn_multipliers
+        mu = self.orbit_of(point).turn_multipliers
         one, other = critical_pair(mu)
         total, product = mu[one] + mu[other], mu[one] * mu[other]
-        return np.array([1.0 - float((total * total / (4.0 * product)).real)])
+        return 1.0 - float((total * total / (4.0 * product)).real)
 
-    def end_at_bound(self, orbit: Orbit) -> CurveEnd:
+    def end_at_bound(self, point: Point) -> CurveEnd:
         """Return the end where the pair is real."""
+        orbit = self.orbit_of(point)
         mu = orbit.turn_multipliers
         kind = CodimTwo.R1 if float(mu[critical_pair(mu)[0]].real) > 0.0 else CodimTwo.R2
         special = SpecialPoint(kind, kind.name, orbit.params, orbit)
@@ -119,24 +120,16 @@ def continue_torus(
             f"{', '.join(f'{m:.6g}' for m in mu)}, and no complex pair is on the unit circle"
         )
     held = OnCircle(orbit, None, 0.0, box)
-    first = solve_held(held, held.scaled(orbit), None)
+    first = held.first()
     if first is None:
         raise ConvergenceError(f"{bifurcation!r} has no curve with a unique direction", orbit)
-    ahead = HeldSide(held, [first], largest)
-    ahead.trace(max_points)
-    behind = HeldSide(held, [Solved(first.x, -first.tangent, first.orbit)], largest)
-    if ahead.end.reason in (CurveEndReason.CLOSED, CurveEndReason.INTERRUPTED):
-        behind.end = CurveEnd(ahead.end.reason)
-    else:
-        behind.trace(max_points)
-    return _joined(held, behind, ahead)
+    return _joined(held, *trace_both(held, first, largest, max_points))
 
 
-def _joined(held: OnCircle, behind: HeldSide, ahead: HeldSide) -> Curve:
-    points = [*behind.points[:0:-1], *ahead.points]
-    arc = np.array([*(-a for a in behind.arc[:0:-1]), *ahead.arc])
-    arc -= arc[0]
-    orbits = [point.orbit for point in points]
+def _joined(
+    held: OnCircle, points: list[Point], arc: FloatArray, both: tuple[CurveEnd, CurveEnd]
+) -> Curve:
+    orbits = [held.orbit_of(point) for point in points]
     part = CurvePart(
         Kind.NS,
         None,
@@ -150,14 +143,14 @@ def _joined(held: OnCircle, behind: HeldSide, ahead: HeldSide) -> Curve:
     )
     special = _resonances(held, points, arc)
     ends = []
-    for side, position in ((behind, 0.0), (ahead, float(arc[-1]))):
-        end = side.end
+    for end, position in zip(both, (0.0, float(arc[-1])), strict=True):
         if end.special is not None:
             kind = end.special.kind
             place = _special(kind, end.special.orbit, position)
-            end = CurveEnd(end.reason, end.message, place)
             special.append(place)
-        ends.append(end)
+            ends.append(CurveEnd(end.reason, end.message, place))
+        else:
+            ends.append(end)
     special.sort(key=lambda s: s.position)
     return Curve(held.box.names, held.orbit.vector, (part,), tuple(special), (ends[0], ends[1]))
 
@@ -166,10 +159,10 @@ def _special(kind: CodimTwo, orbit: Orbit, position: float) -> SpecialPoint:
     return SpecialPoint(kind, kind.name, orbit.params, orbit, position=position)
 
 
-def _resonances(held: OnCircle, points: list[Solved], arc: FloatArray) -> list[SpecialPoint]:
+def _resonances(held: OnCircle, points: list[Point], arc: FloatArray) -> list[SpecialPoint]:
     """Return the strong resonances 1:3 and 1:4 between the points, located."""
     found = []
-    angles = [angle_of(point.orbit) for point in points]
+    angles = [angle_of(held.orbit_of(point)) for point in points]
     for k, (a, b) in enumerate(itertools.pairwise(points)):
         for kind, angle in _RESONANCES.items():
             if not (angles[k] - angle) * (angles[k + 1] - angle) < 0.0:
@@ -182,18 +175,17 @@ def _resonances(held: OnCircle, points: list[Solved], arc: FloatArray) -> list[S
     return found
 
 
-def _located(held: OnCircle, a: Solved, b: Solved, angle: float) -> tuple[float, Orbit] | None:
+def _located(held: OnCircle, a: Point, b: Point, angle: float) -> tuple[float, Orbit] | None:
     """Return where between two points the pair has an angle; None where Newton fails."""
     from scipy.optimize import brentq
 
-    chord = b.x - a.x
-    normal = chord / np.linalg.norm(chord)
+    chord = replace(a, tangent=b.joints - a.joints, direction=b.w - a.w)
 
     def orbit_at(share: float) -> Orbit:
-        point = solve_held(held, a.x + share * chord, normal)
-        if point is None or inside(held, point) < 0.0:
+        point = held.between(a, b, share, chord)
+        if point is None or min(held.inside(point)) < 0.0:
             raise ArithmeticError
-        return point.orbit
+        return held.orbit_of(point)
 
     try:  # to the last digits of a step
         share = brentq(lambda s: angle_of(orbit_at(s)) - angle, 0.0, 1.0, xtol=1e-15, rtol=1e-14)

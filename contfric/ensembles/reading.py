@@ -100,8 +100,10 @@ def crossings_of(branch: Branch, quantity: Quantity, values: FloatArray) -> Cros
     counts = last - first
     k = np.repeat(np.arange(len(counts)), counts)
     index = first[k] + np.arange(len(k)) - np.repeat(np.cumsum(counts) - counts, counts)
-    share = _shares(_Cubics(arc, at, k), values[index])
-    return Crossings(index, stable[k], _Cubics(arc, row, k).at(share)[0])
+    both = np.array([at, row])
+    slopes = np.gradient(both, arc, axis=1, edge_order=2 if len(arc) > 2 else 1)
+    along, across = (_Cubics(arc, y, slope, k) for y, slope in zip(both, slopes, strict=True))
+    return Crossings(index, stable[k], across.at(_shares(along, values[index]))[0])
 
 
 def _nodes(
@@ -132,8 +134,7 @@ def _nodes(
 class _Cubics:
     """Cubics of a quantity of the nodes of a branch, in the share of the arclength from node k to k + 1."""
 
-    def __init__(self, arc: FloatArray, y: FloatArray, k: IntArray) -> None:
-        slopes = np.gradient(y, arc, edge_order=2 if len(arc) > 2 else 1)
+    def __init__(self, arc: FloatArray, y: FloatArray, slopes: FloatArray, k: IntArray) -> None:
         length, rise = arc[k + 1] - arc[k], y[k + 1] - y[k]
         a, b = length * slopes[k], length * slopes[k + 1]
         self.rise = rise

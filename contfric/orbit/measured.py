@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 from contfric.base.shown import Shown
 
 if TYPE_CHECKING:
+    from contfric.models.definition import FloatArray
     from contfric.orbit.gradient import Gradient
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.slides import Outline
@@ -23,6 +24,26 @@ class MeasuredOrbit(Shown):
         from contfric.orbit.slides import outline_of
 
         return outline_of(cast("Orbit", self))
+
+    def extreme(
+        self, observable: int, inside: int, sign: float
+    ) -> tuple[float, FloatArray, FloatArray] | None:
+        """Return the extremum of an observable with its derivatives by the joints and by the parameters.
+
+        None where several values are the extremum.
+
+        Parameters
+        ----------
+        observable : int
+            Which; -1 for the first state where its extrema are at joints.
+        inside : int
+            Whether it may be extreme inside of segments.
+        sign : float
+            1 for the largest value, -1 for the least.
+        """
+        from contfric.orbit.peak import extreme_with_derivatives
+
+        return extreme_with_derivatives(cast("Orbit", self), observable, inside, sign)
 
     def quantity(self, name: QuantityLike) -> Any:
         """Return a quantity: by its name, as an expression, or as a function of an orbit.

@@ -125,7 +125,8 @@ class Trajectory(Shown):
         """The (mode, exit surface) pairs of the segments that ended."""
         modes = [m.name for m in self.model.modes]
         surfaces = [s.name for s in self.model.surfaces]
-        return tuple((modes[m], surfaces[k]) for m, k in zip(self.modes, self.exits, strict=True))
+        pairs = zip(self.modes.tolist(), self.exits.tolist(), strict=True)
+        return tuple((modes[m], surfaces[k]) for m, k in pairs)
 
     def sample(self, times: ArrayLike) -> FloatArray:
         """Return the states at times between begin and end, shape (k, n): exact, nothing is interpolated.

@@ -15,6 +15,7 @@ from contfric.models.definition import FloatArray
 from contfric.models.grammar import Scope
 from contfric.models.quantity_texts import Parsed, read
 from contfric.quantities.duals import Dual, Kinks, constant
+from contfric.quantities.extreme import peak_of
 from contfric.quantities.functionals import Measuring
 from contfric.quantities.inside import inside_of
 from contfric.quantities.motion import Directions, Motion
@@ -84,9 +85,27 @@ def differentiated(quantity: Quantity, orbit: Orbit, directions: Directions | No
         raise ParameterError(
             f"'{quantity.name}' has no derivatives: give a quantity by its name, or as an expression"
         )
+    found = None if directions is None else _extreme(quantity, orbit, directions)
+    return found or _measured(quantity.parsed, orbit, directions)
+
+
+def _extreme(quantity: Quantity, orbit: Orbit, directions: Directions) -> Measured | None:
+    """Return the extremum of an observable by compiled code; None if it is no such, or is reached twice."""
+    peak = peak_of(quantity)
+    found = None if peak is None else orbit.extreme(*peak)
+    if found is None:
+        return None
+    value, by_joints, by_parameters = found
+    slopes = by_joints.ravel() @ directions.joints.reshape(by_joints.size, -1)
+    slopes += by_parameters @ directions.vector
+    return Measured(value, slopes, slopes)
+
+
+def _measured(parsed: Parsed, orbit: Orbit, directions: Directions | None) -> Measured:
+    """Return an expression of an orbit, its functionals resolved."""
     measuring = Measuring(Motion(orbit, directions), inside_of(orbit.model))
     with np.errstate(all="ignore"):
-        found = _value(quantity.parsed, measuring)
+        found = _value(parsed, measuring)
     ahead, behind = found.slopes
     return Measured(float(found.values[0]), ahead, behind, tuple(dict.fromkeys(measuring.kinks)))
 

@@ -33,12 +33,14 @@ from contfric.chaos.cells import follow_cells
 from contfric.continuation.bracket import locate
 from contfric.continuation.march import march
 from contfric.curves.bracket import locate_on_curve
+from contfric.curves.held_march import march_held
 from contfric.curves.march import march_curve
 from contfric.orbit.trajectory import simulate
 from contfric.response.capture import capture
 from contfric.response.section import cut_solutions
 
-kernels = (sweep, follow_cells, locate, march, locate_on_curve, march_curve, simulate, capture, cut_solutions)
+kernels = (sweep, follow_cells, locate, march, locate_on_curve, march_curve, march_held, simulate, capture,
+           cut_solutions)
 for kernel in kernels:
     kernel.dispatcher  # compiled before anything is interrupted
 model, start, parameter, bounds, other, span = {
@@ -67,6 +69,14 @@ calls = {
     "explore": (lambda: cf.explore(orbit, parameter, bounds, max_periods=8), lambda d: not d.complete),
     "continue_bifurcation": (
         lambda: cf.continue_bifurcation(event, (parameter, other), box, max_step=1e-5), lambda c: cut(*c.ends)
+    ),
+    "continue_quantity": (
+        lambda: cf.continue_quantity(orbit, "x_max", orbit.x_max, (parameter, other), box, max_step=1e-5),
+        lambda c: cut(*c.ends),
+    ),
+    "continue_called": (
+        lambda: cf.continue_quantity(orbit, "rms(x)", orbit.quantity("rms(x)"), (parameter, other), box,
+                                     max_step=1e-4), lambda c: cut(*c.ends)
     ),
     "explore_plane": (
         lambda: cf.explore_plane(orbit, (parameter, other), box, max_sections=2), lambda p: not p.complete
@@ -104,6 +114,8 @@ KEPT = (
     "continue_orbit",
     "explore",
     "continue_bifurcation",
+    "continue_quantity",
+    "continue_called",
     "explore_plane",
     "census",
     "lyapunov_map",

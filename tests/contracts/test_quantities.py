@@ -359,6 +359,7 @@ def test_a_curve_of_a_quantity_is_a_table_and_a_figure(orbit: cf.Orbit) -> None:
         ({"ranges": {"Omega": (0.48, 0.52)}}, "the range of 'S' is missing"),
         ({"ranges": {"Omega": (0.6, 0.7), "S": (0.3, 0.34)}}, "outside of the ranges"),
         ({"orbit": 3}, "continuation starts from an Orbit, got int"),
+        ({"quantity": "S0", "value": 0.4}, "it may not depend on Omega and S, or be extreme there"),
     ],
 )
 def test_a_curve_that_cannot_be_says_why(orbit: cf.Orbit, change: Any, words: str) -> None:

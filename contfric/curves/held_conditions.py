@@ -1,0 +1,153 @@
+"""Conditions on quantities as border rows, compiled: q free parameters, q - 1 conditions.
+
+What is held or stationary is an extremum over the orbit (:mod:`contfric.curves.lagrangian`), or any other
+function, which is called by its address: it finds the point in arrays that it shares with the march, and
+leaves values and rows there.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from contfric.compiled import blocks, f8, helper, i8, matrix, vector
+from contfric.continuation.geometry import copy_to, copy_vector
+from contfric.curves.conditions import CurveWorkspace
+from contfric.curves.lagrangian import (
+    LagrangianWorkspace,
+    add_bend,
+    differentiated_extreme,
+    quantity_row,
+)
+from contfric.handle import HandleType
+from contfric.models.definition import FloatArray
+from contfric.orbit.equations import close_chain
+from contfric.orbit.newton import off_normal
+from contfric.orbit.peak import Extreme, ExtremeType, find_place
+from contfric.orbit.system import IntArray
+
+#: What the conditions are: an extremum that has a value, one that is stationary in all free parameters but
+#: the last, a function that is called.
+AT_VALUE, STATIONARY, CALLED = range(3)
+#: A function of Python that fills the arrays of its conditions; 0 if it cannot.
+FILL = {"fill": i8(i8)}
+FillType = HandleType("fill", FILL)
+
+
+class Conditions(NamedTuple):
+    """What vanishes along a curve, as the compiled engine takes it.
+
+    Attributes
+    ----------
+    kind : one of the three above
+    value : what the extremum is held at
+    extreme : the extremum
+    call : handle of the function
+    z, p : where the function is asked, shapes (N, m) and (parameters,)
+    values : what vanishes, shape (q - 1,)
+    on_joints, on_parameters : its derivatives, shapes (q - 1, N, m) and (q - 1, q)
+    """
+
+    kind: int
+    value: float
+    extreme: Extreme
+    call: Any
+    z: FloatArray
+    p: FloatArray
+    values: FloatArray
+    on_joints: FloatArray
+    on_parameters: FloatArray
+
+
+ConditionsType = types.NamedTuple(
+    [i8, f8, ExtremeType, FillType, matrix, vector, vector, blocks, matrix], Conditions
+)
+
+
+class AlongHeld(NamedTuple):
+    """What a step along such a curve needs besides its points.
+
+    Attributes
+    ----------
+    functions, layout, conditions : the model's flow, the chain, and what vanishes
+    p : parameters, those that are free overwritten
+    which, widths, scale : indices of the free parameters, their ranges, and weights in the scaled product
+    counts, workspace, own : what is counted, and what is allocated once
+    """
+
+    functions: Any
+    layout: Any
+    conditions: Conditions
+    p: FloatArray
+    which: IntArray
+    widths: FloatArray
+    scale: FloatArray
+    counts: IntArray
+    workspace: CurveWorkspace
+    own: LagrangianWorkspace
+
+
+@helper
+def call_conditions(z, p, conditions, workspace):  # type: ignore[no-untyped-def]
+    """Ask a function for the conditions; return the largest of them, NaN if it fails."""
+    copy_to(conditions.z, z)
+    copy_vector(conditions.p, p)
+    if conditions.call.fill(0) == 0:
+        return np.nan
+    worst = 0.0
+    for k in range(conditions.values.shape[0]):
+        copy_to(workspace.d[1 + k], conditions.on_joints[k])
+        copy_vector(workspace.e[1 + k], conditions.on_parameters[k])
+        worst = max(worst, abs(conditions.values[k]))
+    return worst
+
+
+@helper
+def fill_conditions(functions, layout, z, p, which, workspace, way):  # type: ignore[no-untyped-def]
+    """Write what vanishes to ``conditions.values``, and its rows to the border; the largest value."""
+    conditions, own, d, e = way.conditions, way.own, workspace.d, workspace.e
+    extreme, values = conditions.extreme, conditions.values
+    if conditions.kind == CALLED:
+        return call_conditions(z, p, conditions, workspace)
+    if conditions.kind == AT_VALUE:
+        if not find_place(functions, layout, extreme, z, p, own.extreme, workspace.stationary):
+            return np.nan
+        value = quantity_row(functions, layout, extreme, z, p, which, workspace, own, d[1], e[1])
+        values[0] = value - conditions.value
+        return abs(values[0])
+    value = differentiated_extreme(functions, layout, extreme, z, p, which, workspace, own)
+    if not math.isfinite(value):
+        return np.nan
+    worst = 0.0
+    for k in range(values.shape[0]):
+        values[k] = own.on_parameters[0, k] * way.widths[k]
+    for k in range(values.shape[0]):
+        if not add_bend(
+            functions, layout, extreme, k, z, p, which, workspace, own, d[1 + k], e[1 + k]
+        ):
+            return np.nan
+        for i in range(z.shape[0]):
+            for j in range(z.shape[1]):
+                d[1 + k, i, j] *= way.widths[k]
+        for j in range(which.shape[0]):
+            e[1 + k, j] *= way.widths[k]
+        close_chain(functions, layout, z, p, which, workspace.equations)
+        worst = max(worst, abs(values[k]))
+    return worst
+
+
+@helper
+def normal_and_held(functions, layout, z, p, which, workspace, way):  # type: ignore[no-untyped-def]
+    """Border a curve with the plane normal to its tangent, and with its conditions."""
+    worst, s, values = (
+        fill_conditions(functions, layout, z, p, which, workspace, way),
+        workspace.s,
+        way.conditions.values,
+    )
+    s[0, 0], s[0, 1] = -off_normal(workspace, z, p, which), 1.0
+    for k in range(values.shape[0]):
+        s[1 + k, 0], s[1 + k, 1] = -values[k], 0.0
+    return worst, -1

@@ -1,0 +1,54 @@
+"""Quantities that are the extremum of one observable over the orbit, which compiled code differentiates."""
+
+from __future__ import annotations
+
+import ast
+from typing import NamedTuple
+
+from contfric.models.definition import Model
+from contfric.models.quantity_texts import Functional, Parsed, read
+from contfric.quantities.registry import NAMED, Quantity
+
+
+class Peak(NamedTuple):
+    """The extremum of an observable.
+
+    Attributes
+    ----------
+    observable : which; -1 for the first state where its extrema are at joints
+    inside : whether it may be extreme inside of segments
+    sign : 1 for the largest value, -1 for the least
+    """
+
+    observable: int
+    inside: int
+    sign: float
+
+
+def peak_of(quantity: Quantity) -> Peak | None:
+    """Return a quantity as an extremum; None if it is anything else."""
+    model = quantity.model
+    functional = _only_functional(quantity.parsed, model)
+    if functional is None or functional.kind not in ("max", "min") or functional.contacts:
+        return None
+    name, sign = functional.text, 1.0 if functional.kind == "max" else -1.0
+    if name == model.states[0]:
+        if not model.displacement:
+            return Peak(-1, 0, sign) if model.stops_at_joints else None
+        name = model.displacement
+    c = model.observable_index.get(name)
+    return None if c is None else Peak(c, 1, sign)
+
+
+def _only_functional(parsed: Parsed | None, model: Model) -> Functional | None:
+    """Return the functional that an expression is, through names of quantities; None if it is more."""
+    if parsed is None or not isinstance(parsed.tree, ast.Name):
+        return None
+    name = parsed.tree.id
+    if name in parsed.functionals:
+        return parsed.functionals[name]
+    own = dict(model.quantities)
+    if name in own:
+        return _only_functional(read(own[name]), model)
+    text = NAMED[name].text if name in NAMED else ""
+    return _only_functional(read(text.replace("%s", model.states[0])), model) if text else None
