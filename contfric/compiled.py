@@ -42,6 +42,7 @@ from numba.core import config
 from contfric.base.resources import SHIPPED_KERNELS, user_cache
 from contfric.base.sources import kernels_digest, kernels_folder
 from contfric.compiling.announced import announced, time_of
+from contfric.compiling.calls import KernelCompiler
 from contfric.compiling.inlined import part_options
 from contfric.compiling.kept import KernelFiles, file_name, writable
 from contfric.compiling.targets import shipped_target, target
@@ -89,7 +90,7 @@ scale_signature = f8(i8, vector)
 second_signature = i8(i8, i8, f8, vector, f8, vector, indices, vector, matrix, vector)
 
 #: How an entry point is compiled.
-_OPTIONS = {"nogil": True, "error_model": "numpy"}
+_OPTIONS = {"nogil": True, "error_model": "numpy", "pipeline_class": KernelCompiler}
 
 
 class Kernel:
@@ -100,10 +101,13 @@ class Kernel:
     handed over must have exactly the types of the signature.
     """
 
-    def __init__(self, function: Callable[..., Any], signature: Any, label: str = "") -> None:
+    def __init__(
+        self, function: Callable[..., Any], signature: Any, label: str = "", counts: bool = True
+    ) -> None:
         self.__wrapped__ = function
         self.__doc__ = function.__doc__
         self.signature = signature
+        self._options = _OPTIONS if counts else {**_OPTIONS, "_nrt": False}
         #: Added to the name of its folder: one function may be compiled for several signatures.
         self.label = label
 
@@ -137,7 +141,7 @@ class Kernel:
                     "compiling %s, once, in another process: %s", self.name, time_of(self.name)
                 )
             aside.wait()  # another process is compiling it into the cache
-        found = numba.njit(**_OPTIONS)(function)
+        found = numba.njit(**self._options)(function)
         found._cache = self._files()
         before = config.OPT, config.LOOP_VECTORIZE
         config.OPT, config.LOOP_VECTORIZE = OPTIMISATION
@@ -217,9 +221,14 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 OPTIMISATION = type(config.OPT)(1), 0
 
 
-def kernel(signature: Any) -> Callable[[Callable[..., Any]], Kernel]:
-    """Compile a function for one explicit signature, with a cache on disk where possible."""
-    return lambda function: Kernel(function, signature)
+def kernel(signature: Any, counts: bool = True) -> Callable[[Callable[..., Any]], Kernel]:
+    """Compile a function for one explicit signature, with a cache on disk where possible.
+
+    Parameters
+    ----------
+    counts : whether it counts references: one that does not allocate itself can do without
+    """
+    return lambda function: Kernel(function, signature, counts=counts)
 
 
 #: A helper is never called from Python or C: its wrappers would take a quarter of the time to compile.

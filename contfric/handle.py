@@ -30,6 +30,7 @@ from numba.core.typing import Signature
 from numba.core.typing.templates import AttributeTemplate
 
 from contfric.compiled import Kernel, f8, i8
+from contfric.compiling.calls import Code, entry_type
 
 #: What a block may hold: a function (its signature), whole numbers, numbers, a number, or the address of
 #: another block of the same layout.
@@ -69,7 +70,7 @@ class HandleType(types.Type):  # type: ignore[misc]
             return types.int64 if isinstance(member, int) else types.Dispatcher(member)
         kind = self.layout.get(name)
         if isinstance(kind, Signature):
-            return types.ExternalFunctionPointer(kind, get_pointer=None)
+            return Code(kind)
         return self if kind is ITSELF else kind
 
 
@@ -189,10 +190,7 @@ class Bound:
     def _code(self) -> tuple[int, Any]:
         """The address of the machine code, and what keeps it alive."""
         context = cpu_target.target_context
-        inner, outer = (
-            context.get_value_type(types.ExternalFunctionPointer(s, get_pointer=None)).pointee
-            for s in (self._kernel.signature, self.signature)
-        )
+        inner, outer = (entry_type(s) for s in (self._kernel.signature, self.signature))
         name = f"contfric_bound_{id(self)}"
         library = context.codegen().create_library(name)
         module = library.create_ir_module(name)

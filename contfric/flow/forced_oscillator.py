@@ -84,7 +84,7 @@ def parameter_slope(index, s, p, t0, x0, v0, d, g, r, one, three):  # type: igno
     return 0.0, 0.0
 
 
-@kernel(flow_signature)
+@kernel(flow_signature, counts=False)
 def flow(mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
     """Advance a state by ``dt`` in one mode, with derivatives where ``jac`` has space for them."""
     if mode == STICK:
@@ -128,7 +128,7 @@ def flow(mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
         )
 
 
-@kernel(observe_signature)
+@kernel(observe_signature, counts=False)
 def observe(c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
     """Return the load u or the velocity v, with the gradient where there is space for it."""
     if grad.shape[0] > 0:
@@ -138,10 +138,7 @@ def observe(c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
             grad[2] = 1.0
         return y[1]
     if grad.shape[0] == 0:
-        f = math.cos(p[OMEGA] * t)
-        if p[H] != 0.0:
-            f += p[H] * math.cos(3 * p[OMEGA] * t)
-        return y[0] - f
+        return y[0] - excitation(p, t)[0]
     f, f1, _ = excitation(p, t)
     if grad.shape[0] > 0:
         grad[0] = -f1
@@ -154,7 +151,7 @@ def observe(c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
     return y[0] - f
 
 
-@kernel(level_signature)
+@kernel(level_signature, counts=False)
 def level(k, p, which, grad):  # type: ignore[no-untyped-def]
     """Return the level of a surface: S0, -S0 or 0."""
     sign = 1.0 if k == 0 else (-1.0 if k == 1 else 0.0)
@@ -164,7 +161,7 @@ def level(k, p, which, grad):  # type: ignore[no-untyped-def]
     return sign * p[S0]
 
 
-@kernel(period_signature)
+@kernel(period_signature, counts=False)
 def period(p, which, grad):  # type: ignore[no-untyped-def]
     """Return the period of the excitation, 2 pi / Omega."""
     value = 2.0 * math.pi / p[OMEGA]
@@ -174,7 +171,7 @@ def period(p, which, grad):  # type: ignore[no-untyped-def]
     return value
 
 
-@kernel(rate_signature)
+@kernel(rate_signature, counts=False)
 def rate(mode, c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
     """Return ``u' = v - f'(t)`` or ``v' = f(t) - s S - 2 zeta v - x``, with the gradient."""
     f, f1, f2 = excitation(p, t)
@@ -211,7 +208,7 @@ def is_motion(t0, y0, dt, p):  # type: ignore[no-untyped-def]
     return p[OMEGA] > 0.0 and math.isfinite(t0 + dt + y0[0] + y0[1] + p[S] + p[H] + p[ZETA])
 
 
-@kernel(hit_signature)
+@kernel(hit_signature, counts=False)
 def hit(mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-untyped-def]
     """Return the first time at which observable c takes a value, with the state there, or -1.
 
@@ -243,7 +240,7 @@ def hit(mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-untyped-
     return tau
 
 
-@kernel(stationary_signature)
+@kernel(stationary_signature, counts=False)
 def stationary(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
     """Write the interior stationary points of observable c and return their number."""
     if dt <= 0.0 or (mode == STICK and c == SPEED):

@@ -122,7 +122,7 @@ def stationary(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[n
     return motion.stationary(motion, mode, c, t0, y0, dt, p, times, values)
 
 
-@kernel(field_signature)
+@kernel(field_signature, counts=False)
 def still(mode, t, y, p, which, out, jac):  # type: ignore[no-untyped-def]
     """Return no motion: the field of a clock."""
     for i in range(out.shape[0]):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contfric.compiled import kernel, reset_signature
 
 
-@kernel(reset_signature)
+@kernel(reset_signature, counts=False)
 def no_reset(k, t, y, p, which, y1, jac):  # type: ignore[no-untyped-def]
     """Return the state unchanged, with the derivatives of that."""
     for i in range(y.shape[0]):

@@ -5,13 +5,13 @@ from __future__ import annotations
 from contfric.compiled import kernel, second_signature, stationary_signature
 
 
-@kernel(second_signature)
+@kernel(second_signature, counts=False)
 def no_second(mode, c, t0, y0, d, p, which, along, jac, workspace):  # type: ignore[no-untyped-def]
     """Say that there are no second derivatives: the engine takes differences of the first ones."""
     return 0
 
 
-@kernel(stationary_signature)
+@kernel(stationary_signature, counts=False)
 def no_stationary(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
     """Say that the search failed: motion is only followed, and who asks is mistaken."""
     return -1

@@ -3,9 +3,9 @@
 A generated module (:mod:`contfric.models.generate`) is scalar arithmetic: assignments, branches, loops over
 whole numbers. Numba takes a fifth of a second for each of its functions, most of it to find out types
 that are known here. This is a translation of that part of Python, and of no more, to LLVM's language, for
-numba's code generator and in its calling convention: numbers are doubles or 64-bit integers, arrays are
-contiguous, indices are not negative and not checked, and arithmetic is that of IEEE 754 (a division by
-zero is infinite, the root of -1 is no number).
+numba's code generator, called as :mod:`contfric.compiling.calls` has it: numbers are doubles or 64-bit
+integers, arrays are contiguous, indices are not negative and not checked, and arithmetic is that of IEEE 754
+(a division by zero is infinite, the root of -1 is no number).
 """
 
 from __future__ import annotations
@@ -14,20 +14,18 @@ import ast
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core.registry import cpu_target
 
-from contfric.compiled import indices, vector
+from contfric.compiling.calls import entry_type
 
 DOUBLE, WORD, FLAG, HALF = ir.DoubleType(), ir.IntType(64), ir.IntType(1), ir.IntType(32)
 #: Functions of ``math`` that LLVM knows; the others are those of the C library, by the same names.
 _INTRINSIC = frozenset({"sin", "cos", "exp", "log", "sqrt", "floor"})
-#: Where numba's structure of an array has the address of the data, and the shape.
-_DATA, _SHAPE = 4, 5
 _COMPARED = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 
 
@@ -55,14 +53,6 @@ class Function:
     symbol: str = ""
 
 
-def type_of(signature: Any) -> Any:
-    """Return LLVM's type of a function, in numba's calling convention for compiled callers."""
-    context = cpu_target.target_context
-    return context.get_value_type(
-        types.ExternalFunctionPointer(signature, get_pointer=None)
-    ).pointee
-
-
 def translated(
     module: ir.Module, source: str, functions: list[Function], tables: Mapping[str, Any]
 ) -> None:
@@ -86,11 +76,11 @@ def translated(
         value.global_constant, value.linkage = True, "internal"
         scope[key] = value
     for function in functions:
-        made = ir.Function(module, type_of(function.signature), function.symbol or function.name)
+        made = ir.Function(module, entry_type(function.signature), function.symbol or function.name)
         if not function.symbol:
             made.linkage = "internal"
         scope[function.name] = made
-        _Body(module, made, scope).write(trees[function.name])
+        _Body(module, made, scope).write(trees[function.name], function.signature)
 
 
 class _Body:
@@ -101,13 +91,15 @@ class _Body:
         self.builder = ir.IRBuilder(function.append_basic_block())
         self.names: dict[str, Any] = {}
 
-    def write(self, tree: ast.FunctionDef) -> None:
+    def write(self, tree: ast.FunctionDef, signature: Any) -> None:
         """Write the whole function."""
-        for argument, value in zip(tree.args.args, self.function.args, strict=True):
-            if isinstance(value.type, ir.LiteralStructType):
-                self.names[argument.arg] = value
+        given = iter(self.function.args)
+        for argument, kind in zip(tree.args.args, signature.args, strict=True):
+            if isinstance(kind, types.Array):
+                data, *shape = islice(given, 1 + kind.ndim)
+                self.names[argument.arg] = Array(data, shape)
             else:
-                self.store(argument.arg, value)
+                self.store(argument.arg, next(given))
         self.block(tree.body)
         if not self.builder.block.is_terminated:
             self.leave(None)
@@ -216,12 +208,12 @@ class _Body:
     def value_Name(self, node: ast.Name) -> Any:
         """Return what has a name."""
         found = self.names.get(node.id) or self.none(node.id)
-        return found if isinstance(found.type, ir.LiteralStructType) else self.builder.load(found)
+        return found if isinstance(found, Array) else self.builder.load(found)
 
-    def none(self, name: str) -> Any:
+    def none(self, name: str) -> Array:
         """Return an array without elements."""
-        kind = {"NO_INDICES": indices, "NO_NUMBERS": vector}[name]
-        return ir.Constant(cpu_target.target_context.get_value_type(kind), None)
+        kind = {"NO_INDICES": WORD, "NO_NUMBERS": DOUBLE}[name]
+        return Array(ir.Constant(kind.as_pointer(), None), [ir.Constant(WORD, 0)])
 
     def value_Attribute(self, node: ast.Attribute) -> Any:
         """Return a constant of ``math``."""
@@ -238,9 +230,9 @@ class _Body:
     def array(self, node: ast.expr) -> Array:
         """Return the array that has a name."""
         assert isinstance(node, ast.Name)
-        found, take = self.names[node.id], self.builder.extract_value
-        count = found.type.elements[_SHAPE].count
-        return Array(take(found, _DATA), [take(found, (_SHAPE, k)) for k in range(count)])
+        found = self.names[node.id]
+        assert isinstance(found, Array)
+        return found
 
     def place(self, node: ast.expr) -> Any:
         """Return the address of ``a[i]``, ``a[i, j]`` or ``a[i][j]``."""
@@ -335,7 +327,8 @@ class _Body:
         """Return the value of a function of ``math``, or of a helper."""
         arguments = [self.value(e) for e in node.args]
         if isinstance(node.func, ast.Name) and node.func.id in self.scope:
-            return self.builder.call(self.scope[node.func.id], arguments)
+            flat = [[a.data, *a.shape] if isinstance(a, Array) else [a] for a in arguments]
+            return self.builder.call(self.scope[node.func.id], [*chain.from_iterable(flat)])
         arguments = [self.number(e) for e in arguments]
         name = "fabs" if isinstance(node.func, ast.Name) else node.func.attr  # type: ignore[attr-defined]
         if name in _INTRINSIC or name == "fabs":

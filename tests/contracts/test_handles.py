@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba import types
 
 from contfric.base.sources import package_files
 from contfric.cli import main
 from contfric.cli.bytecode import stale_bytecode, write_bytecode
-from contfric.compiled import f8, helper, i8, kernel, vector
+from contfric.compiled import blocks, f8, helper, i8, indices, kernel, vector
 from contfric.flow.integrated import AffineModes, Functions
 from contfric.handle import ITSELF, TABLE, Block, Bound, HandleType, with_handle
 from contfric.models import build, load_model
@@ -45,6 +46,47 @@ def total(motion, x, out):
     for k in range(motion.count):
         out[k] = motion.table[k] + motion.other.factor
     return motion.twice * motion.shift(motion.factor * motion.scaled(x)) + motion.other.scaled(x)
+
+
+SHAPES = f8(i8, types.complex128[:, ::1], blocks, indices, types.boolean)
+SHAPED = HandleType("of the tests with arrays", {"shaped": SHAPES})
+
+
+@kernel(SHAPES)
+def shaped(k, grid, cube, which, flag):
+    found = 0.0
+    for i in range(grid.shape[0]):
+        for j in range(grid.shape[1]):
+            found += (i + 2 * j + k) * (grid[i, j].real - 3.0 * grid[i, j].imag)
+    part = cube[1]
+    for i in range(part.shape[0]):
+        for j in range(part.shape[1]):
+            found += part[i, j] * (i - j) if flag else part[i, j]
+    cube[0, :, :] = found
+    return found + which.sum() + cube.size
+
+
+@kernel(with_handle(SHAPES, SHAPED))
+def called(motion, k, grid, cube, which, flag):
+    return motion.shaped(k, grid[1:], cube, which[1:3], flag)
+
+
+@pytest.mark.parametrize("flag", [True, False])
+def test_arrays_of_all_kinds_reach_a_function_behind_an_address(flag):
+    """Their data and shapes are handed over; a contiguous part of an array is an array of its own."""
+    rng = np.random.default_rng(3)
+    grid = rng.normal(size=(4, 3)) + 1j * rng.normal(size=(4, 3))
+    cube, which = rng.normal(size=(2, 3, 5)), np.arange(5)
+    other = cube.copy()
+    behind = Block(SHAPED.layout, {"shaped": shaped})
+    expected = shaped(7, grid[1:].copy(), other, which[1:3].copy(), flag)
+    assert called(behind.address, 7, grid, cube, which, flag) == expected
+    assert np.array_equal(cube, other)
+    i, j = np.indices((3, 3))
+    own = np.sum((i + 2 * j + 7) * (grid[1:].real - 3.0 * grid[1:].imag))
+    i, j = np.indices((3, 5))
+    own += np.sum(cube[1] * (i - j if flag else 1.0))
+    assert expected == pytest.approx(own + 3 + 30, abs=1e-12)
 
 
 def block(function, factor, table, other=None):
