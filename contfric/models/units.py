@@ -196,10 +196,11 @@ def _observables_in_units(data: dict[str, Any], sizes: Mapping[str, float]) -> d
     put = Substitution({name: f"({size!r}*{name})" for name, size in sizes.items()})
 
     def within(value: Any, key: str = "") -> Any:
+        if key in ("to", "from", "in", "mode", "label"):
+            return value
         if isinstance(value, Mapping):
             return {k: within(v, k) for k, v in value.items()}
-        named = key in ("to", "from", "in", "mode", "label")
-        return put.text(value) if isinstance(value, str) and not named else value
+        return put.text(value) if isinstance(value, str) else value
 
     found = dict(data)
     for key in ("define", "field", "resets", "quantities"):

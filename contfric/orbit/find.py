@@ -19,6 +19,7 @@ from contfric.orbit.sections import is_smooth, loops, without_sections
 from contfric.orbit.simulation import SimulationEnd, Trajectory, go_on, simulate
 from contfric.orbit.solve import settle
 from contfric.orbit.system import build_system
+from contfric.orbit.time_scale import time_scale
 from contfric.remember.journal import remembered
 from contfric.signature.cyclic import primitive_length
 
@@ -35,6 +36,8 @@ _SLOW, _SERIES = 0.9, 0.2
 _CREEPING = 1e-5
 #: Periods to follow before the first look, and how much longer before each next one.
 _FIRST, _LONGER = 200, 4
+#: Events without excitation after which is looked, too: the unit of time need not be that of the motion.
+_FIRST_EVENTS = 5_000
 #: Turns smaller than this (relative to 1 + the states) are none: the motion has come to rest.
 _NO_SIZE = 1e-6
 #: An orbit that a motion converges to attracts; beyond rounding its multipliers cannot exceed 1.
@@ -104,9 +107,12 @@ def _settled(
         if progress is not None:
             progress(f"simulating: {done} periods without an orbit, then {text}")
 
+    first = _FIRST_EVENTS if model.autonomous else 10_000_000
+    unit = time_scale(model)
     trajectory = simulate(
-        model, params, state=state, time=time, periods=span, events=10_000_000, progress=heard
+        model, params, state=state, time=time, periods=span * unit, events=first, progress=heard
     )
+    unit = _unit_of(trajectory, unit, span)
     if trajectory.end is SimulationEnd.CHATTER and not model.chatters:
         from contfric.models.chatter import with_chatter  # which takes sympy
 
@@ -128,7 +134,17 @@ def _settled(
             raise why_none(trajectory, done, slow, compared=longest is None)
         span = min(span * _LONGER, most - done)
         heard(f"{span} more")
-        trajectory = go_on(trajectory, span, heard)
+        trajectory = go_on(trajectory, span * unit, heard)
+
+
+def _unit_of(trajectory: Trajectory, unit: float, span: int) -> float:
+    """Return what a period is: the unit of time is too long for an autonomous model of very many events.
+
+    A converter in seconds switches a million times in 200 of them.
+    """
+    if trajectory.end is not SimulationEnd.EVENTS or not trajectory.model.autonomous:
+        return unit
+    return float(trajectory.last[1] - trajectory.begin[0]) / span
 
 
 def _is_point(orbit: Orbit) -> bool:

@@ -14,8 +14,9 @@ from contfric.orbit.tables import bits_of
 #: Displacements that a start is looked for at, in half-widths of the model: where the first is in no
 #: domain (behind a wall, or on a surface that motion does not leave), the next.
 _PLACES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
-#: States that are drawn where none of these is: enough to hit a region of a hundredth of the spread.
-_DRAWS = 1000
+#: States that are drawn where none of these is: enough to hit a region of a hundredth of the spread, which
+#: nobody may have written, and then further out.
+_DRAWS, _WIDER = 1000, (1.0, 3.0, 10.0, 100.0)
 
 
 def signs_at(
@@ -106,14 +107,16 @@ def displaced(model: Model, vector: FloatArray) -> FloatArray:
         if _is_start(model, y, vector):
             return y
     rng = np.random.default_rng(1)  # always the same start
-    for _ in range(_DRAWS):
-        y = rng.uniform(-1.0, 1.0, half_width.shape) * half_width
-        if _is_start(model, y, vector):
-            return y
+    for wider in _WIDER:
+        for _ in range(_DRAWS // len(_WIDER)):
+            y = rng.uniform(-wider, wider, half_width.shape) * half_width
+            if _is_start(model, y, vector):
+                return y
     within = ", ".join(f"|{s}| <= {w:g}" for s, w in zip(model.states, half_width, strict=True))
     raise ParameterError(
-        f"no start was found: of {_DRAWS} states of '{model.name}' at t = 0 with {within}, its 'spread', "
-        "none is in a domain. Give one (state=...), or correct 'spread' or the sides of the modes"
+        f"no start was found: of {_DRAWS} states of '{model.name}' at t = 0 with {within}, its 'spread', and "
+        f"up to {_WIDER[-1]:g} times as far, none is in a domain. "
+        "Give one (state=...), or correct 'spread' or the sides of the modes"
     )
 
 
