@@ -78,7 +78,7 @@ def _cut(data: Mapping[str, Any], angle: str) -> tuple[str, str]:
 
 def _is_met_at(data: Mapping[str, Any], angle: str, cut: str) -> bool:
     """Tell whether some surface is met wherever an angle has a value, whatever the other states are."""
-    values = {
+    values: dict[str, Any] = {
         name: value.get("default") if isinstance(value, Mapping) else value
         for name, value in mapping_in(data, "parameters").items()
     }

@@ -15,6 +15,7 @@ from contfric.models.clocks import with_clock
 from contfric.models.contact_modes import with_contacts
 from contfric.models.description import Description
 from contfric.models.entries import EntryError, Part, as_identifier, listed, mapping_in
+from contfric.models.grammar import RESERVED
 from contfric.models.tied import with_ties_put_in
 from contfric.models.units import in_units
 
@@ -100,6 +101,7 @@ def _with_observables(data: dict[str, Any]) -> dict[str, Any]:
     surfaces, observables = data.get("surfaces") or {}, dict(data.get("observables") or {})
     parts = {str(name) for name in data.get("define") or {}}
     taken = {*map(str, data.get("states") or ()), *map(str, data.get("parameters") or ()), *parts}
+    taken |= {*RESERVED}  # a surface may be called sign
     named: dict[Any, Any] = {}
     for name, entry in surfaces.items():
         named[name] = entry

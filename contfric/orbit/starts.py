@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.errors import ParameterError, did_you_mean, shown
+from contfric.models.clocks import TICK, is_clock
 from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.models.parts import Chatter
 from contfric.orbit.structure import cut_bounds
@@ -100,16 +101,17 @@ def displaced(model: Model, vector: FloatArray) -> FloatArray:
         If no state that was tried is in a domain.
     """
     half_width: FloatArray = model.spread(model.mapping(vector))
-    rest = np.zeros(len(model.states))
+    rest = _at_a_tick(model, vector)
     for place in _PLACES:
         y = rest.copy()
         y[0] = place * half_width[0]
         if _is_start(model, y, vector):
             return y
     rng = np.random.default_rng(1)  # always the same start
+    clocks = rest != 0.0
     for wider in _WIDER:
         for _ in range(_DRAWS // len(_WIDER)):
-            y = rng.uniform(-wider, wider, half_width.shape) * half_width
+            y = np.where(clocks, rest, rng.uniform(-wider, wider, half_width.shape) * half_width)
             if _is_start(model, y, vector):
                 return y
     within = ", ".join(f"|{s}| <= {w:g}" for s, w in zip(model.states, half_width, strict=True))
@@ -118,6 +120,15 @@ def displaced(model: Model, vector: FloatArray) -> FloatArray:
         f"up to {_WIDER[-1]:g} times as far, none is in a domain. "
         "Give one (state=...), or correct 'spread' or the sides of the modes"
     )
+
+
+def _at_a_tick(model: Model, vector: FloatArray) -> FloatArray:
+    """Return the state at rest; clocks that are ahead of the first are so by what its tick says."""
+    rest = np.zeros(len(model.states))
+    clocks = [is_clock(state) for state in model.states]
+    if sum(clocks) < 2:
+        return rest
+    return np.where(clocks, model.view(vector).reset(TICK, 0.0, rest), rest)
 
 
 def _is_start(model: Model, y: FloatArray, vector: FloatArray) -> bool:

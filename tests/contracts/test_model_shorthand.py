@@ -58,7 +58,7 @@ RAMP = "low + (high - low)*{}/Ts"
             "define",
             "the period of the model, 'Ts'",
         ),
-        ("buck", "define/ramp", RAMP.format("mod(t - Ts, Ts)"), "define", "only the time itself"),
+        ("buck", "define/ramp", RAMP.format("mod(t - Ts, Ts)"), "define", "less than a period"),
         (
             "buck",
             "define/ramp",
@@ -73,7 +73,6 @@ RAMP = "low + (high - low)*{}/Ts"
         ("buck", "symmetry", "v -> -v, t -> t + T/2", "symmetry", "the clock"),
         ("buck", "resets/tick/to", "of", "resets", "did you mean 'off'"),
         ("buck", "surfaces/switch/sliding", "filipov", "surfaces", "did you mean 'filippov'"),
-        ("buck", "surfaces/switch/sliding", "filippov", "surfaces", "nothing slides there"),
         ("relay", "surfaces/high/sliding", "filippov", "surfaces", "a mode on each side"),
         ("pendulum", "angles", ["phi"], "angles", "'phi' is no state"),
         ("pendulum", "surfaces/theta+", {"observable": "theta"}, "surfaces", "begins again"),
