@@ -252,7 +252,7 @@ modes:
     path = tmp_path / "capsubot.yaml"
     path.write_text(text, encoding="utf-8")
     orbit = cf.find_orbit(path, {})
-    assert orbit.admissible and any(mode.startswith("slide_ground") for mode, _ in orbit.word)
+    assert orbit.admissible and any(mode.startswith("slide_") for mode, _ in orbit.word)
 
 
 def test_a_part_of_define_may_be_an_observable_and_its_surface_have_any_name(
