@@ -260,9 +260,9 @@ class Bifurcation(MeasuredEvent):
         model, word = self.orbit.model, self.orbit.system.word
         if model.wraps & {s for t in self.tests for s in (t.surface, word[t.segment][1])}:
             return "a joint where an angle begins a new turn"
-        for reset in (chosen_at(self.orbit.system, test) for test in self.tests):
-            if reset:
-                return f"another mode is chosen at the reset '{reset}'"
+        chosen = filter(None, (chosen_at(self.orbit.system, test) for test in self.tests))
+        if reset := next(chosen, ""):
+            return f"another mode is chosen at the reset '{reset}'"
         return meaning_of(self.kind, model, {test.surface for test in self.tests})
 
     def certify(self, parameter: str = "") -> EventCertificate:
@@ -334,8 +334,7 @@ class End:
 
 def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
     """Classify the vanishing of a margin; see the table of the module."""
-    model = system.model
-    mode = system.word[test.segment][0]
+    model, mode = system.model, system.word[test.segment][0]
     hold = hold_of_test(test, orbit)
     if hold is not None:
         return kind_of_hold(hold, test)
