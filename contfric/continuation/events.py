@@ -11,6 +11,7 @@ interior   other segment, surface that switches    GS: the slide touches rest in
 interior   surface with the same field behind      T
 any        surface with a reset                    GS: a grazing impact
 exit       as the interior of the same segment     AS, GS or T: the exit becomes tangential
+joint      a reset chooses its mode by that side   SS: the map jumps (entry: the same)
 joint      the state at a stop meets a surface     CS if it leaves the stick there (distance to
                                                    the limit grows outward), SS if it enters it;
                                                    CS where there is no rest that the surface ends, and GS
@@ -39,6 +40,7 @@ from contfric.base.extras import need_flint
 from contfric.continuation.measured_event import MeasuredEvent
 from contfric.continuation.touching import (
     begins_to_slide,
+    chosen_at,
     is_corner,
     rate_along,
     resting_domain,
@@ -280,6 +282,9 @@ class Bifurcation(MeasuredEvent):
         model, word = self.orbit.model, self.orbit.system.word
         if model.wraps & {s for t in self.tests for s in (t.surface, word[t.segment][1])}:
             return "a joint where an angle begins a new turn"
+        chosen = filter(None, (chosen_at(self.orbit.system, test) for test in self.tests))
+        if reset := next(chosen, ""):
+            return f"another mode is chosen at the reset '{reset}'"
         return meaning_of(self.kind, model, {test.surface for test in self.tests})
 
     def certify(self, parameter: str = "") -> EventCertificate:
@@ -351,11 +356,12 @@ class End:
 
 def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
     """Classify the vanishing of a margin; see the table of the module."""
-    model = system.model
-    mode = system.word[test.segment][0]
+    model, mode = system.model, system.word[test.segment][0]
     hold = hold_of_test(test, orbit)
     if hold is not None:
         return kind_of_hold(hold, test)
+    if chosen_at(system, test):
+        return Kind.SS
     if test.margin is Margin.ENTRY:
         return Kind.CS
     if test.surface in model.reset_by_surface:

@@ -137,3 +137,12 @@ def rate_along(orbit: Orbit, mode: str, surface: str, joint: np.ndarray) -> floa
     time, n = float(joint[0]), len(joint) - 1
     grad = orbit.flow.gradient(observable, time, joint[1:])
     return float(grad[0] + grad[1:] @ orbit.flow.jacobian(mode, time, joint[1:], 0.0)[:, 1 + n])
+
+
+def chosen_at(system: System, test: Test) -> str:
+    """Return the surface of the reset that chooses the mode behind it by the side of a test; else nothing."""
+    joint = test.segment if test.margin is Margin.JOINT else test.segment - 1
+    exit_ = system.word[joint % len(system.word)][1]
+    reset = system.model.reset_by_surface.get(exit_)
+    chooses = reset is not None and test.surface in reset.chooses_by
+    return exit_ if chooses and test.margin in (Margin.JOINT, Margin.ENTRY) else ""

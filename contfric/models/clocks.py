@@ -5,12 +5,16 @@ The time since the last tick is made a state, ``clock``, of rate 1; at the surfa
 the period, it begins again at 0. Everything else that depends on t has the same period, so the clock
 stands in the place of t, and the model has no other time: it is autonomous. A joint at a tick, or at
 ``mod(t, T) = 0.3 T``, is then as ordinary as any other.
+
+A clock that is ahead by a, ``mod(t + a, T)`` with 0 < a < T (two converters half a period apart), is a state
+of its own, with a tick of its own. The tick of the first sets it to a: the time between them is no freedom.
+Another period than that of the model is refused: where two clocks tick at once, which is first is not known.
 """
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from contfric.base.yaml_lines import Address
@@ -27,6 +31,11 @@ _MOVED = (0.0, 0.137)
 
 #: Parts of a model that hold expressions, how many keys down.
 _PARTS = {"define": 1, "observables": 1, "field": 1, "resets": 2}
+
+
+def is_clock(state: str) -> bool:
+    """Tell whether a state is a time since a tick: ``clock``, ``clock2``."""
+    return state.startswith(CLOCK) and (state == CLOCK or state[len(CLOCK) :].isdigit())
 
 
 def with_clock(data: dict[str, Any]) -> dict[str, Any]:
@@ -50,25 +59,35 @@ def with_clock(data: dict[str, Any]) -> dict[str, Any]:
         for key, value in data.items()
         if (depth := _PARTS.get(key, 0)) >= 0
     }
+    own_fields = {
+        name: _own_field(mode, name, reader) for name, mode in mapping_in(data, "modes").items()
+    }
+    ahead = reader.ahead
+    rates = {CLOCK: 1, **dict.fromkeys(ahead.values(), 1)}
+    ticks = {TICK: CLOCK, **{clock.replace(CLOCK, TICK): clock for clock in ahead.values()}}
     found["modes"] = {
-        name: _mode(mode, name, reader) for name, mode in mapping_in(data, "modes").items()
+        name: _mode(mode, own_fields[name], rates, ticks)
+        for name, mode in mapping_in(data, "modes").items()
     }
     if "field" in data:
-        found["field"] = {**found["field"], CLOCK: 1}
+        found["field"] = {**found["field"], **rates}
     del found["period"]
+    begins = {CLOCK: 0, **{clock: text for text, clock in ahead.items()}}
+    resets = mapping_in(found, "resets")
     return found | {
         "autonomous": True,
-        "states": [*data.get("states", ()), CLOCK],
+        "states": [*data.get("states", ()), *rates],
         "surfaces": {
             **mapping_in(data, "surfaces"),
-            TICK: {"observable": CLOCK, "level": str(period)},
+            **{tick: {"observable": clock, "level": str(period)} for tick, clock in ticks.items()},
         },
         "resets": {
-            **found.get("resets", {}),
-            TICK: {CLOCK: 0, **mapping_in(found, "resets").get(TICK, {})},
+            **resets,
+            **{tick: {clock: 0, **resets.get(tick, {})} for tick, clock in ticks.items()},
+            TICK: {**begins, **resets.get(TICK, {})},
         },
         "symmetry": _symmetry(data),
-        "spread": {**mapping_in(data, "spread"), CLOCK: f"({period})/2"},
+        "spread": {**mapping_in(data, "spread"), **dict.fromkeys(rates, f"({period})/2")},
     }
 
 
@@ -112,7 +131,7 @@ def _is_mod(node: ast.AST) -> bool:
 def _check_names(data: Mapping[str, Any]) -> None:
     taken = {*map(str, data.get("states", ())), *mapping_in(data, "parameters")}
     taken |= {*mapping_in(data, "define"), *mapping_in(data, "observables")}
-    if CLOCK in taken or TICK in mapping_in(data, "surfaces"):
+    if any(map(is_clock, taken)) or TICK in mapping_in(data, "surfaces"):
         raise EntryError(
             (),
             f"a model with {MOD}(t, T) gets a state '{CLOCK}' and a surface '{TICK}': "
@@ -130,6 +149,7 @@ class _Reader(ast.NodeTransformer):
             str(name): value.get("default") if isinstance(value, Mapping) else value
             for name, value in mapping_in(data, "parameters").items()
         }
+        self.ahead: dict[str, str] = {}  # how far other clocks are ahead, and their names
         self.define = {
             name: tree.body
             for name, text in mapping_in(data, "define").items()
@@ -161,36 +181,71 @@ class _Reader(ast.NodeTransformer):
 
     def _clock(self, time: ast.expr, period: ast.expr) -> ast.AST:
         what = f"{MOD}({ast.unparse(time)}, {ast.unparse(period)})"
-        if not (isinstance(time, ast.Name) and time.id == TIME):
+        shift = _shift_of(time)
+        if shift is not None and self._is_period(period):
+            return ast.Name(self._clock_ahead(shift, what), ast.Load())
+        if shift is None and not (isinstance(time, ast.Name) and time.id == TIME):
             raise EntryError(
                 self.address,
-                f"{what}: only the time itself begins again: {MOD}(t, T). For a switch at another time give "
-                f"a surface to an observable '{MOD}(t, T)', at the level of that time; a state that jumps "
-                "has a reset",
+                f"{what}: only the time begins again: {MOD}(t, T) or {MOD}(t + a, T). For a switch at "
+                f"another time give a surface to an observable '{MOD}(t, T)', at the level of that time; a "
+                "state that jumps has a reset",
             )
         if not self._is_period(period):
             raise EntryError(
                 self.address,
-                f"{what}: what begins again does so with the period of the model, '{self.period}'",
+                f"{what}: what begins again does so with the period of the model, '{self.period}'. A clock "
+                "of another period would tick together with that one, and which is first is not known",
             )
         return ast.Name(CLOCK, ast.Load())
+
+    def _clock_ahead(self, shift: ast.expr, what: str) -> str:
+        """Return the name of the clock that is ahead by a share of the period, which may be a new one."""
+        own = ast.unparse(self.visit(shift))
+        sizes = [self._values((ast.parse(t, mode="eval").body), 0) for t in (own, self.period)]
+        if sizes[0] < 0.0:
+            own, sizes[0] = f"{self.period} + {own}", sizes[1] + sizes[0]
+        if not 0.0 < sizes[0] < sizes[1]:
+            raise EntryError(
+                self.address,
+                f"{what}: another clock is ahead or behind by less than a period, and by more than nothing, "
+                "at the defaults",
+            )
+        return self.ahead.setdefault(own, f"{CLOCK}{len(self.ahead) + 2}")
+
+    def _values(self, node: ast.expr, k: int) -> float:
+        """Return the value of an expression of the parameters, moved a little."""
+        moved = {
+            name: float(v) * (1.0 + _MOVED[k] * (1 + i * k)) if isinstance(v, (int, float)) else 0.0
+            for i, (name, v) in enumerate(self.parameters.items())
+        }
+        try:
+            return Scope(FLOATS, moved, self.define).evaluate(node)
+        except ModelError as error:
+            raise EntryError(self.address, str(error)) from None
 
     def _is_period(self, node: ast.expr) -> bool:
         if isinstance(node, ast.Name) and node.id == PERIOD:
             return True
         own = ast.parse(self.period, mode="eval").body
-        for k, share in enumerate(_MOVED):
-            moved = {
-                name: float(v) * (1.0 + share * (1 + i * k)) if isinstance(v, (int, float)) else 0.0
-                for i, (name, v) in enumerate(self.parameters.items())
-            }
-            try:
-                a, b = (Scope(FLOATS, dict(moved), self.define).evaluate(e) for e in (node, own))
-            except ModelError as error:
-                raise EntryError(self.address, str(error)) from None
-            if not abs(a - b) <= _SAME * abs(b):
-                return False
-        return True
+        pairs = ([self._values(e, k) for e in (node, own)] for k in range(len(_MOVED)))
+        return all(abs(a - b) <= _SAME * abs(b) for a, b in pairs)
+
+
+def _shift_of(time: ast.expr) -> ast.expr | None:
+    """Return a of ``t + a``, ``a + t`` and ``t - a`` (then -a); None of others."""
+    if not isinstance(time, ast.BinOp) or not isinstance(time.op, (ast.Add, ast.Sub)):
+        return None
+    sides = [time.left, time.right]
+    if isinstance(time.op, ast.Add) and _is_time(sides[1]):
+        sides.reverse()
+    if not _is_time(sides[0]) or any(_is_time(n) for n in ast.walk(sides[1])):
+        return None
+    return sides[1] if isinstance(time.op, ast.Add) else ast.UnaryOp(ast.USub(), sides[1])
+
+
+def _is_time(node: ast.AST) -> bool:
+    return isinstance(node, ast.Name) and node.id == TIME
 
 
 def _rewritten(value: Any, address: Address, depth: int, reader: _Reader) -> Any:
@@ -201,19 +256,23 @@ def _rewritten(value: Any, address: Address, depth: int, reader: _Reader) -> Any
     return reader.read(value, address) if at_end and isinstance(value, str) and not named else value
 
 
-def _mode(mode: Any, name: str, reader: _Reader) -> Any:
+def _own_field(mode: Any, name: str, reader: _Reader) -> Any:
+    """Return the field of a mode with the clocks in it; None if it has none of its own."""
+    if not isinstance(mode, Mapping) or not isinstance(mode.get("field"), Mapping):
+        return None
+    return {
+        state: reader.read(text, ("modes", name, "field", str(state)))
+        if isinstance(text, str)
+        else text
+        for state, text in mode["field"].items()
+    }
+
+
+def _mode(mode: Any, field: Any, rates: Mapping[str, int], ticks: Iterable[str]) -> Any:
     if not isinstance(mode, Mapping):
         return mode
-    found = {**mode, "in": {**mapping_in(mode, "in"), TICK: "-"}}
-    if isinstance(mode.get("field"), Mapping):
-        own = {
-            state: reader.read(text, ("modes", name, "field", str(state)))
-            if isinstance(text, str)
-            else text
-            for state, text in mode["field"].items()
-        }
-        found["field"] = {**own, CLOCK: 1}
-    return found
+    found = {**mode, "in": {**mapping_in(mode, "in"), **dict.fromkeys(ticks, "-")}}
+    return found if field is None else {**found, "field": {**field, **rates}}
 
 
 def _symmetry(data: Mapping[str, Any]) -> Any:

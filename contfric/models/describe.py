@@ -19,6 +19,7 @@ from contfric.models.measuring import measured
 from contfric.models.names import Names
 from contfric.models.parts import Chatter
 from contfric.models.quantity_entries import check_quantities, read_quantities
+from contfric.models.reset_modes import FROM, TO, acts_of, leads_of
 from contfric.models.shorthand import expanded
 from contfric.models.units import APPLIED, KEY, read_units
 
@@ -39,8 +40,6 @@ KEYS = (
 _PARAMETER = ("default", "meaning")
 _SURFACE = ("observable", "level", "switching")
 _MODE = ("in", "field", "sliding", "rank")
-#: In a reset: the mode behind it, and those in which it acts.
-_TO, _FROM = "to", "from"
 _DOMAIN = ("mode", "in", "label")
 _METHODS = ("explicit", "implicit", "automatic")
 #: Tolerances between rounding and what Newton's method on a chain of segments still takes for smooth.
@@ -297,20 +296,14 @@ def _resets(
     maps, leads, acts = {}, {}, {}
     for name in part.data:
         entry = part.part(name, "{state: new value, to: mode, from: modes}")
-        entry.only((*states, _TO, _FROM))
-        if _FROM in entry.data:
-            given = entry.data[_FROM]
-            named = Part(
-                {str(i): v for i, v in enumerate(given if isinstance(given, list) else [given])}
-            )
-            known = [m.name for m in modes]
-            acts[name] = tuple(
-                Part(named.data, entry.address).one_of(key, known, "mode") for key in named.data
-            )
-        if _TO in entry.data:
-            leads[name] = entry.one_of(_TO, [m.name for m in modes], "mode")
+        entry.only((*states, TO, FROM))
+        known = [m.name for m in modes]
+        if FROM in entry.data:
+            acts[name] = acts_of(entry, known)
+        if TO in entry.data:
+            leads[name] = leads_of(entry, known, [s.name for s in surfaces])
         maps[name] = _expressions(
-            Part({k: v for k, v in entry.data.items() if k not in (_TO, _FROM)}, entry.address)
+            Part({k: v for k, v in entry.data.items() if k not in (TO, FROM)}, entry.address)
         )
     return {"resets": maps, "leads": leads, "acts": acts}
 

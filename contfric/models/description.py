@@ -17,7 +17,7 @@ from contfric.models.contact_laws import KEY as LAWS
 from contfric.models.contact_laws import ContactLaws, written
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.names import Names
-from contfric.models.parts import Chatter
+from contfric.models.parts import Chatter, Lead
 
 #: The key of the structure that modes are made from.
 STRUCTURE = "structure"
@@ -54,7 +54,7 @@ class Description:
     define : (name, expression) of each named part
     modes, domains, departures : as declared; what can be derived is derived from them
     resets : surface -> state -> expression
-    leads : surface -> mode behind the reset, where it is said
+    leads : surface -> modes behind the reset, the first that holds, where they are said
     acts : surface -> modes in which the reset acts, where they are said
     chatters : modes that begin with infinitely many impacts
     symmetry : name (a state or t) -> expression of its image; None if there is none
@@ -85,7 +85,7 @@ class Description:
     domains: tuple[DomainText, ...] = ()
     departures: tuple[Departure, ...] = ()
     resets: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    leads: Mapping[str, str] = field(default_factory=dict)
+    leads: Mapping[str, tuple[Lead, ...]] = field(default_factory=dict)
     acts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     chatters: tuple[Chatter, ...] = ()
     symmetry: Mapping[str, str] | None = None
@@ -130,7 +130,11 @@ class Description:
             "resets": {
                 name: {
                     **texts,
-                    **({"to": self.leads[name]} if name in self.leads else {}),
+                    **(
+                        {"to": {lead.mode: dict(lead.where) for lead in self.leads[name]}}
+                        if name in self.leads
+                        else {}
+                    ),
                     **({"from": list(self.acts[name])} if name in self.acts else {}),
                 }
                 for name, texts in self.resets.items()

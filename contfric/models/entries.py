@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn
@@ -28,6 +29,22 @@ def mapping_in(data: Mapping[str, Any], key: str) -> dict[str, Any]:
     """Return a part of a model's data that is a mapping, as a copy; an empty one if it is not there."""
     value = data.get(key)
     return {str(k): v for k, v in value.items()} if isinstance(value, Mapping) else {}
+
+
+def as_identifier(name: str) -> str:
+    """Return a name that an observable may have: modes and surfaces may be named F+, observables not.
+
+    Examples
+    --------
+    >>> as_identifier("F+"), as_identifier("free-:a")
+    ('Fp', 'freen_a')
+    """
+    return re.sub(r"\W", "_", name.replace("+", "p").replace("-", "n"))
+
+
+def listed(value: object) -> list[Any]:
+    """Return the entries of a list, the keys of a mapping, or what stands alone as a list of one."""
+    return list(value) if isinstance(value, (list, tuple, Mapping)) else [value]
 
 
 @dataclass(frozen=True)

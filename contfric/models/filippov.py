@@ -6,6 +6,9 @@ keeps h (A. F. Filippov, Differential Equations with Discontinuous Righthand Sid
 
     f = (r- f+ - r+ f-) / (r- - r+)
 
+Where ``r- - r+`` is never positive nothing slides: motion passes the surface, or leaves it on both sides, and
+no mode is added.
+
 Where two surfaces cross, see :mod:`contfric.models.crossing`.
 
 The mode, its region ``r+ < 0 < r-`` and the surfaces that end it are put into the model as if they had
@@ -17,7 +20,6 @@ This module imports sympy, and is loaded where a model asks for it.
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -25,7 +27,7 @@ import sympy
 
 from contfric.models.crossing import crossing_parts
 from contfric.models.description import Description, ModeText
-from contfric.models.entries import EntryError
+from contfric.models.entries import EntryError, as_identifier
 from contfric.models.functions import as_text
 from contfric.models.symbols import Formulas
 
@@ -66,7 +68,9 @@ def sliding_parts(
             raise EntryError(
                 ("modes", name), f"'{name}' is the name of the sliding mode on '{surface}'"
             )
-        _add(found, _Sliding(formulas, surface, above, below, name))
+        sliding = _Sliding(formulas, surface, above, below, name)
+        if sliding.somewhere:
+            _add(found, sliding)
     return found
 
 
@@ -123,12 +127,19 @@ def _name(
 ) -> str:
     if len(pairs) == 1:
         return "slide"
-    alone = [s for s, _, _ in pairs].count(surface) == 1
-    return f"slide_{surface}" if alone else f"slide_{surface}_{above.name}_{below.name}"
+    if [s for s, _, _ in pairs].count(surface) == 1:
+        return f"slide_{surface}"
+    stems = {mode.name.rstrip("+-") for mode in (above, below)}
+    among = [s for s, a, b in pairs if {m.name.rstrip("+-") for m in (a, b)} == stems]
+    short = len(stems) == 1 and among == [surface] and "" not in stems
+    return f"slide_{stems.pop()}" if short else f"slide_{surface}_{above.name}_{below.name}"
 
 
 class _Sliding:
-    """The sliding mode of a surface between two modes: field and rates, as formulas and as texts."""
+    """The sliding mode of a surface between two modes: field and rates, as formulas and as texts.
+
+    ``somewhere`` is false where nothing ever slides; what else it has is then not there.
+    """
 
     def __init__(
         self, formulas: Formulas, surface: str, above: ModeText, below: ModeText, name: str
@@ -143,12 +154,9 @@ class _Sliding:
         up, down = names.index(above.name), names.index(below.name)
         self.rate_up, self.rate_down = rates[up][c], rates[down][c]
         self.apart = sympy.simplify(self.rate_down - self.rate_up)
-        if self.apart == 0:
-            raise EntryError(
-                ("surfaces", surface, SLIDING),
-                f"'{own.observable}' changes at one rate in '{above.name}' and '{below.name}': motion passes "
-                f"'{surface}', and nothing slides there",
-            )
+        self.somewhere = not self.apart.is_nonpositive
+        if not self.somewhere:
+            return
         pair = zip(fields[up], fields[down], strict=True)
         self.field = [
             a
@@ -173,8 +181,8 @@ class _Sliding:
 
 def _add(found: dict[str, Any], sliding: _Sliding) -> None:
     """Put a sliding mode into the parts of a model: its observables, the surfaces that end it, the mode."""
-    own, word = sliding.name, re.sub(r"\W", "_", sliding.name.replace("+", "p").replace("-", "n"))
-    up = f"{word}_rate"  # modes and surfaces may be named F+, observables not
+    own, word = sliding.name, as_identifier(sliding.name)
+    up = f"{word}_rate"
     found["observables"][up] = sliding.text(sliding.rate_up)
     found["surfaces"][f"{own}-"] = {"observable": up, "level": "0"}
     if sliding.constant:

@@ -15,6 +15,7 @@ from contfric.models.definition import Domain, Reset, Surface
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import Sampler
 from contfric.models.grammar import parse
+from contfric.models.parts import Lead, led
 
 #: States on a surface that are asked: what a single one says may be an accident.
 _PLACES = 24
@@ -44,7 +45,7 @@ class Landing:
         surface: str,
         surfaces: Sequence[Surface],
         domains: Sequence[Domain],
-        leads: str,
+        leads: Sequence[Lead],
     ) -> None:
         self.sampler, self.surface, self.leads = sampler, surface, leads
         self.surfaces = [s.name for s in surfaces]
@@ -122,10 +123,7 @@ class Landing:
         """Return the domains that an image may be in, but for the sides of the surfaces that it is on."""
         sides = self.sampler.sides(t, y, [s for s in self.surfaces if s not in met])
         behind = [d for d in self.domains if all(d.signs[s] == v for s, v in sides.items())]
-        for mode in (self.leads, before.mode):
-            kept = [d.signs for d in behind if d.mode == mode]
-            behind = [d for d in behind if d.mode == mode or d.signs not in kept]
-        return behind
+        return led(behind, (*self.leads, Lead(before.mode, {})))
 
     def _side(self, behind: Sequence[Domain], surface: str, t: float, y: Sequence[float]) -> int:
         """Return the side of a surface to which one image leaves; 0 if there is none, or two."""
@@ -142,7 +140,7 @@ def reset_of(
 ) -> Reset:
     """Return the reset at a surface; observables without the states that it maps are not changed by it."""
     description = sampler.evaluator.description
-    texts, leads = description.resets[surface], description.leads.get(surface, "")
+    texts, leads = description.resets[surface], description.leads.get(surface, ())
     changed = {state for state, value in texts.items() if value != state}
     own = next(s.observable for s in description.surfaces if s.name == surface)
     seen = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -92,6 +92,27 @@ class Domain:
 
 
 @dataclass(frozen=True)
+class Lead:
+    """A mode that a reset leads into from images on some sides of surfaces; on any side if it names none."""
+
+    mode: str
+    where: Mapping[str, int]
+
+
+def led(behind: Sequence[Domain], leads: Sequence[Lead]) -> list[Domain]:
+    """Return the domains behind a reset: of modes that overlap there the first that it leads into."""
+    found = list(behind)
+    for lead in leads:
+        kept = [
+            d.signs
+            for d in found
+            if d.own_mode == lead.mode and all(d.signs[s] == v for s, v in lead.where.items())
+        ]
+        found = [d for d in found if d.own_mode == lead.mode or d.signs not in kept]
+    return found
+
+
+@dataclass(frozen=True)
 class Departure:
     """Where a state at rest on a switching surface cannot stay, and the side it leaves to."""
 
@@ -114,8 +135,8 @@ class Reset:
         the signs of these
     lands : surfaces that every image lies on, and the side to which motion leaves them. For the reset's own
         surface that is +1 where it goes back (a wall), -1 where it passes
-    leads : the mode behind the reset where that holds; else, and if it is empty, the mode before it where
-        that holds, or another one
+    leads : the modes behind the reset, the first that holds; else the mode before it where that holds, or
+        another one
     modes : modes in which it acts; by default (empty) those that lie on one side of the surface
     wraps : whether it takes an angle back by a turn, which is nothing to the motion: it bounds nothing
     """
@@ -124,9 +145,14 @@ class Reset:
     formula: str
     changes: tuple[str, ...] = ()
     lands: Mapping[str, int] = field(default_factory=dict)
-    leads: str = ""
+    leads: tuple[Lead, ...] = ()
     modes: tuple[str, ...] = ()
     wraps: bool = False
+
+    @property
+    def chooses_by(self) -> set[str]:
+        """Surfaces on whose sides it depends which mode it leads into: across them the map jumps."""
+        return {surface for lead in self.leads for surface in lead.where}
 
     @property
     def stays(self) -> bool:

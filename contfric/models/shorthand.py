@@ -14,7 +14,8 @@ from contfric.models.angles import with_angles
 from contfric.models.clocks import with_clock
 from contfric.models.contact_modes import with_contacts
 from contfric.models.description import Description
-from contfric.models.entries import EntryError, Part, mapping_in
+from contfric.models.entries import EntryError, Part, as_identifier, listed, mapping_in
+from contfric.models.grammar import RESERVED
 from contfric.models.tied import with_ties_put_in
 from contfric.models.units import in_units
 
@@ -100,13 +101,14 @@ def _with_observables(data: dict[str, Any]) -> dict[str, Any]:
     surfaces, observables = data.get("surfaces") or {}, dict(data.get("observables") or {})
     parts = {str(name) for name in data.get("define") or {}}
     taken = {*map(str, data.get("states") or ()), *map(str, data.get("parameters") or ()), *parts}
+    taken |= {*RESERVED}  # a surface may be called sign
     named: dict[Any, Any] = {}
     for name, entry in surfaces.items():
         named[name] = entry
         text = entry.get("observable")
         if not isinstance(text, str) or (text.strip().isidentifier() and text.strip() not in parts):
             continue
-        own = str(name)
+        own = as_identifier(str(name))
         while own in taken or own in observables:
             own += "_"
         observables[own] = text
@@ -123,7 +125,7 @@ def _divided_by_resets(data: dict[str, Any]) -> dict[str, Any]:
     modes, resets = dict(data.get("modes") or {}), dict(data.get("resets") or {})
     others = (
         *(data.get("domains") or {}).values(),
-        *({"mode": r.get("to")} for r in resets.values()),
+        *({"mode": mode} for r in resets.values() for mode in listed(r.get("to"))),
     )
     named = {other.get("mode") for other in others if isinstance(other, Mapping)}
     for surface, entry in resets.items():

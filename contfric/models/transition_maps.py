@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from contfric.errors import ParameterError
+from contfric.models.parts import Lead, led
 from contfric.models.section_maps import SectionMaps
 
 if TYPE_CHECKING:
@@ -210,9 +211,7 @@ class TransitionMaps(SectionMaps):
         asked = {**fixed, **landed}
         behind = self._domains_landed(reset).get(tuple(asked[name] for name in sorted(asked)), [])
         behind = [*behind, *self._departed(asked)]
-        for mode in (reset.leads, domain.own_mode):
-            kept = [d.signs for d in behind if d.own_mode == mode]
-            behind = [d for d in behind if d.own_mode == mode or d.signs not in kept]
+        behind = led(behind, (*reset.leads, Lead(domain.own_mode, {})))
         chatter = self.chatter_at.get((domain.mode, reset.surface))
         resting = self.domains_of(chatter.mode) if chatter else ()
         return tuple(d.name for d in (*behind, *resting))

@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from contfric.errors import ModelError
+from contfric.models.clocks import is_clock
 from contfric.models.description import Description
 from contfric.models.entries import EntryError, Part, mapping_in
 from contfric.models.evaluate import Sampler, defaults, floats
@@ -75,8 +76,8 @@ def in_units(data: dict[str, Any], read: Read) -> dict[str, Any]:
             raise EntryError(
                 (KEY, angle), f"'{angle}' is an angle: a turn of it is 2 pi, in radians"
             )
-    if "clock" in data["states"]:  # the time since the last tick
-        units["clock"] = units.get(TIME, 1.0)
+    clocks = filter(is_clock, map(str, data["states"]))  # times since the last ticks
+    units |= dict.fromkeys(clocks, units.get(TIME, 1.0))
     found = _states_in_units(data, units)
     return _observables_in_units(found, _sizes(read(found))) | {APPLIED: units}
 
@@ -196,10 +197,11 @@ def _observables_in_units(data: dict[str, Any], sizes: Mapping[str, float]) -> d
     put = Substitution({name: f"({size!r}*{name})" for name, size in sizes.items()})
 
     def within(value: Any, key: str = "") -> Any:
+        if key in ("to", "from", "in", "mode", "label"):
+            return value
         if isinstance(value, Mapping):
             return {k: within(v, k) for k, v in value.items()}
-        named = key in ("to", "from", "in", "mode", "label")
-        return put.text(value) if isinstance(value, str) and not named else value
+        return put.text(value) if isinstance(value, str) else value
 
     found = dict(data)
     for key in ("define", "field", "resets", "quantities"):

@@ -77,10 +77,16 @@ def entry_rows(
         reset = model.reset_by_surface.get(surface)
         if reset is None or word[i][0] in model.chatter_by_mode:
             continue  # what holds at rest on a wall need not hold before the impacts have come to rest
+        led = {
+            target
+            for (_, met), found in model.targets.items()
+            if met == surface
+            for target in found
+        }
+        behind = [d for d in mode_domains(model, word[i][0]) if d in led]
         for k, other in enumerate(model.surfaces):
             signs = {
-                model.domain_by_name[d].signs[other.name]
-                for d in (domains[i : i + 1] or mode_domains(model, word[i][0]))
+                model.domain_by_name[d].signs[other.name] for d in (domains[i : i + 1] or behind)
             }
             free = model.changed_by(reset, other.name) and other.name not in reset.lands
             free = free and other.name not in model.wraps

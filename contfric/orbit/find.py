@@ -19,6 +19,7 @@ from contfric.orbit.sections import is_smooth, loops, without_sections
 from contfric.orbit.simulation import SimulationEnd, Trajectory, go_on, simulate
 from contfric.orbit.solve import settle
 from contfric.orbit.system import build_system
+from contfric.orbit.time_scale import time_scale
 from contfric.remember.journal import remembered
 from contfric.signature.cyclic import primitive_length
 
@@ -35,6 +36,11 @@ _SLOW, _SERIES = 0.9, 0.2
 _CREEPING = 1e-5
 #: Periods to follow before the first look, and how much longer before each next one.
 _FIRST, _LONGER = 200, 4
+#: Events without excitation after which is looked, too: the unit of time need not be that of the motion.
+_FIRST_EVENTS = 5_000
+_MOST_EVENTS_AT_ONCE = 10_000_000
+#: Share of the time of the first half of these that the second half takes if they do not come faster.
+_STEADY = 0.5
 #: Turns smaller than this (relative to 1 + the states) are none: the motion has come to rest.
 _NO_SIZE = 1e-6
 #: An orbit that a motion converges to attracts; beyond rounding its multipliers cannot exceed 1.
@@ -104,9 +110,20 @@ def _settled(
         if progress is not None:
             progress(f"simulating: {done} periods without an orbit, then {text}")
 
-    trajectory = simulate(
-        model, params, state=state, time=time, periods=span, events=10_000_000, progress=heard
-    )
+    unit = time_scale(model)
+
+    def simulated(events: int) -> Trajectory:
+        """Follow the motion from its start, to a time and not to an event where that is gone on with."""
+        asked = span * unit
+        return simulate(
+            model, params, state=state, time=time, periods=asked, events=events, progress=heard
+        )
+
+    trajectory = simulated(_FIRST_EVENTS if model.autonomous else _MOST_EVENTS_AT_ONCE)
+    if model.autonomous and trajectory.end is SimulationEnd.EVENTS:
+        if _is_steady(trajectory):
+            unit = float(trajectory.last[1] - trajectory.begin[0]) / span
+        trajectory = simulated(_MOST_EVENTS_AT_ONCE)
     if trajectory.end is SimulationEnd.CHATTER and not model.chatters:
         from contfric.models.chatter import with_chatter  # which takes sympy
 
@@ -128,7 +145,16 @@ def _settled(
             raise why_none(trajectory, done, slow, compared=longest is None)
         span = min(span * _LONGER, most - done)
         heard(f"{span} more")
-        trajectory = go_on(trajectory, span, heard)
+        trajectory = go_on(trajectory, span * unit, heard)
+
+
+def _is_steady(trajectory: Trajectory) -> bool:
+    """Tell whether events do not come faster and faster: then the unit of time is too long for the motion.
+
+    A converter in seconds switches a million times in 200 of them.
+    """
+    begin, middle = trajectory.begin[0], float(trajectory.times[len(trajectory) // 2])
+    return float(trajectory.times[-1]) - middle > _STEADY * (middle - begin)
 
 
 def _is_point(orbit: Orbit) -> bool:

@@ -25,6 +25,7 @@ from contfric.orbit.pace import Pace
 from contfric.orbit.starts import checked_state, start_of
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import surfaces_under, tables
+from contfric.orbit.time_scale import time_scale
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -232,7 +233,7 @@ def run(
 
     ``progress`` hears the number of events where that takes more than a tenth of a second.
     """
-    from contfric.orbit.trajectory import ALL_EVENTS, CARRIED
+    from contfric.orbit.trajectory import ALL_EVENTS, CARRIED, UNIT
     from contfric.orbit.trajectory import simulate as kernel
 
     composed = isinstance(model, ComposedModel)
@@ -240,6 +241,7 @@ def run(
     began_at, y = (time, y), y.copy()
     pieces: list[EventRows] = []
     done, carry, pace = 0, np.zeros(CARRIED), Pace(_FIRST_EVENTS)
+    carry[UNIT] = time_scale(model)
     while True:  # between the calls Ctrl-C is heard
         rows, began = min(pace.budget, events - done), perf_counter()
         written = EventRows(

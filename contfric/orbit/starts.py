@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.errors import ParameterError, did_you_mean, shown
+from contfric.models.clocks import TICK, is_clock
 from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.models.parts import Chatter
 from contfric.orbit.structure import cut_bounds
@@ -14,8 +15,9 @@ from contfric.orbit.tables import bits_of
 #: Displacements that a start is looked for at, in half-widths of the model: where the first is in no
 #: domain (behind a wall, or on a surface that motion does not leave), the next.
 _PLACES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
-#: States that are drawn where none of these is: enough to hit a region of a hundredth of the spread.
-_DRAWS = 1000
+#: States that are drawn where none of these is: enough to hit a region of a hundredth of the spread, which
+#: nobody may have written, and then further out.
+_DRAWS, _WIDER = 1000, (1.0, 3.0, 10.0, 100.0)
 
 
 def signs_at(
@@ -99,22 +101,34 @@ def displaced(model: Model, vector: FloatArray) -> FloatArray:
         If no state that was tried is in a domain.
     """
     half_width: FloatArray = model.spread(model.mapping(vector))
-    rest = np.zeros(len(model.states))
+    rest = _at_a_tick(model, vector)
     for place in _PLACES:
         y = rest.copy()
         y[0] = place * half_width[0]
         if _is_start(model, y, vector):
             return y
     rng = np.random.default_rng(1)  # always the same start
-    for _ in range(_DRAWS):
-        y = rng.uniform(-1.0, 1.0, half_width.shape) * half_width
-        if _is_start(model, y, vector):
-            return y
+    clocks = rest != 0.0
+    for wider in _WIDER:
+        for _ in range(_DRAWS // len(_WIDER)):
+            y = np.where(clocks, rest, rng.uniform(-wider, wider, half_width.shape) * half_width)
+            if _is_start(model, y, vector):
+                return y
     within = ", ".join(f"|{s}| <= {w:g}" for s, w in zip(model.states, half_width, strict=True))
     raise ParameterError(
-        f"no start was found: of {_DRAWS} states of '{model.name}' at t = 0 with {within}, its 'spread', "
-        "none is in a domain. Give one (state=...), or correct 'spread' or the sides of the modes"
+        f"no start was found: of {_DRAWS} states of '{model.name}' at t = 0 with {within}, its 'spread', and "
+        f"up to {_WIDER[-1]:g} times as far, none is in a domain. "
+        "Give one (state=...), or correct 'spread' or the sides of the modes"
     )
+
+
+def _at_a_tick(model: Model, vector: FloatArray) -> FloatArray:
+    """Return the state at rest; clocks that are ahead of the first are so by what its tick says."""
+    rest = np.zeros(len(model.states))
+    clocks = [is_clock(state) for state in model.states]
+    if sum(clocks) < 2:
+        return rest
+    return np.where(clocks, model.view(vector).reset(TICK, 0.0, rest), rest)
 
 
 def _is_start(model: Model, y: FloatArray, vector: FloatArray) -> bool:

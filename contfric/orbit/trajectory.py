@@ -56,9 +56,10 @@ _WIDER = 4.0
 _AHEAD = 1e-3
 #: Numbers that a simulation hands over to the call that goes on with it: whether there are any, the period
 #: and phase it began in, the period it is in, events at once, whether one was an impact, surfaces it is on,
-#: 1 + the wall that was met last if no other event came since, and the speed behind that impact.
-CARRIED = 9
-STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON, BOUNCED, SPEED = range(CARRIED)
+#: 1 + the wall that was met last if no other event came since, the speed behind that impact, and the unit of
+#: time of a model without excitation (1 if less).
+CARRIED = 10
+STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON, BOUNCED, SPEED, UNIT = range(CARRIED)
 
 #: A state this large grows for ever (negative damping, or resonance without any): its square is still
 #: far from overflow, and its events are still exact.
@@ -266,7 +267,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
     """Follow a trajectory; see :func:`simulate`."""
     none, after = workspace.none, workspace.after
     period = functions.period(p, none, workspace.empty)
-    unit = period if period > 0.0 else 1.0
+    unit = period if period > 0.0 else max(1.0, carry[UNIT])
     cycle, t, on = begin(carry, on, t, period)
     event, waited, at_most = 0, 0.0, shortest_flight(tables, mode)
     at_once, struck = int(carry[AT_ONCE]), carry[STRUCK] != 0.0

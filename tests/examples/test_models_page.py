@@ -40,6 +40,7 @@ WORDS = {
     },
     "relay": {("up", "high"), ("down", "low")},
     "latch": {("on", "trip"), ("off", "tick")},
+    "sampled": {("on", "tick"), ("off", "tick")},
     "knob": {("turns", "phi+")},
     "dry": {("forward", "stop"), ("backward", "stop"), ("slide", "slide-"), ("slide", "slide+")},
     "element": {("stick+", "z+"), ("stick+", "z-"), ("slip+", "stop"), ("slip-", "stop")},

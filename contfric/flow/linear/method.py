@@ -2,7 +2,11 @@
 
 An observable that is not affine, and a motion through kinks, are searched step by step as along an integrated
 motion (:mod:`contfric.flow.stepping`); the steps of an affine mode are then its closed form. They have no
-error; their length is limited so that the certificates of the search hold.
+error; their length is limited so that the certificates of the search hold. These bound the error of the
+quintic between the ends of a step (:mod:`contfric.flow.panels`), which is true of steps that resolve the
+observable, ``w h <= 2``. How fast an observable such as sin(theta) changes does not follow from the rates of
+the states: it is compared with the quintic inside of the step. The quotient of error and bound falls with the
+square of the length.
 """
 
 from __future__ import annotations
@@ -10,10 +14,19 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.compiled import allocating_helper, helper
+from contfric.flow.dense import node
 from contfric.flow.dop853 import POWER
 from contfric.flow.linear.flow import MOST_STEPS, advance
 from contfric.flow.linear.system import REACH, WAVES, rows_of, set_up, silenced, system_in
+from contfric.flow.panels import error_of
+from contfric.flow.pieces import coefficients as quintic
+from contfric.flow.pieces import left_part
 from contfric.flow.stepping import explicit, explicit_probe
+
+#: Where an observable is compared within a step: at no place that is symmetric to another.
+_INSIDE = (0.21, 0.5, 0.68)
+#: Error of the quintic, as a share of its bound, that is allowed: a third is that at ``w h = 2``.
+_ALLOWED = 0.5
 
 
 @allocating_helper
@@ -68,7 +81,25 @@ def step_in(motion, mode, c, t, h, p, which, workspace, end, any_length, own):  
 def linear_attempt(motion, mode, c, t, h, p, which, workspace):  # type: ignore[no-untyped-def]
     """Step from ``workspace.start`` to ``workspace.end``; return the error in units of what is allowed."""
     length = linear_step(motion, mode, c, t, h, p, which, workspace, workspace.end, False)
-    return length**POWER
+    error, n = length**POWER, workspace.scales.shape[0]
+    if error > 1.0 or workspace.start.shape[0] == n * (1 + workspace.partial.shape[1]):
+        return error  # too long, or without an observable
+    return max(error, unresolved(motion, mode, c, t, h, p, which, workspace) ** (POWER // 2))
+
+
+@helper
+def unresolved(motion, mode, c, t, h, p, which, workspace):  # type: ignore[no-untyped-def]
+    """Return the error of an observable's quintic over a step, in units of what is allowed of its bound."""
+    n, empty, nothing = workspace.scales.shape[0], workspace.none, workspace.nothing
+    motion.field(mode, t + h, workspace.end[:n], p, empty, workspace.stage[:n], nothing)
+    q, q1, q2 = node(motion, mode, c, 0.0, t, workspace.start, workspace.slopes[0], p, workspace)
+    r, r1, r2 = node(motion, mode, c, 0.0, t + h, workspace.end, workspace.stage, p, workspace)
+    ends, missed = quintic(q, q1, q2, r, r1, r2, h), 0.0
+    for share in _INSIDE:
+        linear_step(motion, mode, c, t, share * h, p, which, workspace, workspace.trial, True)
+        missed = max(missed, abs(workspace.trial[n] - left_part(ends, share)[5]))
+    known = workspace.allowed[n] + motion.relative * max(abs(q), abs(r))
+    return missed / (_ALLOWED * error_of(ends) + known)
 
 
 @helper

@@ -131,12 +131,15 @@ def _compare(
             place = [mpmath.mpf(float(x)) for x in point]
             try:
                 exact = np.array([float(v) for v in case.formula(place)])
-                slope = np.array(slopes(case.formula, place, case.step), dtype=np.float64)
+                # relative to a small variable: an inertia of 1e-5, a capacity
+                steps = [case.step * (min(1, abs(x)) or 1) for x in place]
+                slope = np.array(slopes(case.formula, place, steps), dtype=np.float64)
             except (TypeError, ValueError, ArithmeticError):
                 return False
     else:
         exact = values
-        slope = np.array(slopes(lambda p: list(case.compiled(np.array(p))[0]), list(point), 6e-6))
+        steps = [_COARSE_STEP] * len(point)
+        slope = np.array(slopes(lambda p: list(case.compiled(np.array(p))[0]), list(point), steps))
     tolerance = _SAME if described else _COARSE
     scale = 1.0 + max(np.abs(exact).max(), np.abs(slope).max())
     report.count(Topic.DERIVATIVES)

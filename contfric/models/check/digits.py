@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import mpmath
@@ -32,10 +33,10 @@ def digits(description: Description) -> Evaluator[Any]:
     return Evaluator(description, MANY_DIGITS)
 
 
-def slopes(function: Any, point: list[Any], step: Any) -> list[list[Any]]:
-    """Return the derivatives of a vector function by differences, one row a value."""
+def slopes(function: Any, point: list[Any], steps: Sequence[Any]) -> list[list[Any]]:
+    """Return the derivatives of a vector function by differences, one row a value; a step a variable."""
     columns = []
-    for i in range(len(point)):
+    for i, step in enumerate(steps):
         ahead, behind = list(point), list(point)
         ahead[i] += step
         behind[i] -= step

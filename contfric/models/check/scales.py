@@ -8,6 +8,7 @@ import numpy as np
 
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
+from contfric.models.clocks import is_clock
 
 #: Sizes of states, or times in which they change, that are this far apart: Newton's method and distances in
 #: a diagram weigh all states alike.
@@ -79,7 +80,7 @@ def _propose_units(
         if sizes[state] == 1.0:  # nobody has said how large it is
             sizes[state] = size
     angles = {n[:-1] for n in model.reset_by_surface if n[:-1] in sizes}
-    wanted = {n: v for n, v in sizes.items() if n != "clock" and n not in angles} | {"t": shift}
+    wanted = {n: v for n, v in sizes.items() if not is_clock(n) and n not in angles} | {"t": shift}
     # small states next to large ones are small by their nature: the high modes of a beam, bristles
     largest = max((n for n in wanted if n != "t"), key=wanted.__getitem__)
     far = {n: wanted[n] for n in (largest, "t") if not 1.0 / _FAR < wanted[n] < _FAR}

@@ -1,0 +1,27 @@
+"""The modes that an entry of ``resets`` names: those that it leads into (``to``), and acts in (``from``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from contfric.models.entries import Part, listed
+from contfric.models.parts import Lead
+
+#: Their keys.
+TO, FROM = "to", "from"
+
+
+def leads_of(entry: Part, modes: list[str], surfaces: list[str]) -> tuple[Lead, ...]:
+    """Return the modes that a reset leads into: one, the first of a list, or the first whose sides hold."""
+    given = entry.data[TO]
+    named = given if isinstance(given, Mapping) else {mode: {} for mode in listed(given)}
+    part = Part({str(mode): sides for mode, sides in named.items()}, (*entry.address, TO))
+    for mode in part.data:
+        Part({TO: mode}, entry.address).one_of(TO, modes, "mode")
+    return tuple(Lead(mode, part.sides(mode, surfaces)) for mode in part.data)
+
+
+def acts_of(entry: Part, modes: list[str]) -> tuple[str, ...]:
+    """Return the modes that a reset acts in."""
+    named = Part({str(i): v for i, v in enumerate(listed(entry.data[FROM]))}, entry.address)
+    return tuple(named.one_of(key, modes, "mode") for key in named.data)

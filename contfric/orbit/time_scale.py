@@ -1,0 +1,50 @@
+"""The time in which a model without excitation changes, where its unit of time is far too short.
+
+A heated room in seconds turns once in a day: to wait for its events for a number of units of time, as for
+periods of an excitation, is to see none. An observable of a surface changes by its own size, that of the
+states' spread, within
+
+    |grad h . spread| / |h'|
+
+at sampled states; the model's time is that of the observable that changes slowest of those.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from contfric.models.definition import Model
+
+#: States that are sampled, and the unit of time that is a matter of taste: nothing is changed below it.
+_STATES, _LONG = 12, 100.0
+
+
+@lru_cache(maxsize=64)
+def time_scale(model: Model) -> float:
+    """Return the time in which an autonomous model changes at its defaults if that is long, else 1.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> time_scale(cf.load_model("thermostat"))
+    1.0
+    """
+    if not model.autonomous or model.composed:
+        return 1.0
+    view = model.view(model.vector({}))
+    widths = model.spread(model.defaults)
+    rng, times = np.random.default_rng(1), []
+    states = rng.uniform(-1.0, 1.0, (_STATES, len(widths))) * widths
+    for name in {surface.observable for surface in model.surfaces}:
+        fastest = 0.0
+        for y in states:
+            size = float(np.abs(view.gradient(name, 0.0, y)[1 : 1 + len(y)]) @ widths)
+            rates = [abs(view.rate(mode.name, name, 0.0, y)) for mode in model.modes]
+            known = [rate / size for rate in rates if np.isfinite(rate) and size > 0.0]
+            fastest = max([fastest, *known])
+        if fastest > 0.0:
+            times.append(1.0 / fastest)
+    slowest = max(times, default=1.0)
+    return slowest if _LONG < slowest < np.inf else 1.0
