@@ -22,11 +22,6 @@ from scipy.optimize import brentq
 
 import contfric as cf
 
-if __package__:
-    from benchmarks.contacts import HEADING
-else:
-    from contacts import HEADING
-
 STATES = (2, 4, 8, 12, 24, 48, 64)
 OMEGA, FORCE, KINETIC, STATIC, DAMPING = 0.4, 0.6, 0.2, 0.25, 0.03
 PERIODS, ROUNDS, WANTED = 4, 3, 1e-9
@@ -261,8 +256,10 @@ def main() -> None:
         "script does; contfric's simulation works from tables, and its first roots are certified. Errors of "
         "contfric are rounding, amplified by the events.",
     ]
-    _, heading, contacts = PAGE.read_text(encoding="utf-8").partition(HEADING)
-    PAGE.write_text("\n".join([*lines, "", heading + contacts]).rstrip() + "\n", encoding="utf-8")
+    _, heading, others = PAGE.read_text(encoding="utf-8").partition(
+        "\n## "
+    )  # parts of other scripts
+    PAGE.write_text("\n".join([*lines, heading + others]).rstrip() + "\n", encoding="utf-8")
     print("\n".join(lines))
 
 

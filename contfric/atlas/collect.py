@@ -135,6 +135,8 @@ def _with_proposals(model: Model, computed: list[Branch], events: list[Event]) -
             p if p.branch is None else replace(p, branch=place[p.branch]) for p in event.proposals
         )
         kind = telling_kind([*event.kinds, *(member.kind for member in event.members)])
+        if event.final is EndReason.REST:  # all margins of the last slides vanish at once
+            kind = Kind.AS
         for member in event.members:
             same = kind is member.kind and proposals == member.proposals
             changed[id(member)] = (

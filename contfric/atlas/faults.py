@@ -8,6 +8,7 @@ import numpy as np
 
 from contfric.continuation.branch import Branch
 from contfric.models.definition import FloatArray
+from contfric.orbit.one_way import only_grows
 from contfric.orbit.repetition import shortest
 
 #: A hold shorter than this share of the arclength is rounding: on a bridge joints move as its length does, by
@@ -36,6 +37,11 @@ def _longest(branch: Branch, asked: Iterable[int]) -> FloatArray:
     return found
 
 
+def _only_touches(branch: Branch) -> bool:
+    """Tell whether a word has modes that periodic motion cannot be in (:mod:`contfric.orbit.one_way`)."""
+    return bool(only_grows(branch.model, branch[0].as_whole().word))
+
+
 def _never_held(branch: Branch) -> bool:
     """Tell whether a hold has no length at any point of a branch: the equations hold, and nothing is held.
 
@@ -49,7 +55,7 @@ def _never_held(branch: Branch) -> bool:
     return bool(np.any(lasts < _NO_TIME * min(1.0, branch.arc[-1])))
 
 
-def never_lasts(branch: Branch) -> bool:
+def _never_lasts(branch: Branch) -> bool:
     """Tell whether a segment has no length at any point of a branch: the orbits are those without it.
 
     Where orbits are a continuum those of them that touch a surface solve the equations of a word with a
@@ -73,11 +79,15 @@ def _repeats(branch: Branch) -> bool:
 #: What a branch must not be, and why it is refused then.
 _FAULTS = (
     (
+        _only_touches,
+        "something only grows along it, as a slider's offset that slips to one side: it cannot come back",
+    ),
+    (
         _never_held,
         "its hold has no length anywhere: the motion of another word, that only touches rest",
     ),
     (
-        never_lasts,
+        _never_lasts,
         "a segment of it has no length anywhere: the motion of another word, that touches a surface",
     ),
     (_repeats, "its orbits are shorter ones, run through several times"),

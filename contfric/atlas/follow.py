@@ -19,7 +19,7 @@ from contfric.atlas.composed import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.crossings import follow_crossing, whole_branch
 from contfric.atlas.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.faults import fault_of, never_lasts
+from contfric.atlas.faults import fault_of
 from contfric.atlas.folds import follow_fold
 from contfric.atlas.leaving_event import (
     leave_event,
@@ -45,6 +45,7 @@ from contfric.continuation.points import Settings
 from contfric.continuation.switching import (
     settings_value,
 )
+from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import polish
@@ -134,9 +135,12 @@ def _follow_flow(state: Exploration, event: Event) -> None:
         word = canonical_word(guess.word, orbit.model)
         if word in done:
             continue
+        if only_grows(orbit.model, guess.word):  # on its way to another orbit
+            refused.setdefault(word, f"no periodic motion is {show(guess.word)}")
+            continue
         branch = _through(state, guess)
         ends = [] if branch is None else [e for e in branch.ends if _meets(e, event, settings)]
-        if branch is None or not ends or never_lasts(branch):
+        if branch is None or not ends or fault_of(branch):
             refused.setdefault(word, f"no orbit of {show(guess.word)} meets the event")
             continue
         done.add(word)

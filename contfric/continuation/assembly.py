@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import continua_of
-from contfric.continuation.events import Bifurcation, End, Kind
+from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, End, Kind
 from contfric.continuation.openings import with_openings
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
@@ -20,6 +20,9 @@ from contfric.orbit.orbit import Orbit
 #: Share of the range above which a branch is wider than any event's accuracy that makes sense: those need not
 #: be computed.
 _NARROW = 0.01
+#: A multiplier on the unit circle next to the end of a branch (a few roots of rounding; at the end itself
+#: it is known to a few digits only), and how near (arclength) events are to it that are rounding then.
+_CRITICAL, _NEAR_END = 1e-6, 1e-3
 
 
 def join(orbit: Orbit, settings: Settings, behind: Side, ahead: Side) -> Branch:
@@ -98,6 +101,7 @@ def _branch(
         notes=tuple(dict.fromkeys(notes)),
     )
     _renew_ends(branch)
+    branch = _without_critical_ends(branch, settings)
     branch = replace(branch, notes=(*branch.notes, *continua_of(branch)))
     return with_openings(branch, settings)
 
@@ -120,6 +124,34 @@ def _known(
         else:
             kept.append(b)
     return tuple(kept), notes
+
+
+def _without_critical_ends(branch: Branch, settings: Settings) -> Branch:
+    """Return a branch without the branch points of a multiplier that is 1 at a sliding event that ends it.
+
+    Where a contact comes to rest for good the places at which it may are a continuum: a multiplier tends
+    to 1 there, and before that, where segments are about to vanish, on which side it is is rounding.
+    """
+    found = branch.turn_multipliers
+    if found is None:
+        return branch
+    idle = set()
+    for k, end in zip((0, -1), branch.ends, strict=True):
+        last = end.bifurcation
+        if last is None or last.kind not in TERMINAL:
+            continue
+        apart = np.abs(branch.arc - branch.arc[k])
+        beside = np.abs(found[(apart > 0.0) & (apart < _NEAR_END)])
+        if not np.any(np.abs(beside - 1.0) < _CRITICAL):
+            continue
+        for b in branch.bifurcations:
+            gap = abs(b.params[branch.parameter] - last.params[branch.parameter]) / settings.width
+            near = abs(b.position - float(branch.arc[k])) < _NEAR_END
+            if b.kind is Kind.BP and near and gap <= max(b.accuracy, ACCURACY):
+                idle.add(id(b))
+    if not idle:
+        return branch
+    return replace(branch, bifurcations=tuple(b for b in branch.bifurcations if id(b) not in idle))
 
 
 def _renew_ends(branch: Branch) -> None:

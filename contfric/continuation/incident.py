@@ -37,7 +37,7 @@ from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.section_joints import divided
 from contfric.orbit.sections import named_by_ends
-from contfric.orbit.slides import SHORT, resting_modes
+from contfric.orbit.slides import SAME_MOTION, SHORT, resting_modes
 from contfric.orbit.system import Margin, Test, Word, build_system
 from contfric.signature.edits import apply_edit, edited_pieces
 
@@ -47,6 +47,8 @@ _VANISHES = 1e-9
 _NEARLY = 1e-6
 #: Most forms of a unit: six places with two outcomes each.
 _MOST_FORMS = 64
+#: Where in a segment it is asked how far something has moved, as shares of it.
+_SHARES = (0.25, 0.5, 1.0)
 
 
 @dataclass(frozen=True)
@@ -115,13 +117,19 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
 
 
 def _moves(orbit: Orbit) -> bool:
-    """Tell whether a motion has a slide of some length: in less the mass moves by the cube of it."""
-    sliding = resting_modes(orbit)
+    """Tell whether a motion has a slide of some length: in less the mass moves by the cube of it.
+
+    Where one mass rests others are free to move, and may rest as well.
+    """
+    resting = resting_modes(orbit)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
-    return any(
-        mode not in sliding and last > SHORT
-        for (mode, _), last in zip(orbit.word, lasts, strict=True)
-    )
+    for (mode, _), begin, last in zip(orbit.word, orbit.begins, lasts, strict=True):
+        if mode not in resting and last > SHORT:
+            start = float(begin[0]), begin[1:]
+            moved = [orbit.flow.state(mode, *start, float(last * share)) for share in _SHARES]
+            if np.max(np.abs(np.array(moved) - begin[1:])) > SAME_MOTION:
+                return True
+    return False
 
 
 def _started(orbit: Orbit, unit: Unit, least: float) -> _Collection:

@@ -47,7 +47,7 @@ from contfric.continuation.zero_acceleration import (
     touches_again,
 )
 from contfric.errors import NotationError
-from contfric.models.definition import FloatArray
+from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.starts import signs_at
 from contfric.orbit.system import Margin, Test
@@ -216,12 +216,12 @@ def _limit_touched(orbit: Orbit, place: Test) -> Outcome:
     mode, exit_ = word[i]
     j = (i + 1) % len(word)
     touch = touch_of(orbit, i, place.surface)
-    departs = release_mode(model, mode, place.surface)
+    departs = _released(model, mode, place.surface)
     _check_held(orbit, mode, departs, touch)
     reason = f"hold behind the touch of {place.surface} in stick {i + 1}"
-    still = first_zero_acceleration(orbit, i, touch[0], str(departs))
+    still = first_zero_acceleration(orbit, i, touch[0], departs)
     if still is not None:
-        left = (str(departs), _leaves(orbit, mode))
+        left = (departs, _leaves(orbit, mode))
         edit = split(i, place.surface, (mode, TOUCH), left, (mode, exit_))
         away = {(i, 1): _APPEARS[0], (i, 2): _APPEARS[1]}
         return Outcome(edit, {(i, 0): touch, (i, 1): still, (i, 2): still}, reason, away)
@@ -249,11 +249,11 @@ def _stick_becomes_hold(orbit: Orbit, j: int, hold: str, surface: str | None) ->
     model, word = orbit.model, orbit.word
     mode, exit_ = word[j]
     behind = (j + 1) % len(word)
-    departs = word[j - 1][0] if surface is None else release_mode(model, mode, surface)
+    departs = word[j - 1][0] if surface is None else _released(model, mode, surface)
     reason = f"hold instead of stick {j + 1}"
-    still = first_zero_acceleration(orbit, j, float(orbit.cycle[j, 0]), str(departs))
+    still = first_zero_acceleration(orbit, j, float(orbit.cycle[j, 0]), departs)
     if still is not None:
-        left = (str(departs), _leaves(orbit, mode))
+        left = (departs, _leaves(orbit, mode))
         edit = split(j, hold, left, (mode, exit_))
         away = {(j, 0): _APPEARS[0], (j, 1): _APPEARS[1]}
         return Outcome(edit, {(j, 0): still, (j, 1): still}, reason, away)
@@ -262,6 +262,20 @@ def _stick_becomes_hold(orbit: Orbit, j: int, hold: str, surface: str | None) ->
     if is_hold(word[behind][1]):  # the stick ended tangentially: one hold takes the place of both
         edit |= drop(behind)
     return Outcome(edit, {}, reason)
+
+
+def _released(model: Model, mode: str, surface: str) -> str:
+    """Return the mode that a stick is released to through a surface.
+
+    The limit of a load that contacts share has a name for what the others do. Where one of them changes its
+    state at the event itself, the stick has another limit than that which is met.
+    """
+    found = release_mode(model, mode, surface)
+    if found is None:
+        raise NotationError(
+            f"'{mode}' is not released through {surface}: nothing can be held there"
+        )
+    return found
 
 
 def _hold_ends(orbit: Orbit, place: Test) -> Outcome:

@@ -12,6 +12,7 @@ A velocity that is 0 as long as a contact sticks is no datum: the surface that a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -21,8 +22,12 @@ from contfric.models.definition import FloatArray, Model
 from contfric.models.evaluate import Sampler, defaults, floats
 
 Word = tuple[tuple[str, str], ...]
+#: Parameters, time, state and rate.
+Motion = tuple[FloatArray, float, FloatArray, FloatArray]
 #: A rate this small, relative to the largest one, is zero: rounding of formulas of moderate size.
 _ZERO = 1e-9
+#: Rates below this, relative to 1 + the states, are zero: a state is put onto a surface to rounding.
+_NOTHING = 1e-12
 #: States at which rates are asked for, beyond the number of states: one more says that none is an accident.
 _MORE = 3
 #: A second set of parameters: what vanishes at the defaults alone is no datum.
@@ -85,37 +90,38 @@ def _along(model: Model, mode: str) -> tuple[FloatArray, FloatArray]:
 
     Columns of size 1, shapes (n, states).
     """
-    if isinstance(model, ComposedModel):
-        rates, states = _at_random(model, mode)
-    else:
-        rates, states = _at_samples(model, mode)
-    first = states[0] if states else []
-    apart = [[b - a for a, b in zip(first, state, strict=True)] for state in states[1:]]
-    changes = _columns(rates, len(model.states))
+    found = motions_in(model, mode)
+    found = [(p, t, y, _without_rounding(rate, y)) for p, t, y, rate in found]
+    apart = [y - found[0][2] for _, _, y, _ in found[1:]]
+    changes = _columns([rate for *_, rate in found], len(model.states))
     if model.composed:  # many words have this mode: directions that say the same
         left, sizes, _ = np.linalg.svd(changes, full_matrices=False)
         changes = left[:, : int(np.sum(sizes > _ZERO))]
     return changes, _columns(apart, len(model.states))
 
 
-def _at_random(model: ComposedModel, mode: str) -> tuple[list[list[float]], list[list[float]]]:
-    """Return rates along a mode at random states that it has, by its compiled field."""
+@cache
+def motions_in(model: Model, mode: str) -> list[Motion]:
+    """Return some states of a mode: parameters, time, state and its rate."""
+    return _at_random(model, mode) if isinstance(model, ComposedModel) else _at_samples(model, mode)
+
+
+def _at_random(model: ComposedModel, mode: str) -> list[Motion]:
+    """Return random states of a mode, by its compiled field."""
     k, n, draw = model.mode_index[mode], len(model.states), np.random.default_rng(1)
-    rates, states = [], []
+    found = []
     for factor in (1.0, _MOVED):
         vector = model.vector({}) * factor
         wide, period = 2.0 * np.abs(model.spread(model.mapping(vector))), model.view(vector).period
         for _ in range(n + _MORE):
             t, y = float(draw.uniform(0.0, period or 10.0)), wide * draw.uniform(-1.0, 1.0, n)
-            state, rate = model.state_and_rate(k, t, y, vector)
-            states.append(state.tolist())
-            rates.append(rate.tolist())
-    return rates, states
+            found.append((vector, t, *model.state_and_rate(k, t, y, vector)))
+    return found
 
 
-def _at_samples(model: Model, mode: str) -> tuple[list[list[float]], list[list[float]]]:
-    """Return rates along a mode at sampled states that it has, by its formulas."""
-    rates, states = [], []
+def _at_samples(model: Model, mode: str) -> list[Motion]:
+    """Return sampled states of a mode, by its formulas."""
+    found = []
     description = _samplers(model)[0].evaluator.description
     parts = [
         name for name in model.mode_by_name if model.whole_mode(name) == model.whole_mode(mode)
@@ -123,14 +129,16 @@ def _at_samples(model: Model, mode: str) -> tuple[list[list[float]], list[list[f
     text = next(m for m in description.modes if m.name in parts)
     held = [surface for surface, side in text.sides.items() if side == 0]
     for sampler in _samplers(model):
+        vector = np.array([sampler.params[name] for name in model.parameter_names])
         for t, y in sampler.states(len(model.states) + _MORE):
             place: tuple[float, list[float]] | None = (t, y)
             for surface in (*held, *held):  # twice: one may move a state off the other
                 place = place and sampler.landed(surface, *place)
             if place is not None:
-                states.append(place[1])
-                rates.append(sampler.evaluator.field(text.name, sampler.params, *place))
-    return rates, states
+                at, state = place
+                rate = sampler.evaluator.field(text.name, sampler.params, at, state)
+                found.append((vector, at, np.array(state), np.array(rate)))
+    return found
 
 
 @cache
@@ -149,7 +157,12 @@ def _jumps(model: Model, surface: str) -> FloatArray:
     return _columns(found, len(model.states))
 
 
-def _columns(rows: list[list[float]], n: int) -> FloatArray:
+def _without_rounding(rate: FloatArray, y: FloatArray) -> FloatArray:
+    """Return a rate without what is rounding of a state that stands still: the speed of what rests."""
+    return np.where(np.abs(rate) < _NOTHING * (1.0 + np.max(np.abs(y))), 0.0, rate)
+
+
+def _columns(rows: Sequence[FloatArray | list[float]], n: int) -> FloatArray:
     """Return rows as columns, each of size 1: a stiff mode must not drown a slow one."""
     columns = np.array([row for row in rows if np.all(np.isfinite(row))]).reshape(-1, n).T
     sizes: FloatArray = np.linalg.norm(columns, axis=0)

@@ -22,15 +22,12 @@ SHORT = 1e-3
 
 
 def resting_modes(orbit: Orbit) -> set[str]:
-    """Return the modes of an orbit in which a contact rests; where one always does, those in which all do.
+    """Return the modes of an orbit in which nothing moves.
 
-    Of many contacts one or the other nearly always rests.
+    One in which a contact rests is not enough: of several contacts, or masses, one nearly always does. And
+    it does not depend on the word, so that all words of one motion have the same slides.
     """
-    model, modes = orbit.model, {mode for mode, _ in orbit.word}
-    if model.composed:
-        return {mode for mode in modes if model.is_at_rest(mode)}
-    sliding = {mode for mode in modes if model.mode_by_name[mode].sliding}
-    return sliding if sliding < modes else {mode for mode in modes if model.is_at_rest(mode)}
+    return {mode for mode, _ in orbit.word if orbit.model.is_at_rest(mode)}
 
 
 def slides_of(orbit: Orbit) -> list[int]:

@@ -95,8 +95,10 @@ def tables(model: Model) -> Tables:
     """
     if model.composed:
         raise ParameterError(
-            f"this is not offered for '{model.name}', whose modes are made when solutions visit them: all of "
-            "them would be needed before. Simulations, orbits, branches and diagrams are"
+            f"this is not offered for '{model.name}', whose modes are made when solutions visit them (it has "
+            "many contacts, or friction contacts that share their load): sweeps, return maps, basins and "
+            "Lyapunov exponents need all of them before. Simulations, orbits, branches and diagrams are "
+            "offered; in place of a sweep, call find_orbit at each value with the state before it (state=)"
         )
     check_surfaces(model)
     bounds = np.zeros((len(model.modes), len(model.surfaces)), dtype=np.int64)

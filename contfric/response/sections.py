@@ -36,6 +36,8 @@ def section_of(model: Model, section: object, sense: object = "either") -> Cut:
     """
     if not (isinstance(sense, str) and sense in _SENSES):
         raise ParameterError(f"sense is one of {', '.join(_SENSES)}, got {shown(sense)}")
+    if model.composed:
+        tables(model)  # refused, with the reason
     if isinstance(section, str):
         cut = _on_surface(model, section, _SENSES[sense])
     elif isinstance(section, bool) or not isinstance(section, Real):

@@ -162,6 +162,8 @@ def test_what_needs_all_modes_says_so() -> None:
     model = chain(5, 10, "many")
     with pytest.raises(ParameterError, match="modes are made when solutions visit them"):
         cf.lyapunov_exponent(model, state=np.ones(20), periods=10)
+    with pytest.raises(ParameterError, match="call find_orbit at each value"):
+        cf.sweep(model, model.parameter_names[0], [1.0, 1.1])
 
 
 def test_forces_that_are_not_affine_are_refused() -> None:

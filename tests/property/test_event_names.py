@@ -13,10 +13,8 @@ import contfric as cf
 RANGE = (0.1, 1.7)
 
 
-def random_structure(seed: int, kinds: str) -> cf.Model:
-    """Return two masses with friction (f) or a Jenkins element (j) on each, or on the first alone."""
-    draw = np.random.default_rng([seed, {"jj": 0, "fj": 1, "j": 3}[kinds]])
-    k = draw.uniform(0.7, 1.5, 3)
+def random_contacts(draw: np.random.Generator, kinds: str) -> dict[str, dict[str, Any]]:
+    """Return friction (f) or a Jenkins element (j) on the first masses."""
 
     def contact(kind: str, i: int) -> dict[str, Any]:
         if kind == "f":
@@ -25,11 +23,19 @@ def random_structure(seed: int, kinds: str) -> cf.Model:
         stiffness, limit = f"{draw.uniform(0.8, 2):.4f}", f"{draw.uniform(0.2, 0.6):.4f}*s"
         return {"kind": "jenkins", "displacement": f"q{i}", "stiffness": stiffness, "limit": limit}
 
-    contacts = {"ab"[i]: contact(kind, i + 1) for i, kind in enumerate(kinds)}
+    return {"abc"[i]: contact(kind, i + 1) for i, kind in enumerate(kinds)}
+
+
+def random_structure(seed: int, kinds: str) -> cf.Model:
+    """Return a chain of two masses at least with contacts on the first ones."""
+    draw = np.random.default_rng([seed, {"jj": 0, "fj": 1, "j": 3, "ff": 4, "jjj": 5}[kinds]])
+    size = max(2, len(kinds))
+    k = draw.uniform(0.7, 1.5, size + 1)
+    contacts, beside = random_contacts(draw, kinds), np.diag(k[1:-1], 1)
     return cf.Mechanism(
-        np.diag(draw.uniform(0.7, 1.5, 2)),
-        [[0.2, -0.05], [-0.05, 0.2]],
-        [[k[0] + k[1], -k[1]], [-k[1], k[1] + k[2]]],
+        np.diag(draw.uniform(0.7, 1.5, size)),
+        0.2 * np.eye(size) - 0.05 * (np.eye(size, k=1) + np.eye(size, k=-1)),
+        np.diag(k[:-1] + k[1:]) - beside - beside.T,
         contacts=contacts,
         force={"q1": "F*cos(W*t)"},
         parameters={"W": float(draw.uniform(0.5, 1.2)), "F": 1.0, "s": 1.0},
@@ -55,6 +61,9 @@ slow = pytest.mark.slow
         *(pytest.param("j", seed, marks=slow) for seed in range(4)),
         *(pytest.param("jj", seed, marks=slow) for seed in range(5)),
         *(pytest.param("fj", seed, marks=slow) for seed in (0, 3)),
+        ("ff", 0),
+        *(pytest.param("ff", seed, marks=slow) for seed in (1, 2, 3)),
+        *(pytest.param("jjj", seed, marks=slow) for seed in (1, 2)),
     ],
 )
 def test_events_have_the_same_names_from_every_branch(kinds: str, seed: int) -> None:
@@ -64,6 +73,25 @@ def test_events_have_the_same_names_from_every_branch(kinds: str, seed: int) -> 
     for branch in first.branches[:3]:
         again = cf.explore(branch[len(branch) // 2], "F", RANGE, max_periods=1)
         assert names(again) == names(first)
+
+
+def test_a_contact_that_sticks_for_good_does_not_end_a_diagram() -> None:
+    """Behind the event at which one of two contacts stops slipping the other one goes on, down to its limit.
+
+    All rests where the force on the first mass is at most the limit of that; the other contact then
+    carries nothing. Where the second contact stops, its load just reaches the limit.
+    """
+    model = random_structure(0, "ff")
+    found = cf.explore(cf.find_orbit(model, {"F": 1.4}), "F", RANGE, max_periods=1)
+    draw = np.random.default_rng([0, 4])
+    draw.uniform(size=3)  # the springs
+    law = {name: float(c["kinetic"][:-2]) for name, c in random_contacts(draw, "ff").items()}
+    places = {b.contacts: b.params["F"] for b in found.bifurcations if b.kind is cf.Kind.AS}
+    assert places["a",] == pytest.approx(law["a"], abs=1e-9)
+    stuck = next(b for b in found.branches if abs(b.values.max() - places["b",]) < 1e-9)
+    orbit = stuck[int(np.argmax(stuck.values))]
+    assert all(mode[1] == "s" for mode, _ in orbit.word)
+    assert orbit.quantity("max(abs(force(b)))") == pytest.approx(law["b"], abs=1e-8)
 
 
 @pytest.mark.parametrize(

@@ -253,3 +253,30 @@ def test_with_springs_jenkins_elements_and_a_normal_force_of_time() -> None:
     given += 0.1 * orbit.period * orbit.quantity("mean(force(brace))")  # the belt drives, too
     lost = sum(orbit.quantity(f"work({c})") for c in ("grip", "brace", "pad", "stop"))
     assert abs(lost - given) < 1e-6
+
+
+def test_braces_with_static_above_kinetic_friction_have_the_same_events_from_every_branch() -> None:
+    """Where one brace stops as the other lets go, the stick behind it has another limit."""
+    chained = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    braces = {
+        name: {"kind": "friction", "velocity": velocity, "kinetic": 0.05, "static": 0.06}
+        for name, velocity in (("a", "v2 - v1"), ("b", "v3 - v2"))
+    }
+    model = cf.Mechanism(
+        np.eye(3),
+        0.05 * chained,
+        chained,
+        contacts=braces,
+        force={"q3": "F*cos(W*t)"},
+        parameters={"W": 1.1, "F": 0.6},
+        period="2*pi/W",
+    )
+
+    def places(found: cf.Diagram) -> list[tuple[float, tuple[str, ...]]]:
+        return sorted((round(b.params["F"], 8), b.contacts) for b in found.bifurcations if b.tests)
+
+    first = cf.explore(cf.find_orbit(model), "F", (0.1, 0.7), max_periods=1)
+    assert {contacts for _, contacts in places(first)} >= {("a",), ("b",), ("a", "b")}
+    for branch in (first.branches[0], first.branches[-1]):
+        again = cf.explore(branch[len(branch) // 2], "F", (0.1, 0.7), max_periods=1)
+        assert places(again) == places(first)
