@@ -97,12 +97,12 @@ def certify_diagram(
         ended,
         (
             *checkable([part for k in tasks for part in _parts_of(found.get(k))]),
-            *(tube for proof in found.values() for tube in _tubes(proof)),
+            *(tube for k in tasks for tube in _tubes(found.get(k))),
         ),
     )
 
 
-def _tubes(proof: BranchCertificate | EventCertificate) -> list[dict[str, Any]]:
+def _tubes(proof: BranchCertificate | EventCertificate | None) -> list[dict[str, Any]]:
     return tubes_of(proof) if isinstance(proof, BranchCertificate) else []
 
 
