@@ -3,7 +3,7 @@
 python -m benchmarks.certificates orbits 1000      random scenes of coulomb: share proved, by class
 python -m benchmarks.certificates events           the events of several diagrams, by kind
 python -m benchmarks.certificates branches         the branches of Fig. 5, share of the arclength
-python -m benchmarks.certificates diagram          the whole of Fig. 5, and the check of its events
+python -m benchmarks.certificates diagram          the whole of Fig. 5, and the check of its file
 python -m benchmarks.certificates figures DIR      Figs. 4, 5, 6, 7, 13 of the paper, with their files
 python -m benchmarks.certificates chaos            horseshoes of the release map in the plane of Fig. 9
 python -m benchmarks.certificates census           ten values of Omega of Fig. 5: nothing else is there
@@ -16,6 +16,7 @@ import json
 import sys
 import time
 from collections import Counter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,9 @@ import contfric as cf
 from contfric.certify.files import certificate_data
 from contfric.errors import ContfricError
 from contfric.verify.file import check_text
+from tests.certificate_oracle import false_statements, mutated
+from tests.contracts.test_event_files import KINDS, files
+from tests.event_oracle import changed, false_event
 
 SCENES: dict[str, tuple[dict[str, float], str, tuple[float, float]]] = {
     "Omega (Fig. 5)": ({"Omega": 0.5, "S": 0.32, "S0": 0.4}, "Omega", (0.4, 0.6)),
@@ -174,22 +178,29 @@ def census() -> None:
 
 
 def cheats(count: int) -> None:
-    """Change true certificates, and decide by 60 digits those that are verified."""
-    from tests.certificate_oracle import false_statements, mutated
+    """Change true certificates of orbits and events, and decide by 60 digits those that are verified.
 
-    rng = np.random.default_rng(23)
-    texts = _certificates(rng)
-    found: Counter[str] = Counter()
-    for k in range(count):
-        data: dict[str, Any] = mutated(json.loads(texts[k % len(texts)]), rng)
-        if not check_text(json.dumps(data)).yes:
-            found["refused"] += 1
-        elif false_statements(data):
-            found["VERIFIED, BUT FALSE"] += 1
-            print(json.dumps(data))
-        else:
-            found["verified, and true"] += 1
-    print(dict(found))
+    Each case has its own seed and is a line of ``cheats.txt``: a run that was ended goes on there.
+    """
+    done = Path("cheats.txt")
+    known = done.read_text().splitlines() if done.exists() else []
+    begin = time.process_time()
+    orbits = _certificates(np.random.default_rng(23))
+    events = files()
+    with done.open("a") as out:
+        for k in range(len(known), count):
+            rng, kind = np.random.default_rng([23, k]), ("orbit", *KINDS)[k % 2 and 1 + k // 2 % 9]
+            if kind == "orbit":
+                data: dict[str, Any] = mutated(json.loads(orbits[k // 2 % len(orbits)]), rng)
+            else:
+                data = changed(json.loads(events[kind]), rng)
+            verdict = "refused"
+            if check_text(json.dumps(data)).yes:
+                is_false = false_statements if kind == "orbit" else false_event
+                verdict = "VERIFIED, BUT FALSE" if is_false(data) else "verified, and true"
+            known.append(f"{kind}: {verdict}")
+            print(known[-1], file=out, flush=True)
+    print(Counter(known), f"{time.process_time() - begin:.1f} s of the processor")
 
 
 def _certificates(rng: np.random.Generator) -> list[str]:

@@ -86,9 +86,7 @@ class BranchCertificate(Shown):
         return sum(point.proved or k in self.held for k, point in enumerate(self.points))
 
     def save(self, path: Any) -> None:
-        """Write the certificates of all printed orbits and events as one file for ``contfric verify``.
-
-        The tube between them is not in it.
+        """Write the certificates of all printed orbits and events, and its tubes, for ``contfric verify``.
 
         Raises
         ------
@@ -97,14 +95,17 @@ class BranchCertificate(Shown):
         ResultFileError
             If the file cannot be written.
         """
+        from contfric.certify.diagram_certificate import UNCHECKED
         from contfric.certify.files import checkable, write_data
+        from contfric.certify.tube_file import tubes_of
 
-        parts = checkable([*self.proofs, *self.points])
+        parts = [*checkable([*self.proofs, *self.points]), *tubes_of(self)]
         if not parts:
             raise ParameterError(
                 "there is nothing to write: no proof of this branch is one that the checker knows"
             )
-        write_data({"certificate": "diagram", "format": 1, "checkable": parts}, path)
+        data = {"certificate": "diagram", "format": 1, "checkable": parts, "unchecked": UNCHECKED}
+        write_data(data, path)
 
     @property
     def covered(self) -> float:

@@ -26,6 +26,7 @@ from contfric.certify.diagram_certificate import (
 )
 from contfric.certify.events import EventCertificate, certify_event
 from contfric.certify.files import checkable
+from contfric.certify.tube_file import tubes_of
 from contfric.chaos.running import Progress, check_executor, compute_all
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation
@@ -94,8 +95,15 @@ def certify_diagram(
         tuple(events),
         time.time() - began,
         ended,
-        tuple(checkable([part for k in tasks for part in _parts_of(found.get(k))])),
+        (
+            *checkable([part for k in tasks for part in _parts_of(found.get(k))]),
+            *(tube for k in tasks for tube in _tubes(found.get(k))),
+        ),
     )
+
+
+def _tubes(proof: BranchCertificate | EventCertificate | None) -> list[dict[str, Any]]:
+    return tubes_of(proof) if isinstance(proof, BranchCertificate) else []
 
 
 def _is_unfinished(proof: BranchCertificate | EventCertificate) -> bool:

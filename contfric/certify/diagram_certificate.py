@@ -13,6 +13,8 @@ from contfric.base.shown import Shown
 from contfric.errors import ResultFileError, path_of
 
 _KIND, _FORMAT = "diagram", 1
+#: What a file holds that the checker does not look at.
+UNCHECKED = "the summary, orbits with holds, and a tube from an open end to the event there"
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ class DiagramCertificate(Shown):
     ended : str
         What ended the run before all was tried (a time limit, an interrupt); empty if nothing did.
     checkable : tuple of dict
-        Certificates of events and of printed orbits as plain data, which ``contfric verify`` checks.
+        Certificates of events, printed orbits and tubes as plain data, which ``contfric verify`` checks.
     """
 
     model: str
@@ -164,7 +166,7 @@ class DiagramCertificate(Shown):
     def save(self, path: Any) -> None:
         """Write it as a JSON file; :func:`load_diagram_certificate` reads it.
 
-        ``contfric verify`` checks the events and orbits in it that are ``checkable``, and not the summary.
+        ``contfric verify`` checks what is ``checkable`` in it: events, orbits and tubes.
 
         Raises
         ------
@@ -173,7 +175,8 @@ class DiagramCertificate(Shown):
         """
         summary = asdict(self)
         checkable = summary.pop("checkable")
-        data = {"certificate": _KIND, "format": _FORMAT, "checkable": checkable, "summary": summary}
+        data = {"certificate": _KIND, "format": _FORMAT, "checkable": checkable}
+        data |= {"summary": summary, "unchecked": UNCHECKED}
         text = json.dumps(data)
         with replacing(path_of("a certificate file", path)) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 _DIGITS = 40
 #: Discs of multipliers are printed this much wider: another way to compute them rounds otherwise.
 _WIDER = 1e-25
+#: Half-width of the ball of times about a touch.
+_BESIDE = 2.0**-40
 #: Bits with which the balls of events are printed.
 _EVENT_BITS = 320
 #: A larger file is no certificate: an orbit takes 4 kB, one of 400 segments 200 kB.
@@ -105,7 +107,7 @@ def event_data(proof: EventCertificate) -> dict[str, Any]:
         balls = [_printed(x) for x in proof.zero[: orbit.joints.size]]
         at: list[Any] | None = None
         if condition is not None and condition.within:
-            at = [condition.segment, condition.surface, _printed(proof.zero[-2])]
+            at = [condition.segment, condition.surface, _text(proof.zero[-2] + arb(0, _BESIDE))]
         elif condition is not None:
             at = [condition.segment, 1 if condition.surface == "F+" else -1]
         value = _printed(proof.value)

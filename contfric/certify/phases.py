@@ -27,7 +27,15 @@ def in_phases(model: BallModel) -> BallModel:
     turns = [arb(n) for n in model.turns]
     fields = {name: _scaled(model, field, scale) for name, field in model.fields.items()}
     return BallModel(
-        model.states, turns, fields, model.surfaces, two_pi, model.turns, model.resets, slopes
+        model.states,
+        turns,
+        fields,
+        model.surfaces,
+        two_pi,
+        model.turns,
+        model.resets,
+        slopes,
+        model.alike,
     )
 
 

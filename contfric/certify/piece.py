@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from contfric.certify.inequalities import Name
 from contfric.certify.verdict import Finding
+from contfric.models.definition import FloatArray
 
 #: For a number of events that is not known.
 UNKNOWN = 2
@@ -27,6 +28,7 @@ class Piece:
     linked : its curve is that of the piece before
     ends : what ends the branch in its box: the inequalities that change their sign there
     events : labels of the proved events whose orbits are in its box
+    knots : the two orbits between which its box is, (time, state) of each joint and the parameter; or none
     """
 
     start: float
@@ -40,6 +42,7 @@ class Piece:
     linked: bool = True
     ends: tuple[Name, ...] = ()
     events: tuple[str, ...] = ()
+    knots: tuple[FloatArray, ...] = ()
 
     @property
     def proved(self) -> bool:

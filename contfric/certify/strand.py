@@ -20,6 +20,7 @@ from contfric.continuation.events import TERMINAL
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector
+from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 
 #: Shortest step that is halved, as a share of the branch; events at its ends are as near to them and nearer.
@@ -65,6 +66,15 @@ class Strand:
             for joint in found:
                 joint[0] *= 2 * arb.pi() / period
         return [*(c.mid() for joint in found for c in joint), value]
+
+    def printed(self, point: Vector) -> FloatArray:
+        """Return an orbit (z, p) as floats, with times for phases."""
+        period = self._model(point[-1]).period
+        scale = arb(1) if period.is_zero() else period / (2 * arb.pi())
+        found = [float(c.mid()) for c in point]
+        m = self.segments.states + 1
+        found[:-1:m] = [float((c * scale).mid()) for c in point[:-1:m]]
+        return np.array(found)
 
     def met_by(self, proofs: list[EventCertificate]) -> list[tuple[str, Vector, bool]]:
         """Return label and solution of the proved events on the branch, and whether one may end there."""

@@ -180,7 +180,8 @@ class Tracer(Strand):
         ends = (float(values[0].mid()), float(values[1].mid()))
         off = has_no_pair(self.segments, self.build, self.closes, box)
         tori = 0 if off else UNKNOWN
-        return Piece(*arcs, ends, True, admissible, folds, flips, tori, events=inside)
+        knots = self.printed(box.first), self.printed(box.last)
+        return Piece(*arcs, ends, True, admissible, folds, flips, tori, events=inside, knots=knots)
 
     def _count(self, box: Box, sigma: int, points: list[Vector | None]) -> int:
         """Return how often the Jacobian with sigma times the closure is singular between the ends of a box.

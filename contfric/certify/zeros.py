@@ -44,7 +44,7 @@ def zeros_at_joints(
         rows = _at_end(segments, model, (i - 1) % count, found)
         rows += (more or {}).get((i - 1) % count, [])
         if i == 0:
-            rows = [closing(row) for row in rows]
+            rows = [_closed(row, closing) for row in rows]
         pin = segments.pins[i]
         if isinstance(pin, str):
             rows.append(model.rows[pin])
@@ -52,6 +52,16 @@ def zeros_at_joints(
             rows.append(model.rate(pin[1], pin[0]))
         found[i] = rows
     return found
+
+
+def _closed(row: Vector, closing: Closing) -> Vector:
+    """Return the row at the first joint: the same list where the closure changes its sign at most."""
+    pairs = []
+    for k in (k for k, x in enumerate(row) if not x.is_zero()):
+        unit = [arb(int(j == k)) for j in range(len(row))]
+        pairs += list(zip(closing(unit), unit, strict=True))
+    same = any(all(a == sign * b for a, b in pairs) for sign in (1, -1))
+    return row if same else closing(row)
 
 
 def at_start(segments: Segments, model: BallModel, i: int, rows: list[Vector]) -> list[Vector]:
@@ -126,7 +136,8 @@ def order_at_start(
     """
     for order in range(MOST_ORDER):
         row = model.rate(surface, mode, order) if surface else row
-        if not in_span(row, known):
+        named = model.alike(surface, mode) if surface and order == 1 and model.alike else None
+        if not in_span(row, known) and not (named and in_span(model.rows[named], known)):
             return order
         row = numbers(arb_mat([row]) * model.fields[mode])
     return MOST_ORDER

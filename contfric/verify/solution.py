@@ -1,11 +1,11 @@
-"""The solution of a certificate file: its box, its motion, and Krawczyk's operator (see the package)."""
+"""The motion of a certificate file: parameters, segments, flow; in balls or power series."""
 
 from __future__ import annotations
 
 import re
 from typing import Any
 
-from flint import acb, arb, arb_mat, ctx
+from flint import acb, arb, arb_series
 
 #: Direction and exit: (1 or -1, 0) of a slide, (0, 1 or -1) of a stick that ends at +-S0.
 SEGMENTS = {"slide+ v": (1, 0), "slide- v": (-1, 0), "stick F+": (0, 1), "stick F-": (0, -1)}
@@ -44,13 +44,20 @@ def decided(condition: bool, opposite: bool, what: str) -> None:
 class Scene:
     """The parameters and segments of a file, and the motion that they have."""
 
-    def __init__(self, data: dict[str, Any], balls: dict[str, arb] | None = None) -> None:
+    def __init__(self, data: dict[str, Any], moved: dict[str, Any] | None = None) -> None:
         if set(data["params"]) != set(PARAMETERS):
             raise Refused("the parameters are not Omega, S, S0, h and zeta")
-        params = {name: number(value) for name, value in data["params"].items()} | (balls or {})
-        self.omega, self.s, self.s0, self.h, self.zeta = (params[name] for name in PARAMETERS)
-        if not (self.omega > 0 and self.s >= 0 and self.s0 >= self.s):
-            raise Refused("the parameters do not obey Omega > 0 and S0 >= S >= 0")
+        p = {name: number(value) for name, value in data["params"].items()} | (moved or {})
+        series = {name for name, value in p.items() if isinstance(value, arb_series)}
+        omega, s, s0, h, zeta = (p[n][0] if n in series else p[n] for n in PARAMETERS)
+        good, bad = omega > 0 and s >= 0 and s0 >= s, omega <= 0 or s < 0 or s0 < s
+        decided(good, bad, "Omega > 0 and S0 >= S >= 0")
+        self.undamped = "zeta" not in series and zeta.is_zero()
+        if series:
+            p = {name: c if name in series else arb_series([c]) for name, c in p.items()}
+        self.omega, self.s, self.s0, self.h, self.zeta = (p[name] for name in PARAMETERS)
+        single = "h" not in series and h.is_zero()
+        self.waves = [(self.omega, 0 * self.omega + 1), (3 * self.omega, self.h)][: 2 - single]
         periods, self.half = data["periods"], data["half"]
         if type(periods) is not int or periods < 1 or self.half not in (False, periods % 2 == 1):
             raise Refused("it is no orbit of that many periods, or not symmetric in this way")
@@ -60,95 +67,88 @@ class Scene:
             raise Refused("its segments are not 1 to 400 slides and sticks")
         self.segments, self.count = [SEGMENTS[name] for name in names], len(names)
 
-    def box(self, data: dict[str, Any]) -> tuple[list[arb], list[arb]]:
-        """Return printed times and displacements with the half-widths of the box around them."""
-        found = [[[number(c) for c in row] for row in data[name]] for name in ("joints", "radius")]
-        if len(found[0]) != self.count or not all(r > 0 for row in found[1] for r in row):
-            raise Refused("there is not one joint with its box for each segment")
-        for (_, _, v), (_, _, wide) in zip(*found, strict=True):
-            decided(abs(v) <= wide, abs(v) > wide, "the printed velocity is 0 within its box")
-        printed, radii = ([c for t, x, _ in rows for c in (t, x)] for rows in found)
-        return printed, radii
+    def force(self, t: Any, order: int = 0) -> Any:
+        """Return f(t) or one of two derivatives of it."""
+        phases = [(a * w**order, w * t) for w, a in self.waves]
+        found = [a * (phase.sin() if order == 1 else phase.cos()) for a, phase in phases]
+        return sum(found[1:], found[0]) * (-1 if order else 1)
 
-    def force(self, t: arb, order: int = 0) -> arb:
-        """Return f(t) or a derivative of it."""
-        waves = ((arb(1), self.omega), (self.h, 3 * self.omega))
-        return sum((a * (acb(0, w) ** order * acb(0, w * t).exp()).real for a, w in waves), arb(0))
-
-    def forced(self, t: arb, tau: arb) -> tuple[arb, arb]:
+    def forced(self, t: Any, tau: Any) -> tuple[Any, Any]:
         """Return what f adds to displacement and velocity some time after t, from rest at 0."""
-        x, v = arb(0), arb(0)
-        for w, amplitude in ((self.omega, arb(1)), (3 * self.omega, self.h)):
-            if amplitude.is_zero():
-                continue
-            if self.zeta.is_zero():  # also at resonance
-                sine, cosine = (w * t).sin_cos()
-                near, far = ((1 - w) * tau / 2).sinc(), (1 + w) * tau / 2
-                p, q = tau * tau / 2 * far.sinc() * near, tau * far.cos() * near
-                x += amplitude * (cosine * p - sine * (tau.sin() - q) / (1 + w))
+        x = v = 0 * tau
+        c, dc, d, dd = self.free(tau)
+        for w, amplitude in self.waves:
+            (sine, cosine), (later, last) = ((w * s).sin_cos() for s in (t, t + tau))
+            if self.undamped:  # also at resonance
+                near, far = (1 - w) * tau / 2, (1 + w) * tau / 2
+                near = near.sinc() if isinstance(near, arb) else near.sin() / near
+                p, q = tau * near * far.sin() / (1 + w), tau * far.cos() * near
+                x += amplitude * (cosine * p - sine * (d - q) / (1 + w))
                 v += amplitude * (cosine * (q + (w * tau).sin()) / (1 + w) - sine * w * p)
                 continue
-            response = amplitude / acb(1 - w * w, 2 * self.zeta * w)  # of the steady state
-            now, later = (response * acb(0, w * s).exp() for s in (t, t + tau))
-            c, dc, d, dd = self.free(tau)
-            x += later.real - now.real * c + w * now.imag * d
-            v += w * now.imag * dd - w * later.imag - now.real * dc
+            real, imag = 1 - w * w, -2 * self.zeta * w  # of the steady state
+            size = amplitude / (real * real + imag * imag)
+            begin, speed = real * cosine - imag * sine, -w * (real * sine + imag * cosine)
+            x += size * (real * last - imag * later - begin * c - speed * d)
+            v -= size * (w * (real * later + imag * last) + begin * dc + speed * dd)
         return x, v
 
-    def free(self, tau: arb) -> tuple[arb, arb, arb, arb]:
+    def free(self, tau: Any) -> tuple[Any, Any, Any, Any]:
         """Return C, C', D and D' after a duration."""
-        angle, decay = acb(1 - self.zeta * self.zeta).sqrt() * tau, (-self.zeta * tau).exp()
-        near, d = angle.cos().real, tau * angle.sinc().real  # real beyond critical damping, too
+        if self.undamped:
+            d, c = tau.sin_cos()
+            return c, -d, d, c
+        square, decay = 1 - self.zeta * self.zeta, (-self.zeta * tau).exp()
+        if isinstance(tau, arb):  # real beyond critical damping, too
+            angle = acb(square).sqrt() * tau
+            near, d = angle.cos().real, tau * angle.sinc().real
+        else:
+            near, d = (square.sqrt() * tau).cos(), (square.sqrt() * tau).sin() / square.sqrt()
         c, slope = near + self.zeta * d, near - self.zeta * d
         return decay * c, -decay * d, decay * d, decay * slope
 
-    def slide(self, direction: int, t: arb, x: arb, tau: arb) -> tuple[arb, arb]:
-        """Return displacement and velocity of a slide that starts with velocity 0."""
+    def slide(self, direction: int, t: Any, x: Any, tau: Any) -> tuple[Any, Any, Any]:
+        """Return displacement, velocity and acceleration in a slide that starts with velocity 0."""
         c, dc, _, _ = self.free(tau)
         (forced, speed), offset = self.forced(t, tau), -direction * self.s
-        return offset + (x - offset) * c + forced, (x - offset) * dc + speed
+        y, v = offset + (x - offset) * c + forced, (x - offset) * dc + speed
+        return y, v, self.force(t + tau) - y - 2 * self.zeta * v + offset
 
-    def acceleration(self, direction: int, t: arb, x: arb, v: arb) -> arb:
-        """Return the acceleration in a slide."""
-        return self.force(t) - x - 2 * self.zeta * v - direction * self.s
-
-    def observed(self, z: list[arb], i: int, surface: str, tau: arb) -> tuple[arb, arb, arb]:
+    def observed(self, z: list[Any], i: int, surface: str, tau: Any) -> tuple[Any, Any, Any]:
         """Return the observable of a surface with two derivatives, some time after the start of a segment."""
         (t, x), direction = self.joint(z, i), self.segments[i][0]
-        y, v, a = x, arb(0), arb(0)
-        if direction:
-            y, v = self.slide(direction, t, x, tau)
-            a = self.acceleration(direction, t + tau, y, v)
+        y, v, a = self.slide(direction, t, x, tau) if direction else (x, 0 * x, 0 * x)
+        first = v - self.force(t + tau, 1)
         if surface == "v":
-            return v, a, self.force(t + tau, 1) - v - 2 * self.zeta * a
+            return v, a, -first - 2 * self.zeta * a
         load = y - self.force(t + tau) - (self.s0 if surface == "F+" else -self.s0)
-        return load, v - self.force(t + tau, 1), a - self.force(t + tau, 2)
+        return load, first, a - self.force(t + tau, 2)
 
-    def joint(self, z: list[arb], i: int) -> tuple[arb, arb]:
+    def joint(self, z: list[Any], i: int) -> tuple[Any, Any]:
         """Return joint i, the last one by periodicity or symmetry."""
         if i < self.count:
             return z[2 * i], z[2 * i + 1]
         return z[0] + self.turn, -z[1] if self.half else z[1]
 
-    def segment(self, z: list[arb], i: int) -> tuple[list[arb], Any, Any]:
+    def segment(self, z: list[Any], i: int) -> tuple[list[Any], Any, Any]:
         """Return what vanishes for a segment, with its derivatives by (t, x) at its start and at its end."""
-        (t, x), (end, y) = self.joint(z, i), self.joint(z, i + 1)
-        direction, side = self.segments[i]
-        zero, one = arb(0), arb(1)
+        (t, x), (end, y), (direction, side) = (
+            *(self.joint(z, k) for k in (i, i + 1)),
+            self.segments[i],
+        )
+        zero, one = 0 * t, 0 * t + 1
         if not direction:
             values, slope = [y - x, y - self.force(end) - side * self.s0], -self.force(end, 1)
             return values, ((zero, -one), (zero, zero)), ((zero, one), (slope, one))
-        reached, v = self.slide(direction, t, x, end - t)
-        first = self.acceleration(direction, t, x, zero)
-        last = self.acceleration(direction, end, reached, v)
+        reached, v, last = self.slide(direction, t, x, end - t)
+        first = self.force(t) - x - direction * self.s
         c, dc, d, dd = self.free(end - t)
-        own = ((-first * d, c), (-first * dd, dc))
-        return [reached - y, v], own, ((v, -one), (last, zero))
+        return [reached - y, v], ((-first * d, c), (-first * dd, dc)), ((v, -one), (last, zero))
 
-    def equations(self, z: list[arb]) -> tuple[list[arb], arb_mat]:
+    def equations(self, z: list[Any]) -> tuple[list[Any], list[list[Any]]]:
         """Return what vanishes for a solution, and its Jacobian, two rows a segment."""
-        size, values = 2 * self.count, list[arb]()
-        rows = [[arb(0)] * size for _ in range(size)]
+        size, values = 2 * self.count, list[Any]()
+        rows = [[0 * z[0]] * size for _ in range(size)]
         for i in range(self.count):
             found, own, after = self.segment(z, i)
             values += found
@@ -157,36 +157,4 @@ class Scene:
                 for k in (0, 1):
                     row[2 * i + k] += start[k]
                     row[(2 * i + 2 + k) % size] += end[k] * closing**k
-        return values, arb_mat(rows)
-
-    def enclosed(
-        self, centre: list[arb], widths: list[arb] | None, what: str, left: Any = (-1, -1)
-    ) -> tuple[list[arb], list[arb]]:
-        """Return the only zero in a box, and the half-widths of the box; without widths, of some box."""
-        tries, widths = (1, widths) if widths else (12, [arb(2) ** (-ctx.prec // 2)] * len(centre))
-        for _ in range(tries):
-            widths = [w * (n != left[1]) for n, w in enumerate(widths)]
-            box = [c + arb(0, w) for c, w in zip(centre, widths, strict=True)]
-            zero = self.image(box, left)
-            if all(n == left[1] or x.contains_interior(zero[n]) for n, x in enumerate(box)):
-                for _ in range(6):
-                    zero = self.image(zero, left)  # what a box holds lies in its image
-                return zero, widths
-            off = [2 * abs(z - c).upper() for z, c in zip(zero, centre, strict=True)]
-            widths = [max(pair, key=float) for pair in zip(widths, off, strict=True)]
-        raise Undecided(what)
-
-    def image(self, box: list[arb], left: Any = (-1, -1)) -> list[arb]:
-        """Return Krawczyk's image of a box: it holds each zero there (one equation, one unknown left out)."""
-        rows, columns = ([n for n in range(2 * self.count) if n != out] for out in left)
-        centre = [arb(c.mid()) if n in columns else c for n, c in enumerate(box)]
-        values, jacobian = self.equations(centre)
-        wide = self.equations(box)[1]
-        near, wide = (arb_mat([[m[a, b] for b in columns] for a in rows]) for m in (jacobian, wide))
-        identity = arb_mat([[int(a == b) for b in columns] for a in columns])
-        inverse = near.mid().solve(identity, algorithm="approx").mid()
-        spread = arb_mat([[box[n] - centre[n]] for n in columns])
-        residual = arb_mat([[values[n]] for n in rows])
-        moved = (identity - inverse * wide) * spread - inverse * residual
-        found = dict(zip(columns, moved.entries(), strict=True))
-        return [c + found[n] if n in found else c for n, c in enumerate(centre)]
+        return values, rows

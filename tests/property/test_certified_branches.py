@@ -243,3 +243,15 @@ def test_without_its_event_an_end_is_open() -> None:
     )
     certificate = bare.certify()
     assert not certificate.complete and certificate.open
+
+
+@pytest.mark.parametrize("parameter", ["alpha", "delta"])
+def test_what_vanishes_identically_in_the_parameters_is_known_along_a_branch(
+    parameter: str,
+) -> None:
+    """A rate that is 0 where rest is left is that of the surface at which it is, at every parameter."""
+    orbit = cf.find_orbit("dead-band")
+    value = orbit.params[parameter]
+    span = (value * (1 - 1e-3), value * (1 + 1e-3))
+    proof = cf.continue_orbit(orbit, parameter, span).certify()
+    assert proof.complete, (proof.gaps, proof.open)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import sympy
@@ -128,6 +128,22 @@ def affine_model(definition: str) -> AffineModel:
     )
 
 
+@lru_cache(maxsize=4096)
+def alike(affine: AffineModel, surface: str, mode: str) -> str | None:
+    """Return the surface whose row is the rate of another one along a mode, or its negative, in symbols."""
+    n, (row,), field = affine.states, affine.surfaces[surface], affine.fields[mode]
+    rate = [sum(row[i] * field[i][j] for i in range(n)) for j in range(len(row))]
+    for k, w in enumerate(affine.frequencies):
+        at = n + 1 + 2 * k
+        rate[at] += w * row[at + 1]
+        rate[at + 1] -= w * row[at]
+    for name, (other,) in affine.surfaces.items():
+        pairs = list(zip(rate, other, strict=True))
+        if any(all(sympy.expand(a + sign * b) == 0 for a, b in pairs) for sign in (1, -1)):
+            return name
+    return None
+
+
 def _affine(formulas: Formulas, texts: list[Any], what: str, name: str) -> list[AffineForm]:
     found = formulas.affine(texts)
     if isinstance(found, str):
@@ -218,4 +234,5 @@ def _evaluated(
         list(affine.turns),
         {name: reset(rows) for name, rows in affine.resets.items()},
         slopes,
+        partial(alike, affine) if one else None,
     )

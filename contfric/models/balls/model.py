@@ -46,6 +46,9 @@ class BallModel:
     slopes : BallModel or None
         Derivatives by the free parameter, if there is one; of a model of slopes the second ones, if they are
         known.
+    alike : callable or None
+        Returns the surface whose row is the rate of another one along a mode, or its negative, identically in
+        the parameters: balls of the two rows do not show it.
     """
 
     states: int
@@ -56,6 +59,7 @@ class BallModel:
     turns: list[int]
     resets: dict[str, arb_mat] = field(default_factory=dict)
     slopes: BallModel | None = None
+    alike: Callable[[str, str], str | None] | None = None
 
     @cached_property
     def rows(self) -> dict[str, Vector]:

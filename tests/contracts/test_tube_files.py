@@ -1,0 +1,174 @@
+"""Tubes in certificate files: verified by the independent checker, refused where they are wrong."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import contfric as cf
+from contfric.certify.branch import certify_branch
+from contfric.certify.files import verify
+from contfric.certify.tube_file import tubes_of
+from contfric.verify.file import check_text
+
+PARAMS = {"Omega": 0.54, "S": 0.32, "S0": 0.4}
+
+
+@cache
+def tube(name: str, omega: float, low: float, high: float) -> str:
+    """Return the only tube of a branch of Fig. 5 as a text."""
+    orbit = cf.solve_orbit("coulomb", name, {**PARAMS, "Omega": omega})
+    (found,) = tubes_of(certify_branch(cf.continue_orbit(orbit, "Omega", (low, high))))
+    return json.dumps(found)
+
+
+def fold() -> dict[str, Any]:
+    """Return the tube of 1a about its fold, up to its end at a CS."""
+    data: dict[str, Any] = json.loads(tube("1a", 0.54, 0.53, 0.6))
+    return data
+
+
+def is_verified(data: dict[str, Any]) -> bool:
+    return check_text(json.dumps(data)).yes
+
+
+def test_a_tube_with_a_fold_and_two_ends_is_verified() -> None:
+    data = fold()
+    answer = check_text(json.dumps(data))
+    assert answer.yes, answer.why
+    assert [kind for _, kind in data["events"]] == ["SN"]
+    assert data["ends"][1][0] == "CS"
+    assert {"one curve", "admissible", "1 events of multipliers"} <= set(answer.statements)
+
+
+@pytest.mark.parametrize(
+    ("name", "omega", "span", "kinds", "ends"),
+    [
+        ("2s", 0.5, (0.485, 0.6), ["BP"], [None, "CS"]),
+        ("0s", 0.55, (0.4, 0.56), [], ["CS", None]),
+        ("1a", 0.5, (0.4, 0.5), [], ["SS", None]),
+    ],
+)
+def test_tubes_from_event_to_event(
+    name: str, omega: float, span: tuple[float, float], kinds: list[str], ends: list[str | None]
+) -> None:
+    data = json.loads(tube(name, omega, *span))
+    answer = check_text(json.dumps(data))
+    assert answer.yes, answer.why
+    assert [kind for _, kind in data["events"]] == kinds
+    assert [end and end[0] for end in data["ends"]] == ends
+
+
+def _bridge_the_sheets(data: dict[str, Any]) -> None:
+    """Leave the boxes about the fold out: from one sheet to the other at about one value of Omega."""
+    k = data["events"][0][0]
+    del data["knots"][k - 4 : k + 6]
+    data["events"] = []
+
+
+def _shift_a_knot(data: dict[str, Any]) -> None:
+    knot = data["knots"][5]
+    period = 2 * 3.141592653589793 / knot[-1]
+    knot[:-1:2] = [t + period for t in knot[:-1:2]]
+
+
+def _beyond_the_end(data: dict[str, Any]) -> None:
+    data["ends"][1] = None
+
+
+def _other_end(kind: str) -> Callable[[dict[str, Any]], None]:
+    def change(data: dict[str, Any]) -> None:
+        data["ends"][1][0] = kind
+
+    return change
+
+
+def _end_without_one_of_its_stops(data: dict[str, Any]) -> None:
+    data["ends"][1][1] = data["ends"][1][1][:1]
+
+
+def _end_at_the_other_limit(data: dict[str, Any]) -> None:
+    data["ends"][1][1] = [[i, -level] for i, level in data["ends"][1][1]]
+
+
+def _end_too_early(data: dict[str, Any]) -> None:
+    data["knots"] = data["knots"][:-4]
+
+
+def _of_another_branch(data: dict[str, Any]) -> None:
+    """The knots of the other branch of three segments: the mirror image."""
+    for knot in data["knots"]:
+        knot[1:-1:2] = [-x for x in knot[1:-1:2]]
+
+
+def _set(name: str, value: Any) -> Callable[[dict[str, Any]], None]:
+    return lambda data: data.__setitem__(name, value)
+
+
+def _param(name: str, value: float) -> Callable[[dict[str, Any]], None]:
+    return lambda data: data["params"].__setitem__(name, value)
+
+
+def _swap_segments(data: dict[str, Any]) -> None:
+    data["segments"][0], data["segments"][1] = data["segments"][1], data["segments"][0]
+
+
+def _rotate_segments(data: dict[str, Any]) -> None:
+    data["segments"] = [*data["segments"][1:], data["segments"][0]]
+
+
+def _fold_elsewhere(data: dict[str, Any]) -> None:
+    data["events"][0][0] += 3
+
+
+WRONG: dict[str, Callable[[dict[str, Any]], None]] = {
+    "no fold": _set("events", []),
+    "a fold in another box": _fold_elsewhere,
+    "PD for SN": lambda data: data["events"][0].__setitem__(1, "PD"),
+    "two folds": lambda data: data["events"].append([3, "SN"]),
+    "from sheet to sheet": _bridge_the_sheets,
+    "a knot a period later": _shift_a_knot,
+    "beyond the end": _beyond_the_end,
+    "SS for CS": _other_end("SS"),
+    "AS for CS": _other_end("AS"),
+    "SN as an end": _other_end("SN"),
+    "one of two stops": _end_without_one_of_its_stops,
+    "the other limit": _end_at_the_other_limit,
+    "an end that is not reached": _end_too_early,
+    "mirrored knots": _of_another_branch,
+    "another S": _param("S", 0.3205),
+    "another S0": _param("S0", 0.4004),
+    "some h": _param("h", 1e-3),
+    "some damping": _param("zeta", 1e-3),
+    "another parameter": _set("parameter", "S"),
+    "three periods": _set("periods", 3),
+    "half": _set("half", True),
+    "swapped segments": _swap_segments,
+    "rotated segments": _rotate_segments,
+    "one knot": lambda data: data.__setitem__("knots", data["knots"][:1]),
+    "the same knot twice": lambda data: data["knots"].insert(5, data["knots"][5]),
+    "no numbers": lambda data: data["knots"][3].__setitem__(0, "1"),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_wrong_tube_is_refused(wrong: str) -> None:
+    data = copy.deepcopy(fold())
+    WRONG[wrong](data)
+    assert not is_verified(data)
+
+
+def test_a_tube_of_fewer_knots_of_one_curve_is_one(tmp_path: Path) -> None:
+    data = json.loads(tube("0s", 0.55, 0.4, 0.56))
+    data["knots"] = data["knots"][::2] if len(data["knots"]) % 2 else data["knots"][1::2]
+    data["ends"] = [None, None]
+    data["knots"] = data["knots"][1:-1]
+    path = tmp_path / "tube.json"
+    path.write_text(json.dumps(data))
+    assert verify(path).yes
