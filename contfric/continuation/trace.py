@@ -294,8 +294,10 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     reached = after if limit is None else limit[0]
     if np.any(reached.tests[:-EXTRA] < -_VIOLATED):
         side.drop_tip()
-        near = is_at_limit(side.tip.value, settings)
-        side.end = limit_end(side.tip.value, settings) if near else End(EndReason.SINGULAR)
+        if is_at_limit(side.tip.value, settings):
+            side.end = limit_end(side.tip.value, settings)
+        elif not _end_of_holds(orbit, side, settings, True):
+            side.end = End(EndReason.SINGULAR)
         return True
     if limit is None:
         return False

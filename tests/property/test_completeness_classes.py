@@ -36,6 +36,7 @@ CLASSES: dict[str, tuple[tuple[int, int], ...]] = {
     "a hold that grows slowly": ((2, 58),),
     "a branch point of a bridge beside its end": ((2, 169),),
     "a hold on a limit from which its load no longer falls": ((1, 2323), (1, 2146)),
+    "two holds end at once, and Newton fails just before it": ((31, 25),),
     "two touches within one step": ((1, 435), (1, 1117), (1, 2243), (1, 2331), (1, 2413)),
 }
 #: Random scenes of a slow run: as many as take a few minutes.
