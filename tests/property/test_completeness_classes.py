@@ -9,6 +9,7 @@ import sys
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import contfric as cf
@@ -37,6 +38,7 @@ CLASSES: dict[str, tuple[tuple[int, int], ...]] = {
     "a branch point of a bridge beside its end": ((2, 169),),
     "a hold on a limit from which its load no longer falls": ((1, 2323), (1, 2146)),
     "two holds end at once, and Newton fails just before it": ((31, 25),),
+    "a touch that splits into two of equal height": ((21, 3),),
     "two touches within one step": ((1, 435), (1, 1117), (1, 2243), (1, 2331), (1, 2413)),
 }
 #: Random scenes of a slow run: as many as take a few minutes.
@@ -104,6 +106,31 @@ def test_located_openings_open() -> None:
                 assert event.accuracy <= ROUGH
                 checked += 1
     assert checked >= 4
+
+
+def test_a_bridge_goes_on_where_its_touch_splits() -> None:
+    """At h = -1/9 the maximum of cos t + h cos 3t becomes two; only the time of the pin turns there."""
+    found, checked = diagram(21, 3), 0
+    low, place = found.range[0], -1.0 / 9.0
+    assert low < place and not found.of_kind("SN")
+    for event in found.of_kind("AS"):
+        if abs(event.params["h"] - place) > 1e-3:
+            continue
+        assert abs(event.params["h"] - place) < event.accuracy * (found.range[1] - low)
+        (node,) = [n for n in found.events if n.bifurcation is event]
+        sides = sorted(found.branches[k].values.mean() - place for k in node.branches)
+        assert len(sides) == 2 and sides[0] < 0.0 < sides[1]
+        checked += 1
+    assert checked == 2
+    for branch in (b for b in found.branches if b.bridge and not b.mirrored):
+        for orbit in (branch[k] for k in range(0, len(branch), 5)):
+            for hold in (h for h in orbit.system.holds if h.after_rest):
+                h, phase = orbit.params["h"], orbit.cycle[hold.segment, 0] * orbit.params["Omega"]
+                if abs(h - place) < 1e-8:  # the event, and points that cannot be told from it
+                    continue
+                angle = (phase + np.pi / 2.0) % np.pi - np.pi / 2.0  # from the next multiple of pi
+                equal = np.arcsin(np.sqrt((9.0 * h + 1.0) / (12.0 * h))) if h < place else 0.0
+                assert abs(angle + equal) < 1e-7, (h, angle)
 
 
 FIRES = """
