@@ -133,6 +133,27 @@ def test_a_bridge_goes_on_where_its_touch_splits() -> None:
                 assert abs(angle + equal) < 1e-7, (h, angle)
 
 
+@pytest.mark.parametrize("friction", [0.0716077640887964, 0.05])
+def test_a_branch_into_resonance_ends_where_power_balances(friction: float) -> None:
+    """At Omega = 1/3 the third harmonic, h cos t, does the work pi h A a turn, and friction takes 4 S A."""
+    params = {"Omega": 1.0 / 3.0, "S": friction, "S0": 1.2 * friction, "h": 0.0, "zeta": 0.0}
+    orbit = cf.find_orbit("coulomb", params, longest=1000)
+    found = cf.explore(orbit, "h", (-0.05, 0.15))
+    ends = [
+        (branch, end)
+        for branch in found.branches
+        for end in branch.ends
+        if end.reason is cf.EndReason.UNBOUNDED
+    ]
+    assert len(ends) == 1 and not found.loose_ends
+    branch, end = ends[0]
+    value = branch.values[0 if end is branch.ends[0] else -1]
+    assert abs(4.0 * friction / np.pi - value) < 1e-8
+    again = cf.continue_orbit(branch[len(branch) // 8], "h", (-0.05, 0.15), max_step=0.0031)
+    assert [e.reason is cf.EndReason.UNBOUNDED for e in again.ends].count(True) == 1
+    assert abs(again.values[-1] - value) < 1e-8 or abs(again.values[0] - value) < 1e-8
+
+
 FIRES = """
 name: resonator
 states: [x, y]
