@@ -22,11 +22,15 @@ from contfric.atlas.verification import Verification
 
 WHAT = "Diagrams of random scenes in all five parameters, explored again from up to six of their branches."
 #: Longest that one scene may take with its restarts (s of processor time); longer ones are counted as cut.
-LIMIT = 60.0
-#: Most branches of a diagram; those with more are counted as cut.
-MOST_BRANCHES = 60
+#: Diagrams of some 600 branches end by themselves; they take 20 s, and a restart two to three times that.
+LIMIT = 240.0
+#: Most branches of a diagram, far above what any has: what a diagram needs is bounded by its time.
+MOST_BRANCHES = 3000
 #: Restarts a scene, and scenes of a chunk of work.
 RESTARTS, CHUNK = 6, 10
+#: Branches of all restarts of a scene together: a large diagram is restarted from fewer of its branches, at
+#: least from one. Counted in branches, and not in time, the restarts are the same on every machine.
+RESTARTED = 360
 #: S0 and S this near (relative) are equal: conditions degenerate together.
 EQUAL = 1e-6
 #: Omega this near to 1/n with this little damping: a slide lasts whole half natural periods whatever its
@@ -114,6 +118,7 @@ def one_scene(tally: Tally, found: Scene, most: int = RESTARTS) -> None:
     tally.met("events", len(diagram.events))
     tally.met("loose ends", len(diagram.loose_ends))
     name = excuse(found)
+    most = min(most, max(1, RESTARTED // len(diagram.branches)))
     report(tally, found, diagram.verify(most), name)
     points = [orbit for branch in diagram.branches if not branch.mirrored for orbit in branch]
     wrong = [orbit for orbit in points if not orbit.admissible]

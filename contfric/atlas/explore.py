@@ -18,6 +18,7 @@ from contfric.atlas.diagram import Asked, Diagram
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.follow import follow
 from contfric.atlas.seeds import Seeds, attractors
+from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, settings_of
@@ -114,19 +115,20 @@ def explore(
         )
     stops = settings.stop_at
     asked = Asked(max_step, stability, bridges, most, again, max_branches, max_points, stops)
-    # tables that grow as modes are visited belong to one thread
-    with nullcontext() if orbit.model.composed else in_advance():
-        _follow_from(state, orbit, seeds)
-    return collect(
-        orbit.model,
-        settings,
-        (float(range[0]), float(range[1])),
-        state.branches,
-        state.events,
-        tuple(state.notes),
-        state.complete,
-        replace(asked, max_periods=state.max_periods, copies=state.copies),
-    )
+    with one_thread():
+        # tables that grow as modes are visited belong to one thread
+        with nullcontext() if orbit.model.composed else in_advance():
+            _follow_from(state, orbit, seeds)
+        return collect(
+            orbit.model,
+            settings,
+            (float(range[0]), float(range[1])),
+            state.branches,
+            state.events,
+            tuple(state.notes),
+            state.complete,
+            replace(asked, max_periods=state.max_periods, copies=state.copies),
+        )
 
 
 def _follow_from(state: Exploration, orbit: Orbit, seeds: Seeds | None) -> None:

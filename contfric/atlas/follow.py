@@ -27,6 +27,7 @@ from contfric.atlas.leaving_event import (
     settings_for,
 )
 from contfric.atlas.matching import SAME_MOTION, same_kind, stops_apart
+from contfric.atlas.splitting import follow_split
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, sequences_of
 from contfric.continuation.continuum import in_continuum
@@ -114,7 +115,7 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
             if event.proposals and event.proposals[-1].verdict is not Verdict.REFUSED:
                 words |= candidate.words
         event.kinds |= {n.kind for n in incident.names if n.before & words and n.after & words}
-        if accepted:
+        if accepted or follow_split(state, event):
             return
     if not jumps:  # else motions near the event are not near what follows it
         _follow_flow(state, event)

@@ -22,6 +22,7 @@ import numpy as np
 from contfric.atlas.balance import Balance, IndexSum, balances, index_sums
 from contfric.atlas.degenerate import degenerate_events, unresolved
 from contfric.atlas.matching import identity, on_branch, same_place
+from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation
 from contfric.continuation.points import LARGEST_STEP
@@ -139,9 +140,10 @@ def verify(diagram: Diagram, restarts: int = 6, step: float = STEP) -> Verificat
     step : float
         Largest step of the restarts, in largest steps of the diagram.
     """
-    again = tuple(_restart(diagram, i, step) for i in _chosen(diagram, restarts))
-    sums = tuple(balances(diagram)), tuple(index_sums(diagram))
-    return Verification(again, *sums, tuple(degenerate_events(diagram)))
+    with one_thread():
+        again = tuple(_restart(diagram, i, step) for i in _chosen(diagram, restarts))
+        sums = tuple(balances(diagram)), tuple(index_sums(diagram))
+        return Verification(again, *sums, tuple(degenerate_events(diagram)))
 
 
 # --------------------------------------------------------------------------------- restarts

@@ -7,6 +7,7 @@ import numpy as np
 from contfric.continuation.accuracy import Estimate
 from contfric.continuation.events import Bifurcation, Kind, outward_rate
 from contfric.continuation.points import Point, Settings
+from contfric.continuation.split_touch import splits
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Test
 
@@ -28,7 +29,9 @@ def bifurcation_at(
 ) -> Bifurcation:
     """Return the event at a point, with the stability of the points before and after it."""
     sides, least = (before, after), ROUGH if _is_rough(kind, here, tests) else 0.0
-    bound = Estimate(kind, here, tests, sides, point, settings.parameter, settings.width, least)
+    bound: Estimate | float = ROUGH
+    if kind is not Kind.AS or not splits(here):
+        bound = Estimate(kind, here, tests, sides, point, settings.parameter, settings.width, least)
     return Bifurcation(
         kind,
         here.params,

@@ -12,6 +12,7 @@ from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.locate_change import locate_change, locate_label
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.report import ROUGH, bifurcation_at
+from contfric.continuation.split_touch import as_split
 from contfric.continuation.vertices import (
     opens_through,
     parabola_vertex,
@@ -110,8 +111,29 @@ def _fold_between(
     crossing = _vertex_of_crossing(orbit, before, after, beyond, share, settings)
     if crossing is not None:
         return [crossing]
+    split = _split_between(orbit, before, after, share, settings)
+    if split is not None:
+        return [split]
     vertical = _is_vertical(before, after, settings)
     return [] if vertical else [_not_located(orbit, Kind.SN, before, beyond, settings)]
+
+
+def _split_between(
+    orbit: Orbit, before: Point, after: Point, share: float, settings: Settings
+) -> Located | None:
+    """Return where the touch that a hold is pinned to splits, if that is why the slope changes its sign.
+
+    Around it Newton may be lost: the step is taken back until it is as short as the place is known.
+    """
+    if not orbit.system.holds:
+        return None
+    here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    found = bifurcation_at(Kind.SN, here, before, after, before, settings)
+    split = as_split(found, before.tangent + share * (after.tangent - before.tangent))
+    if split is None:
+        return None
+    far = after.arc - before.arc > _SHORTEST_LEAP
+    return replace(split, bound=ROUGH), replace(before, lost=far)
 
 
 def _fold_at(
@@ -125,6 +147,9 @@ def _fold_at(
     crossing = _vertex_of_crossing(orbit, before, after, beyond, share, settings)
     if crossing is not None:
         return [crossing]
+    split = as_split(vertex[0], point.tangent)
+    if split is not None:
+        return [(split, point)]
     vertical = _is_vertical(before, after, settings, point)
     return [] if vertical or _is_idle(orbit, before, point, after, settings) else [vertex]
 

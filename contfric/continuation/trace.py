@@ -53,6 +53,10 @@ _VIOLATED = 1e-9
 #: comes to an equilibrium.
 _LONGER, _STANDS = 1.5, 1e-6
 
+#: A parameter that changes by less than this share of the range over hundreds of points, while states are
+#: this large and grow by this factor, comes to a resonance.
+_AT_RESONANCE, _LARGE, _GROWS = 1e-7, 1e3, 1.1
+
 #: A step this short after hundreds of points (arclength) gets nowhere.
 _CRAWLS = 1e-6
 
@@ -217,6 +221,9 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and _slows_down(side, settings):
             side.end = End(EndReason.PERIOD)
         return True, step
+    if why == kernels.FULL and _grows(side, settings):
+        side.end = End(EndReason.UNBOUNDED)
+        return True, step
     if why == kernels.FULL:
         return _end_of_holds(orbit, side, settings, step < _CRAWLS), step
     return _resolve(orbit, side, settings), step
@@ -240,6 +247,19 @@ def _slows_down(side: Side, settings: Settings) -> bool:
         abs(tip.slope) < _STANDS * settings.width
         and tip.joints[0, 0] < _LONGER * first.joints[0, 0]
     )
+
+
+def _grows(side: Side, settings: Settings) -> bool:
+    """Tell whether a side has run along one value of the parameter while only its amplitude grew.
+
+    In resonance the amplitude grows as the inverse of the distance of the parameter from a limit that it
+    never reaches; far out the orbits are determined to fewer digits than that distance has.
+    """
+    values, last = side.rows.w[: side.last + 1, 0], side.last
+    if np.ptp(values) > _AT_RESONANCE * settings.width:
+        return False
+    before, now = (float(np.max(np.abs(side.rows.joints[k, :, 1:]))) for k in (0, last))
+    return now > _LARGE and now > _GROWS * before
 
 
 def _end_of_holds(orbit: Orbit, side: Side, settings: Settings, stuck: bool) -> bool:
@@ -294,8 +314,10 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     reached = after if limit is None else limit[0]
     if np.any(reached.tests[:-EXTRA] < -_VIOLATED):
         side.drop_tip()
-        near = is_at_limit(side.tip.value, settings)
-        side.end = limit_end(side.tip.value, settings) if near else End(EndReason.SINGULAR)
+        if is_at_limit(side.tip.value, settings):
+            side.end = limit_end(side.tip.value, settings)
+        elif not _end_of_holds(orbit, side, settings, True):
+            side.end = End(EndReason.SINGULAR)
         return True
     if limit is None:
         return False

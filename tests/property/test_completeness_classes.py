@@ -9,6 +9,7 @@ import sys
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import contfric as cf
@@ -36,6 +37,8 @@ CLASSES: dict[str, tuple[tuple[int, int], ...]] = {
     "a hold that grows slowly": ((2, 58),),
     "a branch point of a bridge beside its end": ((2, 169),),
     "a hold on a limit from which its load no longer falls": ((1, 2323), (1, 2146)),
+    "two holds end at once, and Newton fails just before it": ((31, 25),),
+    "a touch that splits into two of equal height": ((21, 3),),
     "two touches within one step": ((1, 435), (1, 1117), (1, 2243), (1, 2331), (1, 2413)),
 }
 #: Random scenes of a slow run: as many as take a few minutes.
@@ -103,6 +106,52 @@ def test_located_openings_open() -> None:
                 assert event.accuracy <= ROUGH
                 checked += 1
     assert checked >= 4
+
+
+def test_a_bridge_goes_on_where_its_touch_splits() -> None:
+    """At h = -1/9 the maximum of cos t + h cos 3t becomes two; only the time of the pin turns there."""
+    found, checked = diagram(21, 3), 0
+    low, place = found.range[0], -1.0 / 9.0
+    assert low < place and not found.of_kind("SN")
+    for event in found.of_kind("AS"):
+        if abs(event.params["h"] - place) > 1e-3:
+            continue
+        assert abs(event.params["h"] - place) < event.accuracy * (found.range[1] - low)
+        (node,) = [n for n in found.events if n.bifurcation is event]
+        sides = sorted(found.branches[k].values.mean() - place for k in node.branches)
+        assert len(sides) == 2 and sides[0] < 0.0 < sides[1]
+        checked += 1
+    assert checked == 2
+    for branch in (b for b in found.branches if b.bridge and not b.mirrored):
+        for orbit in (branch[k] for k in range(0, len(branch), 5)):
+            for hold in (h for h in orbit.system.holds if h.after_rest):
+                h, phase = orbit.params["h"], orbit.cycle[hold.segment, 0] * orbit.params["Omega"]
+                if abs(h - place) < 1e-8:  # the event, and points that cannot be told from it
+                    continue
+                angle = (phase + np.pi / 2.0) % np.pi - np.pi / 2.0  # from the next multiple of pi
+                equal = np.arcsin(np.sqrt((9.0 * h + 1.0) / (12.0 * h))) if h < place else 0.0
+                assert abs(angle + equal) < 1e-7, (h, angle)
+
+
+@pytest.mark.parametrize("friction", [0.0716077640887964, 0.05])
+def test_a_branch_into_resonance_ends_where_power_balances(friction: float) -> None:
+    """At Omega = 1/3 the third harmonic, h cos t, does the work pi h A a turn, and friction takes 4 S A."""
+    params = {"Omega": 1.0 / 3.0, "S": friction, "S0": 1.2 * friction, "h": 0.0, "zeta": 0.0}
+    orbit = cf.find_orbit("coulomb", params, longest=1000)
+    found = cf.explore(orbit, "h", (-0.05, 0.15))
+    ends = [
+        (branch, end)
+        for branch in found.branches
+        for end in branch.ends
+        if end.reason is cf.EndReason.UNBOUNDED
+    ]
+    assert len(ends) == 1 and not found.loose_ends
+    branch, end = ends[0]
+    value = branch.values[0 if end is branch.ends[0] else -1]
+    assert abs(4.0 * friction / np.pi - value) < 1e-8
+    again = cf.continue_orbit(branch[len(branch) // 8], "h", (-0.05, 0.15), max_step=0.0031)
+    assert [e.reason is cf.EndReason.UNBOUNDED for e in again.ends].count(True) == 1
+    assert abs(again.values[-1] - value) < 1e-8 or abs(again.values[0] - value) < 1e-8
 
 
 FIRES = """

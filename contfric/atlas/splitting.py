@@ -1,0 +1,52 @@
+"""What follows where the touch that a hold is pinned to splits: the same word, pinned to the earlier touch.
+
+See :mod:`contfric.continuation.split_touch`. The equations are singular there in the time of the pin, so that
+the orbits of the other side are looked for next to the event.
+"""
+
+from __future__ import annotations
+
+from contfric.atlas.collect import Event
+from contfric.atlas.crossings import whole_branch
+from contfric.atlas.departures import ends_at
+from contfric.atlas.exploration import Exploration
+from contfric.continuation.events import Kind, Verdict
+from contfric.continuation.split_touch import pinned_first, splits
+from contfric.continuation.switching import settings_value
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.repetition import shortest
+from contfric.orbit.solve import polish
+
+#: Where an orbit of the other side is looked for, relative to the range: the pin moves by the root of it.
+_SHARES = (1e-5, -1e-5, 1e-4, -1e-4, 1e-3, -1e-3)
+_REASON = "the touch that the hold is pinned to becomes two, or two become one"
+
+
+def follow_split(state: Exploration, event: Event) -> bool:
+    """Follow a bridge through a place where a touch splits; return whether it goes on there."""
+    orbit = event.bifurcation.orbit
+    if event.bifurcation.kind is not Kind.AS or not splits(orbit):
+        return False
+    for share in _SHARES:
+        beside = _beside(state, orbit, share)
+        if beside is None or state.known(beside) is not None:
+            continue
+        branch = whole_branch(beside, state.settings)
+        if not any(ends_at(end, event, state.settings) for end in branch.ends):
+            continue
+        state.accept(event, _REASON, branch)
+        return True
+    state.judge(event, _REASON, Verdict.REFUSED, why="no orbit on the other side was found")
+    return False
+
+
+def _beside(state: Exploration, orbit: Orbit, share: float) -> Orbit | None:
+    """Return the orbit of the same word at a parameter next to the event, pinned to the first touch."""
+    settings = state.settings
+    value = settings_value(orbit, settings) + share * settings.width
+    if not settings.low <= value <= settings.high:
+        return None
+    vector = orbit.vector.copy()
+    vector[orbit.model.index_of(settings.parameter)] = value
+    solved = polish(pinned_first(orbit, vector))
+    return shortest(solved) if solved.converged and solved.admissible else None
