@@ -178,7 +178,7 @@ def test_random_scenes() -> None:
     tally = Tally()
     for index in SHARE:
         tally.index = index
-        restarts.one_scene(tally, restarts.scene(7, index), most=1)
+        restarts.one_scene(tally, restarts.scene(7, index), most=1, branches=60)
     assert not tally.failed, tally.failed
     assert tally.counts["restarts"] > 40
     assert tally.counts["balances"] > len(SHARE) // 2
