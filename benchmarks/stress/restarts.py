@@ -102,11 +102,13 @@ def chunk(seed: int, first: int, last: int) -> Tally:
     return tally
 
 
-def one_scene(tally: Tally, found: Scene, most: int = RESTARTS) -> None:
-    """Explore one scene, ask its points, and verify it."""
+def one_scene(
+    tally: Tally, found: Scene, most: int = RESTARTS, branches: int = MOST_BRANCHES
+) -> None:
+    """Explore one scene, ask its points, and verify it; one with more branches is cut."""
     try:
         orbit = cf.find_orbit("coulomb", found.params, longest=1000)
-        diagram = cf.explore(orbit, found.vary, found.range, max_branches=MOST_BRANCHES)
+        diagram = cf.explore(orbit, found.vary, found.range, max_branches=branches)
     except cf.ContfricError as error:
         tally.met(f"no start: {type(error).__name__}")
         return

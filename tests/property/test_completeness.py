@@ -179,7 +179,7 @@ def test_random_scenes(share: range) -> None:
     tally = Tally()
     for index in share:
         tally.index = index
-        restarts.one_scene(tally, restarts.scene(7, index), most=1)
+        restarts.one_scene(tally, restarts.scene(7, index), most=1, branches=60)
     assert not tally.failed, tally.failed
     assert tally.counts["restarts"] > 2 * len(share) // 3
     assert tally.counts["balances"] > len(share) // 2

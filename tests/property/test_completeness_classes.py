@@ -68,7 +68,7 @@ def test_many_random_scenes() -> None:
     tally = Tally()
     for index in MANY:
         tally.index = index
-        restarts.one_scene(tally, restarts.scene(2, index), most=3)
+        restarts.one_scene(tally, restarts.scene(2, index), most=3, branches=60)
     assert not tally.failed, tally.failed
     assert tally.counts["restarts"] > len(MANY)
 
