@@ -17,7 +17,7 @@ from contfric.continuation.crossing import Direction
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.side import first_point
 from contfric.models.definition import FloatArray
-from contfric.orbit.linear import assembled, least_vector
+from contfric.orbit.linear import assembled
 from contfric.orbit.orbit import Orbit
 from contfric.remember.advance import foreseeable
 
@@ -50,11 +50,11 @@ class Departure:
 def null_vector(orbit: Orbit) -> FloatArray:
     """Return the unit null vector of a system that is singular at fixed parameters, shape (N, m).
 
-    Done once a branch point.
+    By the singular value decomposition of the assembled Jacobian; done once a branch point.
     """
     count, m = orbit.joints.shape
     full = assembled(orbit.system, orbit.joints, orbit.vector)
-    vector = least_vector(full).reshape(count, m)
+    vector: FloatArray = np.linalg.svd(full)[2][-1].reshape(count, m)
     return vector / float(np.sqrt(np.sum(vector**2) / count))
 
 

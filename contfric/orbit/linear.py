@@ -13,10 +13,6 @@ from contfric.orbit.system import System
 #: Singular values below this share of the largest are zero: at an event they are good to the root of rounding
 #: at worst.
 _NULL = 1e-7
-#: Rows from which on LAPACK decomposes on several threads (OpenBLAS: 48).
-_LARGE = 40
-#: Steps of inverse iteration: each squares the ratio of the two least singular values.
-_ITERATIONS = 3
 
 
 def jacobian_blocks(
@@ -115,33 +111,6 @@ def null_space(
     rank = int(np.sum(size > _NULL * size[0]))
     found = right[rank:]
     return found[:, :-1].reshape(len(found), *joints.shape), found[:, -1]
-
-
-def least_vector(full: FloatArray) -> FloatArray:
-    """Return the unit vector that a singular matrix makes least.
-
-    By its singular value decomposition where it is small. That of a larger one LAPACK spreads over threads,
-    which are busy waiting: it takes ten to fifty times as long. There it is inverse iteration on the matrix
-    bordered by the last iterates (as :func:`tangent_of`), unless there is no unique null vector.
-    """
-    size = len(full)
-    if size < _LARGE:
-        return np.asarray(np.linalg.svd(full)[2][-1])
-    bordered, wanted = np.zeros((size + 1, size + 1)), np.zeros(size + 1)
-    bordered[:size, :size], wanted[size] = full, 1.0
-    left = right = np.cos(np.arange(1.0, size + 1.0))  # no vector of an orbit
-    try:
-        for _ in range(_ITERATIONS):
-            bordered[size, :size] = right / np.linalg.norm(right)
-            bordered[:size, size] = left / np.linalg.norm(left)
-            right = np.linalg.solve(bordered, wanted)[:size]
-            left = np.linalg.solve(bordered.T, wanted)[:size]
-        right = right / np.linalg.norm(right)
-    except np.linalg.LinAlgError:
-        right = np.full(size, np.nan)
-    if not np.linalg.norm(full @ right) < _NULL * np.linalg.norm(full):
-        right = np.linalg.svd(full)[2][-1]
-    return np.asarray(right)
 
 
 def pencil_of_turn(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:

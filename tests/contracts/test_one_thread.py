@@ -7,35 +7,34 @@ import threading
 import pytest
 
 import contfric as cf
-from contfric.base import one_thread as module
-from contfric.base.one_thread import one_thread
-
-control = module._control()
+from contfric.base.one_thread import libraries, one_thread
 
 
-@pytest.mark.skipif(control is None, reason="numpy has another library here")
+def threads() -> int:
+    """Return how many threads linear algebra has now."""
+    return max(library["num_threads"] for library in libraries().info())
+
+
+needs_library = pytest.mark.skipif(
+    not libraries().select(user_api="blas").info(), reason="numpy has another library here"
+)
+
+
+@needs_library
 def test_one_thread_and_as_many_as_before() -> None:
-    assert control is not None
-    ask, tell = control
-    kept = ask()
-    tell(2)
-    two = ask()  # 1 where there is one core
-    try:
+    with libraries().limit(limits=2, user_api="blas"):
+        two = threads()  # 1 where there is one core
         with pytest.raises(ValueError, match="inside"), one_thread():
             with one_thread():
-                assert ask() == 1
-            assert ask() == 1  # the outer one is not done
+                assert threads() == 1
+            assert threads() == 1  # the outer one is not done
             raise ValueError("inside")
-        assert ask() == two
-    finally:
-        tell(kept)
+        assert threads() == two
 
 
-@pytest.mark.skipif(control is None, reason="numpy has another library here")
-def test_threads_that_overlap_give_the_number_back_once() -> None:
-    assert control is not None
-    ask, _ = control
-    before, entered, leave = ask(), threading.Event(), threading.Event()
+@needs_library
+def test_threads_that_overlap_give_the_number_back() -> None:
+    before, entered, leave = threads(), threading.Event(), threading.Event()
 
     def hold() -> None:
         with one_thread():
@@ -46,16 +45,15 @@ def test_threads_that_overlap_give_the_number_back_once() -> None:
     with one_thread():
         other.start()
         assert entered.wait(10.0)
-    assert ask() == 1  # the other thread is inside yet
+        assert threads() == 1
     leave.set()
     other.join()
-    assert ask() == before
+    assert threads() == before
 
 
-@pytest.mark.skipif(control is None, reason="numpy has another library here")
+@needs_library
 def test_explorations_are_done_in_one_thread() -> None:
-    assert control is not None
-    ask, seen = control[0], []
+    seen: list[int] = []
     orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
-    diagram = cf.explore(orbit, "Omega", (0.49, 0.51), progress=lambda text: seen.append(ask()))
+    diagram = cf.explore(orbit, "Omega", (0.49, 0.51), progress=lambda text: seen.append(threads()))
     assert set(seen) == {1} and diagram.branches
