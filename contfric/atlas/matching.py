@@ -142,7 +142,8 @@ def _in_family(orbit: Orbit, branch: Branch, mirror: bool) -> bool:
 def on_branch(orbit: Orbit, branch: Branch) -> bool:
     """Tell whether an orbit (or its mirror image) lies on a branch.
 
-    Where the branch passes the orbit's parameter it is solved there and compared.
+    Where the branch passes the orbit's parameter it is solved there and compared. The stops may be the same
+    in another order, or after holds of other lengths: the motions are compared as well.
     """
     if orbit.periods != branch.system.periods or orbit.system.half != branch.system.half:
         return False
@@ -155,7 +156,8 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
     for guess in _guesses(branch, orbit, value):
         solved = polish(guess, damped=False)
         same = _SAME_ORBIT * (1.0 + float(np.max(np.abs(orbit.stops), initial=0.0)))
-        if solved.converged and stops_distance(orbit.stops, solved.stops, mirror) < same:
+        alike = solved.converged and stops_distance(orbit.stops, solved.stops, mirror) < same
+        if alike and orbit.outline.apart(solved.outline) < SAME_MOTION:
             return True
     return False
 
