@@ -20,10 +20,13 @@ from contfric.atlas.leaving_event import (
     plane_of,
     settings_for,
 )
+from contfric.atlas.matching import same_place
 from contfric.continuation.arms import Arms, arms_at
 from contfric.continuation.assembly import assemble
 from contfric.continuation.events import (
+    End,
     EndReason,
+    Kind,
     Verdict,
 )
 from contfric.continuation.points import Point
@@ -83,9 +86,29 @@ def follow_arms(state: Exploration, event: Event) -> bool:
             continue
         for sequence in necklaces(arms.letters, length):
             exchanged = _rotated(tuple(arms.letters - 1 - letter for letter in sequence))
-            if sequence <= exchanged:  # else its curve comes through the fold from that one
-                _try_arms(state, event, beside, sequence, sequence == exchanged)
+            _try_arms(state, event, beside, sequence, sequence == exchanged)
     return True
+
+
+def turns_there(state: Exploration, event: Event) -> bool:
+    """Tell whether a doubling of a bridge is a fold at which passages turn; then it becomes a part of that.
+
+    The determinant over two turns is a product over the passages as well. What ends there on its own
+    half is a sequence of arms.
+    """
+    b, settings = event.bifurcation, state.settings
+    if not b.orbit.system.holds:
+        return False
+    for fold in state.events:
+        own = fold.bifurcation
+        if own.kind not in (Kind.SN, Kind.BP) or not same_place(
+            own, b, settings.parameter, settings.width
+        ):
+            continue
+        if arms_at(own.orbit) is not None:
+            state.merge(fold, End(EndReason.PD, bifurcation=b))
+            return True
+    return False
 
 
 def _rotated(sequence: tuple[int, ...]) -> tuple[int, ...]:
