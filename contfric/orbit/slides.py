@@ -6,7 +6,7 @@ inside of a slide. The slides of some length, joined over such touches, are the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -123,6 +123,12 @@ class Outline:
         cycles = np.full(self.starts.shape[1], np.inf)
         cycles[[0, *self.angles]] = [self.cycle, *(2.0 * np.pi for _ in self.angles)]
         return cycles
+
+    def repeated(self, periods: int) -> Outline:
+        """Return the same motion over a multiple of its periods."""
+        times = periods // self.periods
+        starts, images = np.tile(self.starts, (times, 1)), np.tile(self.images, (times, 1))
+        return replace(self, periods=periods, starts=starts, images=images)
 
     @cached_property
     def apart_from_image(self) -> float:
