@@ -20,11 +20,9 @@ from contfric.atlas.leaving_event import (
     plane_of,
     settings_for,
 )
-from contfric.atlas.matching import same_place
 from contfric.continuation.arms import Arms, arms_at
 from contfric.continuation.assembly import assemble
 from contfric.continuation.events import (
-    End,
     EndReason,
     Kind,
     Verdict,
@@ -70,6 +68,7 @@ def follow_arms(state: Exploration, event: Event) -> bool:
     arms = arms_at(event.bifurcation.orbit)
     if arms is None:
         return False
+    event.kinds.add(Kind.SN)  # for sequences of two units it is a doubling, too
     unit = arms.unit
     state.raise_copies(shortest(event.bifurcation.orbit).periods // unit.periods)
     most = min(state.max_periods, state.copies * unit.periods)
@@ -88,27 +87,6 @@ def follow_arms(state: Exploration, event: Event) -> bool:
             exchanged = _rotated(tuple(arms.letters - 1 - letter for letter in sequence))
             _try_arms(state, event, beside, sequence, sequence == exchanged)
     return True
-
-
-def turns_there(state: Exploration, event: Event) -> bool:
-    """Tell whether a doubling of a bridge is a fold at which passages turn; then it becomes a part of that.
-
-    The determinant over two turns is a product over the passages as well. What ends there on its own
-    half is a sequence of arms.
-    """
-    b, settings = event.bifurcation, state.settings
-    if not b.orbit.system.holds:
-        return False
-    for fold in state.events:
-        own = fold.bifurcation
-        if own.kind not in (Kind.SN, Kind.BP) or not same_place(
-            own, b, settings.parameter, settings.width
-        ):
-            continue
-        if arms_at(own.orbit) is not None:
-            state.merge(fold, End(EndReason.PD, bifurcation=b))
-            return True
-    return False
 
 
 def _rotated(sequence: tuple[int, ...]) -> tuple[int, ...]:

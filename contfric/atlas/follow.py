@@ -20,7 +20,7 @@ from contfric.atlas.crossings import follow_crossing, whole_branch
 from contfric.atlas.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.faults import fault_of
-from contfric.atlas.folds import follow_arms, follow_fold, turns_there
+from contfric.atlas.folds import follow_arms, follow_fold
 from contfric.atlas.leaving_event import (
     leave_event,
     leave_singular,
@@ -79,7 +79,7 @@ def follow(state: Exploration, event: Event) -> None:
         if not follow_arms(state, event):
             _follow_branch_point(state, event)
     elif kind is Kind.PD:
-        if not turns_there(state, event):
+        if not follow_arms(state, event):
             _follow_doubling(state, event)
     elif kind is Kind.SN:
         follow_fold(state, event)

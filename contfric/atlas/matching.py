@@ -110,12 +110,13 @@ def same_kind(a: Bifurcation, b: Bifurcation) -> bool:
     """Tell whether two events may be one by what branches call them.
 
     What is a grazing for one word may be a stop at the boundary of rest for another: the sliding events are
-    compared by their motions alone. A symmetric bridge may turn where an asymmetric one leaves it.
+    compared by their motions alone. A symmetric bridge may turn where an asymmetric one leaves it, and where
+    it turns with one passage alone orbits of several periods end on it.
     """
     if a.kind is b.kind or (a.kind in TERMINAL and b.kind in TERMINAL):
         return True
     held = bool(a.orbit.system.holds) and bool(b.orbit.system.holds)
-    return held and {a.kind, b.kind} == {Kind.SN, Kind.BP}
+    return held and {a.kind, b.kind} <= {Kind.SN, Kind.BP, Kind.PD}
 
 
 def telling_kind(kinds: Iterable[Kind]) -> Kind:
