@@ -13,6 +13,7 @@ import pytest
 import contfric as cf
 from contfric.continuation.arms import arms_at, passages, turning_passages
 from contfric.continuation.events import Kind
+from contfric.continuation.points import settings_of
 from contfric.continuation.sequences import count, lengths
 from contfric.orbit.apart import cyclic_apart, farthest_apart
 from contfric.orbit.linear import assembled
@@ -90,8 +91,6 @@ def test_a_composed_orbit_solves_its_equations_at_once() -> None:
     arms = arms_at(fold.orbit)
     assert arms is not None
     bounds = diagram.range
-    from contfric.continuation.points import settings_of
-
     settings = settings_of(fold.orbit, diagram.parameter, bounds, None, False, 1000)
     beside = arms.beside(1e-3, settings)
     assert beside is not None
