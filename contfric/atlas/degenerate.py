@@ -6,21 +6,22 @@ start; what differs is told together with it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.atlas.matching import stops_apart
+from contfric.atlas.matching import stops_distance
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
 
-#: Motions whose stops are this near to each other (one may have a hold more) may be taken for one where their
-#: parameters cannot be told apart.
+#: Motions this near to each other (one may have a hold more) may be taken for one where their parameters
+#: cannot be told apart.
 _ALIKE = 1e-3
 #: A margin this small at a smooth event: the branch that leaves it, along which margins change in proportion
 #: to the distance, ends before its parameter has changed by the rounding of one (the square of this).
@@ -40,7 +41,7 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
     for a, b in pairwise(values):
         gap = b.params[parameter] - a.params[parameter]
         known = max(ACCURACY, a.accuracy + b.accuracy) * width
-        if gap <= known and stops_apart(a.orbit, b.orbit) < _ALIKE:
+        if gap <= known and _alike(a, b):
             yield f"{a.label} and {b.label} at {a.params[parameter]:.10g}: not to be told apart"
     for branch in diagram.branches:
         if not branch.mirrored and unresolved(branch, width):
@@ -49,6 +50,19 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
     for b in values:
         if b.kind in _SMOOTH and _least_margin(b) < _SECOND:
             yield f"{b.label} at {b.params[parameter]:.10g}: a margin vanishes there, too"
+
+
+def _alike(a: Bifurcation, b: Bifurcation) -> bool:
+    """Tell whether the motions at two events may be taken for one, run through as often as it takes.
+
+    Slides one after the other are compared: sequences of the same passages in another order are told apart.
+    Where one motion has more slides than the other, only their stops can be.
+    """
+    one, other = a.outline, b.outline
+    if len(one.starts) * other.periods != len(other.starts) * one.periods:
+        return stops_distance(a.orbit.stops, b.orbit.stops, mirror=True) < _ALIKE
+    both = math.lcm(one.periods, other.periods)
+    return one.repeated(both).apart(other.repeated(both)) < _ALIKE
 
 
 def unresolved(branch: Branch, width: float) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from contfric.atlas.collect import Event
-from contfric.atlas.matching import identity, on_branch, same_event, stops_distance
+from contfric.atlas.matching import SAME_MOTION, identity, on_branch, same_event, stops_distance
 from contfric.base.interrupts import held_back
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import (
@@ -31,9 +31,15 @@ _PASSED = frozenset({Kind.SN, Kind.T, Kind.NS})
 _SAME_PLACE, _SAME_STOPS = 1e-8, 1e-6
 
 
-def _may_cross(bifurcation: Bifurcation) -> bool:
-    """Tell whether other families may pass a fold: those of several holds."""
-    return bifurcation.kind is Kind.SN and len(bifurcation.orbit.as_whole().system.holds) > 1
+def _alike(one: Orbit, other: Orbit) -> bool:
+    """Tell whether two orbits are one motion: holds of other lengths may lead to the same stops."""
+    return one.outline.apart(other.outline) < SAME_MOTION
+
+
+def _combines(bifurcation: Bifurcation) -> bool:
+    """Tell whether orbits of several copies may meet there: at sliding events, and folds of bridges."""
+    held = bool(bifurcation.orbit.system.holds) and bifurcation.kind is not Kind.T
+    return bifurcation.kind in TERMINAL or held
 
 
 @dataclass(eq=False)
@@ -77,14 +83,14 @@ class Exploration:
                 event.branches.append(index)
 
     def raise_copies(self, copies: int) -> None:
-        """Try more copies at sliding events from now on, those that were followed already among them."""
+        """Try more copies at events from now on, those that were followed already among them."""
         if copies <= self.copies:
             return
         self.copies = copies
         self.notes.append(f"copies raised to {copies}: a branch arrives with that many")
         waiting = {id(event) for event in self.waiting}
         for event in self.events:
-            if event.bifurcation.kind in TERMINAL and id(event) not in waiting:
+            if _combines(event.bifurcation) and id(event) not in waiting:
                 event.proposals.clear()
                 self.waiting.append(event)
 
@@ -108,7 +114,7 @@ class Exploration:
                 event.members.append(bifurcation)
                 if index not in event.branches:
                     event.branches.append(index)
-                if bifurcation.kind in TERMINAL:
+                if _combines(bifurcation):
                     self.raise_copies(bifurcation.orbit.periods // bifurcation.outline.periods)
                 return
         event = Event(bifurcation, [index], [bifurcation])
@@ -116,7 +122,7 @@ class Exploration:
         if not bifurcation.located:
             why = "not located: Newton fails behind this point"
             self.judge(event, "go on behind the event", Verdict.REFUSED, why=why)
-        elif bifurcation.kind not in _PASSED or _may_cross(bifurcation):
+        elif bifurcation.kind not in _PASSED or _combines(bifurcation):
             self.waiting.append(event)
 
     def merge(self, event: Event, end: End) -> None:
@@ -152,6 +158,6 @@ class Exploration:
             for tip in (branch[0], branch[-1]):
                 gap = abs(tip.params[branch.parameter] - orbit.params[branch.parameter])
                 near = stops_distance(tip.stops, orbit.stops, mirror) < _SAME_STOPS
-                if gap < _SAME_PLACE * width and near:
+                if gap < _SAME_PLACE * width and near and _alike(tip, orbit):
                     return index
         return None

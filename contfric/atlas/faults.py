@@ -76,6 +76,19 @@ def _repeats(branch: Branch) -> bool:
     return all(shortest(orbit) is not orbit for orbit in (branch[k] for k in asked))
 
 
+def _is_symmetric(branch: Branch) -> bool:
+    """Tell whether the orbits of a branch that is solved as a whole are their own symmetry images.
+
+    A symmetric branch is solved on its half: this one is reached by a step off an event near its end. Near
+    that end asymmetry may be the root of rounding, and an asymmetric branch may pass a symmetric orbit: two
+    places of three tell.
+    """
+    if branch.system.half or branch.model.symmetry is None:
+        return False
+    asked = {round(share * (len(branch) - 1)) for share in _ASKED}
+    return sum(branch[k].symmetric for k in asked) > len(asked) / 2
+
+
 #: What a branch must not be, and why it is refused then.
 _FAULTS = (
     (
@@ -90,5 +103,6 @@ _FAULTS = (
         _never_lasts,
         "a segment of it has no length anywhere: the motion of another word, that touches a surface",
     ),
+    (_is_symmetric, "its orbits are symmetric: it is another branch, which is solved on its half"),
     (_repeats, "its orbits are shorter ones, run through several times"),
 )

@@ -1,7 +1,9 @@
-"""What crosses a symmetric bridge where it turns.
+"""What passes a bridge where it turns.
 
-A hold has an effect on the orbit that is stationary in its length. There each of two symmetric holds may be
-shorter or longer, so that the bridge with one of either passes the same motion, and turns there as well.
+Where passages turn by themselves (:mod:`contfric.continuation.arms`), every cyclic sequence of their arms is
+a candidate, over as many periods as at a sliding event. Elsewhere a hold of a symmetric bridge may still
+have an effect that is stationary in its length. There each of two symmetric holds may be shorter or longer,
+so that the bridge with one of either passes the same motion, and turns there as well.
 """
 
 from __future__ import annotations
@@ -11,18 +13,22 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.atlas.collect import Event
+from contfric.atlas.crossings import whole_branch
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving_event import (
     first_end,
     plane_of,
     settings_for,
 )
+from contfric.continuation.arms import Arms, arms_at
 from contfric.continuation.assembly import assemble
 from contfric.continuation.events import (
     EndReason,
+    Kind,
     Verdict,
 )
 from contfric.continuation.points import Point
+from contfric.continuation.sequences import MOST_SEQUENCES, count, lengths, necklaces
 from contfric.continuation.side import first_point
 from contfric.continuation.switching import (
     NEARER,
@@ -33,18 +39,17 @@ from contfric.continuation.vertices import symmetrised
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import null_space
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.repetition import shortest
 
 #: An orbit this much (of its distance from a symmetric one) off its own symmetry image is asymmetric.
 _ODD = 0.1
 
 
 def follow_fold(state: Exploration, event: Event) -> None:
-    """Try the families that cross a symmetric bridge where it turns.
-
-    A hold has an effect that is stationary in its length: there each of two symmetric holds may be shorter
-    or longer, so that the bridge with one of either passes the same motion, and turns there as well.
-    """
+    """Try the families that pass a bridge where it turns."""
     orbit = event.bifurcation.orbit
+    if follow_arms(state, event) or len(orbit.as_whole().system.holds) < 2:
+        return
     half = orbit if orbit.system.half else symmetrised(orbit)
     if half is None:
         return
@@ -53,6 +58,77 @@ def follow_fold(state: Exploration, event: Event) -> None:
     )
     if not any(state.branches[i].system.half for i in event.branches):
         _try_crossing(state, event, half, "the symmetric branch through the fold")
+
+
+# ---------------------------------------------------------------- passages that turn by themselves
+
+
+def follow_arms(state: Exploration, event: Event) -> bool:
+    """Try all sequences of arms at a fold at which passages turn by themselves; tell whether some do."""
+    arms = arms_at(event.bifurcation.orbit)
+    if arms is None:
+        return False
+    event.kinds.add(Kind.SN)  # for sequences of two units it is a doubling, too
+    unit = arms.unit
+    state.raise_copies(shortest(event.bifurcation.orbit).periods // unit.periods)
+    most = min(state.max_periods, state.copies * unit.periods)
+    longest = lengths(unit.periods, unit.half, most)
+    if arms.letters == 2 and longest == [1]:
+        return True  # the two arms of the branch itself
+    beside = [(d, found) for d in NEARER if (found := arms.beside(d, state.settings)) is not None]
+    for length in longest:
+        many = count(arms.letters, length)
+        if many > MOST_SEQUENCES or not beside:
+            why = f"{many} sequences: more than {MOST_SEQUENCES} are not tried"
+            why = why if beside else "the arms were not found beside the fold"
+            state.judge(event, f"orbits of {length} units", Verdict.REFUSED, why=why)
+            continue
+        for sequence in necklaces(arms.letters, length):
+            exchanged = _rotated(tuple(arms.letters - 1 - letter for letter in sequence))
+            _try_arms(state, event, beside, sequence, sequence == exchanged)
+    return True
+
+
+def _rotated(sequence: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the least rotation of a sequence."""
+    return min(sequence[k:] + sequence[:k] for k in range(len(sequence)))
+
+
+def _try_arms(
+    state: Exploration,
+    event: Event,
+    beside: list[tuple[float, Arms]],
+    sequence: tuple[int, ...],
+    comes_back: bool,
+) -> None:
+    """Try one sequence; where it comes back through the fold as itself, or its image, to one side of it."""
+    reason = _reason(beside[0][1], sequence)
+    for _, arms in beside:
+        there = arms.orbit(sequence)
+        if not (there.converged and there.admissible):
+            continue
+        if (known := state.known(there)) is not None:
+            state.judge(event, reason, Verdict.KNOWN, known)
+            return
+        settings = settings_for(there, state.settings)
+        if not comes_back:
+            state.accept(event, reason, whole_branch(there, settings))
+            return
+        point = first_point(there, settings)
+        if point is not None:
+            _add_one_sided(state, event, arms.at_fold(len(sequence)), point, reason)
+            return
+    state.judge(event, reason, Verdict.REFUSED, why="no admissible orbit beside the fold")
+
+
+def _reason(arms: Arms, sequence: tuple[int, ...]) -> str:
+    """Return what a sequence is, in words: each unit with its holds, longer or shorter."""
+    bits = range(len(arms.turning))
+    text = " ".join("".join("+-"[letter >> k & 1] for k in bits) for letter in sequence)
+    return f"holds longer (+) or shorter (-) one after the other: {text}"
+
+
+# -------------------------------------------------------------------------- symmetric holds
 
 
 def _try_crossing(state: Exploration, event: Event, orbit: Orbit, reason: str) -> None:
@@ -88,19 +164,24 @@ def _add_crossing(
     state: Exploration, event: Event, orbit: Orbit, point: Point, reason: str
 ) -> None:
     """Trace a family that crosses a fold: both ways, or to one side of it where the other is its image."""
+    if not orbit.system.half:
+        _add_one_sided(state, event, orbit, point, reason)
+        return
+    active = orbit.model.index_of(state.settings.parameter)
+    there = point.orbit(orbit.system, orbit.vector, active)
+    state.accept(event, reason, follow_orbit(there, settings_for(orbit, state.settings)))
+
+
+def _add_one_sided(
+    state: Exploration, event: Event, orbit: Orbit, point: Point, reason: str
+) -> None:
+    """Trace a family away from its orbit at a fold, from a point beside it."""
     settings = settings_for(orbit, state.settings)
-    active = orbit.model.index_of(settings.parameter)
-    if orbit.system.half:
-        there = point.orbit(orbit.system, orbit.vector, active)
-        branch = follow_orbit(there, settings)
-    else:
-        if float(np.sum((point.joints - orbit.joints) * point.tangent)) < 0.0:
-            point = point.reversed()
-        origin = replace(
-            point, joints=orbit.joints, w=np.array([settings_value(orbit, settings)]), arc=0.0
-        )
-        point.arc = float(np.linalg.norm(point.joints - orbit.joints)) / len(orbit.joints) ** 0.5
-        side = trace_side(orbit, point, settings, progress=state.progress)
-        first = first_end(EndReason.BP, event, side, settings)
-        branch = assemble(orbit, settings, side, first, origin)
-    state.accept(event, reason, branch)
+    if float(np.sum((point.joints - orbit.joints) * point.tangent)) < 0.0:
+        point = point.reversed()
+    value = np.array([settings_value(orbit, settings)])
+    origin = replace(point, joints=orbit.joints, w=value, arc=0.0)
+    point.arc = float(np.linalg.norm(point.joints - orbit.joints)) / len(orbit.joints) ** 0.5
+    side = trace_side(orbit, point, settings, progress=state.progress)
+    first = first_end(EndReason.BP, event, side, settings)
+    state.accept(event, reason, assemble(orbit, settings, side, first, origin))

@@ -20,7 +20,7 @@ from contfric.atlas.crossings import follow_crossing, whole_branch
 from contfric.atlas.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.faults import fault_of
-from contfric.atlas.folds import follow_fold
+from contfric.atlas.folds import follow_arms, follow_fold
 from contfric.atlas.leaving_event import (
     leave_event,
     leave_singular,
@@ -64,6 +64,8 @@ _ROUNDED = 1e-5
 #: Where rounding moves an event by this share of the range its orbits hold for every value of the parameter.
 _UNKNOWN = 0.1
 
+#: Why what was traced is no branch of an event: its first step has gone to a branch nearby.
+_ELSEWHERE = "it is a branch that begins at another event nearby"
 #: Why nothing is followed where the impacts of a chatter just come to rest before the wall lets go.
 _INCOMPLETE = (
     "the chatter is not complete beyond: branches with any number of impacts come together here"
@@ -76,9 +78,11 @@ def follow(state: Exploration, event: Event) -> None:
     if kind in TERMINAL:
         _follow_sliding(state, event)
     elif kind is Kind.BP:
-        _follow_branch_point(state, event)
+        if not follow_arms(state, event):
+            _follow_branch_point(state, event)
     elif kind is Kind.PD:
-        _follow_doubling(state, event)
+        if not follow_arms(state, event):
+            _follow_doubling(state, event)
     elif kind is Kind.SN:
         follow_fold(state, event)
 
@@ -205,6 +209,12 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
     if branch is not None and _has_no_width(branch, event, state.settings):
         why = "it begins and ends at the event, without any width"
         state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
+        return False
+    if branch is not None and (found := state.known(branch[len(branch) // 2])) is not None:
+        if any(ends_at(end, event, state.settings) for end in state.branches[found].ends):
+            state.judge(event, candidate.reason, Verdict.KNOWN, found)
+            return True
+        state.judge(event, candidate.reason, Verdict.REFUSED, why=_ELSEWHERE)
         return False
     if branch is None:
         why = "no admissible orbit beyond the event"

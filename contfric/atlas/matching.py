@@ -110,12 +110,13 @@ def same_kind(a: Bifurcation, b: Bifurcation) -> bool:
     """Tell whether two events may be one by what branches call them.
 
     What is a grazing for one word may be a stop at the boundary of rest for another: the sliding events are
-    compared by their motions alone. A symmetric bridge may turn where an asymmetric one leaves it.
+    compared by their motions alone. A symmetric bridge may turn where an asymmetric one leaves it, and where
+    it turns with one passage alone orbits of several periods end on it.
     """
     if a.kind is b.kind or (a.kind in TERMINAL and b.kind in TERMINAL):
         return True
     held = bool(a.orbit.system.holds) and bool(b.orbit.system.holds)
-    return held and {a.kind, b.kind} == {Kind.SN, Kind.BP}
+    return held and {a.kind, b.kind} <= {Kind.SN, Kind.BP, Kind.PD}
 
 
 def telling_kind(kinds: Iterable[Kind]) -> Kind:
@@ -142,7 +143,8 @@ def _in_family(orbit: Orbit, branch: Branch, mirror: bool) -> bool:
 def on_branch(orbit: Orbit, branch: Branch) -> bool:
     """Tell whether an orbit (or its mirror image) lies on a branch.
 
-    Where the branch passes the orbit's parameter it is solved there and compared.
+    Where the branch passes the orbit's parameter it is solved there and compared. The stops may be the same
+    in another order, or after holds of other lengths: the motions are compared as well.
     """
     if orbit.periods != branch.system.periods or orbit.system.half != branch.system.half:
         return False
@@ -155,7 +157,8 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
     for guess in _guesses(branch, orbit, value):
         solved = polish(guess, damped=False)
         same = _SAME_ORBIT * (1.0 + float(np.max(np.abs(orbit.stops), initial=0.0)))
-        if solved.converged and stops_distance(orbit.stops, solved.stops, mirror) < same:
+        alike = solved.converged and stops_distance(orbit.stops, solved.stops, mirror) < same
+        if alike and orbit.outline.apart(solved.outline) < SAME_MOTION:
             return True
     return False
 

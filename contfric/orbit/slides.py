@@ -6,7 +6,7 @@ inside of a slide. The slides of some length, joined over such touches, are the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -94,6 +94,7 @@ class Outline:
     images : ndarray, shape (k, 1 + n)
         The same for the symmetry image; ``starts`` if the model has no symmetry.
     angles : columns of angles, the same a turn later
+    ordered : whether the starts are a cyclic sequence; where they are states at a phase they are a set
     """
 
     periods: int
@@ -101,15 +102,20 @@ class Outline:
     starts: FloatArray
     images: FloatArray
     angles: tuple[int, ...] = ()
+    ordered: bool = True
 
     def apart(self, other: Outline) -> float:
         """Return how far two motions are apart, up to symmetry; infinite if they are of another kind."""
         if self.periods != other.periods or len(self.starts) != len(other.starts):
             return np.inf
-        from contfric.orbit.apart import farthest_apart
+        return min(self._apart_from(there) for there in (other.starts, other.images))
 
-        images = (other.starts, other.images)
-        return min(float(farthest_apart(self.starts, there, self._cycles)) for there in images)
+    def _apart_from(self, there: FloatArray) -> float:
+        """Return how far joints are from the starts: in their order, unless they have none."""
+        from contfric.orbit.apart import cyclic_apart, farthest_apart
+
+        measure = cyclic_apart if self.ordered else farthest_apart
+        return float(measure(self.starts, there, self._cycles))
 
     @cached_property
     def _cycles(self) -> FloatArray:
@@ -118,12 +124,16 @@ class Outline:
         cycles[[0, *self.angles]] = [self.cycle, *(2.0 * np.pi for _ in self.angles)]
         return cycles
 
+    def repeated(self, periods: int) -> Outline:
+        """Return the same motion over a multiple of its periods."""
+        times = periods // self.periods
+        starts, images = np.tile(self.starts, (times, 1)), np.tile(self.images, (times, 1))
+        return replace(self, periods=periods, starts=starts, images=images)
+
     @cached_property
     def apart_from_image(self) -> float:
         """How far the motion is from its symmetry image."""
-        from contfric.orbit.apart import farthest_apart
-
-        return float(farthest_apart(self.starts, self.images, self._cycles))
+        return self._apart_from(self.images)
 
 
 def outline_of(orbit: Orbit) -> Outline:
@@ -170,7 +180,7 @@ def _at_one_phase(whole: Orbit) -> Outline:
         images = np.column_stack([np.zeros(periods), others @ mirror.T])
         turned = np.column_stack([(impacts[:, 0] + back) % cycle, impacts[:, 1:] @ mirror.T])
         images = np.vstack([images, turned])
-    return Outline(periods, cycle, starts, images, _columns(model))
+    return Outline(periods, cycle, starts, images, _columns(model), ordered=False)
 
 
 def _impacts(whole: Orbit) -> FloatArray:

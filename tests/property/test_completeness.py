@@ -105,6 +105,11 @@ CAUGHT = {
         "h",
         (-0.212482322652623, -0.08062492770669732),
     ),
+    "a step off an event went to a symmetric branch that ends 2e-6 of the range away": (
+        {"Omega": 1.0 / 3.0, "S": 0.05, "S0": 0.06, "zeta": 0.0},
+        "h",
+        (-0.05, 0.15),
+    ),
     "the stop of a hold depends on its length twice": (
         {"Omega": 0.43, "S": 0.17605, "S0": 0.219291},
         "Omega",

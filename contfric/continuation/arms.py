@@ -1,0 +1,149 @@
+"""Orbits whose holds are longer or shorter, each by itself: what passes a fold at which passages turn.
+
+A pin may fix the whole state at which its hold starts: at a touch inside a stick ``u' = 0`` gives the phase
+and ``u = S0`` the position; a stop is fixed where the stick before the slide to it has such an end. Then the
+motion from one pin to the next, a **passage**, is an equation of its own for the length of its hold, and the
+orbits are the cyclic sequences of passages. Near a fold ``lambda = c s^2`` a passage has two lengths, its
+arms ``s = +-(lambda / c)^(1/2)``. An orbit that runs through turning passages n times is 2^n orbits beyond
+the fold, and each of their curves goes on through it, with all signs exchanged.
+
+With the Jacobian J of an orbit at fixed parameters, a passage turns by itself if J has a null vector in which
+its own joints move alone, those between its two pins. That is what is tested; nothing is assumed of pins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from contfric.continuation.points import Settings
+from contfric.continuation.side import first_point
+from contfric.continuation.unit import Form, Unit, form_of, pieces, unit_of
+from contfric.errors import NotationError
+from contfric.models.definition import FloatArray
+from contfric.orbit.linear import assembled
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.solve import polish
+from contfric.orbit.system import System
+
+#: A singular value this small (relative to the largest) is zero at a fold: the length of a hold is known
+#: there to the root of rounding.
+_NULL = 1e-6
+#: An arm is the other side of the fold if its holds have moved by this share of the distance at least.
+_OTHER_SIDE = 0.5
+
+
+def passages(system: System) -> list[list[int]]:
+    """Return the joints that follow from each hold: from its end to the start of the next one."""
+    count, starts = len(system.word), [hold.segment for hold in system.holds]
+    ahead = [*starts[1:], starts[0] + count] if starts else []
+    return [
+        [j % count for j in range(start + 1, after + 1)]
+        for start, after in zip(starts, ahead, strict=True)
+    ]
+
+
+def turning_passages(orbit: Orbit) -> dict[int, FloatArray]:
+    """Return the holds whose passages turn by themselves, each with its null vector, shape (N, 1 + n).
+
+    The vectors are scaled to the length of the hold.
+    """
+    full = assembled(orbit.system, orbit.joints, orbit.vector)
+    m = orbit.joints.shape[1]
+    largest, found = float(np.linalg.norm(full, 2)), {}
+    for hold, joints in enumerate(passages(orbit.system)):
+        inner = np.array(joints[:-1])  # without the next pin
+        columns = (inner[:, None] * m + np.arange(m)).ravel()
+        _, size, right = np.linalg.svd(full[:, columns], full_matrices=False)
+        if not size[-1] < _NULL * largest or abs(right[-1][0]) < _NULL:
+            continue
+        vector = np.zeros_like(orbit.joints)
+        vector[inner] = (right[-1] / right[-1][0]).reshape(len(inner), m)
+        found[hold] = vector
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Arms:
+    """The motion at a fold, and its two arms at one value of the parameter beside it.
+
+    Attributes
+    ----------
+    unit : the shortest part that the motion consists of
+    fold : the orbit of one unit at the fold
+    turning : the holds of the unit whose passages turn
+    longer, shorter : the orbits of one unit with all of them on the same arm; None at the fold itself
+    """
+
+    unit: Unit
+    fold: Orbit
+    turning: dict[int, FloatArray]
+    longer: Orbit | None = None
+    shorter: Orbit | None = None
+
+    @cached_property
+    def letters(self) -> int:
+        """How many orbits of one unit there are: each turning hold is on either arm."""
+        return int(2 ** len(self.turning))
+
+    def beside(self, distance: float, settings: Settings) -> Arms | None:
+        """Return the same with both arms solved beside the fold, this far in the lengths of holds."""
+        fold = self.fold
+        direction = np.sum(list(self.turning.values()), axis=0)
+        point = first_point(
+            replace(fold, joints=fold.joints + distance * direction), settings, direction, 0.0
+        )
+        if point is None:
+            return None
+        active = fold.model.index_of(settings.parameter)
+        longer = point.orbit(fold.system, fold.vector, active)
+        guess = replace(longer, joints=2.0 * fold.joints - longer.joints)
+        shorter = polish(replace(guess, residual=np.inf), damped=False)
+        if not (longer.converged and shorter.converged):
+            return None
+        ends = [passages(fold.system)[hold][0] for hold in self.turning]
+        moved = np.array([(o.joints - fold.joints)[ends, 0] for o in (longer, shorter)])
+        least = _OTHER_SIDE * distance
+        if not (np.all(moved[0] > least) and np.all(moved[1] < -least)):
+            return None
+        return replace(self, longer=longer, shorter=shorter)
+
+    def at_fold(self, count: int) -> Orbit:
+        """Return the motion at the fold as an orbit of several units."""
+        return self._repeated(self.fold, count)
+
+    def orbit(self, sequence: tuple[int, ...]) -> Orbit:
+        """Return the orbit of a sequence, solved; a letter's bits tell which holds of a unit are shorter."""
+        assert self.longer is not None
+        assert self.shorter is not None
+        orbit = self._repeated(self.longer, len(sequence))
+        other = self._repeated(self.shorter, len(sequence)).joints
+        joints, own = orbit.joints.copy(), len(self.fold.system.holds)
+        short = [hold for bit, hold in enumerate(self.turning)]
+        for number, places in enumerate(passages(orbit.system)):
+            unit, hold = divmod(number, own)
+            if hold in self.turning and sequence[unit] >> short.index(hold) & 1:
+                joints[places] = other[places]
+        return polish(replace(orbit, joints=joints, residual=np.inf), damped=False)
+
+    def _repeated(self, orbit: Orbit, count: int) -> Orbit:
+        unit = replace(self.unit, vector=orbit.vector, duration=orbit.turn)
+        form = Form(orbit.system.word, orbit.joints, np.zeros(len(orbit.joints)), "", unit)
+        return unit.orbit((form,) * count)[0]
+
+
+def arms_at(orbit: Orbit) -> Arms | None:
+    """Return what turns by itself at a fold; None if nothing does."""
+    if orbit.model.autonomous or not orbit.system.holds:
+        return None
+    whole = orbit.as_whole()
+    unit = unit_of(whole)
+    try:
+        form = form_of(whole, np.zeros(len(whole.word)), unit, pieces(whole, unit)[0], "")
+        fold = form.orbit
+    except (NotationError, ValueError):
+        return None
+    turning = turning_passages(fold)
+    return Arms(unit, fold, turning) if turning else None
