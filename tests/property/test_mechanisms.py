@@ -117,6 +117,33 @@ def test_one_mass_is_the_oscillator_of_the_article() -> None:
     assert model.symmetry is not None
 
 
+@pytest.mark.parametrize(
+    ("load", "symmetric"),
+    [
+        ("R", True),
+        ("R/(1 + abs(v1))", True),
+        ("R*(1 + 0.2*cos(2*w*t))", True),
+        ("R*(1 + 0.2*cos(w*t))", False),
+        ("R*exp(0.3*q2)", False),
+        ("R*pressed", False),
+    ],
+)
+def test_a_load_that_differs_half_a_period_later_leaves_no_symmetry(
+    load: str, symmetric: bool
+) -> None:
+    model = cf.Mechanism(
+        [1.0, 0.5],
+        0.1 * np.eye(2),
+        [[2.0, -1.0], [-1.0, 2.0]],
+        contacts={"pad": {"kind": "friction", "velocity": "v1", "kinetic": load}},
+        force={"q1": "cos(w*t)"},
+        parameters={"w": 0.8, "R": 0.3},
+        period="2*pi/w",
+        define={"pressed": "1 + 0.1*q2"},
+    )
+    assert (model.symmetry is not None) == symmetric
+
+
 def test_a_jenkins_element_is_that_of_its_equations() -> None:
     contacts = {"z": {"kind": "jenkins", "displacement": "q1", "stiffness": "kt", "limit": "muN"}}
     model = cf.Mechanism(
