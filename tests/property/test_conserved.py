@@ -100,3 +100,24 @@ def test_the_fields_of_contacts_at_rest_conserve_it_exactly() -> None:
     )
     assert field[1] == 0.0
     assert field[3] == 0.0
+
+
+@pytest.mark.parametrize("offset", [0.08, -0.2])
+def test_a_stuck_branch_off_the_centre_ends_where_its_slider_begins_to_creep(offset: float) -> None:
+    """The stretch is ``k d/(k + kt)`` on the average for an offset d, about which a linear oscillator moves.
+
+    Beyond the force at which it reaches the limit on one side the slider slips to that side alone.
+    """
+    model = cf.load_model("jenkins")
+    p = model.defaults
+    orbit = cf.find_orbit(model, {"F": 0.05}, state=[0.0, 0.0, offset])
+    diagram = cf.explore(orbit, "F", (0.01, 1.3))
+    assert not diagram.loose_ends
+    start, end = diagram.branches[0].ends
+    assert start.reason.name == "RANGE"
+    assert end.reason.name == "SHAKEDOWN"
+    mean = p["k"] * abs(offset) / (p["k"] + p["kt"])
+    stiff = p["k"] + p["kt"] - p["W"] ** 2 + 2j * p["zeta"] * p["W"]
+    assert end.bifurcation is not None
+    expected = (p["muN"] / p["kt"] - mean) * abs(stiff)
+    assert end.bifurcation.params["F"] == pytest.approx(expected, abs=1e-9)
