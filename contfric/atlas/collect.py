@@ -33,6 +33,7 @@ FINAL = frozenset(
             "UNBOUNDED",
             "REST",
             "CONTINUUM",
+            "SHAKEDOWN",
             "PERIOD",
             "POINT",
         )

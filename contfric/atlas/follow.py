@@ -135,12 +135,14 @@ def _follow_flow(state: Exploration, event: Event) -> None:
     reason = "the word that the flow walks near the event"
     refused: dict[Word, str] = {}
     done: set[Word] = set()
+    creeps: set[Word] = set()
     for found in walked(orbit.as_whole(), shifts):
         guess = replace(found, vector=orbit.vector)
         word = canonical_word(guess.word, orbit.model)
         if word in done:
             continue
         if only_grows(orbit.model, guess.word):  # on its way to another orbit
+            creeps.add(word)
             refused.setdefault(word, f"no periodic motion is {show(guess.word)}")
             continue
         branch = _through(state, guess)
@@ -157,6 +159,8 @@ def _follow_flow(state: Exploration, event: Event) -> None:
                 state.merge(event, end)
     for word in (w for w in refused if w not in done):
         state.judge(event, reason, Verdict.REFUSED, why=refused[word])
+    if creeps and creeps == refused.keys() and not done and len(event.branches) == 1:
+        event.final = EndReason.SHAKEDOWN
 
 
 def _meets(end: End, event: Event, settings: Settings) -> bool:

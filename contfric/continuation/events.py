@@ -140,6 +140,10 @@ class EndReason(str, Enum):
     GS = "grazing-sliding: the Poincare map is discontinuous"
     REST = "the mass stays at rest for ever beyond this point"
     CONTINUUM = "its orbits go on as a continuum, at this one value of the parameter"
+    SHAKEDOWN = (
+        "the position of a stuck contact is at its limit: beyond this point it slips to one side until it "
+        "sticks at another position; start there from a simulation"
+    )
     PERIOD = "the period grows without bound: the orbit comes to an equilibrium (homoclinic), or slows down"
     POINT = "the orbit shrinks to a point: an equilibrium that begins to oscillate (Hopf)"
     BP = "the orbit has become symmetric: its mirror branch goes on from here"

@@ -7,8 +7,10 @@ its contacts (:mod:`contfric.models.contacts`), a letter for each, in their orde
 
 from __future__ import annotations
 
+import ast
 import itertools
 import math
+import random
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -22,7 +24,7 @@ from contfric.models.contact_surfaces import ContactSurfaces
 from contfric.models.contacts import Contact, ContactKind, drift
 from contfric.models.description import STRUCTURE
 from contfric.models.entries import EntryError, Part, mapping_in
-from contfric.models.grammar import Scope, number_of, parse
+from contfric.models.grammar import FLOATS, TIME, Scope, number_of, parse
 from contfric.models.matrices import summed, times
 from contfric.models.not_affine import NotAffineError
 from contfric.models.shared_loads import Limit, Setting, load_name
@@ -41,6 +43,8 @@ _OTHERS = (
 _T = TypeVar("_T")
 #: How far the order of a harmonic may be from an odd number: rounding.
 _ODD = 1e-9
+#: What limits the force of a contact, and how many states tell whether it is an even function of them.
+_LIMITS, _TRIES = ("kinetic", "static", "limit"), 5
 
 
 def with_contacts(data: dict[str, Any]) -> dict[str, Any]:
@@ -135,9 +139,7 @@ class Combinations:
         params = defaults_of(self.top)
         if any(c.kind in (ContactKind.SPRING, ContactKind.IMPACT) for c in self.contacts):
             return False
-        names = (*self.coordinates, *self.velocities)
-        define = {k: parse(str(v)) for k, v in mapping_in(self.top.data, "define").items()}
-        scope = Scope(AFFINE, symbols(names, tuple(params)), define)
+        scope = Scope(AFFINE, symbols(self._moving, tuple(params)), self._define)
         period = self.top.data.get("period")
         try:
             forms = [
@@ -149,7 +151,37 @@ class Combinations:
             orders = [number_of(text_of(w), params) * turn if w else 0.0 for w in waves]
         except (NotAffineError, ModelError):
             return False
-        return all(abs(math.remainder(order - 1.0, 2.0)) < _ODD for order in orders)
+        odd = all(abs(math.remainder(order - 1.0, 2.0)) < _ODD for order in orders)
+        return odd and self._limits_are_even(params)
+
+    @property
+    def _moving(self) -> tuple[str, ...]:
+        return (*self.coordinates, *self.velocities)
+
+    @property
+    def _define(self) -> dict[str, ast.expr]:
+        return {k: parse(str(v)) for k, v in mapping_in(self.top.data, "define").items()}
+
+    def _limits_are_even(self, params: Mapping[str, float]) -> bool:
+        """Tell whether limits of friction are those of the opposite states half a period later.
+
+        They are any functions, so they are compared at random states and times. A load that follows a
+        coordinate, or the excitation, is another one there.
+        """
+        texts = {c.texts[key] for c in self.contacts for key in _LIMITS if key in c.texts}
+        period = self.top.data.get("period")
+        span, draw = number_of(str(period), params) if period else 0.0, random.Random(2)
+        define = self._define
+        for _ in range(_TRIES):
+            t, at = span * draw.random(), {name: draw.gauss(0.0, 1.0) for name in self._moving}
+            opposite = {name: -value for name, value in at.items()}
+            here = Scope(FLOATS, {**params, **at, TIME: t}, define)
+            there = Scope(FLOATS, {**params, **opposite, TIME: t + 0.5 * span}, define)
+            for text in texts:
+                value, image = here.evaluate(parse(text)), there.evaluate(parse(text))
+                if not abs(image - value) <= _ODD * (abs(value) + abs(image)):
+                    return False
+        return True
 
     def _contradicts(self, states: Mapping[str, str]) -> bool:
         """Tell whether elements along one direction slide opposite ways."""

@@ -15,7 +15,9 @@ from contfric.orbit.aperiodic import MOST, MOST_PERIODS, affordable, why_none
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
+from contfric.orbit.rest import check_rest, comes_to_rest, is_point
 from contfric.orbit.sections import is_smooth, loops, without_sections
+from contfric.orbit.shakedown import beyond_creep, creeps
 from contfric.orbit.simulation import SimulationEnd, Trajectory, go_on, simulate
 from contfric.orbit.solve import settle
 from contfric.orbit.system import build_system
@@ -41,8 +43,6 @@ _FIRST_EVENTS = 5_000
 _MOST_EVENTS_AT_ONCE = 10_000_000
 #: Share of the time of the first half of these that the second half takes if they do not come faster.
 _STEADY = 0.5
-#: Turns smaller than this (relative to 1 + the states) are none: the motion has come to rest.
-_NO_SIZE = 1e-6
 #: An orbit that a motion converges to attracts; beyond rounding its multipliers cannot exceed 1.
 _ATTRACTS = 1.0 + 1e-6
 
@@ -131,21 +131,33 @@ def _settled(
         if resting is not None:
             return _settled(resting, params, state, time, longest, progress=progress)
     while True:
+        check_rest(trajectory)
         _check_motion(trajectory)
         done, events = done + span, events + len(trajectory)
         if longest is None:
             most = min(most, affordable(model, done, events))
         orbit = _read_off(trajectory, final=done >= most)
-        if orbit is not None and model.autonomous and _is_point(orbit):
-            raise ConvergenceError(_comes_to_rest(trajectory), trajectory)
+        if orbit is not None and model.autonomous and is_point(orbit):
+            raise ConvergenceError(comes_to_rest(trajectory), trajectory)
         if orbit is not None:
             return orbit
         if done >= most:
             slow = next((r for r in recurrences(trajectory) if r[2] < _CREEPING), None)
             raise why_none(trajectory, done, slow, compared=longest is None)
+        behind = _behind_creep(trajectory)
+        if behind is not None:
+            time, state = behind
+            trajectory = simulated(_MOST_EVENTS_AT_ONCE)
+            continue
         span = min(span * _LONGER, most - done)
         heard(f"{span} more")
         trajectory = go_on(trajectory, span * unit, heard)
+
+
+def _behind_creep(trajectory: Trajectory) -> tuple[float, FloatArray] | None:
+    """Return time and state where a motion that creeps to one side will have come to; None if it does not."""
+    lag = next((lag for lag, _, _ in recurrences(trajectory)), 0)
+    return beyond_creep(trajectory, lag) if lag else None
 
 
 def _is_steady(trajectory: Trajectory) -> bool:
@@ -155,21 +167,6 @@ def _is_steady(trajectory: Trajectory) -> bool:
     """
     begin, middle = trajectory.begin[0], float(trajectory.times[len(trajectory) // 2])
     return float(trajectory.times[-1]) - middle > _STEADY * (middle - begin)
-
-
-def _is_point(orbit: Orbit) -> bool:
-    """Tell whether an orbit has no size: a motion that turns about the place where its surfaces meet."""
-    states = np.concatenate([orbit.begins[:, 1:], orbit.ends[:, 1:]])
-    return bool(np.max(np.ptp(states, axis=0)) < _NO_SIZE * (1.0 + np.max(np.abs(states))))
-
-
-def _comes_to_rest(trajectory: Trajectory) -> str:
-    state = trajectory.states[-1]
-    where = ", ".join(f"{s} = {v:.4g}" for s, v in zip(trajectory.model.states, state, strict=True))
-    return (
-        f"no periodic orbit: the motion comes to rest near {where}, where surfaces meet: it crosses them in "
-        "smaller and smaller turns. Choose other parameters or another start"
-    )
 
 
 def _wanted(orbit: Orbit, periods: int | None) -> Orbit:
@@ -198,6 +195,8 @@ def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:
     motion creeps towards the orbit as slowly as they say.
     """
     for lag, turns, mismatch in recurrences(trajectory):
+        if creeps(trajectory, lag):  # near an orbit of another word
+            return None
         if mismatch > _EXACT and not final:
             return _crept_to(trajectory, lag, turns)
         orbit = _orbit_of_lag(trajectory, lag, turns)

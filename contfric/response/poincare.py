@@ -27,7 +27,7 @@ from contfric.response.collecting import collect
 from contfric.response.cuts import Following, Points
 from contfric.response.outcome import Outcome
 from contfric.response.returns import ReleaseMap, Returns
-from contfric.response.sections import RELEASES, STOPS, SectionLike, section_of
+from contfric.response.sections import RELEASES, SectionLike, section_of, usual_section
 from contfric.response.sweeping import positive
 
 #: Points without a limit, as the kernel takes them.
@@ -45,7 +45,7 @@ def poincare(
     params: Parameters | None = None,
     state: ArrayLike | None = None,
     *,
-    section: SectionLike = STOPS,
+    section: SectionLike | None = None,
     sense: str = "either",
     time: float = 0.0,
     periods: float = 1000.0,
@@ -57,7 +57,7 @@ def poincare(
     ----------
     model, params : the model (or its name) and its parameters; defaults fill in
     section : "stops", "releases", a surface of the model by its name, or a phase of the excitation as a share
-        of its period
+        of its period; by default the stops, or phase 0 where an excited model has none, such as a structure
     sense : of a surface: "either", "rising" or "falling"
     state, time : initial condition; by default displaced from rest at time 0
     periods, transient : periods of the excitation (units of time without one) of which points are
@@ -76,6 +76,7 @@ def poincare(
     True
     """
     model, params = tied(model, params)
+    section = usual_section(model) if section is None else section
     cut = section_of(model, section, sense)
     vector = model.vector(mapping_of("params", {} if params is None else params, "{'S0': 0.4}"))
     y, begins = checked_state(model, vector, state), real_number("time", time)

@@ -20,6 +20,14 @@ STOPS, RELEASES = "stops", "releases"
 _SENSES = {"either": 0, "rising": 1, "falling": -1}
 
 
+def usual_section(model: Model) -> SectionLike:
+    """Return the section to take where none is named: the stops, or a phase where the model has none.
+
+    A structure has as many velocities that vanish as it has contacts, and no stops.
+    """
+    return STOPS if model.stop_surface or model.autonomous else 0.0
+
+
 def section_of(model: Model, section: object, sense: object = "either") -> Cut:
     """Return a section as the kernel takes it.
 

@@ -32,7 +32,7 @@ from contfric.orbit.system import IntArray
 from contfric.response.collecting import repeats_of
 from contfric.response.cuts import Cut, Following
 from contfric.response.outcome import Outcome
-from contfric.response.sections import STOPS, SectionLike, section_of
+from contfric.response.sections import SectionLike, section_of, usual_section
 from contfric.response.stretch import STRETCH, Stretch, StretchRows, compute_stretch
 from contfric.response.sweep import Sweep, SweepRun
 
@@ -94,7 +94,7 @@ def sweep(
     direction: str = "both",
     periods: float = 100.0,
     transient: float = 100.0,
-    section: SectionLike = STOPS,
+    section: SectionLike | None = None,
     sense: str = "either",
     state: ArrayLike | None = None,
     executor: Executor | None = None,
@@ -117,7 +117,7 @@ def sweep(
     periods, transient : periods of the excitation (units of time without one) of which points are collected,
         and before that
     section : "stops", "releases", a surface of the model by its name, or a phase of the excitation as a share
-        of its period
+        of its period; by default the stops, or phase 0 where an excited model has none, such as a structure
     sense : of a surface: "either", "rising" or "falling"
     state : initial state, shape (n,); by default displaced from rest
     executor : any :class:`concurrent.futures.Executor`; the two directions are independent of each other
@@ -141,6 +141,7 @@ def sweep(
     model, params = tied(model, params)
     check_executor(executor)
     function_of("progress", progress)
+    section = usual_section(model) if section is None else section
     cut = section_of(model, section, sense)
     how = Following(
         real_number("transient", transient, least=0.0),

@@ -8,6 +8,7 @@ import pytest
 import contfric as cf
 from contfric.models.evaluate import floats
 from contfric.orbit.conserved import conserved, kept_by
+from contfric.orbit.simulation import Trajectory
 
 PARAMETERS = {"Omega": 0.9, "k": 1.0, "S1": 0.3, "S2": 1.5}
 FREE = {"c1": {"kind": "friction", "velocity": "v1", "kinetic": "S1"}}
@@ -100,3 +101,58 @@ def test_the_fields_of_contacts_at_rest_conserve_it_exactly() -> None:
     )
     assert field[1] == 0.0
     assert field[3] == 0.0
+
+
+@pytest.mark.parametrize("offset", [0.08, -0.2])
+def test_a_stuck_branch_off_the_centre_ends_where_its_slider_begins_to_creep(offset: float) -> None:
+    """The stretch is ``k d/(k + kt)`` on the average for an offset d, about which a linear oscillator moves.
+
+    Beyond the force at which it reaches the limit on one side the slider slips to that side alone.
+    """
+    model = cf.load_model("jenkins")
+    p = model.defaults
+    orbit = cf.find_orbit(model, {"F": 0.05}, state=[0.0, 0.0, offset])
+    diagram = cf.explore(orbit, "F", (0.01, 1.3))
+    assert not diagram.loose_ends
+    start, end = diagram.branches[0].ends
+    assert start.reason.name == "RANGE"
+    assert end.reason.name == "SHAKEDOWN"
+    mean = p["k"] * abs(offset) / (p["k"] + p["kt"])
+    stiff = p["k"] + p["kt"] - p["W"] ** 2 + 2j * p["zeta"] * p["W"]
+    assert end.bifurcation is not None
+    expected = (p["muN"] / p["kt"] - mean) * abs(stiff)
+    assert end.bifurcation.params["F"] == pytest.approx(expected, abs=1e-9)
+
+
+def slipping(kinetic: str, jenkins: bool = False) -> cf.Model:
+    """A mass between two springs with friction, next to one that has friction (or a Jenkins element), too."""
+    slider = {"kind": "jenkins", "displacement": "q2", "stiffness": "1", "limit": "S"}
+    contacts = {"a": {"kind": "friction", "velocity": "v1", "kinetic": kinetic}}
+    return cf.Mechanism(
+        [1.0, 1.0],
+        0.2 * np.eye(2),
+        [[2.0, -1.0], [-1.0, 2.0]],
+        contacts=contacts | ({"b": slider} if jenkins else {"b": FREE["c1"] | {"velocity": "v2"}}),
+        force={"q1": "F*cos(w*t)"},
+        parameters={"F": 0.2, "w": 0.7, "S": 0.3, "S1": 0.3},
+        period="2*pi/w",
+    )
+
+
+@pytest.mark.parametrize("start", [-0.07, -0.055])
+def test_a_mass_that_creeps_rests_where_its_load_just_reaches_the_limit(start: float) -> None:
+    """It slips up a little in each period until ``F - 2 q = S``, by the square of what is left."""
+    with pytest.raises(cf.ConvergenceError, match="comes to rest at") as caught:
+        cf.find_orbit(slipping("S"), state=[start, 0.0, 0.0, 0.0])
+    trajectory = caught.value.result
+    assert isinstance(trajectory, Trajectory)
+    assert trajectory.last[2][:2] == pytest.approx([(0.2 - 0.3) / 2.0, 0.0], abs=1e-5)
+
+
+def test_a_motion_that_dies_away_next_to_a_stuck_contact_comes_to_rest() -> None:
+    """The events that it meets in the end are rounding: it was called aperiodic."""
+    with pytest.raises(cf.ConvergenceError, match="comes to rest at") as caught:
+        cf.find_orbit(slipping("S", jenkins=True), state=[-0.02, 0.1, 0.0, 0.0, 0.1])
+    assert isinstance(caught.value.result, Trajectory)
+    q1, q2, *_, stretch = caught.value.result.last[2]
+    assert -q1 + 2.0 * q2 + stretch == pytest.approx(0.0, abs=1e-12)

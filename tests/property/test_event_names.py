@@ -75,6 +75,19 @@ def test_events_have_the_same_names_from_every_branch(kinds: str, seed: int) -> 
         assert names(again) == names(first)
 
 
+@pytest.mark.parametrize("force", [0.3195, 0.33])
+def test_a_contact_that_creeps_ends_at_the_limit_of_its_load(force: float) -> None:
+    """A simulation has ever shorter slips of the second mass, to one side; the orbit has none."""
+    model = random_structure(0, "ff")
+    orbit = cf.find_orbit(model, {"F": force}, state=[-0.13, 0.065, 0.0, 0.0])
+    assert orbit.admissible
+    assert {surface for _, surface in orbit.word} == {"a", "a+", "a-"}
+    draw = np.random.default_rng([0, 4])
+    draw.uniform(size=3)  # the springs
+    limit = float(random_contacts(draw, "ff")["b"]["kinetic"][:-2])
+    assert limit - 1e-5 < orbit.quantity("max(abs(force(b)))") < limit
+
+
 def test_a_contact_that_sticks_for_good_does_not_end_a_diagram() -> None:
     """Behind the event at which one of two contacts stops slipping the other one goes on, down to its limit.
 

@@ -117,6 +117,33 @@ def test_one_mass_is_the_oscillator_of_the_article() -> None:
     assert model.symmetry is not None
 
 
+@pytest.mark.parametrize(
+    ("load", "symmetric"),
+    [
+        ("R", True),
+        ("R/(1 + abs(v1))", True),
+        ("R*(1 + 0.2*cos(2*w*t))", True),
+        ("R*(1 + 0.2*cos(w*t))", False),
+        ("R*exp(0.3*q2)", False),
+        ("R*pressed", False),
+    ],
+)
+def test_a_load_that_differs_half_a_period_later_leaves_no_symmetry(
+    load: str, symmetric: bool
+) -> None:
+    model = cf.Mechanism(
+        [1.0, 0.5],
+        0.1 * np.eye(2),
+        [[2.0, -1.0], [-1.0, 2.0]],
+        contacts={"pad": {"kind": "friction", "velocity": "v1", "kinetic": load}},
+        force={"q1": "cos(w*t)"},
+        parameters={"w": 0.8, "R": 0.3},
+        period="2*pi/w",
+        define={"pressed": "1 + 0.1*q2"},
+    )
+    assert (model.symmetry is not None) == symmetric
+
+
 def test_a_jenkins_element_is_that_of_its_equations() -> None:
     contacts = {"z": {"kind": "jenkins", "displacement": "q1", "stiffness": "kt", "limit": "muN"}}
     model = cf.Mechanism(
@@ -463,3 +490,22 @@ def test_a_normal_force_that_vanishes_somewhere_is_warned_of() -> None:
     report = cf.check_model(model)
     assert report.ok
     assert any("friction limit that is negative" in f.message for f in report.findings)
+
+
+def test_a_sweep_of_a_structure_needs_no_section() -> None:
+    """Its contacts have several velocities, and no stops: the points are those at phase 0."""
+    pad = {"kind": "friction", "velocity": "v2", "kinetic": "R"}
+    model = cf.Mechanism(
+        [1.0, 0.5],
+        0.1 * np.eye(2),
+        [[2.0, -1.0], [-1.0, 2.0]],
+        contacts={"pad": pad},
+        force={"q1": "cos(w*t)"},
+        parameters={"w": 0.8, "R": 0.1},
+        period="2*pi/w",
+    )
+    found = cf.sweep(model, "w", [0.8, 0.9])
+    assert found.section == 0.0
+    orbit = cf.find_orbit(model, {"w": 0.9})
+    assert found.up.states[-1] == pytest.approx(orbit.as_whole().state(0.0), abs=1e-8)
+    assert cf.poincare(model, state=[0.1, 0.0, 0.0, 0.0], periods=3).section == 0.0

@@ -119,3 +119,19 @@ def test_units_change_numbers_only(name: str) -> None:
     )
     for quantity, _ in plain.quantities:
         assert other.quantity(quantity) == pytest.approx(one.quantity(quantity), rel=1e-7)
+
+
+def test_units_that_are_far_off_are_proposed_anew() -> None:
+    """What is given is in the line as well: it is to be replaced, whatever its size."""
+    pad = {"kind": "friction", "velocity": "v1", "kinetic": "R"}
+    model = cf.Mechanism(
+        [2.0],
+        [0.5],
+        [8.0],
+        contacts={"pad": pad},
+        force={"q1": "F*cos(w*t)"},
+        parameters={"w": 2.1, "F": 2.0, "R": 0.1},
+        period="2*pi/w",
+        units={"q1": 1e-3, "t": 1.0},
+    )
+    assert 0.1 < proposed(model)["q1"] < 10.0

@@ -86,11 +86,12 @@ def _propose_units(
     far = {n: wanted[n] for n in (largest, "t") if not 1.0 / _FAR < wanted[n] < _FAR}
     if not far or not all(v > 0.0 for v in far.values()):
         return
-    units = {n: 1.0 for n, v in wanted.items() if v > 0.0} | dict(model.units)
+    given = dict(model.units)
+    units = {n: 1.0 for n, v in wanted.items() if v > 0.0} | given
     line = ", ".join(
         f"{n}: {_rounded(v * units[n])}"
         for n, v in wanted.items()
-        if n in units and (v * units[n] < 0.1 or v * units[n] > 10.0)
+        if n in units and (n in given or v * units[n] < 0.1 or v * units[n] > 10.0)
     )
     named = ", ".join(f"{n} {v:.0e}" for n, v in far.items())
     report.warn(

@@ -61,9 +61,9 @@ class Section(Response):
         self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
     ) -> None:
         """Check the state and the section."""
-        from contfric.response.sections import section_of
+        from contfric.response.sections import section_of, usual_section
 
         check_state(located, (self.name, "state"), self.state, model)
         given: dict[str, Any] = self.options()
-        section, sense = given.get("section", "stops"), given.get("sense", "either")
+        section, sense = given.get("section", usual_section(model)), given.get("sense", "either")
         attempt(located, (self.name, "section"), lambda: section_of(model, section, sense))
