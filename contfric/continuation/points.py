@@ -162,6 +162,22 @@ class Point:
             self.arc,
         )
 
+    def on_other_side(self) -> Point:
+        """Return the same point with the arclength counted the other way."""
+        # dataclasses.replace takes several times as long, for each point of a curve
+        return Point(
+            self.joints,
+            self.w,
+            self.tangent,
+            self.direction,
+            self.tests,
+            self.labels,
+            self.mu,
+            -self.arc,
+            self.lost,
+            self.rough,
+        )
+
 
 @dataclass(eq=False)
 class Rows:

@@ -32,7 +32,7 @@ def join_sides(behind: CurveSide | None, ahead: CurveSide, first: CurveEnd | Non
         back = _pieces(behind)
         first = back[-1].end
         joined = replace(pieces[0])
-        joined.points = [*(replace(p, arc=-p.arc) for p in back[0].points[:0:-1]), *joined.points]
+        joined.points = [*(p.on_other_side() for p in back[0].points[:0:-1]), *joined.points]
         joined.special = [*_turned(back[0].special), *joined.special]
         pieces = [*(_reversed(piece) for piece in back[:0:-1]), joined, *pieces[1:]]
     shift = -pieces[0].points[0].arc
@@ -61,7 +61,7 @@ def _turned(special: list[SpecialPoint]) -> list[SpecialPoint]:
 
 def _reversed(piece: CurveSide) -> CurveSide:
     turned = replace(piece)
-    turned.points = [replace(p, arc=-p.arc) for p in piece.points[::-1]]
+    turned.points = [p.on_other_side() for p in piece.points[::-1]]
     turned.special = _turned(piece.special)
     return turned
 

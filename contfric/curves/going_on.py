@@ -208,9 +208,10 @@ def prove(
             continue
         orbit = problem.orbit(beside.joints, beside.w)
         margins, pinned = orbit.margins, problem.condition.pinned
-        free = np.array([k for k in pinned if not abs(margins[k]) < _STILL], dtype=np.int64)
-        still = np.setdiff1d(pinned, free)
-        others = np.setdiff1d(np.arange(len(margins)), still)
+        held = np.abs(margins[pinned]) < _STILL
+        free, still = pinned[~held], np.sort(pinned[held])
+        others = np.ones(len(margins), dtype=np.bool_)
+        others[still] = False
         lasts = bool(np.all(orbit.ends[:, 0] - orbit.cycle[:, 0] > -_NO_TIME))
         if not lasts or not np.all(margins[others] > 0.0) or _is_exit(problem, still):
             continue

@@ -100,7 +100,12 @@ def prepare(definition: str) -> None:
 
 def load_module(definition: str) -> ModuleType:
     """Import the generated module of a definition."""
-    return _imported(module_path(definition))
+    try:
+        return _imported(module_path(definition))
+    except ResultFileError:
+        # its file was fine when it was looked for: it was removed, or damaged, since then
+        module_path.cache_clear()
+        return _imported(module_path(definition))
 
 
 @cache

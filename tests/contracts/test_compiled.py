@@ -174,6 +174,20 @@ def test_a_damaged_module_of_a_model_is_generated_again(fresh_cache, damage, suf
     assert callable(build._imported.__wrapped__(path).compiled_flow)
 
 
+@pytest.mark.parametrize("damage", [*DAMAGE, "removed"])
+def test_a_module_that_is_damaged_after_it_was_looked_for_is_generated_again(fresh_cache, damage):
+    data = yaml.safe_load((MODELS / "bilinear.yaml").read_text(encoding="utf-8"))
+    field = {**data["field"], "v": f"{data['field']['v']} + 0*{len(damage)}*x"}  # its own module
+    definition = describe({**data, "field": field}).motion
+    path = build.module_path(definition)
+    if damage == "removed":
+        path.unlink()
+    else:
+        path.write_bytes(DAMAGE[damage](path.read_bytes(), np.random.default_rng(1)))
+    assert callable(build.load_module(definition).compiled_flow)
+    assert build.module_path(definition) == path
+
+
 def test_a_model_by_another_name_is_not_compiled_again():
     data = yaml.safe_load((MODELS / "bilinear.yaml").read_text(encoding="utf-8"))
     other = {**data, "name": "mine", "title": "My own", "references": ["a thesis"]}
