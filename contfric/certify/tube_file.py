@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 from contfric.certify.inequalities import DURATION, INSIDE, JOINT
 from contfric.certify.piece import Piece
 from contfric.continuation.events import TERMINAL
-from contfric.verify.file import CHECKED_MODELS, check_text
+from contfric.verify.curves.file import check_text
+from contfric.verify.file import CHECKED_MODELS
 
 if TYPE_CHECKING:
     from contfric.certify.branch import BranchCertificate

@@ -13,7 +13,7 @@ import pytest
 import contfric as cf
 from contfric.certify.files import event_data, verify
 from contfric.errors import ParameterError
-from contfric.verify.file import check_text
+from contfric.verify.curves.file import check_text
 from tests.event_oracle import changed, false_event
 
 PARAMS = {"Omega": 0.54, "S": 0.32, "S0": 0.4}

@@ -15,7 +15,7 @@ import contfric as cf
 from contfric.certify.branch import certify_branch
 from contfric.certify.files import verify
 from contfric.certify.tube_file import tubes_of
-from contfric.verify.file import check_text
+from contfric.verify.curves.file import check_text
 
 PARAMS = {"Omega": 0.54, "S": 0.32, "S0": 0.4}
 
