@@ -16,13 +16,7 @@ from contfric.verify.scene import Refused, Scene, Undecided, ball, number, phase
 BITS = (106, 212, 424, 848)  # asked for one after the other, until all is decided
 CHECKED_MODELS = ("coulomb",)
 _DAMAGED = AttributeError, LookupError, TypeError, ValueError, ArithmeticError, RecursionError
-_BOTH = ("proved", "undecided")
-_STATED = {
-    "exists": ("proved",),
-    "unique": _BOTH,
-    "admissible": _BOTH,
-    "stable": (*_BOTH, "refuted"),
-}
+_STATED = ("exists", "unique", "admissible", "stable")
 
 
 @dataclass(frozen=True)
@@ -70,8 +64,9 @@ def _check(data: Any, checks: Any, whole: bool = True) -> tuple[tuple[str, ...],
 
 
 def _check_orbit(data: dict[str, Any]) -> list[str]:
-    claims, scene = dict(data["statements"]), Scene(data)
-    if set(claims) != set(_STATED) or any(claims[name] not in _STATED[name] for name in claims):
+    claims, scene, verdicts = data["statements"], Scene(data), ("proved", "undecided", "refuted")
+    known = [claims[name] in verdicts[: 2 + (name == "stable")] for name in _STATED]
+    if len(claims) != 4 or not all(known) or claims["exists"] != "proved":
         raise Refused("its statements are not those of an orbit")
     joints, radii = ([[number(c) for c in row] for row in data[k]] for k in ("joints", "radius"))
     for (*_, v), row in zip(joints, radii, strict=True):
@@ -93,7 +88,7 @@ def _check_orbit(data: dict[str, Any]) -> list[str]:
                 raise Undecided("balls hold the joints")
     if claims["admissible"] == "proved":
         check_admissible(scene, z)
-    proved = [name for name in list(_STATED)[:3] if claims[name] == "proved"]
+    proved = [name for name in _STATED[:3] if claims[name] == "proved"]
     return proved + check_multipliers(scene, data, z, claims["stable"])
 
 

@@ -81,8 +81,7 @@ def check_multipliers(scene: Scene, data: Any, z: list[arb], stable: str) -> lis
     trace, det = scene.multipliers(z)
     if stable != "undecided":
         room = (1 - abs(det)).min(1 + det - abs(trace))  # Jury
-        what = "the multipliers lie on their side of the unit circle"
-        positive(room if stable == "proved" else -room, what)
+        positive(room if stable == "proved" else -room, "the multipliers lie on that side of 1")
     root, mean = acb(trace * trace / 4 - det).sqrt(), trace / 2
     found = [acb(trace), acb(0)] if det.is_zero() else [mean + root, mean - root]
     stated = [acb(ball(mu["re"]), ball(mu["im"])) for mu in data["multipliers"]]

@@ -53,6 +53,15 @@ def part(value: Any, k: int) -> arb:
     return value[k] if isinstance(value, arb_series) else arb(0 if k else value)
 
 
+def sinc(x: Any) -> Any:
+    """Return sin(x) / x, also at 0: there by the derivatives of 0F1(3/2, -x^2 / 4)."""
+    if isinstance(x, arb) or not x[0].contains(0):
+        return x.sinc() if isinstance(x, arb) else x.sin() / x
+    q = -x * x / 4
+    terms = (q[0].hypgeom_0f1(1.5 + k) * (q - q[0]) ** k / (1, 1.5, 7.5)[k] for k in range(3))
+    return sum(terms, 0 * x)
+
+
 class Scene:
     """The parameters and segments of a file, and their motion; joints are (phase of the excitation, x)."""
 
@@ -94,7 +103,7 @@ class Scene:
             later, last = (k * phase + w * tau).sin_cos()
             if self.undamped:  # also at resonance
                 near, far = (1 - w) * tau / 2, (1 + w) * tau / 2
-                near = near.sinc() if isinstance(near, arb) else near.sin() / near
+                near = sinc(near)
                 p, q = tau * near * far.sin() / (1 + w), tau * far.cos() * near
                 x += amplitude * (cosine * p - sine * (d - q) / (1 + w))
                 v += amplitude * (cosine * (q + (w * tau).sin()) / (1 + w) - sine * w * p)

@@ -95,6 +95,8 @@ def check_event(data: dict[str, Any]) -> list[str]:
         positive(radius - abs(box.curve(INSIDE)[n, 0] - middle), "it does so in the ball")
     else:
         place = Place(scene, kind, data["at"])
+        if any(time.rad() < 100 * radius for time in place.times):
+            raise Refused("its ball of times is too narrow, as in older files: write it anew")
         product = place.value(*first.orbits(0)) * place.value(*last.orbits(0))
         positive(-product, f"what vanishes at a {kind} changes its sign")
         met = place.met(scene, z)
