@@ -27,7 +27,8 @@ _UNCHECKED = "what lies between an open end (null) and the event at which the br
 def tubes_of(proof: BranchCertificate) -> list[dict[str, Any]]:
     """Return the tubes along a branch as plain data: one for each run of linked boxes.
 
-    There are none if the checker does not know the model, or the orbits have holds.
+    There are none if the checker does not know the model, or the orbits have holds. Boxes with a damping of 1
+    or more are left out: the square root of ``1 - zeta^2`` is no power series with real coefficients there.
     """
     branch = proof.branch
     size = len(branch.system.word) * branch[0].joints.shape[1] + 1
@@ -36,6 +37,8 @@ def tubes_of(proof: BranchCertificate) -> list[dict[str, Any]]:
     runs: list[list[Piece]] = [[]]
     for piece in proof.pieces:
         known = piece.proved and bool(piece.knots) and len(piece.knots[0]) == size
+        damping = piece.values if branch.parameter == "zeta" else [branch[0].params["zeta"]]
+        known = known and max(damping) < 1
         if not (known and piece.linked):
             runs.append([])
         if known:
