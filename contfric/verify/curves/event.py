@@ -100,7 +100,8 @@ def check_event(data: dict[str, Any]) -> list[str]:
         product = place.value(*first.orbits(0)) * place.value(*last.orbits(0))
         positive(-product, f"what vanishes at a {kind} changes its sign")
         met = place.met(scene, z)
-    if not holds(box, at) or (kind == "SN" and data["at"] is not None):
+    inside = all(holds(box, point) for point in (first, at, last))
+    if not inside or (kind == "SN" and data["at"] is not None):
         raise Undecided("one curve through the event")
     check_admissible(scene, z, met)
     return ["exists", f"is a {kind} in {name}", "admissible"]
