@@ -29,6 +29,7 @@ def tubes_of(proof: BranchCertificate) -> list[dict[str, Any]]:
 
     There are none if the checker does not know the model, or the orbits have holds. Boxes with a damping of 1
     or more are left out: the square root of ``1 - zeta^2`` is no power series with real coefficients there.
+    So is a tube that the checker does not decide, which would spoil its file.
     """
     branch = proof.branch
     size = len(branch.system.word) * branch[0].joints.shape[1] + 1
@@ -43,7 +44,8 @@ def tubes_of(proof: BranchCertificate) -> list[dict[str, Any]]:
             runs.append([])
         if known:
             runs[-1].append(piece)
-    return [_tube(proof, run) for run in runs if run]
+    found = [_tube(proof, run) for run in runs if run]
+    return [tube for tube in found if check_text(json.dumps(tube)).yes]
 
 
 def _tube(proof: BranchCertificate, run: list[Piece]) -> dict[str, Any]:
