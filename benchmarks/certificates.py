@@ -24,7 +24,7 @@ import numpy as np
 import contfric as cf
 from contfric.certify.files import certificate_data
 from contfric.errors import ContfricError
-from contfric.verify.file import check_text
+from contfric.verify.curves.file import check_text
 from tests.certificate_oracle import false_statements, mutated
 from tests.contracts.test_event_files import KINDS, files
 from tests.event_oracle import changed, false_event

@@ -14,7 +14,8 @@ from contfric.certify.verdict import Verdict
 from contfric.continuation.events import Kind
 from contfric.errors import ParameterError, ResultFileError, path_of
 from contfric.models.balls.numbers import working
-from contfric.verify.file import CHECKED_MODELS, Answer, check_text
+from contfric.verify.curves.file import check_text
+from contfric.verify.file import CHECKED_MODELS, Answer
 
 if TYPE_CHECKING:
     from contfric.certify.certificate import Certificate

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 from contfric.certify.inequalities import DURATION, INSIDE, JOINT
 from contfric.certify.piece import Piece
 from contfric.continuation.events import TERMINAL
-from contfric.verify.file import CHECKED_MODELS, check_text
+from contfric.verify.curves.file import check_text
+from contfric.verify.file import CHECKED_MODELS
 
 if TYPE_CHECKING:
     from contfric.certify.branch import BranchCertificate
@@ -26,7 +27,9 @@ _UNCHECKED = "what lies between an open end (null) and the event at which the br
 def tubes_of(proof: BranchCertificate) -> list[dict[str, Any]]:
     """Return the tubes along a branch as plain data: one for each run of linked boxes.
 
-    There are none if the checker does not know the model, or the orbits have holds.
+    There are none if the checker does not know the model, or the orbits have holds. Boxes with a damping of 1
+    or more are left out: the square root of ``1 - zeta^2`` is no power series with real coefficients there.
+    So is a tube that the checker does not decide, which would spoil its file.
     """
     branch = proof.branch
     size = len(branch.system.word) * branch[0].joints.shape[1] + 1
@@ -35,11 +38,14 @@ def tubes_of(proof: BranchCertificate) -> list[dict[str, Any]]:
     runs: list[list[Piece]] = [[]]
     for piece in proof.pieces:
         known = piece.proved and bool(piece.knots) and len(piece.knots[0]) == size
+        damping = piece.values if branch.parameter == "zeta" else [branch[0].params["zeta"]]
+        known = known and max(damping) < 1
         if not (known and piece.linked):
             runs.append([])
         if known:
             runs[-1].append(piece)
-    return [_tube(proof, run) for run in runs if run]
+    found = [_tube(proof, run) for run in runs if run]
+    return [tube for tube in found if check_text(json.dumps(tube)).yes]
 
 
 def _tube(proof: BranchCertificate, run: list[Piece]) -> dict[str, Any]:

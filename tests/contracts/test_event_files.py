@@ -13,7 +13,7 @@ import pytest
 import contfric as cf
 from contfric.certify.files import event_data, verify
 from contfric.errors import ParameterError
-from contfric.verify.file import check_text
+from contfric.verify.curves.file import check_text
 from tests.event_oracle import changed, false_event
 
 PARAMS = {"Omega": 0.54, "S": 0.32, "S0": 0.4}
@@ -141,3 +141,13 @@ def test_the_file_of_a_branch_holds_its_orbits_and_events(tmp_path: Path) -> Non
     bilinear = cf.find_orbit("impact")
     with pytest.raises(ParameterError, match="no proof of this branch"):
         cf.continue_orbit(bilinear, "w", (0.99, 1.01)).certify().save(tmp_path / "none.json")
+
+
+@pytest.mark.parametrize("kind", ["AS", "GS", "T"])
+def test_a_file_of_an_older_version_is_to_be_written_anew(kind: str) -> None:
+    data = json.loads(files()[kind])
+    centre = data["at"][2].partition(" +/- ")[0]
+    data["at"][2] = f"{centre} +/- 1e-30"
+    answer = check_text(json.dumps(data))
+    assert not answer.yes
+    assert "write it anew" in answer.why

@@ -15,7 +15,7 @@ import contfric as cf
 from contfric.certify.branch import certify_branch
 from contfric.certify.files import verify
 from contfric.certify.tube_file import tubes_of
-from contfric.verify.file import check_text
+from contfric.verify.curves.file import check_text
 
 PARAMS = {"Omega": 0.54, "S": 0.32, "S0": 0.4}
 
@@ -172,3 +172,42 @@ def test_a_tube_of_fewer_knots_of_one_curve_is_one(tmp_path: Path) -> None:
     path = tmp_path / "tube.json"
     path.write_text(json.dumps(data))
     assert verify(path).yes
+
+
+def _by_hand(params: dict[str, float], parameter: str, span: tuple[float, float]) -> dict[str, Any]:
+    """Return a tube through all printed orbits of a branch, which no prover has seen."""
+    branch = cf.continue_orbit(cf.find_orbit("coulomb", params), parameter, span)
+    rows = [[*point.joints[:, :2].ravel().tolist(), point.params[parameter]] for point in branch]
+    return fold() | {
+        "params": dict(branch[0].params),
+        "parameter": parameter,
+        "half": bool(branch.system.half),
+        "segments": [list(pair) for pair in branch.system.word],
+        "knots": rows,
+        "events": [],
+        "ends": [None, None],
+    }
+
+
+def test_a_tube_passes_resonance_without_damping() -> None:
+    data = _by_hand({"Omega": 1.0, "S": 0.9, "S0": 0.9}, "Omega", (0.998, 1.002))
+    assert data["knots"][0][-1] < 1.0 < data["knots"][-1][-1]
+    answer = check_text(json.dumps(data))
+    assert answer.yes, answer.why
+    data["params"]["S"] += 1e-4
+    assert not is_verified(data)
+
+
+def test_a_tube_with_overcritical_damping_is_left_out() -> None:
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.3, "S0": 0.4, "zeta": 0.99})
+    proof = certify_branch(cf.continue_orbit(orbit, "zeta", (0.98, 1.01)))
+    found = tubes_of(proof)
+    assert found
+    assert max(knot[-1] for part in found for knot in part["knots"]) < 1.0
+    assert all(is_verified(part) for part in found)
+
+
+def test_a_tube_of_two_knots_cannot_have_two_ends() -> None:
+    data = fold()
+    data |= {"knots": data["knots"][-2:], "events": [], "ends": [data["ends"][1]] * 2}
+    assert not is_verified(data)
