@@ -89,9 +89,9 @@ def main() -> None:
         "its first mass on friction S; orbits of six segments along F, which is in no matrix. Microseconds "
         "of the processor for a point: prediction, Newton's method, all margins with their stationary "
         f"points; and with multipliers. The least of {ROUNDS} branches in turns with a yardstick (200,000 "
-        "numbers sorted, milliseconds), all that a call costs divided by its points. At 24 states two "
-        "thirds of it are states with derivatives (a segment in 80 to 95 microseconds, six of them twice "
-        "a point), the rest stationary points (20 each).",
+        "numbers sorted, milliseconds), all that a call costs divided by its points. Beyond six "
+        "states most of each motion is kept from point to point (docs/integration.md), which is part of "
+        "the time of the first points.",
         "",
         "| states | points | a point | with multipliers | yardstick |",
         "|---|---|---|---|---|",

@@ -102,12 +102,18 @@ class Kernel:
     """
 
     def __init__(
-        self, function: Callable[..., Any], signature: Any, label: str = "", counts: bool = True
+        self,
+        function: Callable[..., Any],
+        signature: Any,
+        label: str = "",
+        counts: bool = True,
+        vectors: bool = False,
     ) -> None:
         self.__wrapped__ = function
         self.__doc__ = function.__doc__
         self.signature = signature
         self._options = _OPTIONS if counts else {**_OPTIONS, "_nrt": False}
+        self._optimisation = _VECTORS if vectors else OPTIMISATION
         #: Added to the name of its folder: one function may be compiled for several signatures.
         self.label = label
 
@@ -144,7 +150,7 @@ class Kernel:
         found = numba.njit(**self._options)(function)
         found._cache = self._files()
         before = config.OPT, config.LOOP_VECTORIZE
-        config.OPT, config.LOOP_VECTORIZE = OPTIMISATION
+        config.OPT, config.LOOP_VECTORIZE = self._optimisation
         # what the compiler makes lives as long as it does: looking for garbage takes a tenth of its time
         collects = gc.isenabled()
         gc.disable()
@@ -219,6 +225,8 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 #: LLVM's level, and vectorised loops or not: loops are over 3 to 10 numbers here, so that more of
 #: either does not run faster (measured: within 2 percent) and takes up to a quarter longer to compile.
 OPTIMISATION = type(config.OPT)(1), 0
+#: The same for a kernel that loops over many states.
+_VECTORS = type(config.OPT)(3), 1
 
 
 def kernel(signature: Any, counts: bool = True) -> Callable[[Callable[..., Any]], Kernel]:

@@ -33,11 +33,14 @@ from enum import Enum
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from contfric.compiled import Kernel
 from contfric.flow.dop853 import POWER
 from contfric.flow.general import Kind, kernels_of, still
 from contfric.flow.interface import CompiledFlow
 from contfric.flow.layouts import MODEL
+from contfric.flow.linear.kept import NUMBERS
 from contfric.handle import Block, Bound
 
 
@@ -149,6 +152,7 @@ class Functions:
         values: dict[str, Any] = {name: getattr(self, name) for name in names}
         if self.affine is not None:
             values |= self.affine.functions
+            values["memory"] = np.zeros(NUMBERS)
         if self.timed:
             values["clock"] = self._clock.block
         return Block(MODEL, {**values, **self._tables(), **self._numbers()})

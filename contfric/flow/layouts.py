@@ -25,7 +25,7 @@ from contfric.compiled import (
     stationary_signature,
     vector,
 )
-from contfric.handle import ITSELF, TABLE, HandleType
+from contfric.handle import ITSELF, TABLE, WEIGHTS, HandleType
 
 #: The functions of a flow, as the engine takes them.
 FLOW = {
@@ -71,7 +71,7 @@ AFFINE = {
     # terms; vary(piece, co, by, z, waves, w, dw, h, terms, series, out): their derivatives
     "rates": types.void(i8, vector, vector, vector, vector, vector),
     "expand": types.void(i8, vector, vector, vector, vector, vector, f8, i8, matrix),
-    # carry(piece, co, h, terms, columns): rows of ``columns`` times exp(A h)
+    # carry(piece, co, h, terms, columns): columns of a matrix times exp(A h)
     "carry": types.void(i8, vector, f8, i8, matrix),
     "vary": types.void(i8, vector, vector, vector, matrix, vector, vector, f8, i8, matrix, matrix),
     # sums(piece, co, d, row, column, own): sums of the matrix in units d
@@ -103,5 +103,12 @@ NUMBERS = {
     "carries": i8,  # whether there is ``carry``; else ``expand`` does it column by column
 }
 #: What an integrator knows of a model. A clock is a block along whose field no state moves: zeros of
-#: observables of time alone are sought along it.
-MODEL = {**FUNCTIONS, **AFFINE, **dict.fromkeys(TABLES, TABLE), **NUMBERS, "clock": ITSELF}
+#: observables of time alone are sought along it. The memory is that of :mod:`contfric.flow.linear.kept`.
+MODEL = {
+    **FUNCTIONS,
+    **AFFINE,
+    **dict.fromkeys(TABLES, TABLE),
+    **NUMBERS,
+    "clock": ITSELF,
+    "memory": WEIGHTS,
+}

@@ -27,7 +27,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contfric.compiled import allocating_helper, helper
+from contfric.compiled import allocating_helper, helper, inlined_helper
+from contfric.compiling.vectors import subtract_eight
 from contfric.models.definition import FloatArray
 
 #: Share of a border row's entry below which all other pivots for it are rounding.
@@ -115,13 +116,23 @@ def swap_rows(a, i, j):  # type: ignore[no-untyped-def]
         a[i, k], a[j, k] = a[j, k], a[i, k]
 
 
+@inlined_helper
+def subtract_multiple(target, row, source, j, factor, begin, end):  # type: ignore[no-untyped-def]
+    """Subtract a multiple of a part of a row, eight numbers at a time."""
+    k = begin
+    while k + 8 <= end:
+        subtract_eight(target, row, source, j, factor, k)
+        k += 8
+    while k < end:
+        target[row, k] -= factor * source[j, k]
+        k += 1
+
+
 @helper
 def subtract(target, row, source, j, factor, m, col):  # type: ignore[no-untyped-def]
     """Subtract a multiple of a row; the columns m .. col of both are eliminated already."""
-    for k in range(m):
-        target[row, k] -= factor * source[j, k]
-    for k in range(col + 1, source.shape[1]):
-        target[row, k] -= factor * source[j, k]
+    subtract_multiple(target, row, source, j, factor, 0, m)
+    subtract_multiple(target, row, source, j, factor, col + 1, source.shape[1])
 
 
 @helper

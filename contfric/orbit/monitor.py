@@ -40,6 +40,8 @@ _AT_PIN = 1e-6
 _SAME_HEIGHT = 1e-13
 #: Duration below which a hold comes to no later maximum; divided by its square the above is 1e-10.
 _SOON = 0.03
+#: In the place of a label that is not known yet.
+_NO_LABEL = -2
 #: Duration below which rounding hides what is left of a margin without its double zero: at this one it is
 #: known to 1e-3, and a curvature of the load is larger.
 _CLEAR = 1e-6
@@ -131,8 +133,10 @@ def joint_margin(functions, layout, k, z, p, workspace):  # type: ignore[no-unty
 
 
 @helper
-def margins(functions, layout, z, p, workspace, stationary, out, followed):  # type: ignore[no-untyped-def]
+def margins(functions, layout, z, p, workspace, stationary, out, labels, followed):  # type: ignore[no-untyped-def]
     """Fill the margins in the order interior, exit, joint, entry, lasting, held.
+
+    And those labels whose stationary points are found on the way.
 
     An interior margin is infinite without stationary points, that of a tangential exit always. The
     closure and the rates at the exits are in ``workspace``; stationary values are kept in ``followed``.
@@ -148,6 +152,12 @@ def margins(functions, layout, z, p, workspace, stationary, out, followed):  # t
                 found = find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
             segment, watched = i, c
             keep_values(followed, k, found, stationary)
+            for row in range(layout.labels.shape[0]):
+                if layout.labels[row, 0] == i and layout.labels[row, 1] == c:
+                    write_label(
+                        functions, layout, row, found, z, p, workspace, stationary, out, labels,
+                        followed,
+                    )  # fmt: skip
         out[k] = interior_margin(functions, layout, k, found, z, p, workspace, stationary)
     at = interior.shape[0]
     for i in range(z.shape[0]):
@@ -265,24 +275,32 @@ def side_of(value, target):  # type: ignore[no-untyped-def]
 
 
 @helper
+def points_of_label(functions, layout, k, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
+    """Fill the stationary points of row k of the labels; return their number."""
+    i, c = layout.labels[k, 0], layout.labels[k, 1]
+    if layout.resets[i] >= 0:
+        return find_behind(functions, layout, i, c, z, p, workspace, stationary)
+    return find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
+
+
+@helper
 def crossings(functions, layout, k, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
     """Return the surfaces that the segment of row k crosses, as digits of one integer.
 
     And the distance to the nearest change, of a stationary point or a joint from a surface, and the number
     of stationary points.
     """
-    i, c, on, to = (
-        layout.labels[k, 0],
-        layout.labels[k, 1],
-        layout.labels[k, 2],
-        layout.labels[k, 3],
-    )
-    if layout.resets[i] >= 0:
-        found = find_behind(functions, layout, i, c, z, p, workspace, stationary)
-    else:
-        found = find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
+    found = points_of_label(functions, layout, k, z, p, workspace, stationary)
+    code, nearest, final = crossed(functions, layout, k, found, z, p, workspace, stationary)
+    return code, nearest, found, final
+
+
+@helper
+def crossed(functions, layout, k, found, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
+    """Return the crossings, the distance to the nearest change, and the value at the end."""
+    c, on, to = layout.labels[k, 1], layout.labels[k, 2], layout.labels[k, 3]
     if found < 0:
-        return -1, np.inf, found, np.nan
+        return -1, np.inf, np.nan
     value, final = ends_of(functions, layout, k, z, p, workspace)
     surfaces = layout.observables.shape[0]
     code, nearest, sides = 0, np.inf, 0  # two bits of ``sides`` a surface
@@ -307,7 +325,19 @@ def crossings(functions, layout, k, z, p, workspace, stationary):  # type: ignor
             if before != 0:
                 code = code * (surfaces + 1) + surface + 1
         value = following
-    return code, nearest, found, final
+    return code, nearest, final
+
+
+@helper
+def write_label(  # type: ignore[no-untyped-def]
+    functions, layout, k, found, z, p, workspace, stationary, out, labels, followed
+):
+    """Write label k, its distance behind the margins, and what is kept of it."""
+    labels[k], out[count_margins(layout) + k], end = crossed(
+        functions, layout, k, found, z, p, workspace, stationary
+    )
+    keep_values(followed, layout.interior.shape[0] + k, found, stationary)
+    keep_end(followed, layout.interior.shape[0] + k, end)
 
 
 @helper
@@ -317,15 +347,16 @@ def watch(functions, layout, z, p, workspace, stationary, out, labels, followed)
     Stationary values are kept in ``followed``, if it has space for any. False if something is not finite.
     """
     keep_levels(functions, p, followed, workspace)
-    margins(functions, layout, z, p, workspace, stationary, out, followed)
-    count, interior = count_margins(layout), layout.interior.shape[0]
     for k in range(layout.labels.shape[0]):
-        labels[k], out[count + k], found, end = crossings(
-            functions, layout, k, z, p, workspace, stationary
-        )
-        keep_values(followed, interior + k, found, stationary)
-        keep_end(followed, interior + k, end)
-    for k in range(count):
+        labels[k] = _NO_LABEL
+    margins(functions, layout, z, p, workspace, stationary, out, labels, followed)
+    for k in range(layout.labels.shape[0]):
+        if labels[k] == _NO_LABEL:
+            found = points_of_label(functions, layout, k, z, p, workspace, stationary)
+            write_label(
+                functions, layout, k, found, z, p, workspace, stationary, out, labels, followed
+            )
+    for k in range(count_margins(layout)):
         if math.isnan(out[k]):
             return False
     return True

@@ -1,4 +1,4 @@
-"""A model of four states whose matrix and excitation are parameters: any affine motion of that size."""
+"""A model of some states whose matrix and excitation are parameters: any affine motion of that size."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 SIZE = 4
 
 
-def definition() -> dict[str, Any]:
+def definition(size: int = SIZE) -> dict[str, Any]:
     """Return the model as a mapping: one affine field on both sides of a section."""
-    states = [f"y{i}" for i in range(SIZE)]
-    entries = {(i, j): f"a{i}{j}" for i in range(SIZE) for j in range(SIZE)}
+    states = [f"y{i}" for i in range(size)]
+    entries = {(i, j): f"a{i}{j}" for i in range(size) for j in range(size)}
     parameters = dict.fromkeys(entries.values(), 0.1)
     field = {}
     for i, state in enumerate(states):

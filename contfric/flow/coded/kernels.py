@@ -29,7 +29,7 @@ _VALUES = {
 }
 #: The kernels of models whose formulas are data, by what they are to a flow.
 KERNELS = {
-    name: Kernel(getattr(module, name), with_handle(signature, CODED))
+    name: Kernel(getattr(module, name), with_handle(signature, CODED), vectors=name == "carry")
     for module, signatures in ((series, AFFINE), (values, _VALUES))
     for name, signature in signatures.items()
 }

@@ -113,27 +113,25 @@ def expand(model, piece, co, y, c, s, w, h, terms, series):  # type: ignore[no-u
 
 
 def carry(model, piece, co, h, terms, columns):  # type: ignore[no-untyped-def]
-    """Multiply columns (rows of an array) by exp(A h): ``v + h A (v + h A / 2 (v + ...))``."""
-    count, n = columns.shape
+    """Multiply a matrix by exp(A h): ``v + h A (v + h A / 2 (v + ...))``."""
+    n, count = columns.shape
     row = model.row_of[model.group_of[piece]]
     first = model.slope_at[row]
-    start, sums, other = np.empty((n, count)), np.empty((n, count)), np.empty((n, count))
-    for i in range(n):
-        for j in range(count):
-            start[i, j] = sums[i, j] = columns[j, i]
+    sums, other = columns.copy(), np.empty((n, count))
     for m in range(terms, 0, -1):
         f = h / m
         for i in range(n):
+            into, start = other[i], columns[i]
             for j in range(count):
-                other[i, j] = start[i, j]
+                into[j] = start[j]
             for k in range(model.slope_at[row + i], model.slope_at[row + i + 1]):
-                a, source = f * co[k - first], model.columns[k]
+                a, source = f * co[k - first], sums[model.columns[k]]
                 for j in range(count):
-                    other[i, j] += a * sums[source, j]
+                    into[j] += a * source[j]
         sums, other = other, sums
     for i in range(n):
         for j in range(count):
-            columns[j, i] = sums[i, j]
+            columns[i, j] = sums[i, j]
 
 
 @helper

@@ -16,7 +16,8 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.dense import node
 from contfric.flow.dop853 import POWER
-from contfric.flow.linear.flow import MOST_STEPS, advance
+from contfric.flow.linear.flow import MOST_STEPS
+from contfric.flow.linear.steps import advance, exponential
 from contfric.flow.linear.system import REACH, WAVES, rows_of, set_up, silenced, system_in
 from contfric.flow.panels import error_of
 from contfric.flow.pieces import coefficients as quintic
@@ -34,7 +35,7 @@ def linear_step(motion, mode, c, t, h, p, which, workspace, end, any_length):  #
     """Write the vector after a step from ``workspace.start``; return its length against the longest one."""
     n, size = workspace.scales.shape[0], workspace.partial.shape[1]
     free = which.shape[0] if size > 0 else 0
-    coefficients = np.empty((1 + free, motion.entries_count))
+    coefficients = np.empty((2 + free, motion.entries_count))
     waves = np.empty((1 + free + WAVES, motion.waves_count))
     rows = np.empty((rows_of(free, 2 * n if size > 0 else 0), n))
     own = (coefficients, waves, rows)
@@ -62,6 +63,8 @@ def step_in(motion, mode, c, t, h, p, which, workspace, end, any_length, own):  
         for k in range(system.varied.shape[0]):
             system.varied[k, i] = 0.0
     advance(motion, mode, t, h, rate, spread, y, system)
+    if size > 0:
+        exponential(motion, mode, h, rate, spread, system)
     for i in range(n):
         end[i] = y[i]
     if first > n:
@@ -72,7 +75,7 @@ def step_in(motion, mode, c, t, h, p, which, workspace, end, any_length, own):  
         for j in range(size):  # the derivatives so far, carried on, and what this step adds
             total = system.work[5, i] if j == 0 else system.varied[j - n - 1, i] if j > n else 0.0
             for k in range(n):
-                total += maps[k, i] * start[first + k * size + j]
+                total += maps[i, k] * start[first + k * size + j]
             end[first + i * size + j] = total
     return length
 

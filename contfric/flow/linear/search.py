@@ -13,8 +13,12 @@ import math
 import numpy as np
 
 from contfric.compiled import allocating_helper, helper, inlined_helper
+from contfric.compiling.shared import numbers_at, try_lock, unlock
 from contfric.flow.folding import folded
 from contfric.flow.linear.flow import MOST_STEPS
+from contfric.flow.linear.kept import NUMBERS, space_of
+from contfric.flow.linear.sighted import advance_seen, sight_of, write_seen
+from contfric.flow.linear.steps import SMALL
 from contfric.flow.linear.system import (
     REACH,
     TERMS,
@@ -293,16 +297,20 @@ def stationary_in_step(poly, slope, first, terms, sign, done, h, span, count, ti
 
 
 @inlined_helper
-def stationary_in(motion, piece, c, t0, dt, p, reach, system, sight, polys, times, values):  # type: ignore[no-untyped-def]
+def stationary_in(motion, piece, c, t0, dt, p, reach, system, sight, seen, polys, times, values):  # type: ignore[no-untyped-def]
     """Write the interior stationary points of an observable; return their number, or -1."""
     rate, spread = reach
     y, near, poly, slope = system.work[4], _AT_JOINT * (1.0 + dt), polys[0], polys[1]
     span = (min(near, 0.5 * dt), max(dt - near, 0.5 * dt))
     done, sign, count = 0.0, 0.0, 0
+    at, by, step, memory = seen
     while done < dt:
-        h = next_length(rate, dt - done)
+        h = next_length(rate if at < 0 else REACH / step, dt - done)
         terms, first, size = terms_for(rate * h, spread), 0, 0.0
-        write_series(motion, piece, sight, c, 0.0, t0 + done, y, h, terms, system, poly)
+        if at < 0:
+            write_series(motion, piece, sight, c, 0.0, t0 + done, y, h, terms, system, poly)
+        else:
+            write_seen(motion, c, memory, at, t0 + done, y, h, terms, system, poly)
         for k in range(1, terms + 1):
             slope[k - 1] = k * poly[k]
             size += abs(poly[k])
@@ -323,7 +331,10 @@ def stationary_in(motion, piece, c, t0, dt, p, reach, system, sight, polys, time
                 )
                 if count < 0:
                     return -1
-        state_at(system.series, terms, 1.0, y)
+        if at < 0:
+            state_at(system.series, terms, 1.0, y)
+        elif h != dt - done:
+            advance_seen(memory, by, t0 + done, y, system)
         done = dt if h == dt - done else done + h
     return count
 
@@ -334,18 +345,26 @@ def linear_stationary(motion, piece, c, t0, y0, dt, p, times, values):  # type: 
     if not dt > 0.0:
         return 0
     entries, none = motion.entries_count, np.empty(0, dtype=np.int64)
-    coefficients, waves = np.empty((2, entries)), np.empty((1 + WAVES, motion.waves_count))
-    rows, poly = np.empty((rows_of(0, 0), y0.shape[0])), np.empty((2, TERMS + 2))
+    n, keeps = y0.shape[0], y0.shape[0] > SMALL
+    coefficients, waves = np.zeros((3, entries)), np.empty((1 + WAVES, motion.waves_count))
+    rows, poly = np.empty((rows_of(0, 2 * n if keeps else 0), n)), np.empty((2, TERMS + 2))
     period = motion.period(p, none, poly[0, :0])
     t = t0 - folded(t0, period) * period
-    workspace = (coefficients, waves, rows, poly)
-    return search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, values)
+    locked = keeps and try_lock(motion.memory) != 0
+    space = space_of(n, entries, waves.shape[1]) if keeps and not locked else 0
+    memory = numbers_at(motion.memory, NUMBERS) if locked else np.zeros(space)
+    workspace = (coefficients, waves, rows, poly, memory)
+    found = search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, values)
+    if locked:
+        unlock(motion.memory)
+    return found
 
 
 @inlined_helper
 def search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, values):  # type: ignore[no-untyped-def]
     """Search all stationary points, from a folded time, in a workspace that is given."""
-    system, sight = system_in(workspace[0][:1], workspace[1], workspace[2], 0), workspace[0][1]
+    sight, memory = workspace[0][0], workspace[4]
+    system = system_in(workspace[0][1:], workspace[1], workspace[2], 0)
     found, shorter = -1, 1.0
     for _ in range(
         2
@@ -354,8 +373,12 @@ def search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, va
         if math.isnan(rate):
             return -1
         reach = (rate * shorter, spread)
+        at, by, step = -1, -1, 0.0
+        if memory.shape[0] > 0 and shorter == 1.0:
+            at, by, step = sight_of(motion, piece, c, rate, spread, dt, sight, memory, system)
+        seen = (at, by, step, memory)
         found = stationary_in(
-            motion, piece, c, t, dt, p, reach, system, sight, workspace[3], times, values
+            motion, piece, c, t, dt, p, reach, system, sight, seen, workspace[3], times, values
         )
         if found >= 0:
             break

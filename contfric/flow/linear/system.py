@@ -60,7 +60,8 @@ class System(NamedTuple):
     work : workspace for n numbers, and the derivative by the time of the start, (6, n)
     series, other : Taylor terms of the state, and of another column, (TERMS + 1, n)
     varied : derivatives by the parameters, (parameters, n)
-    maps : exp(A d) of the motion so far, and of a step, transposed, (2 n, n); (0, n) where not wanted
+    maps : exp(A d) of a motion, and of a step, (2 n, n); (0, n) where no derivatives are wanted
+    scratch : space for the coefficients of a unit force, (entries,)
     """
 
     co: FloatArray
@@ -73,6 +74,7 @@ class System(NamedTuple):
     other: FloatArray
     varied: FloatArray
     maps: FloatArray
+    scratch: FloatArray
 
 
 #: Rows of waves, and of work.
@@ -91,9 +93,9 @@ def system_in(coefficients, waves, rows, free):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    coefficients, waves, rows : shapes (1 + free, entries), (1 + free + WAVES, waves) and (rows, n)
+    coefficients, waves, rows : shapes (2 + free, entries), (1 + free + WAVES, waves) and (rows, n)
     """
-    for k in range(1, 1 + free):
+    for k in range(1 + free):
         for j in range(coefficients.shape[1]):
             coefficients[k, j] = 0.0
     for k in range(waves.shape[0]):
@@ -102,7 +104,7 @@ def system_in(coefficients, waves, rows, free):  # type: ignore[no-untyped-def]
     a = _WORK + TERMS + 1
     return System(
         coefficients[0],
-        coefficients[1:],
+        coefficients[1 : 1 + free],
         waves[0],
         waves[1 : 1 + free],
         waves[1 + free :],
@@ -111,6 +113,7 @@ def system_in(coefficients, waves, rows, free):  # type: ignore[no-untyped-def]
         rows[a : a + TERMS + 1],
         rows[a + TERMS + 1 : a + TERMS + 1 + free],
         rows[a + TERMS + 1 + free :],
+        coefficients[coefficients.shape[0] - 1],
     )
 
 
