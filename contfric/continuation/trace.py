@@ -9,7 +9,14 @@ import numpy as np
 from contfric.continuation.accuracy import not_critical
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
-from contfric.continuation.ending import end_at_limit, ends_at, is_point, never_leaves
+from contfric.continuation.ending import (
+    end_at_limit,
+    end_of_period,
+    ends_at,
+    equilibrium_met,
+    is_point,
+    never_leaves,
+)
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.limits import is_at_limit, limit_crossed, limit_end
 from contfric.continuation.locate import belongs_to, locate_events
@@ -212,9 +219,12 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         side.end = End(reasons[why])
         if why == kernels.BROKEN and any(m in orbit.model.chatter_by_mode for m, _ in orbit.word):
             side.end = End(EndReason.BROKEN, _NO_REST)
-        if why in (kernels.STEP, kernels.BROKEN) and is_at_limit(side.tip.value, settings):
+        tip, stuck = _tip(orbit, side, settings), why in (kernels.STEP, kernels.BROKEN)
+        if stuck and is_at_limit(side.tip.value, settings):
             side.end = limit_end(side.tip.value, settings)
-        elif why in (kernels.STEP, kernels.BROKEN) and never_leaves(_tip(orbit, side, settings)):
+        elif why == kernels.ENDLESS or stuck and equilibrium_met(tip) is not None:
+            side.end = end_of_period(tip)
+        elif stuck and never_leaves(tip):
             side.end = End(EndReason.REST)
         elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
             end_stalled(orbit, side, settings)
@@ -291,6 +301,10 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         side.end = End(EndReason.STEP, LAST_CROSSING)
         return True
     side.largest = np.inf  # what asked for shorter steps is behind
+    if shrunk := [pair for pair in located if is_point(pair[0].orbit)]:
+        # segments of no length fold and double with it, and Newton fails before it
+        clear = [pair for pair in located if pair[0].located and not pair[1].lost]
+        located = [*(pair for pair in clear if pair not in shrunk), shrunk[-1]]
     for bifurcation, point in located:
         if limit is not None and _is_beyond(point, limit[0], after.arc - before.arc, settings):
             break
@@ -299,9 +313,13 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             return True
         if _is_known(side, bifurcation, before, point, after, settings):
             continue
-        if bifurcation.kind in TERMINAL and is_point(bifurcation.orbit):
+        if is_point(bifurcation.orbit):
             side.put_tip(point)
             side.end = End(EndReason.POINT)
+            return True
+        if bifurcation.kind in TERMINAL and equilibrium_met(bifurcation.orbit) is not None:
+            side.put_tip(point)
+            side.end = end_of_period(bifurcation.orbit)
             return True
         if bifurcation.kind in TERMINAL and never_leaves(bifurcation.orbit):
             side.put_tip(point)
