@@ -25,7 +25,7 @@ from contfric.atlas.degenerate import degenerate_events, unresolved
 from contfric.atlas.matching import identity, on_branch, same_place
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation
+from contfric.continuation.events import Bifurcation, EndReason
 from contfric.continuation.points import LARGEST_STEP
 from contfric.errors import ConvergenceError
 from contfric.orbit.orbit import Orbit
@@ -189,12 +189,12 @@ def _starts(branch: Branch) -> Iterator[Orbit]:
     """Yield the orbits of a branch that it is restarted from, in turn.
 
     Where its period grows without bound most of its points are at one value of the parameter, and cannot
-    be told from each other: the last one is in the middle of the values.
+    be told from each other: then the first of them is in the middle of the values.
     """
+    if any(end.reason is EndReason.PERIOD for end in branch.ends):
+        middle = 0.5 * (branch.values.min() + branch.values.max())
+        yield branch[int(np.argmin(np.abs(branch.values - middle)))]
     yield from (_inside(branch, share) for share in _SHARES)
-    low, high = branch.values.min(), branch.values.max()
-    nearest = int(np.argmin(np.abs(branch.values - 0.5 * (low + high))))
-    yield branch[nearest]
 
 
 def _inside(branch: Branch, share: float) -> Orbit:

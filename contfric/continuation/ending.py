@@ -101,12 +101,13 @@ def _to_equilibrium(orbit: Orbit, mode: str, joint: FloatArray, lasts: float) ->
     return float(np.max(np.abs(step))) if reached else np.inf
 
 
-def end_of_period(orbit: Orbit) -> End:
-    """Return the end of a branch along which the period grows without bound."""
+def endless(orbit: Orbit) -> End | None:
+    """Return the end of a branch whose orbit comes to an equilibrium on a surface; None if it does not."""
     surface = equilibrium_met(orbit)
+    if surface is None:
+        return None
     where = f"the orbit comes to an equilibrium on the surface '{surface}' (boundary equilibrium)"
-    message = f"the period grows without bound: {where}" if surface is not None else ""
-    return End(EndReason.PERIOD, message)
+    return End(EndReason.PERIOD, f"the period grows without bound: {where}")
 
 
 def end_at_limit(

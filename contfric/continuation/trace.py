@@ -11,9 +11,8 @@ from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
 from contfric.continuation.ending import (
     end_at_limit,
-    end_of_period,
+    endless,
     ends_at,
-    equilibrium_met,
     is_point,
     never_leaves,
 )
@@ -181,10 +180,17 @@ def trace_side(
         if progress is not None:
             progress(f"{side.count} points, {settings.parameter} = {side.tip.value:.6g}")
         if finished:
+            if side.end.reason in _MAY_BE_ENDLESS and (end := endless(_tip(orbit, side, settings))):
+                side.end = end
             side.rows = side.rows.first(side.last + 1)
             return side
 
 
+#: What the end at an equilibrium may look like: there every rate vanishes, and so do conditions on them.
+_MAY_BE_ENDLESS = frozenset(
+    EndReason[name]
+    for name in ("PERIOD", "STEP", "BROKEN", "SINGULAR", *(k.name for k in TERMINAL))
+)
 #: Why an orbit with chatter is not finite beyond a point.
 _NO_REST = "incomplete chatter: beyond this point the impacts do not come to rest"
 
@@ -219,12 +225,9 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         side.end = End(reasons[why])
         if why == kernels.BROKEN and any(m in orbit.model.chatter_by_mode for m, _ in orbit.word):
             side.end = End(EndReason.BROKEN, _NO_REST)
-        tip, stuck = _tip(orbit, side, settings), why in (kernels.STEP, kernels.BROKEN)
-        if stuck and is_at_limit(side.tip.value, settings):
+        if why in (kernels.STEP, kernels.BROKEN) and is_at_limit(side.tip.value, settings):
             side.end = limit_end(side.tip.value, settings)
-        elif why == kernels.ENDLESS or stuck and equilibrium_met(tip) is not None:
-            side.end = end_of_period(tip)
-        elif stuck and never_leaves(tip):
+        elif why in (kernels.STEP, kernels.BROKEN) and never_leaves(_tip(orbit, side, settings)):
             side.end = End(EndReason.REST)
         elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
             end_stalled(orbit, side, settings)
@@ -316,10 +319,6 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         if is_point(bifurcation.orbit):
             side.put_tip(point)
             side.end = End(EndReason.POINT)
-            return True
-        if bifurcation.kind in TERMINAL and equilibrium_met(bifurcation.orbit) is not None:
-            side.put_tip(point)
-            side.end = end_of_period(bifurcation.orbit)
             return True
         if bifurcation.kind in TERMINAL and never_leaves(bifurcation.orbit):
             side.put_tip(point)
