@@ -55,6 +55,12 @@ _ADVICE: dict[type[ast.AST], str] = {
     ast.NotEq: "a condition has one of <, <=, >, >=",
     ast.Tuple: "a comma can only separate the arguments of a function",
 }
+#: Functions that jump without end.
+_STAIRCASES = frozenset({"floor", "ceil", "round", "frac", "fmod", "rint", "trunc"})
+_STAIRCASE = (
+    "no function of the language: it jumps, and every jump needs a surface, with a mode on each side. Of the "
+    "time, mod(t, T) is the time since the last tick, where T is the period of the model"
+)
 
 
 @dataclass(frozen=True)
@@ -177,6 +183,8 @@ def _check_call(node: ast.Call, source: str, depth: int) -> None:
             "a product needs its *"
         )
     name, count = node.func.id, len(node.args)
+    if name in _STAIRCASES:
+        raise ModelError(f"in '{_short(source)}': {name}() is {_STAIRCASE}")
     if name not in FUNCTIONS:
         raise ModelError(
             f"in '{_short(source)}': unknown function '{name}'{did_you_mean(name, FUNCTIONS)} "
