@@ -320,7 +320,7 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             side.put_tip(point)
             side.end = End(EndReason.POINT)
             return True
-        if bifurcation.kind in TERMINAL and never_leaves(bifurcation.orbit):
+        if never_leaves(bifurcation.orbit):  # flights of no height fold by rounding
             side.put_tip(point)
             side.end = End(EndReason.REST)
             return True
