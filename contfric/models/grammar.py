@@ -55,12 +55,8 @@ _ADVICE: dict[type[ast.AST], str] = {
     ast.NotEq: "a condition has one of <, <=, >, >=",
     ast.Tuple: "a comma can only separate the arguments of a function",
 }
-#: Functions that jump without end.
-_STAIRCASES = frozenset({"floor", "ceil", "round", "frac", "fmod", "rint", "trunc"})
-_STAIRCASE = (
-    "no function of the language: it jumps, and every jump needs a surface, with a mode on each side. Of the "
-    "time, mod(t, T) is the time since the last tick, where T is the period of the model"
-)
+_STAIRCASES = ("floor", "ceil", "round", "frac", "fmod", "rint", "trunc")
+_JUMPS = "; every jump needs a surface with a mode on each side, of the time there is mod(t, T)"
 
 
 @dataclass(frozen=True)
@@ -183,12 +179,10 @@ def _check_call(node: ast.Call, source: str, depth: int) -> None:
             "a product needs its *"
         )
     name, count = node.func.id, len(node.args)
-    if name in _STAIRCASES:
-        raise ModelError(f"in '{_short(source)}': {name}() is {_STAIRCASE}")
     if name not in FUNCTIONS:
+        hint = _JUMPS if name in _STAIRCASES else did_you_mean(name, FUNCTIONS)
         raise ModelError(
-            f"in '{_short(source)}': unknown function '{name}'{did_you_mean(name, FUNCTIONS)} "
-            "(a product needs its *)"
+            f"in '{_short(source)}': unknown function '{name}'{hint} (a product needs its *)"
         )
     if node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
         raise ModelError(f"in '{_short(source)}': {name}() takes plain arguments")
