@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +25,7 @@ from contfric.atlas.degenerate import degenerate_events, unresolved
 from contfric.atlas.matching import identity, on_branch, same_place
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation
+from contfric.continuation.events import Bifurcation, EndReason
 from contfric.continuation.points import LARGEST_STEP
 from contfric.errors import ConvergenceError
 from contfric.orbit.orbit import Orbit
@@ -171,8 +172,7 @@ def _spread(places: list[int], most: int) -> list[int]:
 
 def _restart(diagram: Diagram, i: int, step: float) -> Restart:
     branch, refused = diagram.branches[i], ""
-    for share in _SHARES:
-        start = _inside(branch, share)
+    for start in _starts(branch):
         value = start.params[diagram.parameter]
         try:
             again = _explored(diagram, start, step)
@@ -183,6 +183,18 @@ def _restart(diagram: Diagram, i: int, step: float) -> Restart:
         degenerate = tuple(degenerate_events(again)) if less or more else ()
         return Restart(i, value, less, more, again.complete, degenerate)
     return Restart(i, value, (refused,), (), True)
+
+
+def _starts(branch: Branch) -> Iterator[Orbit]:
+    """Yield the orbits of a branch that it is restarted from, in turn.
+
+    Where its period grows without bound most of its points are at one value of the parameter, and cannot
+    be told from each other: then the first of them is in the middle of the values.
+    """
+    if any(end.reason is EndReason.PERIOD for end in branch.ends):
+        middle = 0.5 * (branch.values.min() + branch.values.max())
+        yield branch[int(np.argmin(np.abs(branch.values - middle)))]
+    yield from (_inside(branch, share) for share in _SHARES)
 
 
 def _inside(branch: Branch, share: float) -> Orbit:
@@ -236,7 +248,7 @@ def _covers(known: Branch, branch: Branch) -> bool:
     """Tell whether a branch lies on another one: some point in its middle does."""
     if known.mirrored or known.system.periods != branch.system.periods:
         return False
-    inside = (_inside(branch, share) for share in _INSIDE)
+    inside = chain((_inside(branch, share) for share in _INSIDE), _starts(branch))
     return any(on_branch(orbit, known) for orbit in inside if orbit.converged)
 
 

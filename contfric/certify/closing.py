@@ -67,7 +67,7 @@ def keeps(system: System, segments: Segments, model: BallModel, matrices: BallMo
         for mode in {mode for mode, _ in system.word}
     ]
     gaps += [
-        matrices.surfaces[to] * matrix + matrices.surfaces[name]
+        matrices.surfaces[to] * matrix - matrices.surfaces[name] * symmetry.sense(name)
         for name, to in symmetry.surfaces.items()
     ]
     return all(x.is_zero() for gap in gaps for x in gap.entries())

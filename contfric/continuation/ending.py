@@ -11,7 +11,9 @@ from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
 from contfric.continuation.vertex_ends import CROSSED
 from contfric.continuation.vertices import at_vertex
+from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.slides import SHORT
 
 #: Points this near to a vertex (arclength) are left out: the system is singular there, and they are good
 #: to about 1e-4 only. The branch that leaves starts at twice the distance.
@@ -21,6 +23,12 @@ _NO_SIZE = 1e-5
 #: Flights this high (relative to 1 + the states) between contacts are about to vanish: their impacts have
 #: speeds near the root of rounding, and no limit that is known to more than a few digits.
 _NO_HEIGHT = 1e-8
+#: An orbit that passes an equilibrium this near (relative to its size) comes to it: what is left of the
+#: distance there is rounding, over the factor by which it grows on the way out.
+_AT_EQUILIBRIUM = 1e-6
+#: Duration, in parts of a segment, over which its field is asked for an equilibrium: short enough that no
+#: eigenvalue makes a whole turn, long enough to be seen beside rounding.
+_PART = 1e-2
 
 
 def is_point(orbit: Orbit) -> bool:
@@ -52,6 +60,54 @@ def never_leaves(orbit: Orbit) -> bool:
         if highest < least:
             return True
     return False
+
+
+def equilibrium_met(orbit: Orbit) -> str | None:
+    r"""Return the surface on which an autonomous orbit comes to an equilibrium; None if it comes to none.
+
+    An equilibrium of a mode is a fixed point of its flow :math:`\varphi_h` over any time h. From a state x
+    it is Newton's step away from it,
+
+    .. math:: d = (D\varphi_h - 1)^{-1} (x - \varphi_h(x)).
+
+    Where a joint is at the equilibrium of the mode that ends or begins there, a boundary equilibrium, the
+    orbit needs for ever: its period grows as the logarithm of the distance :math:`|d|`, and what conditions
+    are met there besides is of no meaning, as every rate vanishes.
+    """
+    if not orbit.model.autonomous:
+        return None
+    size = float(np.max(np.ptp(np.vstack([orbit.begins, orbit.ends])[:, 1:], axis=0)))
+    for i, (mode, exit_) in enumerate(orbit.word):
+        lasts = float(orbit.ends[i, 0] - orbit.begins[i, 0])
+        stands = orbit.model.is_at_rest(mode) or mode in orbit.model.chatter_by_mode
+        if stands or lasts < SHORT * orbit.period:
+            continue
+        for joint, surface in ((orbit.ends[i], exit_), (orbit.begins[i], orbit.word[i - 1][1])):
+            if _to_equilibrium(orbit, mode, joint, _PART * lasts) < _AT_EQUILIBRIUM * size:
+                return surface
+    return None
+
+
+def _to_equilibrium(orbit: Orbit, mode: str, joint: FloatArray, lasts: float) -> float:
+    """Return how far an equilibrium of a mode is from a joint by Newton's method; infinite if none is."""
+    time, state = float(joint[0]), joint[1:]
+    moved = orbit.flow.state(mode, time, state, lasts) - state
+    slopes = orbit.flow.jacobian(mode, time, state, lasts)[:, 1 : 1 + len(state)]
+    slopes -= np.eye(len(state))
+    if not (np.all(np.isfinite(moved)) and np.all(np.isfinite(slopes))):
+        return np.inf
+    step = np.linalg.lstsq(slopes, -moved, rcond=None)[0]
+    reached = np.max(np.abs(moved + slopes @ step)) <= 0.5 * np.max(np.abs(moved))
+    return float(np.max(np.abs(step))) if reached else np.inf
+
+
+def endless(orbit: Orbit) -> End | None:
+    """Return the end of a branch whose orbit comes to an equilibrium on a surface; None if it does not."""
+    surface = equilibrium_met(orbit)
+    if surface is None:
+        return None
+    where = f"the orbit comes to an equilibrium on the surface '{surface}' (boundary equilibrium)"
+    return End(EndReason.PERIOD, f"the period grows without bound: {where}")
 
 
 def end_at_limit(

@@ -9,7 +9,13 @@ import numpy as np
 from contfric.continuation.accuracy import not_critical
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
-from contfric.continuation.ending import end_at_limit, ends_at, is_point, never_leaves
+from contfric.continuation.ending import (
+    end_at_limit,
+    endless,
+    ends_at,
+    is_point,
+    never_leaves,
+)
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.limits import is_at_limit, limit_crossed, limit_end
 from contfric.continuation.locate import belongs_to, locate_events
@@ -174,10 +180,17 @@ def trace_side(
         if progress is not None:
             progress(f"{side.count} points, {settings.parameter} = {side.tip.value:.6g}")
         if finished:
+            if side.end.reason in _MAY_BE_ENDLESS and (end := endless(_tip(orbit, side, settings))):
+                side.end = end
             side.rows = side.rows.first(side.last + 1)
             return side
 
 
+#: What the end at an equilibrium may look like: there every rate vanishes, and so do conditions on them.
+_MAY_BE_ENDLESS = frozenset(
+    EndReason[name]
+    for name in ("PERIOD", "STEP", "BROKEN", "SINGULAR", *(k.name for k in TERMINAL))
+)
 #: Why an orbit with chatter is not finite beyond a point.
 _NO_REST = "incomplete chatter: beyond this point the impacts do not come to rest"
 
@@ -291,6 +304,10 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         side.end = End(EndReason.STEP, LAST_CROSSING)
         return True
     side.largest = np.inf  # what asked for shorter steps is behind
+    if shrunk := [pair for pair in located if is_point(pair[0].orbit)]:
+        # segments of no length fold and double with it, and Newton fails before it
+        clear = [pair for pair in located if pair[0].located and not pair[1].lost]
+        located = [*(pair for pair in clear if pair not in shrunk), shrunk[-1]]
     for bifurcation, point in located:
         if limit is not None and _is_beyond(point, limit[0], after.arc - before.arc, settings):
             break
@@ -299,11 +316,11 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             return True
         if _is_known(side, bifurcation, before, point, after, settings):
             continue
-        if bifurcation.kind in TERMINAL and is_point(bifurcation.orbit):
+        if is_point(bifurcation.orbit):
             side.put_tip(point)
             side.end = End(EndReason.POINT)
             return True
-        if bifurcation.kind in TERMINAL and never_leaves(bifurcation.orbit):
+        if never_leaves(bifurcation.orbit):  # flights of no height fold by rounding
             side.put_tip(point)
             side.end = End(EndReason.REST)
             return True

@@ -129,7 +129,7 @@ def unit_of(orbit: Orbit) -> Unit:
     """Return the unit of the motion of a whole orbit."""
     slides = slides_of(orbit)
     turns = repetitions(orbit, slides)
-    periods = orbit.periods // turns
+    periods = max(1, orbit.periods // turns)
     half = periods % 2 == 1 and repeats(orbit, slides, 2 * turns, mirrored=True)
     longest = max(slides, key=lambda i: orbit.ends[i, 0] - orbit.cycle[i, 0])
     duration = orbit.period / (turns * (2 if half else 1))

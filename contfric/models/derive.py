@@ -274,7 +274,10 @@ def symmetry_of(sampler: Sampler, surfaces: list[Surface]) -> Symmetry | None:
             {s.name: [evaluator.height(s.name, params, t, y) for t, y in at] for s in surfaces}
             for at in (points, moved)
         )
-        images = {s.name: _image(s, heights, beyond) for s in surfaces}
+        found = {s.name: _image(s, heights, beyond) for s in surfaces}
+        images = {name: image for name, (image, _) in found.items()}
+        kept = frozenset(name for name, (_, sense) in found.items() if sense > 0)
+        modes = _modes_alike(sampler, matrix, points, moved)
         lifts = {own.surface: own.lift for own in description.chatters if not own.other}
         for wall, lift in lifts.items():  # of two walls they may be levels of one observable
             images[lift] = lifts.get(images[wall], images[lift])
@@ -282,7 +285,34 @@ def symmetry_of(sampler: Sampler, surfaces: list[Surface]) -> Symmetry | None:
         raise EntryError(("symmetry",), str(error)) from None
     if not description.period:
         fraction = 0.5
-    return Symmetry(matrix, fraction, images)
+    return Symmetry(matrix, fraction, images, kept, modes)
+
+
+def _modes_alike(
+    sampler: Sampler,
+    matrix: tuple[tuple[float, ...], ...],
+    points: list[tuple[float, list[float]]],
+    moved: list[tuple[float, list[float]]],
+) -> dict[str, frozenset[str]]:
+    """Return for each mode those whose field, at the images of some states, is the image of its own."""
+    evaluator, modes = sampler.evaluator, sampler.evaluator.description.modes
+    here, there = (
+        {
+            mode.name: np.array(
+                [[evaluator.value(f, sampler.params, t, y) for f in mode.field] for t, y in at]
+            )
+            for mode in modes
+        }
+        for at in (points, moved)
+    )
+    return {
+        name: frozenset(
+            other
+            for other, values in there.items()
+            if np.allclose(values, rates @ np.array(matrix).T, _SAME, _SAME, equal_nan=True)
+        )
+        for name, rates in here.items()
+    }
 
 
 def _linear_map(description: Description) -> tuple[tuple[tuple[float, ...], ...], float]:
@@ -309,13 +339,14 @@ def _linear_map(description: Description) -> tuple[tuple[tuple[float, ...], ...]
 
 def _image(
     surface: Surface, heights: Mapping[str, list[float]], images: Mapping[str, list[float]]
-) -> str:
-    """Return the surface whose sides at some states are the other ones of a surface at their images."""
-    for other, values in heights.items():
-        pairs = zip(images[surface.name], values, strict=True)
-        if all(abs(a + b) <= _SAME * (1.0 + abs(a) + abs(b)) for a, b in pairs):
-            return other
+) -> tuple[str, int]:
+    """Return the surface that a surface comes to, and whether its sides are kept (1) or exchanged (-1)."""
+    for sense in (-1, 1):
+        for other, values in heights.items():
+            pairs = zip(images[surface.name], values, strict=True)
+            if all(abs(a - sense * b) <= _SAME * (1.0 + abs(a) + abs(b)) for a, b in pairs):
+                return other, sense
     raise ModelError(
         f"the image of surface '{surface.name}' ({surface.observable} = {surface.level}) is none of "
-        "the surfaces with its sides exchanged: there is no such symmetry, or a surface is missing"
+        "the surfaces: there is no such symmetry, or a surface is missing"
     )

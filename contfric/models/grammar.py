@@ -55,6 +55,8 @@ _ADVICE: dict[type[ast.AST], str] = {
     ast.NotEq: "a condition has one of <, <=, >, >=",
     ast.Tuple: "a comma can only separate the arguments of a function",
 }
+_STAIRCASES = ("floor", "ceil", "round", "frac", "fmod", "rint", "trunc")
+_JUMPS = "; every jump needs a surface with a mode on each side, of the time there is mod(t, T)"
 
 
 @dataclass(frozen=True)
@@ -178,9 +180,9 @@ def _check_call(node: ast.Call, source: str, depth: int) -> None:
         )
     name, count = node.func.id, len(node.args)
     if name not in FUNCTIONS:
+        hint = _JUMPS if name in _STAIRCASES else did_you_mean(name, FUNCTIONS)
         raise ModelError(
-            f"in '{_short(source)}': unknown function '{name}'{did_you_mean(name, FUNCTIONS)} "
-            "(a product needs its *)"
+            f"in '{_short(source)}': unknown function '{name}'{hint} (a product needs its *)"
         )
     if node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
         raise ModelError(f"in '{_short(source)}': {name}() takes plain arguments")

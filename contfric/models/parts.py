@@ -191,12 +191,20 @@ class Symmetry:
     """The map ``(t, y) -> (t + fraction * T, matrix @ y)`` that takes solutions to solutions.
 
     Of an autonomous model it is a map of states only, and the fraction means nothing.
-    ``surfaces`` names the image of each surface; the sign of (observable - level) is reversed.
+    ``surfaces`` names the image of each surface; the sign of (observable - level) is reversed, but for
+    those in ``kept``, such as the tick of a clock. ``modes`` names the modes whose field is the image of
+    that of a mode: where modes overlap, the sides of the surfaces do not tell which one it is.
     """
 
     matrix: tuple[tuple[float, ...], ...]
     fraction: float
     surfaces: Mapping[str, str]
+    kept: frozenset[str] = frozenset()
+    modes: Mapping[str, frozenset[str]] = field(default_factory=dict)
+
+    def sense(self, surface: str) -> int:
+        """Return what the sign of a surface is multiplied by at the image."""
+        return 1 if surface in self.kept else -1
 
     def array(self) -> FloatArray:
         """Return the state matrix, shape (n, n); not to be changed."""

@@ -340,6 +340,7 @@ class TransitionMaps(SectionMaps):
             modes[domain.own_mode] = modes.get(domain.own_mode, fits) & fits
         for domain in self.domains:
             fit = modes[domain.own_mode]
+            fit = fit & self.symmetry.modes.get(domain.own_mode, fit) or fit
             target = next((d.name for d in self._mirrored(domain) if d.own_mode in fit), None)
             if target is None:
                 raise ParameterError(f"model {self.name}: domain {domain.name} has no mirror image")
@@ -349,5 +350,6 @@ class TransitionMaps(SectionMaps):
     def _mirrored(self, domain: Domain) -> tuple[Domain, ...]:
         """Return the domains in which the image of a domain under the symmetry lies."""
         assert self.symmetry is not None
-        signs = {self.symmetry.surfaces[s]: -v for s, v in domain.signs.items()}
+        symmetry = self.symmetry
+        signs = {symmetry.surfaces[s]: symmetry.sense(s) * v for s, v in domain.signs.items()}
         return self._domains_by_signs.get(tuple(signs[s.name] for s in self.surfaces), ())

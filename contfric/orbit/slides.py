@@ -72,12 +72,12 @@ def repeats(orbit: Orbit, slides: list[int], turns: int, mirrored: bool = False)
 
 
 def repetitions(orbit: Orbit, slides: list[int]) -> int:
-    """Return how often the motion of a whole orbit repeats itself in its period."""
-    found = (
-        k
-        for k in range(orbit.periods, 0, -1)
-        if orbit.periods % k == 0 and repeats(orbit, slides, k)
-    )
+    """Return how often the motion of a whole orbit repeats itself in its period.
+
+    Without an excitation that may be any part of its slides.
+    """
+    whole = len(slides) if orbit.model.autonomous else orbit.periods
+    found = (k for k in range(whole, 0, -1) if whole % k == 0 and repeats(orbit, slides, k))
     return next(found)
 
 
@@ -87,7 +87,7 @@ class Outline:
 
     Attributes
     ----------
-    periods : shortest period, in periods of the excitation
+    periods : shortest period, in periods of the excitation; without one it is of no importance
     cycle : period of the excitation; infinite without one
     starts : ndarray, shape (k, 1 + n)
         Time and state at the start of each slide; times are those of the excitation, zero without one.
@@ -105,8 +105,12 @@ class Outline:
     ordered: bool = True
 
     def apart(self, other: Outline) -> float:
-        """Return how far two motions are apart, up to symmetry; infinite if they are of another kind."""
-        if self.periods != other.periods or len(self.starts) != len(other.starts):
+        """Return how far two motions are apart, up to symmetry; infinite if they are of another kind.
+
+        Without an excitation a motion is told by any of its states, however often it is run through.
+        """
+        alike = self.periods == other.periods and len(self.starts) == len(other.starts)
+        if np.isfinite(self.cycle) and not alike:
             return np.inf
         return min(self._apart_from(there) for there in (other.starts, other.images))
 
@@ -152,7 +156,7 @@ def outline_of(orbit: Orbit) -> Outline:
         images[:, 1:] = starts[:, 1:] @ model.symmetry.array().T
         if not model.autonomous:
             images[:, 0] += model.symmetry.fraction * cycle
-    return Outline(whole.periods // turns, cycle, starts, images, _columns(model))
+    return Outline(max(1, whole.periods // turns), cycle, starts, images, _columns(model))
 
 
 def _at_one_phase(whole: Orbit) -> Outline:

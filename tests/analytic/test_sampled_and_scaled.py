@@ -67,20 +67,47 @@ resets: {tick: {to: {minus: {sign: +}, plus: {sign: -}}}}
 """
 
 
+MIRROR = "symmetry: x -> -x, v -> -v"
+
+
+@pytest.mark.parametrize("more", ["", MIRROR])
 @pytest.mark.parametrize("Ts", [0.7, 1.3])
-def test_a_sampled_relay_repeats_its_samples(tmp_path: Path, Ts: float) -> None:
+def test_a_sampled_relay_repeats_its_samples(tmp_path: Path, Ts: float, more: str) -> None:
     """The samples of the orbit, and their signs, are those of the map from tick to tick."""
-    model = typed(tmp_path, RELAY)
+    model = typed(tmp_path, RELAY + more)
+    assert cf.check_model(model).ok
     orbit = cf.find_orbit(model, {"Ts": Ts})
     matrix = np.array([[0.0, 1.0], [-1.0, -0.6]])
     step = expm(matrix * Ts)
-    ticks = orbit.ends[np.array([exit_ == "tick" for _, exit_ in orbit.system.word])]
+    ticks = orbit.ends[np.array([exit_ == "tick" for _, exit_ in orbit.word])]
     y = ticks[0, 1:3]
-    for _ in range(len(ticks) * (2 if orbit.system.half else 1)):
+    for _ in range(len(ticks)):
         force = -0.4 if y[0] + 0.5 * y[1] > 0.0 else 0.4
         rest = np.array([force, 0.0])
         y = rest + step @ (y - rest)
     assert np.allclose(y, ticks[0, 1:3], atol=1e-10)
+
+
+def test_the_clock_of_a_symmetric_relay_is_its_own_image(tmp_path: Path) -> None:
+    """The states change their signs, the clock does not: half of an orbit has half of its ticks.
+
+    Both modes hold everywhere: which is the image of which is told by their fields.
+    """
+    model = typed(tmp_path, RELAY + MIRROR)
+    assert model.symmetry is not None and model.symmetry.kept == {"tick"}
+    for domain, image in model.mirror_domain.items():
+        assert model.mirror_domain[image] == domain
+        assert model.domain_by_name[domain].own_mode != model.domain_by_name[image].own_mode
+    orbit = cf.find_orbit(model)
+    plain = cf.find_orbit(typed(tmp_path, RELAY))
+    assert orbit.symmetric and orbit.period == pytest.approx(plain.period, abs=1e-11)
+    assert np.sort(orbit.multipliers) == pytest.approx(np.sort(plain.multipliers), abs=1e-10)
+    half = orbit.as_half()
+    ticks = [sum(exit_ == "tick" for _, exit_ in word) for word in (half.system.word, orbit.word)]
+    assert half.system.half and 2 * ticks[0] == ticks[1]
+    assert half.as_whole().residual < 1e-10
+    with pytest.raises(cf.ModelError, match="none of the surfaces"):
+        typed(tmp_path, RELAY + "symmetry: x -> -x")
 
 
 def test_the_modes_of_a_reset_are_read_in_three_ways(tmp_path: Path) -> None:

@@ -279,7 +279,7 @@ def check_symmetry(report: ModelReport, probe: Probe) -> None:
                 return
             for name, image in symmetry.surfaces.items():
                 a = probe.height(name, moved, mirrored)
-                b = probe.height(image, *place)
+                b = -symmetry.sense(name) * probe.height(image, *place)
                 if not abs(a + b) <= _SAME * (1.0 + abs(a) + abs(b)):
                     report.error(
                         Topic.SYMMETRY,
