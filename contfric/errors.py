@@ -43,8 +43,8 @@ class ParameterError(ContfricError):
     >>> try:
     ...     cf.find_orbit("coulomb", {"S": 0.5, "S0": 0.4})
     ... except cf.ParameterError as error:
-    ...     print(str(error)[:46])
-    model 'coulomb' needs S0 >= S, got S0 = 0.4, S
+    ...     print(str(error)[16:46])
+    needs S0 >= S, got S0 = 0.4, S
     """
 
 

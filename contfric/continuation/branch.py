@@ -16,10 +16,11 @@ from contfric.base.shown import Shown
 from contfric.continuation.events import Bifurcation, End, Kind
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.orbit import Orbit, Status, of_two_halves
+from contfric.orbit.linear import of_two_halves
+from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
 from contfric.orbit.system import IntArray, System, build_system
-from contfric.orbit.words import decode, encode, mirror_pairs
+from contfric.orbit.words import mirror_pairs, mirrored_labels
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -268,7 +269,7 @@ class Branch(Shown):
             self,
             system=system,
             joints=joints,
-            labels=_mirrored_labels(self.labels, self.model),
+            labels=mirrored_labels(self.labels, self.model),
             bifurcations=tuple(images[id(b)] for b in self.bifurcations),
             ends=(_mirror_end(self.ends[0], images), _mirror_end(self.ends[1], images)),
             mirrored=not self.mirrored,
@@ -385,16 +386,6 @@ def _padded(rows: list[FloatArray]) -> FloatArray:
     for row, values in zip(found, rows, strict=True):
         row[: len(values)] = values
     return found
-
-
-def _mirrored_labels(labels: IntArray, model: Model) -> IntArray:
-    """Return the labels of the mirror image: the same crossings of the mirrored surfaces."""
-    assert model.symmetry is not None
-    image = model.symmetry.surfaces
-    surfaces = [s.name for s in model.surfaces]
-    codes, inverse = np.unique(labels, return_inverse=True)
-    mirrored = [encode([image[s] for s in decode(int(c), surfaces)], surfaces) for c in codes]
-    return np.array(mirrored, dtype=np.int64)[inverse].reshape(labels.shape)
 
 
 def _mirror_end(end: End, images: dict[int, Bifurcation]) -> End:

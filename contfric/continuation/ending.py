@@ -6,11 +6,13 @@ import numpy as np
 
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.limits import limit_end
-from contfric.continuation.outcomes import end_message
+from contfric.continuation.outcomes import NoJump, outcome_at
+from contfric.continuation.places import places_of
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
 from contfric.continuation.vertex_ends import CROSSED
 from contfric.continuation.vertices import at_vertex
+from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import SHORT
@@ -146,7 +148,7 @@ def ends_at(
 def _end_message(bifurcation: Bifurcation) -> str:
     """Return why a branch ends at an event, in words that fit what happens there."""
     kind, meaning = bifurcation.kind, bifurcation.meaning
-    message = end_message(bifurcation)
+    message = _why_it_ends(bifurcation)
     if meaning == kind.meaning or not TERMINAL & {kind}:
         return message
     return (message or EndReason[kind.name].value).replace(kind.meaning, meaning)
@@ -163,3 +165,31 @@ def _ends_branch(bifurcation: Bifurcation, point: Point, orbit: Orbit) -> EndRea
     if bifurcation.kind is Kind.PD and bifurcation.orbit.periods < orbit.periods:
         return EndReason.PD
     return None
+
+
+def _why_it_ends(bifurcation: Bifurcation) -> str:
+    """Return why a branch ends at an event where its kind alone would say something else; else nothing."""
+    orbit, kind = bifurcation.orbit, bifurcation.kind
+    if kind not in (Kind.SS, Kind.AS, Kind.GS) or orbit.system.holds:
+        return ""
+    if any(test.surface in orbit.model.reset_by_surface for test in bifurcation.tests):
+        struck = next(
+            t.surface for t in bifurcation.tests if t.surface in orbit.model.reset_by_surface
+        )
+        if orbit.model.reset_by_surface[struck].stays:
+            return "grazing impact: the wall is just touched"
+        return f"grazing: the surface of the reset at '{struck}' is just touched"
+    if orbit.model.composed and orbit.model.filippov:
+        return (
+            ""
+            if kind is Kind.SS
+            else f"{kind.meaning}: the signature changes, the motion is continuous"
+        )
+    for place in places_of(bifurcation)[:1]:
+        try:
+            outcome_at(orbit.as_whole(), place, kind)
+        except NoJump:
+            return f"{kind.meaning}: the signature changes, the motion is continuous"
+        except NotationError:
+            return ""
+    return ""

@@ -22,7 +22,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contfric.continuation.events import ACCURACY, Bifurcation, Kind, kind_of_margin
+from contfric.continuation.events import (
+    ACCURACY,
+    Bifurcation,
+    Kind,
+)
+from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.outcomes import (
     NO_LENGTH_AT_TOUCH,
     Outcome,

@@ -37,8 +37,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from contfric.continuation.composed_outcomes import continuous_edit
-from contfric.continuation.events import Bifurcation, Kind
-from contfric.continuation.places import places_of
+from contfric.continuation.events import Kind
 from contfric.continuation.touching import chosen_at
 from contfric.continuation.zero_acceleration import (
     first_zero_acceleration,
@@ -101,34 +100,6 @@ class Outcome:
     joints: Mapping[Origin, FloatArray]
     reason: str
     away: Mapping[Origin, float] = field(default_factory=dict)
-
-
-def end_message(bifurcation: Bifurcation) -> str:
-    """Return why a branch ends at an event where its kind alone would say something else; else nothing."""
-    orbit, kind = bifurcation.orbit, bifurcation.kind
-    if kind not in (Kind.SS, Kind.AS, Kind.GS) or orbit.system.holds:
-        return ""
-    if any(test.surface in orbit.model.reset_by_surface for test in bifurcation.tests):
-        struck = next(
-            t.surface for t in bifurcation.tests if t.surface in orbit.model.reset_by_surface
-        )
-        if orbit.model.reset_by_surface[struck].stays:
-            return "grazing impact: the wall is just touched"
-        return f"grazing: the surface of the reset at '{struck}' is just touched"
-    if orbit.model.composed and orbit.model.filippov:
-        return (
-            ""
-            if kind is Kind.SS
-            else f"{kind.meaning}: the signature changes, the motion is continuous"
-        )
-    for place in places_of(bifurcation)[:1]:
-        try:
-            outcome_at(orbit.as_whole(), place, kind)
-        except NoJump:
-            return f"{kind.meaning}: the signature changes, the motion is continuous"
-        except NotationError:
-            return ""
-    return ""
 
 
 def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:

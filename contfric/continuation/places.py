@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from contfric.continuation.events import Bifurcation, hold_of_test
+from contfric.continuation.events import (
+    Bifurcation,
+)
+from contfric.continuation.kinds import hold_of_test
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test
 

@@ -9,9 +9,8 @@ import numpy as np
 from contfric.continuation.events import (
     Bifurcation,
     Kind,
-    hold_of_test,
-    kind_of_margin,
 )
+from contfric.continuation.kinds import hold_of_test, kind_of_margin
 from contfric.continuation.locate_change import locate_change
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import bifurcation_at

@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.continuation.events import Kind, kind_of_margin
+from contfric.continuation.events import (
+    Kind,
+)
+from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import Point
 from contfric.curves.curve import Curve, CurvePart
 from contfric.curves.problem import Problem

@@ -14,7 +14,12 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.candidates import candidates
-from contfric.continuation.events import TERMINAL, Bifurcation, Kind, kind_of_margin
+from contfric.continuation.events import (
+    TERMINAL,
+    Bifurcation,
+    Kind,
+)
+from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import EXTRA, Point, Rows
 from contfric.curves.naming import MARGINAL
 from contfric.curves.points import first_curve_point, march_rows

@@ -13,8 +13,8 @@ from contfric.continuation.events import (
     TERMINAL,
     Bifurcation,
     Kind,
-    kind_of_margin,
 )
+from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.touching import resting_domain
 from contfric.errors import ParameterError, checked_range, did_you_mean, items_of, mapping_of, shown
 from contfric.models.definition import FloatArray, Model

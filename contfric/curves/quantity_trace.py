@@ -12,7 +12,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from contfric.continuation.events import EndReason, kind_of_margin
+from contfric.continuation.events import (
+    EndReason,
+)
+from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point, Rows
 from contfric.continuation.trace import continue_orbit
 from contfric.curves.points import CHUNK

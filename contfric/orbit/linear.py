@@ -6,6 +6,7 @@ For single orbits; along a branch the engine has the pencil from the elimination
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray
 from contfric.orbit.system import System
@@ -126,3 +127,16 @@ def pencil_of_turn(system: System, joints: FloatArray, vector: FloatArray) -> Fl
     pencil = np.empty((2, *a.shape[1:]))
     turn_pencil(a, b, pencil)
     return pencil
+
+
+def of_two_halves(mu: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Return multipliers of a symmetric orbit from those of its half: their squares, infinite ones too.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> of_two_halves(np.array([-0.5, np.inf]) + 0j).real.tolist()
+    [0.25, inf]
+    """
+    finite = np.isfinite(mu)
+    return np.where(finite, np.where(finite, mu, 0.0) ** 2, complex(np.inf))

@@ -15,7 +15,7 @@ from contfric.base.tally import tally
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
-from contfric.orbit.linear import pencil_of_turn
+from contfric.orbit.linear import of_two_halves, pencil_of_turn
 from contfric.orbit.measured import MeasuredOrbit
 from contfric.orbit.reading import read_signature
 from contfric.orbit.samples import samples, state_within
@@ -49,19 +49,6 @@ class Status(str, Enum):
     NOT_CONVERGED = "Newton did not converge: start nearer, from a simulation or a continuation"
     SINGULAR = "the system is singular: a fold, or an orbit that belongs to a continuum"
     NOT_FINITE = "an iterate left the region where the flow is finite: start nearer"
-
-
-def of_two_halves(mu: ComplexArray) -> ComplexArray:
-    """Return multipliers of a symmetric orbit from those of its half: their squares, infinite ones too.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> of_two_halves(np.array([-0.5, np.inf]) + 0j).real.tolist()
-    [0.25, inf]
-    """
-    finite = np.isfinite(mu)
-    return np.where(finite, np.where(finite, mu, 0.0) ** 2, complex(np.inf))
 
 
 @dataclass(frozen=True, eq=False)

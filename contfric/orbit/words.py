@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections import deque
 from functools import cache
 
+import numpy as np
+
 from contfric.models.definition import Model
 from contfric.orbit.structure import exit_domains
-from contfric.orbit.system import Word
+from contfric.orbit.system import IntArray, Word
 from contfric.signature.reduced import mirror_pair
 
 
@@ -100,3 +102,13 @@ def encode(crossed: list[str], surfaces: list[str]) -> int:
     for surface in crossed:
         code = code * (len(surfaces) + 1) + surfaces.index(surface) + 1
     return code
+
+
+def mirrored_labels(labels: IntArray, model: Model) -> IntArray:
+    """Return the labels of the mirror image: the same crossings of the mirrored surfaces."""
+    assert model.symmetry is not None
+    image = model.symmetry.surfaces
+    surfaces = [s.name for s in model.surfaces]
+    codes, inverse = np.unique(labels, return_inverse=True)
+    mirrored = [encode([image[s] for s in decode(int(c), surfaces)], surfaces) for c in codes]
+    return np.array(mirrored, dtype=np.int64)[inverse].reshape(labels.shape)

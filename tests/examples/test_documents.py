@@ -197,11 +197,11 @@ def test_guide_mentions_every_public_name() -> None:
 
 
 #: Their examples need a model file: docs/equilibria.md has them.
-ELSEWHERE = {"BoundaryPoint", "EquilibriumSet", "TwoFold"}
+WITHOUT_EXAMPLE = {"BoundaryPoint", "EquilibriumSet", "TwoFold"}
 
 
 def test_every_public_name_has_an_example() -> None:
-    public = {n: getattr(contfric, n) for n in contfric.__all__ if n not in ELSEWHERE}
+    public = {n: getattr(contfric, n) for n in contfric.__all__ if n not in WITHOUT_EXAMPLE}
     named = {n: o for n, o in public.items() if inspect.isclass(o) or inspect.isfunction(o)}
     assert [n for n, o in named.items() if ">>>" not in (inspect.getdoc(o) or "")] == []
 

@@ -14,7 +14,7 @@ from contfric.atlas.exploration import Exploration
 from contfric.atlas.follow import _through
 from contfric.atlas.matching import same_kind, telling_kind
 from contfric.base.tally import tally
-from contfric.continuation import events, smooth
+from contfric.continuation import kinds, smooth
 from contfric.continuation.points import Point, settings_of
 from contfric.continuation.side import first_point
 from contfric.continuation.smooth import _is_idle
@@ -50,9 +50,9 @@ def test_a_load_that_stands_still_at_a_stop_is_held(
     (event,) = [b for b in asymmetric().bifurcations if b.tests and b.kind is not cf.Kind.T]
     (test, *_) = event.tests
     assert test.margin is Margin.JOINT and event.orbit.system.holds == ()
-    assert events.kind_of_margin(event.orbit.system, test, event.orbit) is event.kind
-    monkeypatch.setattr(events, "outward_rate", lambda *_: rate)
-    assert events.kind_of_margin(event.orbit.system, test, event.orbit).value == kind
+    assert kinds.kind_of_margin(event.orbit.system, test, event.orbit) is event.kind
+    monkeypatch.setattr(kinds, "outward_rate", lambda *_: rate)
+    assert kinds.kind_of_margin(event.orbit.system, test, event.orbit).value == kind
 
 
 def point(value: float, multiplier: float) -> Point:

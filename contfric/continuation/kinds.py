@@ -1,0 +1,115 @@
+"""Which kind of sliding event the vanishing of a margin is.
+
+A margin that reaches zero is a sliding event; which one follows from the model's definition alone:
+
+=========  ======================================  ==========================================
+margin     where                                   kind
+=========  ======================================  ==========================================
+interior   segment that stays on a surface         AS: the stick touches its limit inside; GS where the
+                                                   surface is another contact's, and the stick goes on
+interior   other segment, surface that switches    GS: the slide touches rest inside, a slider its limit
+interior   surface with the same field behind      T
+any        surface with a reset                    GS: a grazing impact
+exit       as the interior of the same segment     AS, GS or T: the exit becomes tangential
+joint      a reset chooses its mode by that side   SS: the map jumps (entry: the same)
+joint      the state at a stop meets a surface     CS if it leaves the stick there (distance to
+                                                   the limit grows outward), SS if it enters it;
+                                                   CS where there is no rest that the surface ends, and GS
+                                                   where one of the two is the zero of the other's rate;
+                                                   as the interior where a section is touched
+entry      behind a reset the state is on another  CS: another mode follows
+           surface
+lasting    slide between two holds                 GS: the first can be left no more
+=========  ======================================  ==========================================
+
+For CS and SS the sign of the observable's rate at the stop decides: rest is left if the state moves
+out of the region where it can stay.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.continuation.events import Kind
+from contfric.continuation.touching import (
+    begins_to_slide,
+    chosen_at,
+    is_corner,
+    rate_along,
+    resting_domain,
+    touched_at_joint,
+)
+from contfric.orbit.holds import Hold
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Margin, System, Test, inside_sign
+
+#: A slide behind a hold that is this short has vanished where one of its margins has: they are its length
+#: times a rate of the load, and Newton may fail before they are below 1e-5.
+_VANISHED = 1e-3
+
+
+def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
+    """Classify the vanishing of a margin; see the table of the module."""
+    model, mode = system.model, system.word[test.segment][0]
+    hold = hold_of_test(test, orbit)
+    if hold is not None:
+        return kind_of_hold(hold, test)
+    if chosen_at(system, test):
+        return Kind.SS
+    if test.margin is Margin.ENTRY:
+        return Kind.CS
+    if test.surface in model.reset_by_surface:
+        return Kind.CS if is_corner(system, test, orbit) else Kind.GS
+    if test.margin is Margin.JOINT and test.surface in model.section_surfaces:
+        resting = resting_domain(system, test)
+        if resting is None and inside_sign(model, mode, test.surface) == 0:
+            return Kind.T
+    joint = test.margin is Margin.JOINT
+    touched = touched_at_joint(system, test, orbit) if joint else test.surface
+    if touched is not None:
+        if model.mode_by_name[mode].sliding and not begins_to_slide(model, mode, touched):
+            return Kind.AS
+        return Kind.T if inside_sign(model, mode, touched) == 0 else Kind.GS
+    # a load that stands still at rest: from beyond the limit the slide leads back into it, as at SS
+    return Kind.CS if outward_rate(system, test, orbit) > 0.0 else Kind.SS
+
+
+def hold_of_test(test: Test, orbit: Orbit) -> Hold | None:
+    """Return the hold that a margin belongs to: its own, or of the slide behind it that has vanished."""
+    for hold in orbit.system.holds:
+        if test.segment == hold.segment:
+            return hold
+        behind = (hold.segment + 1) % len(orbit.system.word)
+        if test.segment == behind and test.margin is not Margin.JOINT:
+            duration = orbit.ends[behind, 0] - orbit.cycle[behind, 0]
+            if duration < _VANISHED:
+                return hold
+    return None
+
+
+def kind_of_hold(hold: Hold, test: Test) -> Kind:
+    """Return the event that an end of a hold's freedom is: that which the hold is pinned to.
+
+    Unless it touches its limit on the way (AS), or can just not be left there (GS).
+    """
+    if test.margin is Margin.INTERIOR and test.segment == hold.segment:
+        return Kind.AS
+    if test.margin is Margin.HELD:
+        return Kind.GS
+    if test.margin is Margin.LASTING and test.segment != hold.segment:
+        return Kind.GS  # the slide behind it has vanished
+    if hold.pin is not None:
+        return Kind.SS
+    return Kind.AS if hold.after_rest else Kind.GS
+
+
+def outward_rate(system: System, test: Test, orbit: Orbit) -> float:
+    """Rate at which a state that rests at the joint would leave the region where it can rest.
+
+    Infinite where there is no rest.
+    """
+    resting = resting_domain(system, test)
+    if resting is None:
+        return np.inf
+    end = orbit.ends[test.segment]
+    return -resting.signs[test.surface] * rate_along(orbit, resting.mode, test.surface, end)
