@@ -206,7 +206,9 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     why, step = side.march(orbit, settings, step)
     overshoot = overshoots_vertex(orbit, side, settings, side.count - count)
     if overshoot is not Overshoot.NONE:
-        return overshoot is Overshoot.ENDED, step
+        kept = side.count - count
+        stopped = bool(settings.stop_at) and stop_among(orbit, side, settings, kept, side.last)
+        return stopped or overshoot is Overshoot.ENDED, step
     unresolved = why in (kernels.EVENT, kernels.OUTSIDE)  # what is in the last step may come first
     last, fresh = side.last - int(unresolved), side.count - count
     if settings.stop_at and stop_among(orbit, side, settings, fresh, last):

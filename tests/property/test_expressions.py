@@ -69,7 +69,9 @@ def test_formulas_and_numbers_agree(text: str, seed: int) -> None:
     with mpmath.workdps(60):
         place = [mpmath.mpf(p) for p in point]
         exact = float(many_digits(text, place))
-        slope = slopes(lambda p: [many_digits(text, p)], place, [mpmath.mpf(10) ** -18] * len(place))[0]
+        slope = slopes(
+            lambda p: [many_digits(text, p)], place, [mpmath.mpf(10) ** -18] * len(place)
+        )[0]
     assume(abs(exact) < 1e6 and max(abs(s) for s in slope) < 1e6)
     assert number_of(text, dict(zip(NAMES, point, strict=True))) == pytest.approx(exact, rel=1e-9)
     helpers = {
@@ -221,7 +223,9 @@ def test_compiled_fields_of_random_models(rate: str, observable: str) -> None:
                 return [(ends[0] - ends[1]) / (2 * step)]
 
             exact = slopes(lambda q: [many_digits(rate, q)], place, [step] * len(place))[0]
-            exact_grad = slopes(lambda q: [many_digits(observable, q)], place, [step] * len(place))[0]
+            exact_grad = slopes(lambda q: [many_digits(observable, q)], place, [step] * len(place))[
+                0
+            ]
             exact_rate = slopes(along, place, [wide] * len(place))[0]
             order = [2, 0, 1, 3, 4]  # t, x, v, a, b
             assert out[1] == pytest.approx(float(many_digits(rate, place)), rel=1e-9, abs=1e-9)
