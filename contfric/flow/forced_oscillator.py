@@ -138,7 +138,10 @@ def observe(c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
             grad[2] = 1.0
         return y[1]
     if grad.shape[0] == 0:
-        return y[0] - excitation(p, t)[0]
+        f = math.cos(p[OMEGA] * t)
+        if p[H] != 0.0:
+            f += p[H] * math.cos(3 * p[OMEGA] * t)
+        return y[0] - f
     f, f1, _ = excitation(p, t)
     if grad.shape[0] > 0:
         grad[0] = -f1

@@ -2,7 +2,7 @@
 
 Everything that the search asks for (an observable or its rate with derivatives, and bounds of the higher
 ones) follows from x, v and the excitation there. Without damping these take the sines and cosines of
-``(w - 1) d / 2``, ``(w + 1) d / 2``, d / 2 and the phase at the start; the rest is the addition theorems.
+``(w - 1) d / 2`` and ``(w + 1) d / 2`` and the phase at the start; the rest is the addition theorems.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import math
 from contfric.compiled import helper
 from contfric.flow.overdamped import STRONG, damped_bound, damped_rates, is_gone
 from contfric.flow.response import forced, free
-from contfric.flow.sines import sines
 
 OMEGA, S, S0, H, ZETA = range(5)
 STICK = 2
@@ -23,9 +22,10 @@ LOAD, SPEED = range(2)
 def excitation(p, t):  # type: ignore[no-untyped-def]
     """Return f(t) and its first two time derivatives."""
     w, h = p[OMEGA], p[H]
-    s, s3, c, c3 = sines((w * t, 3 * w * t))
+    c, s = math.cos(w * t), math.sin(w * t)
     f, f1, f2 = c, -w * s, -w * w * c
     if h != 0.0:
+        c3, s3 = math.cos(3 * w * t), math.sin(3 * w * t)
         f, f1, f2 = f + h * c3, f1 - 3 * w * h * s3, f2 - 9 * w * w * h * c3
     return f, f1, f2
 
@@ -56,21 +56,20 @@ def slide(s, p, t0, x0, v0, d):  # type: ignore[no-untyped-def]
 def phases(p, t0):  # type: ignore[no-untyped-def]
     """Return (sin, cos) of the excitation's phase at the start of a segment, and of three times it."""
     w = p[OMEGA]
-    s, s3, c, c3 = sines((w * t0, 3 * w * t0))
-    return s, c, s3, c3
+    s, c = math.sin(w * t0), math.cos(w * t0)
+    if p[H] == 0.0:
+        return s, c, 0.0, 1.0
+    return s, c, math.sin(3 * w * t0), math.cos(3 * w * t0)
 
 
 @helper
-def harmonic(s, c, d, p, q, sp, sq, cp, cq):  # type: ignore[no-untyped-def]
-    """Return the undamped response (X, V) to one harmonic after d, and (sin, cos) of its phase.
+def harmonic(w, s, c, d):  # type: ignore[no-untyped-def]
+    """Return the undamped response (X, V) to one harmonic, (sin, cos) of its phase and of d after d.
 
     The formulas of :func:`contfric.flow.response.undamped`.
-
-    Parameters
-    ----------
-    s, c : (sin, cos) of the phase at the start
-    p, q : the two angles there; then their sines and cosines
     """
+    p, q = 0.5 * (w - 1.0) * d, 0.5 * (w + 1.0) * d
+    sp, cp, sq, cq = math.sin(p), math.cos(p), math.sin(q), math.cos(q)
     a = 0.5 * d * (1.0 if p == 0.0 else sp / p)
     b = 0.5 * d * (1.0 if q == 0.0 else sq / q)
     sin_p, cos_p = s * cp + c * sp, c * cp - s * sp
@@ -80,6 +79,8 @@ def harmonic(s, c, d, p, q, sp, sq, cp, cq):  # type: ignore[no-untyped-def]
         a * cos_q + b * cos_p,
         sin_p * cq + cos_p * sq,
         cos_p * cq - sin_p * sq,
+        sq * cp - cq * sp,
+        cq * cp + sq * sp,
     )
 
 
@@ -94,24 +95,23 @@ def point(mode, p, phase, t0, x0, v0, d):  # type: ignore[no-untyped-def]
         x, v = x0, 0.0
         if mode != STICK:
             x, v = slide(direction(mode), p, t0, x0, v0, d)
-        s1, c1 = sines((w * d,))
+        s1, c1 = math.sin(w * d), math.cos(w * d)
         sin1, cos1 = phase[0] * c1 + phase[1] * s1, phase[1] * c1 - phase[0] * s1
         s3, c3 = s1 * (3.0 - 4.0 * s1 * s1), c1 * (4.0 * c1 * c1 - 3.0)
         sin3, cos3 = phase[2] * c3 + phase[3] * s3, phase[3] * c3 - phase[2] * s3
     else:
-        below, above, half = 0.5 * (w - 1.0) * d, 0.5 * (w + 1.0) * d, 0.5 * d
-        sp, sq, s, cp, cq, c = sines((below, above, half))
-        one = harmonic(phase[0], phase[1], d, below, above, sp, sq, cp, cq)
-        sin1, cos1 = one[2], one[3]
-        sin_d, cos_d = 2.0 * s * c, (c - s) * (c + s)
+        one = harmonic(w, phase[0], phase[1], d)
+        sin1, cos1, sin_d, cos_d = one[2], one[3], one[4], one[5]
+        versine = 1.0 - cos_d
+        if d < 1.0:  # where it would cancel
+            half = math.sin(0.5 * d)
+            versine = 2.0 * half * half
         load = x0 + direction(mode) * p[S]
-        x = x0 + v0 * sin_d - load * (2.0 * s * s) + one[0]
+        x = x0 + v0 * sin_d - load * versine + one[0]
         v = v0 * cos_d - load * sin_d + one[1]
         sin3, cos3 = 0.0, 0.0
         if h != 0.0:
-            below, above = 0.5 * (3.0 * w - 1.0) * d, 0.5 * (3.0 * w + 1.0) * d
-            sp, sq, cp, cq = sines((below, above))
-            three = harmonic(phase[2], phase[3], d, below, above, sp, sq, cp, cq)
+            three = harmonic(3.0 * w, phase[2], phase[3], d)
             x, v = x + h * three[0], v + h * three[1]
             sin3, cos3 = three[2], three[3]
     k = 3.0 * w

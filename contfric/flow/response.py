@@ -29,17 +29,16 @@ import math
 import numpy as np
 
 from contfric.compiled import allocating_helper, helper
-from contfric.flow.sines import sines
 
 
 @helper
-def sinc(x, sine):  # type: ignore[no-untyped-def]
+def sinc(x):  # type: ignore[no-untyped-def]
     """Return sin(x)/x; the quotient is accurate for every x but 0."""
-    return 1.0 if x == 0.0 else sine / x
+    return 1.0 if x == 0.0 else math.sin(x) / x
 
 
 @helper
-def sinc_slope(x, sine, cosine):  # type: ignore[no-untyped-def]
+def sinc_slope(x):  # type: ignore[no-untyped-def]
     """Return d/dx sin(x)/x; below 0.5 by its series, where the quotient would cancel."""
     if abs(x) < 0.5:
         # sum of (-1)^k 2k x^(2k-1) / (2k+1)!; seven terms leave less than 1e-17 at 0.5
@@ -56,7 +55,7 @@ def sinc_slope(x, sine, cosine):  # type: ignore[no-untyped-def]
                 )
             )
         )
-    return (cosine - sine / x) / x
+    return (math.cos(x) - math.sin(x) / x) / x
 
 
 @helper
@@ -65,13 +64,14 @@ def undamped(w, theta, d):  # type: ignore[no-untyped-def]
     p = 0.5 * (w - 1.0) * d
     q = 0.5 * (w + 1.0) * d
     half = 0.5 * d
-    s, sin_p, sin_q, c, cos_p, cos_q = sines((theta, p, q))
-    a = half * sinc(p, sin_p)
-    b = half * sinc(q, sin_q)
-    sp, cp = s * cos_p + c * sin_p, c * cos_p - s * sin_p
-    sq, cq = s * cos_q + c * sin_q, c * cos_q - s * sin_q
-    aw = half * half * sinc_slope(p, sin_p, cos_p)
-    bw = half * half * sinc_slope(q, sin_q, cos_q)
+    a = half * sinc(p)
+    b = half * sinc(q)
+    sp = math.sin(theta + p)
+    cp = math.cos(theta + p)
+    sq = math.sin(theta + q)
+    cq = math.cos(theta + q)
+    aw = half * half * sinc_slope(p)
+    bw = half * half * sinc_slope(q)
     return (
         a * sq - b * sp,
         a * cq + b * cp,
@@ -104,18 +104,8 @@ def sinhc(z):  # type: ignore[no-untyped-def]
             )
         )
         return value, slope
-    grown, (s, c) = math.expm1(abs(z.real)), sines((z.imag,))
-    sinh = math.copysign(0.5 * (grown + grown / (grown + 1.0)), z.real)
-    cosh = 1.0 + 0.5 * grown * grown / (grown + 1.0)
-    value = complex(sinh * c, cosh * s) / z
-    return value, (complex(cosh * c, sinh * s) - value) / z
-
-
-@helper
-def exponential(z):  # type: ignore[no-untyped-def]
-    """Return e^z of a complex z."""
-    size, (s, c) = math.exp(z.real), sines((z.imag,))
-    return complex(size * c, size * s)
+    value = cmath.sinh(z) / z
+    return value, (cmath.cosh(z) - value) / z
 
 
 @helper
@@ -124,10 +114,10 @@ def difference(a, b, d):  # type: ignore[no-untyped-def]
     z = 0.5 * (a - b) * d
     if abs(z.real) > 20.0:
         # the larger exponential dominates by e^40: no cancellation, and sinh would overflow
-        eb = exponential(b * d)
-        value = (exponential(a * d) - eb) / (a - b)
+        eb = cmath.exp(b * d)
+        value = (cmath.exp(a * d) - eb) / (a - b)
         return value, (value - d * eb) / (a - b)
-    middle = d * exponential(0.5 * (a + b) * d)
+    middle = d * cmath.exp(0.5 * (a + b) * d)
     value, slope = sinhc(z)
     return middle * value, 0.5 * d * middle * (value - slope)
 
@@ -147,8 +137,8 @@ def roots(zeta):  # type: ignore[no-untyped-def]
 def free(zeta, d):  # type: ignore[no-untyped-def]
     """Return (G, C, R): kernel, its slope, and the response ``1 - C - 2 zeta G`` to a unit force."""
     if zeta == 0.0:
-        s, c = sines((0.5 * d,))
-        return 2.0 * s * c, (c - s) * (c + s), 2.0 * s * s
+        s = math.sin(0.5 * d)
+        return math.sin(d), math.cos(d), 2.0 * s * s
     a, b = roots(zeta)
     g = difference(a, b, d)[0].real
     r = transfer(a, b, 0.0, d)[0].real
@@ -178,8 +168,7 @@ def forced(zeta, w, theta, d):  # type: ignore[no-untyped-def]
     a, b = roots(zeta)
     g = difference(a, b, d)[0]
     p, pw = transfer(a, b, w, d)
-    s, c = sines((theta,))
-    e = complex(c, s)
+    e = complex(math.cos(theta), math.sin(theta))
     v = e * (1j * w * p + g)
     x = e * p
     xw = e * pw

@@ -111,7 +111,7 @@ def load_variation(t, tau, p, which, row):  # type: ignore[no-untyped-def]
             row[3 + j] = 3.0 * p[OMEGA] * math.sin(3.0 * p[OMEGA] * t) * tau
 
 
-@kernel(second_signature, counts=False)
+@kernel(second_signature)
 def second(mode, c, t0, y0, d, p, which, along, jac, workspace):  # type: ignore[no-untyped-def]
     """Write the derivative, in a direction, of the flow's jacobian or of an observable's gradient."""
     if c >= 0:
