@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import continua_of
-from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, End, Kind
+from contfric.continuation.events import ACCURACY, Bifurcation, End, Kind
 from contfric.continuation.openings import with_openings
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
@@ -127,7 +127,7 @@ def _known(
 
 
 def _without_critical_ends(branch: Branch, settings: Settings) -> Branch:
-    """Return a branch without the branch points of a multiplier that is 1 at a sliding event that ends it.
+    """Return a branch without the branch points of a multiplier that is 1 at an AS that ends it.
 
     Where a contact comes to rest for good the places at which it may are a continuum: a multiplier tends
     to 1 there, and before that, where segments are about to vanish, on which side it is is rounding.
@@ -138,7 +138,7 @@ def _without_critical_ends(branch: Branch, settings: Settings) -> Branch:
     idle = set()
     for k, end in zip((0, -1), branch.ends, strict=True):
         last = end.bifurcation
-        if last is None or last.kind not in TERMINAL:
+        if last is None or last.kind is not Kind.AS:
             continue
         apart = np.abs(branch.arc - branch.arc[k])
         beside = np.abs(found[(apart > 0.0) & (apart < _NEAR_END)])
