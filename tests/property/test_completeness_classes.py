@@ -41,6 +41,8 @@ CLASSES: dict[str, tuple[tuple[int, int], ...]] = {
     "a touch that splits into two of equal height": ((21, 3),),
     "two touches within one step": ((1, 435), (1, 1117), (1, 2243), (1, 2331), (1, 2413)),
 }
+#: Others with a branch point or a doubling of a bridge.
+OPENINGS = ((2, 48), (4, 70))
 #: Random scenes of a slow run: as many as take a few minutes.
 MANY = range(150)
 
@@ -98,14 +100,14 @@ def test_orbits_on_a_curve_that_turns() -> None:
 def test_located_openings_open() -> None:
     """What vanishes at a branch point or a doubling of a bridge does so, as the search for it promises."""
     checked = 0
-    for seed, index in [pair for pairs in CLASSES.values() for pair in pairs]:
+    for seed, index in [*(pair for pairs in CLASSES.values() for pair in pairs), *OPENINGS]:
         found = diagram(seed, index)
         for event in found.bifurcations:
             if event.kind in (cf.Kind.BP, cf.Kind.PD) and event.orbit.system.holds:
                 assert abs(opening(event.orbit)) < _LOCATED
                 assert event.accuracy <= ROUGH
                 checked += 1
-    assert checked >= 4
+    assert checked >= 3  # those at folds at which passages turn by themselves belong to the folds
 
 
 def test_a_bridge_goes_on_where_its_touch_splits() -> None:
