@@ -24,8 +24,8 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "stress"))
 import restarts
 from report import Tally
 
-#: Scenes of the share that runs here, few enough for some seconds; and those of the long run.
-SHARES = [range(20), pytest.param(range(20, 60), marks=pytest.mark.slow)]
+#: The 60 scenes of the share that runs here, in parts that processes divide among themselves.
+SHARES = [range(start, start + 15) for start in range(0, 60, 15)]
 EQUAL_MAXIMA = "a hold is left where its load has an equal maximum, which is no event"
 #: Scenes that gave different diagrams from different starts: S, S0, Omega, zeta, h; what varies, its range.
 CAUGHT = {
@@ -178,7 +178,7 @@ def test_a_start_that_is_symmetric_but_for_rounding_is_a_symmetric_branch() -> N
     assert branch.system.half
 
 
-@pytest.mark.parametrize("share", SHARES, ids=["quick", "long"])
+@pytest.mark.parametrize("share", SHARES, ids=lambda share: f"{share.start}-{share.stop - 1}")
 def test_random_scenes(share: range) -> None:
     """No difference outside of the degenerate classes; most scenes have something to restart."""
     tally = Tally()
