@@ -89,6 +89,16 @@ def _is_symmetric(branch: Branch) -> bool:
     return sum(branch[k].symmetric for k in asked) > len(asked) / 2
 
 
+def _undetermined(branch: Branch) -> bool:
+    """Tell whether an end of a bridge is known to no better than the whole range of the parameter.
+
+    Its equations are singular to rounding there. Such a bridge is one of many that a continuum of holds
+    without damping seems to consist of: each begins and ends where rounding has it.
+    """
+    ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
+    return branch.bridge and any(b.accuracy >= 1.0 for b in ends)
+
+
 #: What a branch must not be, and why it is refused then.
 _FAULTS = (
     (
@@ -105,4 +115,5 @@ _FAULTS = (
     ),
     (_is_symmetric, "its orbits are symmetric: it is another branch, which is solved on its half"),
     (_repeats, "its orbits are shorter ones, run through several times"),
+    (_undetermined, "rounding leaves no place of its end in the range: its equations are singular there"),
 )

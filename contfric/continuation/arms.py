@@ -9,6 +9,11 @@ the fold, and each of their curves goes on through it, with all signs exchanged.
 
 With the Jacobian J of an orbit at fixed parameters, a passage turns by itself if J has a null vector in which
 its own joints move alone, those between its two pins. That is what is tested; nothing is assumed of pins.
+
+A whole unit turns by itself where the way to its pin does, and the hold before makes good for it: a stick
+has one number x left, its position, and ``G(x, lambda) = 0`` says that the pin is met. Where ``dG/dx = 0``,
+x has two values, and the hold of the unit before is as long as it takes to come to either. No joints move
+alone then, but over two units J has two null vectors: one for each of the two x.
 """
 
 from __future__ import annotations
@@ -45,6 +50,14 @@ def passages(system: System) -> list[list[int]]:
     ]
 
 
+def null_vectors(orbit: Orbit) -> FloatArray:
+    """Return the null vectors of an orbit's Jacobian, shape (k, N, 1 + n)."""
+    _, size, right = np.linalg.svd(assembled(orbit.system, orbit.joints, orbit.vector))
+    rank = int(np.sum(size > _NULL * size[0]))
+    found: FloatArray = right[rank:].reshape(-1, *orbit.joints.shape)
+    return found
+
+
 def turning_passages(orbit: Orbit) -> dict[int, FloatArray]:
     """Return the holds whose passages turn by themselves, each with its null vector, shape (N, 1 + n).
 
@@ -74,18 +87,20 @@ class Arms:
     unit : the shortest part that the motion consists of
     fold : the orbit of one unit at the fold
     turning : the holds of the unit whose passages turn
+    as_one : the unit turns as a whole, all of its passages together
     longer, shorter : the orbits of one unit with all of them on the same arm; None at the fold itself
     """
 
     unit: Unit
     fold: Orbit
     turning: dict[int, FloatArray]
+    as_one: bool = False
     longer: Orbit | None = None
     shorter: Orbit | None = None
 
     @cached_property
     def letters(self) -> int:
-        """How many orbits of one unit there are: each turning hold is on either arm."""
+        """How many orbits of one unit there are: each turning hold is on either arm, or all on the same."""
         return int(2 ** len(self.turning))
 
     def beside(self, distance: float, settings: Settings) -> Arms | None:
@@ -121,10 +136,11 @@ class Arms:
         orbit = self._repeated(self.longer, len(sequence))
         other = self._repeated(self.shorter, len(sequence)).joints
         joints, own = orbit.joints.copy(), len(self.fold.system.holds)
-        short = [hold for bit, hold in enumerate(self.turning)]
+        short = list(self.turning)
         for number, places in enumerate(passages(orbit.system)):
             unit, hold = divmod(number, own)
-            if hold in self.turning and sequence[unit] >> short.index(hold) & 1:
+            bit = 0 if self.as_one else short.index(hold) if hold in self.turning else self.letters
+            if sequence[unit] >> bit & 1:
                 joints[places] = other[places]
         return polish(replace(orbit, joints=joints, residual=np.inf), damped=False)
 
@@ -145,5 +161,12 @@ def arms_at(orbit: Orbit) -> Arms | None:
         fold = form.orbit
     except (NotationError, ValueError):
         return None
-    turning = turning_passages(fold)
-    return Arms(unit, fold, turning) if turning else None
+    if turning := turning_passages(fold):
+        return Arms(unit, fold, turning)
+    null = null_vectors(fold)
+    end = passages(fold.system)[0][0]
+    if len(null) != 1 or abs(null[0, end, 0]) < _NULL:
+        return None
+    whole = Arms(unit, fold, {0: null[0] / null[0, end, 0]}, as_one=True)
+    null = null_vectors(whole.at_fold(2))
+    return whole if len(null) == 2 else None
