@@ -115,5 +115,8 @@ _FAULTS = (
     ),
     (_is_symmetric, "its orbits are symmetric: it is another branch, which is solved on its half"),
     (_repeats, "its orbits are shorter ones, run through several times"),
-    (_undetermined, "rounding leaves no place of its end in the range: its equations are singular there"),
+    (
+        _undetermined,
+        "rounding leaves no place of its end in the range: its equations are singular there",
+    ),
 )

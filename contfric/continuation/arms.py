@@ -28,7 +28,7 @@ from contfric.continuation.side import first_point
 from contfric.continuation.unit import Form, Unit, form_of, pieces, unit_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
-from contfric.orbit.linear import assembled
+from contfric.orbit.linear import assembled, null_vectors
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
 from contfric.orbit.system import System
@@ -48,14 +48,6 @@ def passages(system: System) -> list[list[int]]:
         [j % count for j in range(start + 1, after + 1)]
         for start, after in zip(starts, ahead, strict=True)
     ]
-
-
-def null_vectors(orbit: Orbit) -> FloatArray:
-    """Return the null vectors of an orbit's Jacobian, shape (k, N, 1 + n)."""
-    _, size, right = np.linalg.svd(assembled(orbit.system, orbit.joints, orbit.vector))
-    rank = int(np.sum(size > _NULL * size[0]))
-    found: FloatArray = right[rank:].reshape(-1, *orbit.joints.shape)
-    return found
 
 
 def turning_passages(orbit: Orbit) -> dict[int, FloatArray]:
@@ -163,10 +155,11 @@ def arms_at(orbit: Orbit) -> Arms | None:
         return None
     if turning := turning_passages(fold):
         return Arms(unit, fold, turning)
-    null = null_vectors(fold)
+    null = null_vectors(fold.system, fold.joints, fold.vector)
     end = passages(fold.system)[0][0]
     if len(null) != 1 or abs(null[0, end, 0]) < _NULL:
         return None
     whole = Arms(unit, fold, {0: null[0] / null[0, end, 0]}, as_one=True)
-    null = null_vectors(whole.at_fold(2))
+    two = whole.at_fold(2)
+    null = null_vectors(two.system, two.joints, two.vector)
     return whole if len(null) == 2 else None

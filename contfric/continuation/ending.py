@@ -139,7 +139,8 @@ def ends_at(
     else:
         side.put_tip(point)
     message = _end_message(bifurcation) if ends.name == bifurcation.kind.name else ""
-    if ends is EndReason.BP and bifurcation.orbit.system.half == orbit.system.half:
+    vertex = ends is EndReason.BP and bifurcation.kind is Kind.BP
+    if vertex and bifurcation.orbit.system.half == orbit.system.half:
         message = CROSSED
     side.end = End(ends, message, None if point.lost else bifurcation)
     return True
@@ -160,9 +161,11 @@ def _ends_branch(bifurcation: Bifurcation, point: Point, orbit: Orbit) -> EndRea
         return EndReason[bifurcation.kind.name]
     if bifurcation.kind is Kind.BP and point.slope == 0.0:  # another curve crosses at its vertex
         return EndReason.BP
-    if not orbit.system.half and bifurcation.kind is Kind.BP and bifurcation.orbit.system.half:
+    # at a fold, too: holds that turn by themselves have changed their lengths with each other
+    simpler = bifurcation.kind in (Kind.BP, Kind.PD, Kind.SN)
+    if simpler and bifurcation.orbit.system.half and not orbit.system.half:
         return EndReason.BP
-    if bifurcation.kind is Kind.PD and bifurcation.orbit.periods < orbit.periods:
+    if simpler and bifurcation.orbit.periods < orbit.periods:
         return EndReason.PD
     return None
 

@@ -16,6 +16,7 @@ from contfric.continuation.split_touch import as_split
 from contfric.continuation.vertices import (
     opens_through,
     parabola_vertex,
+    simpler_fold,
     symmetric_part,
     undoubled_part,
 )
@@ -352,7 +353,7 @@ def _fold(orbit: Orbit, before: Point, after: Point, point: Point, settings: Set
     elif (undoubled := undoubled_part(here, active)) is not None:
         kind, here = Kind.PD, undoubled
     else:
-        kind = Kind.SN
+        kind, here = Kind.SN, simpler_fold(here, settings) or here
     found = bifurcation_at(kind, here, before, after, point, settings)
     if kind is not Kind.SN and not opens_through(here, active):
         found = replace(found, bound=ROUGH)

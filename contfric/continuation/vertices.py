@@ -13,10 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.along_curve import Line
-from contfric.continuation.points import Point
+from contfric.continuation.points import Point, Settings
+from contfric.continuation.side import first_point
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
-from contfric.orbit.linear import pencil_of_turn
+from contfric.orbit.linear import null_vectors, pencil_of_turn
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.sections import crossings_near, in_halves, is_smooth
 from contfric.orbit.solve import polish
@@ -94,6 +95,24 @@ def undoubled(orbit: Orbit) -> Orbit | None:
     middle = 0.5 * (image + orbit.joints[:n])
     middle = clocked(orbit.model, middle, float(middle[0, 0]) + 0.5 * orbit.period)
     return replace(orbit, system=part, joints=middle)
+
+
+def simpler_fold(orbit: Orbit, settings: Settings) -> Orbit | None:
+    """Return the symmetric (undoubled) orbit that a bridge has come to at a fold of both; None if far.
+
+    Where holds turn by themselves, each is longer or shorter beyond the fold: the branch on which two of them
+    change their lengths with each other passes the orbit at which they are the same.
+    """
+    if not orbit.system.holds:
+        return None
+    for part in (symmetrised(orbit), undoubled(orbit)):
+        if part is None or np.max(np.abs(part.joints - orbit.joints[: len(part.joints)])) > _ODD:
+            continue
+        null = null_vectors(part.system, part.joints, part.vector)
+        point = first_point(part, settings, null[0], 0.0) if len(null) == 1 else None
+        if point is not None and np.max(np.abs(point.joints - part.joints)) < _ODD:
+            return point.orbit(part.system, part.vector, part.model.index_of(settings.parameter))
+    return None
 
 
 def passed_vertex(system: System, joints: FloatArray, first: int = 0) -> tuple[int, float] | None:

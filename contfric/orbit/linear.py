@@ -98,6 +98,13 @@ def tangent_of(
     return null[:size].reshape(joints.shape), float(null[size])
 
 
+def null_vectors(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:
+    """Return the null vectors of the Jacobian at fixed parameters, shape (k, N, m)."""
+    _, size, right = np.linalg.svd(assembled(system, joints, vector))
+    found: FloatArray = right[int(np.sum(size > _NULL * size[0])) :].reshape(-1, *joints.shape)
+    return found
+
+
 def null_space(
     system: System, joints: FloatArray, vector: FloatArray, active: int
 ) -> tuple[FloatArray, FloatArray]:
