@@ -69,6 +69,20 @@ def test_all_sequences_are_judged_and_balance(index: int, periods: int) -> None:
     assert all(sum((-1) ** k * comb(n, k) for k in range(n + 1)) == 0 for n in range(1, 9))
 
 
+def test_a_unit_that_turns_as_one_has_all_sequences() -> None:
+    """Over two units there are two null vectors, and three cyclic sequences: two arms, and one of each."""
+    scene = restarts.scene(34, 61)
+    orbit = cf.find_orbit("coulomb", scene.params, longest=1000)
+    found = cf.explore(orbit, scene.vary, scene.range)
+    (fold,) = (b for b in found.events if b.bifurcation.label == "SN_4a, 14seg, 1hold")
+    arms = arms_at(fold.bifurcation.orbit)
+    assert arms is not None
+    assert arms.as_one and not turning_passages(arms.fold)
+    told = [p for p in fold.proposals if "one after the other" in p.reason]
+    assert [p.verdict.value for p in told] == ["known", "known", "accepted"]
+    assert all(b.holds for b in found.verify(restarts=0).balances)
+
+
 def test_a_passage_turns_by_itself() -> None:
     """Its null vector moves nothing but its own joints, and all of its hold's length."""
     diagram = _explored(179, 2)

@@ -39,6 +39,11 @@ CLASSES: dict[str, tuple[tuple[int, int], ...]] = {
     "a hold on a limit from which its load no longer falls": ((1, 2323), (1, 2146)),
     "two holds end at once, and Newton fails just before it": ((31, 25),),
     "a touch that splits into two of equal height": ((21, 3),),
+    "a unit of a bridge that turns as one, over two of which its hold is longer, then shorter": (
+        (34, 61),
+    ),
+    "a bridge that is its own image beyond a fold of symmetric orbits": ((34, 112),),
+    "an end of a bridge that rounding places anywhere": ((34, 204),),
     "two touches within one step": ((1, 435), (1, 1117), (1, 2243), (1, 2331), (1, 2413)),
 }
 #: Others with a branch point or a doubling of a bridge.
@@ -73,6 +78,16 @@ def test_many_random_scenes() -> None:
         restarts.one_scene(tally, restarts.scene(2, index), most=3, branches=60)
     assert not tally.failed, tally.failed
     assert tally.counts["restarts"] > len(MANY)
+
+
+def test_a_bridge_without_damping_ends_where_its_end_is_known() -> None:
+    """Where a continuum of holds seems to be many bridges, none of them is one; all points are admissible."""
+    found = diagram(34, 204)
+    assert len(found.branches) < 20
+    assert all(orbit.admissible for branch in found.branches for orbit in branch)
+    for branch in found.branches:
+        ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
+        assert not branch.bridge or all(event.accuracy < 1.0 for event in ends)
 
 
 def test_orbits_on_a_curve_that_turns() -> None:
