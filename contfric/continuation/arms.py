@@ -159,7 +159,7 @@ def arms_at(orbit: Orbit) -> Arms | None:
     end = passages(fold.system)[0][0]
     if len(null) != 1 or abs(null[0, end, 0]) < _NULL:
         return None
-    whole = Arms(unit, fold, {0: null[0] / null[0, end, 0]}, as_one=True)
-    two = whole.at_fold(2)
+    one = Arms(unit, fold, {0: null[0] / null[0, end, 0]}, as_one=True)
+    two = one.at_fold(2)
     null = null_vectors(two.system, two.joints, two.vector)
-    return whole if len(null) == 2 else None
+    return one if len(null) == 2 else None
