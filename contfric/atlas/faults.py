@@ -17,6 +17,8 @@ _NO_TIME = 1e-4
 #: A segment this short is known to the root of rounding only, where it touches a surface; and one that comes
 #: in at an event is longer than this share of the arclength.
 _NO_LENGTH, _NO_SHARE = 1e-6, 1e-2
+#: A bridge on which the parameter changes by less (relative to 1 + its value) may consist of rounding.
+_NARROW = 1e-5
 #: Places on a branch, as shares of its points, that are asked whether its segments last: a segment that does
 #: not vanish all along lasts at one of them.
 _ASKED = (0.25, 0.5, 0.75)
@@ -90,13 +92,14 @@ def _is_symmetric(branch: Branch) -> bool:
 
 
 def _undetermined(branch: Branch) -> bool:
-    """Tell whether an end of a bridge is known to no better than the whole range of the parameter.
+    """Tell whether a narrow bridge ends where rounding leaves no place of the event in the whole range.
 
-    Its equations are singular to rounding there. Such a bridge is one of many that a continuum of holds
-    without damping seems to consist of: each begins and ends where rounding has it.
+    Its equations are singular there. Such a bridge is one of many that a continuum of holds without damping
+    seems to consist of: each begins and ends where rounding has it. A wide one is known by its points.
     """
+    narrow = np.ptp(branch.values) < _NARROW * (1.0 + np.max(np.abs(branch.values)))
     ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
-    return branch.bridge and any(b.accuracy >= 1.0 for b in ends)
+    return bool(branch.bridge and narrow and any(b.accuracy >= 1.0 for b in ends))
 
 
 #: What a branch must not be, and why it is refused then.
