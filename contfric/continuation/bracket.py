@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from contfric.compiled import f8, helper, i8, indices, kernel, vector
+from contfric.compiled import f8, helper, i8, indices, kernel, matrix
 from contfric.compiling.references import by_reference
 from contfric.continuation.geometry import (
     PointsType,
@@ -30,13 +30,13 @@ from contfric.continuation.steps import (
     CHI_MINUS,
     CHI_ONE,
     FOLD,
-    Along,
+    BranchProblemType,
+    along_branch,
     correct_branch,
     observe_branch,
-    step_workspace,
 )
-from contfric.flow.layouts import FlowType
-from contfric.orbit.equations import LayoutType, close_chain
+from contfric.models.definition import FloatArray
+from contfric.orbit.equations import close_chain
 from contfric.orbit.monitor import (
     count_margins,
     crossings,
@@ -141,20 +141,25 @@ def plain_margin(functions, layout, index, z, p, workspace):  # type: ignore[no-
 
 
 class Sought(NamedTuple):
-    """The value whose change of sign is sought along a branch.
+    """The value whose change of sign is sought along a branch or curve.
 
     Attributes
     ----------
     kind : BY_TEST, BY_LABEL or BY_PARAMETER
     number : column of the tests, or row of the labels
-    target : the label before, or the value of the parameter
+    target : the label before, or the value of the parameter of a branch
+    planes : of a curve by parameters: rows (a, b, c), of which the least of ``a p + b q + c`` vanishes
     plain : counts the values for which a label was that of one of the two points, shape (1,)
     """
 
     kind: int
     number: int
     target: float
+    planes: FloatArray
     plain: IntArray
+
+
+SoughtType = types.NamedTuple([i8, i8, f8, matrix, indices], Sought)
 
 
 @helper
@@ -216,15 +221,33 @@ def values_at_ends(way, sought, points):  # type: ignore[no-untyped-def]
 @helper
 def copy_row(points, target, source):  # type: ignore[no-untyped-def]
     """Copy one row of points to another."""
-    zs, ws, tzs, tws, arc, tests, labels, mu = points
-    copy_to(zs[target], zs[source])
-    copy_to(tzs[target], tzs[source])
-    copy_vector(ws[target], ws[source])
-    copy_vector(tws[target], tws[source])
-    copy_vector(tests[target], tests[source])
-    copy_vector(labels[target], labels[source])
-    copy_vector(mu[target], mu[source])
-    arc[target] = arc[source]
+    copy_to(points.joints[target], points.joints[source])
+    copy_to(points.tangents[target], points.tangents[source])
+    copy_vector(points.w[target], points.w[source])
+    copy_vector(points.directions[target], points.directions[source])
+    copy_vector(points.tests[target], points.tests[source])
+    copy_vector(points.labels[target], points.labels[source])
+    copy_vector(points.mu[target], points.mu[source])
+    points.arc[target] = points.arc[source]
+
+
+class Rules(NamedTuple):
+    """How a bracket is narrowed down.
+
+    Attributes
+    ----------
+    accuracy : of a trial
+    two_sided : whether the value has the sign that it has before, or is positive there
+    noise : value that is rounding
+    narrowest : width of a bracket that is as narrow as can be
+    given_up : width below which it is not narrowed down where trials fail, 0 where sheets are not told apart
+    """
+
+    accuracy: float
+    two_sided: bool
+    noise: float
+    narrowest: float
+    given_up: float
 
 
 def bracketing(correct_at: Any, value_at: Any) -> Any:
@@ -237,6 +260,14 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
     """
 
     @helper
+    def trial(way: Any, sought: Any, points: Any, x: Any, accuracy: Any, sign: Any) -> Any:
+        """Solve for the point at a share of the step, in row 2; whether it is solved, and its value."""
+        interpolate(points, x)
+        zs, ws, tzs, tws = points.joints, points.w, points.tangents, points.directions
+        fine, _ = correct_at(way, zs[2], ws[2], tzs[2], tws[2], accuracy)
+        return fine, limited(sign * value_at(way, sought, points, 2)) if fine else -1.0
+
+    @helper
     def bracket(way, sought, points, ends, rules):  # type: ignore[no-untyped-def]
         """Find where a value changes sign between rows 0 and 1 of the points.
 
@@ -245,9 +276,7 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
         way, sought : what the two functions need
         points : four rows; the third one is for trials, the place is left in the fourth
         ends : (value at row 0, value at row 1)
-        rules : (accuracy of a trial; whether the value has the sign that it has, or is positive before;
-            value that is rounding; width of a bracket that is as narrow as can be; width below which it is
-            not narrowed down where trials fail, 0 where sheets are not told apart)
+        rules : :class:`Rules`
 
         Returns
         -------
@@ -255,31 +284,25 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
             (position in the step, value there, whether trials fail behind it or go over to another sheet,
             whether any did not).
         """
-        way = by_reference(way)
-        zs, ws, tzs, tws = points.joints, points.w, points.tangents, points.directions
-        accuracy, two_sided, noise, narrowest, given_up = rules
-        sign = -1.0 if two_sided and ends[0] < 0.0 else 1.0
+        way, points = by_reference(way), by_reference(points)
+        noise, narrowest, given_up = rules.noise, rules.narrowest, rules.given_up
+        zs, ws, sign = points.joints, points.w, -1.0 if rules.two_sided and ends[0] < 0.0 else 1.0
         f_low, f_high = limited(sign * ends[0]), limited(sign * ends[1])
         low, high, x, best, best_f, left = 0.0, 1.0, 0.5, 0.0, f_low, _LEFT * f_low
         x_old, f_old, lost, solved = low, f_low, False, False
         reach = _APART * distance(zs[0], ws[0], zs[1], ws[1], way.scale)
-        copy_row(points, 3, 0)
-        if f_low > 0.0 and f_high < 0.0:
+        at_end = f_low > 0.0 and f_high > 0.0
+        copy_row(points, 3, 1 if at_end else 0)
+        if at_end or f_low <= 0.0:
+            return (1.0, f_high, lost, solved) if at_end else (best, best_f, lost, solved)
+        if f_high < 0.0:
             x = min(0.99, max(0.01, f_low / (f_low - f_high)))
         for _ in range(_MOST_TRIALS):
-            if f_low <= 0.0 or f_high > 0.0:
-                if f_low > 0.0:
-                    best, best_f = 1.0, f_high
-                    copy_row(points, 3, 1)
-                break
-            interpolate(points, x)
-            fine, _ = correct_at(way, zs[2], ws[2], tzs[2], tws[2], accuracy)
-            f = -1.0
-            if fine:
-                f, solved = limited(sign * value_at(way, sought, points, 2)), True
-                if f >= 0.0:
-                    best, best_f = x, f
-                    copy_row(points, 3, 2)
+            fine, f = trial(way, sought, points, x, rules.accuracy, sign)
+            solved = solved or fine
+            if fine and f >= 0.0:
+                best, best_f = x, f
+                copy_row(points, 3, 2)
             if f > 0.0:
                 x_old, f_old = low, f_low
                 low, f_low = x, f
@@ -305,26 +328,29 @@ _bracket = bracketing(correct_branch, watched_value)
 
 
 @helper
+def rules_of(way, sought, kinked, points):  # type: ignore[no-untyped-def]
+    """Return how the bracket of a value along a branch is narrowed down."""
+    layout, kind = way.layout, sought.kind
+    of_branch = kind == BY_TEST and sought.number >= count_margins(layout)
+    # margins and distances are positive before the event, the others have the sign that they have
+    two_sided = kind == BY_PARAMETER or of_branch
+    noise = 0.1 * _NOISE if two_sided else _NOISE  # slopes and products of multipliers have less
+    # slopes and multipliers are those of the last Jacobian. Near a touch of a kink it changes with the root
+    # of a distance: it must be that of the orbit, not one from which Newton is known to end there
+    accuracy = ALONG if kinked and of_branch else AT_EVENT
+    length, size = abs(points.arc[1] - points.arc[0]), largest_state(points.joints[0])
+    given_up = _LOST if two_sided and layout.rounding > INTEGRATED else 0.0
+    return Rules(accuracy, two_sided, noise, resolution(layout.rounding, length, size), given_up)
+
+
+@helper
 def located(way, sought, kinked, points):  # type: ignore[no-untyped-def]
     """Find where the value that is sought changes sign; what :func:`locate` returns."""
-    way = by_reference(way)
-    layout, workspace, kind, index = way.layout, way.workspace, sought.kind, sought.number
-    zs, ws, tzs, tws, arc, tests, labels, mu = points
-    margins = count_margins(layout)
+    way, points = by_reference(way), by_reference(points)
+    zs, ws, tzs, tws = points.joints, points.w, points.tangents, points.directions
     ends = values_at_ends(way, sought, points)
-    # margins and distances are positive before the event, the others have the sign that they have
-    two_sided = kind == BY_PARAMETER or (kind == BY_TEST and index >= margins)
-    noise = 0.1 * _NOISE if two_sided else _NOISE  # slopes and products of multipliers have less
-    accuracy = AT_EVENT
-    if kinked and kind == BY_TEST and index >= margins:
-        # slopes and multipliers are those of the last Jacobian. Beside a touch of a kink it changes with the
-        # root of a distance: it must be that of the orbit, not one from which Newton is known to end there
-        accuracy = ALONG
-    narrowest = resolution(layout.rounding, abs(arc[1] - arc[0]), largest_state(zs[0]))
-    given_up = _LOST if two_sided and layout.rounding > INTEGRATED else 0.0
-    rules = accuracy, two_sided, noise, narrowest, given_up
     before, sought.plain[0] = way.counts[SOLVES], 0
-    best, _, lost, _ = _bracket(way, sought, points, ends, rules)
+    best, _, lost, _ = _bracket(way, sought, points, ends, rules_of(way, sought, kinked, points))
     plain = sought.plain[0] == way.counts[SOLVES] - before
     # the last Jacobian at the located point, for its rates and multipliers; the point itself stays
     copy_row(points, 2, 3)
@@ -332,38 +358,28 @@ def located(way, sought, kinked, points):  # type: ignore[no-untyped-def]
     if not fine:
         return -1.0, False
     way.p[way.which[0]] = ws[3, 0]
-    close_chain(way.functions, layout, zs[3], way.p, workspace.equations.none, workspace.equations)
-    observe_branch(way, zs[3], ws[3], tws[3], tests[3], labels[3], mu[3])
+    workspace = way.workspace
+    close_chain(
+        way.functions, way.layout, zs[3], way.p, workspace.equations.none, workspace.equations
+    )
+    observe_branch(way, zs[3], ws[3], tws[3], points.tests[3], points.labels[3], points.mu[3])
     return -2.0 - best if lost else best, plain
 
 
 @kernel(
     types.Tuple((f8, types.boolean))(
-        FlowType,
-        LayoutType,
-        vector,
-        indices,
-        vector,
-        types.boolean,
-        i8,
-        i8,
-        f8,
-        types.boolean,
-        PointsType,
-        indices,
+        BranchProblemType, SoughtType, types.boolean, PointsType, indices
     )
 )
-def locate(  # type: ignore[no-untyped-def]
-    functions, layout, p, which, scale, stability, kind, index, target, kinked, points, counts
-):
+def locate(problem, sought, kinked, points, counts):  # type: ignore[no-untyped-def]
     """Find where a watched value changes sign between two points of a branch.
 
     Parameters
     ----------
-    which, scale : index of the parameter that is free, and its weight in the scaled product, shapes (1,)
-    kind, index, target : those of :class:`Sought`
+    problem, sought : the branch, and the value
     kinked : whether the fields have kinks
     points : four rows: both points, one for trials, and the place with what is watched there
+    counts : what is counted
 
     Returns
     -------
@@ -373,8 +389,6 @@ def locate(  # type: ignore[no-untyped-def]
         all trials were solved and had that of one of the points: then it changes at one place only, as far
         as is seen.
     """
-    zs, followed = points.joints, min(index, 0)  # nothing, but no literal
-    workspace = step_workspace(zs.shape[1], zs.shape[2], p.shape[0], followed, followed)
-    way = Along(functions, layout, p.copy(), which, scale, stability, counts, workspace)
-    plain = np.zeros(1, dtype=np.int64)
-    return located(way, Sought(kind, index, target, plain), kinked, points)
+    zs, followed = points.joints, min(sought.number, 0)  # nothing, but no literal
+    way = along_branch(problem, zs.shape[1], zs.shape[2], followed, followed, counts)
+    return located(way, sought, kinked, points)

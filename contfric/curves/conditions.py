@@ -9,6 +9,7 @@ EXIT        rate of the exit's observable at the end of a segment: a tangential 
 INTERIOR    value of a stationary point inside a segment, less the level (AS, GS, T)
 SPECTRAL    the bordered function of the chain's Jacobian (SN, BP, PD), in
             :mod:`contfric.curves.bordered`
+QUANTITY    what is asked of a quantity (:mod:`contfric.curves.held_conditions`); there may be several
 ==========  ==================================================================================
 
 At a stationary point the derivative with respect to its time is zero, so the gradient of its value is
@@ -48,7 +49,7 @@ from contfric.orbit.stationary import (
 )
 from contfric.orbit.system import IntArray
 
-JOINT, START, EXIT, INTERIOR, SPECTRAL = range(5)
+JOINT, START, EXIT, INTERIOR, SPECTRAL, QUANTITY = range(6)
 
 
 class Condition(NamedTuple):

@@ -250,5 +250,5 @@ def _step_away(problem: Problem, start: Point, border: FloatArray, step: float) 
     """Return the point a step away from the first one; None if there is none."""
     rows = Rows.empty(problem.system, 2, 2)
     rows.put(0, start)
-    _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), step, step, 3e-13)
+    _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), step, step)
     return rows.point(1) if last == 1 else None

@@ -15,19 +15,12 @@ from numba import types
 
 from contfric.compiled import blocks, f8, helper, i8, matrix, vector
 from contfric.continuation.geometry import copy_to, copy_vector
-from contfric.curves.conditions import CurveWorkspace
-from contfric.curves.lagrangian import (
-    LagrangianWorkspace,
-    add_bend,
-    differentiated_extreme,
-    quantity_row,
-)
+from contfric.curves.lagrangian import add_bend, differentiated_extreme, quantity_row
 from contfric.handle import HandleType
 from contfric.models.definition import FloatArray
 from contfric.orbit.equations import close_chain
-from contfric.orbit.newton import off_normal
 from contfric.orbit.peak import Extreme, ExtremeType, find_place
-from contfric.orbit.system import IntArray
+from contfric.orbit.system import Layout
 
 #: What the conditions are: an extremum that has a value, one that is stationary in all free parameters but
 #: the last, a function that is called.
@@ -67,27 +60,12 @@ ConditionsType = types.NamedTuple(
 )
 
 
-class AlongHeld(NamedTuple):
-    """What a step along such a curve needs besides its points.
+_NONE = np.empty((0, 0)), np.empty(0), np.empty(0), np.empty((0, 0, 0)), np.empty((0, 0))
 
-    Attributes
-    ----------
-    functions, layout, conditions : the model's flow, the chain, and what vanishes
-    p : parameters, those that are free overwritten
-    which, widths, scale : indices of the free parameters, their ranges, and weights in the scaled product
-    counts, workspace, own : what is counted, and what is allocated once
-    """
 
-    functions: Any
-    layout: Any
-    conditions: Conditions
-    p: FloatArray
-    which: IntArray
-    widths: FloatArray
-    scale: FloatArray
-    counts: IntArray
-    workspace: CurveWorkspace
-    own: LagrangianWorkspace
+def no_quantity(layout: Layout) -> Conditions:
+    """Return what stands where nothing is asked of a quantity."""
+    return Conditions(CALLED, 0.0, Extreme(-1, 0, 1.0, layout), 0, *_NONE)
 
 
 @helper
@@ -108,7 +86,7 @@ def call_conditions(z, p, conditions, workspace):  # type: ignore[no-untyped-def
 @helper
 def fill_conditions(functions, layout, z, p, which, workspace, way):  # type: ignore[no-untyped-def]
     """Write what vanishes to ``conditions.values``, and its rows to the border; the largest value."""
-    conditions, own, d, e = way.conditions, way.own, workspace.d, workspace.e
+    conditions, own, d, e = way.held, way.own, workspace.d, workspace.e
     extreme, values = conditions.extreme, conditions.values
     if conditions.kind == CALLED:
         return call_conditions(z, p, conditions, workspace)
@@ -137,17 +115,3 @@ def fill_conditions(functions, layout, z, p, which, workspace, way):  # type: ig
         close_chain(functions, layout, z, p, which, workspace.equations)
         worst = max(worst, abs(values[k]))
     return worst
-
-
-@helper
-def normal_and_held(functions, layout, z, p, which, workspace, way):  # type: ignore[no-untyped-def]
-    """Border a curve with the plane normal to its tangent, and with its conditions."""
-    worst, s, values = (
-        fill_conditions(functions, layout, z, p, which, workspace, way),
-        workspace.s,
-        way.conditions.values,
-    )
-    s[0, 0], s[0, 1] = -off_normal(workspace, z, p, which), 1.0
-    for k in range(values.shape[0]):
-        s[1 + k, 0], s[1 + k, 1] = -values[k], 0.0
-    return worst, -1

@@ -7,15 +7,19 @@ them; its watched value decides on which side the place is.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contfric.base.tally import tally
+from contfric.continuation.locate_change import sought_of
 from contfric.continuation.points import Point, Rows
-from contfric.curves.points import solve_point
+from contfric.curves.points import Conditioned, compiled_problem, solve_point
 from contfric.curves.problem import Problem
 from contfric.models.definition import FloatArray
+
+if TYPE_CHECKING:
+    from contfric.continuation.bracket import Sought
 
 #: Share of a step to which a place is bracketed: the resolution of the arithmetic.
 _RESOLUTION = 4e-16
@@ -38,7 +42,7 @@ def between(a: Point, b: Point, x: float) -> tuple[FloatArray, FloatArray, Float
 
 
 def point_between(
-    problem: Problem, a: Point, b: Point, x: float, border: FloatArray
+    problem: Conditioned, a: Point, b: Point, x: float, border: FloatArray
 ) -> Point | None:
     """Return the solved point at a share of a step."""
     point = solve_point(problem, *between(a, b, x), border.copy())
@@ -48,7 +52,7 @@ def point_between(
 
 
 def locate_zero(
-    problem: Problem, a: Point, b: Point, border: FloatArray, value: Value
+    problem: Conditioned, a: Point, b: Point, border: FloatArray, value: Value
 ) -> tuple[Point, bool]:
     """Return the place where a value changes sign, and whether it is bracketed to its last digits.
 
@@ -82,24 +86,6 @@ def locate_zero(
     return best, not lost and abs(value(best)) < 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class Sought:
-    """What is sought between two points: a test, a label, or a place in the plane.
-
-    Attributes
-    ----------
-    kind : BY_TEST, BY_LABEL or BY_PARAMETER of the compiled bracket
-    index : column of the tests, or row of the labels
-    target : the label before
-    planes : rows (a, b, c): the least of ``a p + b q + c`` vanishes
-    """
-
-    kind: int
-    index: int = 0
-    target: int = 0
-    planes: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
-
-
 def locate(
     problem: Problem, a: Point, b: Point, border: FloatArray, sought: Sought
 ) -> tuple[Point, bool]:
@@ -109,41 +95,27 @@ def locate(
     rows = Rows.empty(problem.system, 4, 2)
     rows.put(0, a)
     rows.put(1, b)
-    status, _ = locate_on_curve(
-        problem.system.functions(),
-        problem.model.flow.second_derivatives,
-        problem.system.layout,
-        problem.condition,
-        problem.vector,
-        problem.which,
-        1.0 / problem.box.widths**2,
-        sought.kind,
-        sought.index,
-        sought.target,
-        np.ascontiguousarray(sought.planes, dtype=np.float64),
-        border.copy(),
-        rows.arrays(),
-        tally(),
-    )
+    compiled = compiled_problem(problem)
+    status, _ = locate_on_curve(compiled, border.copy(), sought, rows.arrays(), tally())
     return (a, False) if status < 0 else (rows.point(3), status == 1)
 
 
 def by_test(index: int) -> Sought:
     """Return the search for the zero of one test."""
-    from contfric.curves.bracket import BY_TEST
+    from contfric.continuation.bracket import BY_TEST
 
-    return Sought(BY_TEST, index)
+    return sought_of(BY_TEST, index)
 
 
 def by_label(row: int, before: int) -> Sought:
     """Return the search for the change of one label."""
-    from contfric.curves.bracket import BY_LABEL
+    from contfric.continuation.bracket import BY_LABEL
 
-    return Sought(BY_LABEL, row, before)
+    return sought_of(BY_LABEL, row, float(before))
 
 
 def by_place(planes: FloatArray) -> Sought:
     """Return the search for where the least of ``a p + b q + c`` vanishes."""
-    from contfric.curves.bracket import BY_PARAMETER
+    from contfric.continuation.bracket import BY_PARAMETER
 
-    return Sought(BY_PARAMETER, planes=planes)
+    return sought_of(BY_PARAMETER, planes=planes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +21,10 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.linear import jacobian_blocks
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, Margin, System, Test
+
+if TYPE_CHECKING:
+    from contfric.curves.conditions import Condition
+    from contfric.curves.held_conditions import Conditions
 
 #: Margins below this at the start (nondimensional) vanish along the curve, with its condition: located
 #: events are zero to about 1e-12, and those of a group agree to their conditioning.
@@ -90,7 +94,7 @@ class Problem:
     system: System
     vector: FloatArray
     box: Box
-    condition: Any
+    condition: Condition
     test: Test | None
 
     @property
@@ -102,6 +106,15 @@ class Problem:
     def which(self) -> IntArray:
         """Indices of the two parameters."""
         return np.array([self.model.index_of(n) for n in self.box.names], dtype=np.int64)
+
+    def conditions(self) -> tuple[Condition, Conditions]:
+        """Return what vanishes, as the compiled engine takes it: nothing is asked of a quantity."""
+        from contfric.curves.held_conditions import no_quantity
+
+        return self.condition, no_quantity(self.system.layout)
+
+    def raise_kept(self) -> None:
+        """Raise nothing: the engine calls no function of Python for this problem."""
 
     @cached_property
     def limits(self) -> FloatArray:

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.continuation.events import Bifurcation, Kind
-from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS, Point, Rows
+from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS, Point
 from contfric.curves.assembly import join_sides
 from contfric.curves.births import birth_among, birth_between
 from contfric.curves.curve import Curve
 from contfric.curves.going_on import Start, goes_on, is_continuum, prove
 from contfric.curves.locating import by_place, locate
 from contfric.curves.naming import crossings
-from contfric.curves.points import CHUNK, first_curve_point, march_rows
+from contfric.curves.points import end_of_march, first_curve_point, march_on
 from contfric.curves.problem import Problem, box_of, check_start, problem_of
 from contfric.curves.special import CurveEnd, CurveEndReason, SpecialPoint
 from contfric.errors import ConvergenceError, ParameterError, real_number, whole_number
@@ -270,50 +270,36 @@ def _trace_piece(
 
 def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[bool, float]:
     """March once and deal with what stopped it; (whether the side is finished, next step)."""
-    from contfric.continuation import march as codes
+    from contfric.continuation.march import EVENT, OUTSIDE
 
     if len(side.points) >= most:
         side.end = CurveEnd(CurveEndReason.POINTS)
         return True, step
-    problem, last = side.problem, min(2, len(side.points))
-    rows = Rows.empty(problem.system, last + min(CHUNK, most - len(side.points)), 2)
-    for k in range(last):
-        rows.put(k, side.points[len(side.points) - last + k])
-    border = side.border.copy()
-    why, k, step = march_rows(
-        problem, rows, last - 1, side.points[0], len(side.points) - 1, border, step, largest, 3e-13
-    )
-    fresh = rows.points(last, k + 1)
-    located = 1 if why == codes.EVENT else 0  # the last point lies behind an event
-    lasts = np.all(np.diff(rows.joints[last : k + 1 - located, :, 0]) > -_NO_TIME, axis=1)
-    gone = _first(~lasts)
+    problem, border = side.problem, side.border.copy()
+    rows, first, stop, why, step = march_on(problem, side.points, border, step, largest, most)
+    fresh = rows.points(first, stop)
+    lasting = stop - 1 if why == EVENT else stop  # the last point lies behind an event
+    gone = _first(~np.all(np.diff(rows.joints[first:lasting, :, 0]) > -_NO_TIME, axis=1))
     if gone is not None:
         side.points += fresh[:gone]
         side.end = CurveEnd(CurveEndReason.LOST)
         return True, step
-    limit = _first(problem.within_limits(rows.w[last : k + 1]) < 0.0)
+    limit = _first(problem.within_limits(rows.w[first:stop]) < 0.0)
     birth = birth_among(problem, [*side.points[-1:], *fresh]) if fresh else None
     if birth is not None and (limit is None or birth <= limit):
         return _end_at_birth(side, fresh, birth), step
     if limit is not None:
         side.points += fresh[:limit]
         return _end_at_limit(side, fresh[limit]), step
-    if why in (codes.EVENT, codes.OUTSIDE):
+    if why in (EVENT, OUTSIDE):
         side.points += fresh[:-1]
         return _resolve(side, fresh[-1], border), step
     side.points += fresh
     side.border = border
-    ends = {
-        codes.STEP: CurveEndReason.STEP,
-        codes.BROKEN: CurveEndReason.LOST,
-        codes.CLOSED: CurveEndReason.CLOSED,
-        codes.UNBOUNDED: CurveEndReason.UNBOUNDED,
-        codes.ENDLESS: CurveEndReason.PERIOD,
-    }
-    if why in ends:
-        side.end = _near_limit(problem, side.tip) or CurveEnd(ends[why])
-        return True, step
-    return False, step
+    reason = end_of_march(why)
+    if reason is not None:
+        side.end = _near_limit(problem, side.tip) or CurveEnd(reason)
+    return reason is not None, step
 
 
 def _first(flags: NDArray[np.bool_]) -> int | None:

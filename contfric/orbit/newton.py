@@ -262,37 +262,36 @@ def verdict(step, size, before, worst, worst_before, floor, rounding):  # type: 
     return GOES_ON
 
 
+@helper
+def rounding_of(layout, z):  # type: ignore[no-untyped-def]
+    """Return the relative rounding of the flow: a closed form knows a phase as well as the time."""
+    if layout.rounding <= INTEGRATED:
+        return layout.rounding * (1.0 + abs(z[z.shape[0] - 1, 0]))
+    return layout.rounding
+
+
 def correcting(border: Any) -> Any:
     """Return the Newton iteration of orbits, branches or curves, as a helper.
+
+    It takes ``(functions, layout, z, p, which, limits, workspace, extra)``, solves for the orbit from (z, p)
+    in place, and returns (status, steps, size of the first correction, last residual).
 
     Parameters
     ----------
     border : fills the border rows of the workspace at (z, p), as many as parameters are free, and returns
         their residual and the segment of a tangential exit
+    limits : (longest correction, infinite for the plain method: a flag would be compiled twice; size of a
+        correction after which no other is asked for; the probe of :func:`newton_step`)
+    workspace : allocated once: the elimination, with the last solution and the tangent; the pencil
+        (2, m, m) P and Q; the rates: all of the last Jacobian, nearer than the second limit to the orbit
+    extra : handed on to ``border``
     """
 
     @helper
-    def correct(functions, layout, z, p, which, trust, floor, probe, workspace, extra):  # type: ignore[no-untyped-def]
-        """Solve for the orbit from (z, p) in place.
-
-        Parameters
-        ----------
-        trust : longest correction, infinite for the plain method (a flag would be compiled twice)
-        floor : size of a correction after which no other is asked for
-        probe : that of :func:`newton_step`
-        workspace : allocated once: the elimination, with the last solution and the tangent; the pencil
-            (2, m, m) P and Q; the rates: all of the last Jacobian, nearer than ``floor`` to the orbit
-        extra : handed on to ``border``
-
-        Returns
-        -------
-        tuple
-            (status, steps, size of the first correction, last residual).
-        """
+    def correct(functions, layout, z, p, which, limits, workspace, extra):  # type: ignore[no-untyped-def]
+        trust, floor, probe = limits
         before, first, worst = np.inf, 0.0, 0.0
-        work, rounding = workspace.elimination, layout.rounding
-        if rounding <= INTEGRATED:  # a closed form knows a phase as well as the time
-            rounding *= 1.0 + abs(z[z.shape[0] - 1, 0])
+        work, rounding = workspace.elimination, rounding_of(layout, z)
         share, worst_before, residual_before = 1.0, np.inf, np.inf
         damped, circles = math.isfinite(trust), 0
         for step in range(_MOST_STEPS):
@@ -319,23 +318,16 @@ def correcting(border: Any) -> Any:
                 return NOT_FINITE, step, first, worst
             share = trust / size if size > trust else 1.0
             move(z, p, which, work.z, work.w, share)
-            if step == 0:
-                first = size
-            found = verdict(step, size, before, worst, residual_before, floor, (rounding, noise))
+            first = size if step == 0 else first
+            roundings = rounding, noise
+            found = verdict(step, size, before, worst, residual_before, floor, roundings)
             if found == CONVERGED or (found == NOT_CONVERGED and not damped):
                 return found, step + 1, first, worst
-            if size > 0.5 * before:
-                circles += 1
-            if (
-                floor > ALONG
-                and circles >= _CIRCLES
-                and not is_noise(size, worst, (rounding, noise))
-            ):
+            circles += 1 if size > 0.5 * before else 0
+            if floor > ALONG and circles >= _CIRCLES and not is_noise(size, worst, roundings):
                 return NOT_CONVERGED, step + 1, first, worst
             residual_before = worst
-            before = (
-                size if share == 1.0 else np.inf
-            )  # a correction that was cut tells nothing of the order
+            before = size if share == 1.0 else np.inf  # one that was cut tells nothing of the order
         return NOT_CONVERGED, _MOST_STEPS, first, worst
 
     return correct
@@ -360,9 +352,8 @@ def solved(functions, layout, z, p, trust, workspace):  # type: ignore[no-untype
     """Solve for the orbit at fixed parameters; what :func:`solve` returns."""
     layout, workspace = by_reference(layout), by_reference(workspace)
     work, none = workspace.elimination, workspace.equations.none
-    status, steps, first, _ = _correct_orbit(
-        functions, layout, z, p, none, trust, FLOOR, layout.rounding, workspace, 0
-    )
+    limits = trust, FLOOR, layout.rounding
+    status, steps, first, _ = _correct_orbit(functions, layout, z, p, none, limits, workspace, 0)
     if status == CONVERGED and correction_size(work.z, work.w, z, p, none, 1) > _UNDETERMINED:
         status = SINGULAR
     last = mismatch(functions, layout, z, p, workspace.equations)
