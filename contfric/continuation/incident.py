@@ -256,7 +256,7 @@ def edited_whole(
     Raises
     ------
     NotationError
-        If the transition graph has no such walk.
+        If the transition graph has no such path.
     """
     edit, joints, speeds = outcomes[0].edit, dict(outcomes[0].joints), dict(outcomes[0].away)
     for outcome in outcomes[1:]:

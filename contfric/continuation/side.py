@@ -194,7 +194,8 @@ class Side:
         """March on; return (why it stopped, next step)."""
         from contfric.continuation.geometry import Course
         from contfric.continuation.march import BUDGET, MORE, march
-        from contfric.orbit.newton import ALONG, INTEGRATED, ON_THE_WAY
+        from contfric.orbit.convergence import ALONG, INTEGRATED
+        from contfric.orbit.newton import ON_THE_WAY
 
         if self.last + 1 >= CHUNK:
             self._keep_full_rows()
@@ -264,7 +265,7 @@ def first_point(
     """
     from contfric.continuation.geometry import Course
     from contfric.continuation.march import BROKEN, march
-    from contfric.orbit.newton import ALONG
+    from contfric.orbit.convergence import ALONG
 
     direction = np.zeros_like(orbit.joints) if tangent is None else tangent
     rows = Rows.empty(orbit.system, 1)

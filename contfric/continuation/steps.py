@@ -11,6 +11,7 @@ from contfric.compiled import allocating_helper, helper, indices, vector
 from contfric.continuation.geometry import anchor, copy_to, copy_vector, take_tangent
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
+from contfric.orbit.convergence import CONVERGED, NOT_FINITE
 from contfric.orbit.cyclic import Elimination, elimination_workspace
 from contfric.orbit.equations import (
     EquationWorkspace,
@@ -20,15 +21,7 @@ from contfric.orbit.equations import (
 )
 from contfric.orbit.followed import Followed, followed_values, remember
 from contfric.orbit.monitor import watch
-from contfric.orbit.newton import (
-    CHECKS,
-    CONVERGED,
-    MULTIPLIERS,
-    NOT_FINITE,
-    SOLVES,
-    correcting,
-    normal_to_tangent,
-)
+from contfric.orbit.newton import CHECKS, MULTIPLIERS, SOLVES, correcting, normal_to_tangent
 from contfric.orbit.spectrum import SpectralWorkspace, multipliers, spectral_workspace
 from contfric.orbit.stationary import StationaryPoints, stationary_workspace
 from contfric.orbit.system import IntArray
@@ -140,16 +133,14 @@ def correcting_along(border: Any, again: Any) -> Any:
     @helper
     def correct_at(way, z, w, tz, tw, accuracy):  # type: ignore[no-untyped-def]
         """Correct (z, w) normal to the tangent (tz, tw), and replace it; (converged, all is finite)."""
-        functions, layout, p, which = way.functions, way.layout, way.p, way.which
-        workspace = way.workspace
+        p, which, workspace = way.p, way.which, way.workspace
         copy_free(p, which, w)
         anchor(workspace, z, p, which, tz, tw, way.scale)
         way.counts[SOLVES] += 1
         attempt, tries, status = 0, True, NOT_FINITE
         again(way, attempt, True)
         while tries:
-            limits = np.inf, accuracy, 0.0
-            status, _, _, _ = correct(functions, layout, z, p, which, limits, workspace, way)
+            status, _, _, _ = correct(way, z, (np.inf, accuracy, 0.0))
             attempt += 1
             tries = again(way, attempt, status == CONVERGED)
             if tries:
@@ -159,7 +150,7 @@ def correcting_along(border: Any, again: Any) -> Any:
             w[k] = p[which[k]]
         if status != CONVERGED:
             return False, status != NOT_FINITE
-        close_chain(functions, layout, z, p, which, workspace.equations)
+        close_chain(way.functions, way.layout, z, p, which, workspace.equations)
         fine = take_tangent(workspace.elimination, tz, tw, way.scale)
         return fine, fine
 

@@ -19,7 +19,7 @@ from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialP
 from contfric.models.definition import FloatArray
 
 if TYPE_CHECKING:
-    from contfric.curves.trace import CurveSide
+    from contfric.curves.side import CurveSide
 
 
 def join_sides(behind: CurveSide | None, ahead: CurveSide, first: CurveEnd | None = None) -> Curve:

@@ -123,15 +123,14 @@ def bordered_workspace(count, m, free):  # type: ignore[no-untyped-def]
 
 
 @helper
-def fill_blocks(functions, layout, z, p, which, workspace):  # type: ignore[no-untyped-def]
+def fill_blocks(way, z):  # type: ignore[no-untyped-def]
     """Write the blocks of the Jacobian on both joints of each segment, and its columns of the parameters."""
-    count, m = z.shape
-    rows, bordered = workspace.elimination.rows, workspace.bordered
+    functions, layout, p, which = way.functions, way.layout, way.p, way.which
+    (count, m), equations = z.shape, way.workspace.equations
+    rows, bordered = way.workspace.elimination.rows, way.workspace.bordered
     for i in range(count):
-        after = z[i + 1] if i + 1 < count else workspace.equations.last
-        worst = segment_rows(
-            functions, layout, i, m, z[i], after, p, which, workspace.equations, rows
-        )
+        after = z[i + 1] if i + 1 < count else equations.last
+        worst = segment_rows(functions, layout, i, m, z[i], after, p, which, equations, rows)
         if worst == np.inf:
             return False
         for j in range(m):
@@ -241,23 +240,21 @@ def end_of(vectors, i, sign, close, j):  # type: ignore[no-untyped-def]
 
 
 @helper
-def add_curvature(functions, second, layout, i, sign, z, p, which, workspace):  # type: ignore[no-untyped-def]
+def add_curvature(way, i, z):  # type: ignore[no-untyped-def]
     """Add what segment i contributes to the gradient ``-u^T dJ v``."""
-    from_ = z[i]
+    from_, sign, layout, workspace = z[i], way.condition.sign, way.layout, way.workspace
     bordered, equations = workspace.bordered, workspace.equations
     count, m = z.shape
-    n, free = m - 1, which.shape[0]
+    n, free = m - 1, way.which.shape[0]
     after = z[i + 1] if i + 1 < count else equations.last
     along, u, grad = bordered.along, bordered.u, equations.grad
     segment_direction(bordered.v, i, sign, equations.close, along)
     lasts = after[0] - from_[0]
     bent = bordered.bent
-    bend_flow(
-        functions, second, layout, i, from_, lasts, p, which, along, bent, bordered, equations
-    )
-    divided = is_divided(functions, layout, i, from_, lasts, p, which, equations)
+    bend_flow(way, i, from_, lasts, along, bent)
+    divided = is_divided(way.functions, layout, i, from_, lasts, way.p, way.which, equations)
     if divided:
-        bend_mean_rate(functions, layout, i, from_, lasts, p, which, along, workspace)
+        bend_mean_rate(way, i, from_, lasts, along)
     for k in range(grad.shape[0]):
         grad[k] = 0.0
     for k in range(2 + n + free):
@@ -285,10 +282,7 @@ def add_curvature(functions, second, layout, i, sign, z, p, which, workspace):  
     params = bordered.plus[0]
     for k in range(free):
         params[k] = grad[m + k]
-    c = layout.observables[layout.exits[i]]
-    bend_observable(
-        functions, second, c, after, p, which, along, bordered.bent, bordered, equations
-    )
+    bend_observable(way, layout.observables[layout.exits[i]], after, along, bordered.bent)
     for k in range(m):
         grad[k] = (flow_part[0] if k == 0 else 0.0) - u[i, n] * bordered.bent[0, k]
     for k in range(free):
@@ -320,13 +314,13 @@ def spread_end(grad, i, workspace):  # type: ignore[no-untyped-def]
 
 
 @helper
-def spectral_value(functions, second, layout, sign, z, p, which, border, workspace):  # type: ignore[no-untyped-def]
+def spectral_value(way, z):  # type: ignore[no-untyped-def]
     """Return g, with its gradient in the second border row (cleared before)."""
-    if not fill_blocks(functions, layout, z, p, which, workspace):
+    if not fill_blocks(way, z):
         return np.nan
-    g = null_vectors(border, sign, workspace)
+    g = null_vectors(way.border, way.condition.sign, way.workspace)
     if not math.isfinite(g):
         return np.nan
     for i in range(z.shape[0]):
-        add_curvature(functions, second, layout, i, sign, z, p, which, workspace)
+        add_curvature(way, i, z)
     return g

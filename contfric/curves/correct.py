@@ -122,18 +122,16 @@ def along_curve(problem, border, count, m, rows, counts):  # type: ignore[no-unt
 
 
 @helper
-def normal_and_condition(functions, layout, z, p, which, workspace, way):  # type: ignore[no-untyped-def]
+def normal_and_condition(way, z):  # type: ignore[no-untyped-def]
     """Border a curve with the plane normal to its tangent, and with its conditions."""
-    condition, s, values = way.condition, workspace.s, way.held.values
-    s[0, 0], s[0, 1] = -off_normal(workspace, z, p, which), 1.0
+    condition, s, values = way.condition, way.workspace.s, way.held.values
+    s[0, 0], s[0, 1] = -off_normal(way, z), 1.0
     if condition.kind == QUANTITY:
-        worst = fill_conditions(functions, layout, z, p, which, workspace, way)
+        worst = fill_conditions(way, z)
         for k in range(values.shape[0]):
             s[1 + k, 0], s[1 + k, 1] = -values[k], 0.0
         return worst, -1
-    value = condition_value(
-        functions, way.second, layout, condition, z, p, which, way.border, workspace
-    )
+    value = condition_value(way, z)
     s[1, 0], s[1, 1] = -value, 0.0
     return value, condition.segment if condition.kind == EXIT else -1
 
@@ -180,10 +178,11 @@ def follow_border(border, workspace):  # type: ignore[no-untyped-def]
 
 
 @helper
-def bend_value(functions, second, layout, condition, z, p, which, workspace):  # type: ignore[no-untyped-def]
+def bend_value(way, z):  # type: ignore[no-untyped-def]
     """Return the coefficient or rate whose zero is a point of codimension two; 1 if there is none."""
+    condition, layout, workspace = way.condition, way.layout, way.workspace
     if condition.kind == SPECTRAL and condition.sign < 0.0:
-        return cubic_coefficient(functions, second, layout, condition.sign, z, p, which, workspace)
+        return cubic_coefficient(way, z)
     if condition.kind == SPECTRAL:
         bordered, value = workspace.bordered, 0.0
         for i in range(z.shape[0]):
@@ -194,21 +193,18 @@ def bend_value(functions, second, layout, condition, z, p, which, workspace):  #
         i, equations = condition.segment, workspace.equations
         after = z[i + 1] if i + 1 < z.shape[0] else equations.last
         c = layout.observables[condition.surface]
-        return functions.rate(
-            condition.rest, c, after[0], after[1:], p, equations.none, equations.empty
-        )
+        none, empty = equations.none, equations.empty
+        return way.functions.rate(condition.rest, c, after[0], after[1:], way.p, none, empty)
     return 1.0
 
 
 @helper
-def other_touches(functions, layout, row, z, p, workspace):  # type: ignore[no-untyped-def]
+def other_touches(way, row, z):  # type: ignore[no-untyped-def]
     """Return an interior margin without the one stationary point that lies on the surface."""
+    functions, layout, p = way.functions, way.layout, way.p
     i, surface = layout.interior[row, 0], layout.interior[row, 1]
-    sign, stationary, equations = (
-        float(layout.interior[row, 2]),
-        workspace.stationary,
-        workspace.equations,
-    )
+    stationary, equations = way.workspace.stationary, way.workspace.equations
+    sign = float(layout.interior[row, 2])
     c = layout.observables[surface]
     if layout.resets[i] >= 0:
         found = find_behind(functions, layout, i, c, z, p, equations, stationary)
@@ -229,21 +225,25 @@ def other_touches(functions, layout, row, z, p, workspace):  # type: ignore[no-u
 @helper
 def observe_curve(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped-def]
     """Fill everything that is watched on a corrected point; False if something is not finite."""
-    functions, second, layout, condition = way.functions, way.second, way.layout, way.condition
-    p, which, workspace = way.p, way.which, way.workspace
+    functions, layout, condition, workspace = (
+        way.functions,
+        way.layout,
+        way.condition,
+        way.workspace,
+    )
     way.counts[CHECKS] += 1
     way.counts[MULTIPLIERS] += 1
     equations = workspace.equations
     at = tests.shape[0] - EXTRA
     one, minus = multipliers(layout, workspace.pencil, equations.close, mu, workspace.spectral)
-    tests[at + BEND] = bend_value(functions, second, layout, condition, z, p, which, workspace)
+    tests[at + BEND] = bend_value(way, z)
     stationary, followed = workspace.stationary, workspace.followed
-    finite = watch(functions, layout, z, p, equations, stationary, tests, labels, followed)
+    finite = watch(functions, layout, z, way.p, equations, stationary, tests, labels, followed)
     for k in range(condition.pinned.shape[0]):
         row = condition.pinned[k]
         tests[row] = 1.0
         if row < layout.interior.shape[0]:
-            tests[row] = other_touches(functions, layout, row, z, p, workspace)
+            tests[row] = other_touches(way, row, z)
     distances = at - labels.shape[0]
     for k in range(condition.quiet.shape[0]):
         labels[condition.quiet[k]] = 0

@@ -23,7 +23,8 @@ from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import EXTRA, Point, Rows
 from contfric.curves.naming import MARGINAL
 from contfric.curves.points import first_curve_point, march_rows
-from contfric.curves.problem import Box, Problem, problem_of, tangency
+from contfric.curves.problem import Problem, problem_of, tangency
+from contfric.curves.ranges import Box
 from contfric.curves.special import SpecialPoint
 from contfric.errors import ContfricError, ParameterError
 from contfric.models.definition import FloatArray

@@ -38,7 +38,8 @@ from contfric.continuation.vertices import symmetric_part, undoubled_part
 from contfric.curves.curve import CurvePart
 from contfric.curves.going_on import Start, prove, starts_of, words_at
 from contfric.curves.points import solve_point
-from contfric.curves.problem import Box, Problem, border_of, problem_of
+from contfric.curves.problem import Problem, border_of, problem_of
+from contfric.curves.ranges import Box
 from contfric.curves.special import CodimTwo, SpecialPoint
 from contfric.errors import ContfricError, NotationError
 from contfric.models.definition import FloatArray

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.base.tally import tally
+from contfric.continuation.hermite import cubic_between
 from contfric.continuation.locate_change import sought_of
 from contfric.continuation.points import Point, Rows
 from contfric.curves.points import Conditioned, compiled_problem, solve_point
@@ -31,21 +32,11 @@ _NOISE = 2e-15
 Value = Callable[[Point], float]
 
 
-def between(a: Point, b: Point, x: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return joints, parameters, tangent and slope at a share of a step, by the cubic through both ends."""
-    y, length = 1.0 - x, b.arc - a.arc
-    ha, hb = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x)
-    ga, gb = x * y * y * length, -x * x * y * length
-    joints = ha * a.joints + hb * b.joints + ga * a.tangent + gb * b.tangent
-    w = ha * a.w + hb * b.w + ga * a.direction + gb * b.direction
-    return joints, w, y * a.tangent + x * b.tangent, y * a.direction + x * b.direction
-
-
 def point_between(
     problem: Conditioned, a: Point, b: Point, x: float, border: FloatArray
 ) -> Point | None:
     """Return the solved point at a share of a step."""
-    point = solve_point(problem, *between(a, b, x), border.copy())
+    point = solve_point(problem, *cubic_between(a, b, x), border.copy())
     if point is not None:
         point.arc = a.arc + x * (b.arc - a.arc)
     return point

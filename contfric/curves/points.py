@@ -9,7 +9,8 @@ import numpy as np
 
 from contfric.base.tally import tally
 from contfric.continuation.points import SMALLEST_STEP, Point, Rows
-from contfric.curves.problem import Problem, Ranges, border_of
+from contfric.curves.problem import Problem, border_of
+from contfric.curves.ranges import Ranges
 from contfric.curves.special import CurveEndReason
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import assembled

@@ -24,7 +24,7 @@ import numpy as np
 
 from contfric.continuation.points import Point, Rows
 from contfric.curves.points import solve_point
-from contfric.curves.problem import Ranges, limits_of
+from contfric.curves.ranges import Ranges, limits_of
 from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.errors import ConvergenceError
 from contfric.models.definition import FloatArray

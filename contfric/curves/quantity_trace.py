@@ -17,9 +17,9 @@ from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point
 from contfric.continuation.trace import continue_orbit
 from contfric.curves.locating import locate_zero
 from contfric.curves.points import end_of_march, march_on
-from contfric.curves.problem import Box, box_of
 from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.quantity_step import Held
+from contfric.curves.ranges import Box, box_of
 from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.curves.trace import largest_step
 from contfric.errors import ConvergenceError, ParameterError, real_number, whole_number

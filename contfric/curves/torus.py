@@ -25,9 +25,9 @@ from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.points import MOST_POINTS, Point
 from contfric.curves.curve import Curve, CurvePart
 from contfric.curves.locating import locate_zero
-from contfric.curves.problem import Box
 from contfric.curves.quantity_step import Defects, Held
 from contfric.curves.quantity_trace import trace_both
+from contfric.curves.ranges import Box
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.errors import ConvergenceError, ParameterError
 from contfric.models.definition import FloatArray

@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 
 from contfric.models.definition import FloatArray
 from contfric.plot.labels import Anchor, near, place_labels
+from contfric.plot.names import event_label
 from contfric.plot.runs import quantity
-from contfric.plot.style import MARKERS, OTHER_MARKER, event_label, sized
+from contfric.plot.style import MARKERS, OTHER_MARKER, sized
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
