@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 #: Share of a step to which a place is bracketed: the resolution of the arithmetic.
 _RESOLUTION = 4e-16
-#: Bisections after which a bracket has that width, whatever the function.
-_MOST_TRIALS = 120
+#: Rounding of a number.
+_ROUNDING = float(np.finfo(float).eps)
 #: Values below this are rounding: a narrower bracket would follow noise.
 _NOISE = 2e-15
 
@@ -47,34 +47,30 @@ def locate_zero(
 ) -> tuple[Point, bool]:
     """Return the place where a value changes sign, and whether it is bracketed to its last digits.
 
-    By regula falsi with Illinois' halving of the end that stays, and a bisection every fourth trial. A
-    trial that is not solved counts as beyond the place.
+    By Brent's method. A trial that is not solved counts as beyond the place, and so does the far end.
     """
-    low, high, f_low, f_high = 0.0, 1.0, value(a), value(b)
-    best, sign, side, lost = a, np.sign(f_low) or 1.0, 0, False
-    for trial in range(_MOST_TRIALS):
-        x = low + (high - low) * f_low / (f_low - f_high) if f_low != f_high else 0.5
-        if trial % 4 == 3 or not low < x < high or not np.isfinite(x):
-            x = 0.5 * (low + high)
+    from scipy.optimize import brentq
+
+    first, last = value(a), value(b)
+    sign = float(np.sign(first)) or 1.0
+    best, left, lost = a, abs(first), False
+
+    def value_at(x: float) -> float:
+        nonlocal best, left, lost
+        if x in (0.0, 1.0):
+            return first if x == 0.0 else -sign * max(-sign * last, _NOISE)
         point = point_between(problem, a, b, x, border)
         f = -sign if point is None else value(point)
-        if not np.isfinite(f):
-            f = sign
-        if point is not None and (abs(f) < abs(value(best)) or f * sign >= 0.0):
-            best = point
-        if abs(f) <= _NOISE and point is not None:
-            return point, True
-        if f * sign > 0.0:
-            low, f_low = x, f
-            f_high = 0.5 * f_high if side == 1 else f_high
-            side = 1
-        else:
-            high, f_high, lost = x, f, point is None
-            f_low = 0.5 * f_low if side == -1 else f_low
-            side = -1
-        if high - low <= _RESOLUTION:
-            break
-    return best, not lost and abs(value(best)) < 1e-6
+        f = f if np.isfinite(f) else sign
+        if f * sign <= 0.0:
+            lost = point is None
+        if point is not None and (abs(f) < left or f * sign >= 0.0):
+            best, left = point, abs(f)
+        return 0.0 if abs(f) <= _NOISE else f
+
+    if first != 0.0:
+        brentq(value_at, 0.0, 1.0, xtol=_RESOLUTION, rtol=4.0 * _ROUNDING)
+    return best, not lost and left < 1e-6
 
 
 def locate(
