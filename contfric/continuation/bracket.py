@@ -10,10 +10,7 @@ from numba import types
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix
 from contfric.compiling.references import by_reference
 from contfric.continuation.bracketing import Rules, bracketing, copy_row
-from contfric.continuation.geometry import (
-    PointsType,
-    largest_state,
-)
+from contfric.continuation.geometry import PointsType, largest_state
 from contfric.continuation.steps import (
     AT_EVENT,
     CHI_MINUS,

@@ -22,18 +22,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contfric.continuation.events import (
-    ACCURACY,
-    Bifurcation,
-    Kind,
-)
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
-from contfric.continuation.outcomes import (
-    NO_LENGTH_AT_TOUCH,
-    Outcome,
-    RestsForEver,
-    outcome_at,
-)
+from contfric.continuation.outcomes import NO_LENGTH_AT_TOUCH, Outcome, RestsForEver, outcome_at
 from contfric.continuation.places import normal_place, places_of
 from contfric.continuation.unit import Form, Unit, form_of, pieces, unit_of
 from contfric.errors import NotationError

@@ -5,20 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.continuation.accuracy import not_critical
-from contfric.continuation.ending import (
-    end_at_limit,
-    ends_at,
-    is_point,
-    never_leaves,
-)
+from contfric.continuation.ending import end_at_limit, ends_at, is_point, never_leaves
 from contfric.continuation.events import Bifurcation, End, EndReason, Kind
 from contfric.continuation.limits import is_at_limit, limit_crossed, limit_end
 from contfric.continuation.locate import belongs_to, locate_events
-from contfric.continuation.points import (
-    EXTRA,
-    Point,
-    Settings,
-)
+from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.section_joints import (
     LAST_CROSSING,
     is_known_touch,
@@ -29,10 +20,7 @@ from contfric.continuation.side import Side
 from contfric.continuation.sliding import nearly_reached
 from contfric.continuation.smooth import SAME_PLACE
 from contfric.continuation.stopping import stop_between
-from contfric.continuation.vertex_ends import (
-    NEAREST,
-    SHORTER,
-)
+from contfric.continuation.vertex_ends import NEAREST, SHORTER
 from contfric.orbit.orbit import Orbit
 
 #: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).

@@ -252,10 +252,7 @@ def branch_problem(orbit: Orbit, settings: Settings) -> BranchProblem:
 
 
 def first_point(
-    orbit: Orbit,
-    settings: Settings,
-    tangent: FloatArray | None = None,
-    slope: float = 1.0,
+    orbit: Orbit, settings: Settings, tangent: FloatArray | None = None, slope: float = 1.0
 ) -> Point | None:
     """Solve for the first point of a branch; None if it has no unique tangent there.
 

@@ -13,12 +13,7 @@ from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
 from contfric.orbit.convergence import CONVERGED, NOT_FINITE
 from contfric.orbit.cyclic import Elimination, elimination_workspace
-from contfric.orbit.equations import (
-    EquationWorkspace,
-    LayoutType,
-    close_chain,
-    equation_workspace,
-)
+from contfric.orbit.equations import EquationWorkspace, LayoutType, close_chain, equation_workspace
 from contfric.orbit.followed import Followed, followed_values, remember
 from contfric.orbit.monitor import watch
 from contfric.orbit.newton import CHECKS, MULTIPLIERS, SOLVES, correcting, normal_to_tangent

@@ -8,31 +8,16 @@ import numpy as np
 
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
-from contfric.continuation.ending import (
-    endless,
-    never_leaves,
-)
+from contfric.continuation.ending import endless, never_leaves
 from contfric.continuation.events import TERMINAL, End, EndReason
 from contfric.continuation.limits import is_at_limit, limit_end
-from contfric.continuation.points import (
-    FIRST_STEP,
-    MOST_POINTS,
-    Point,
-    Settings,
-    settings_of,
-)
+from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point, Settings, settings_of
 from contfric.continuation.resolve import end_of_holds, resolve
-from contfric.continuation.section_joints import (
-    move_joints,
-)
+from contfric.continuation.section_joints import move_joints
 from contfric.continuation.side import Side
 from contfric.continuation.start import start_of
 from contfric.continuation.stopping import stop_among
-from contfric.continuation.vertex_ends import (
-    Overshoot,
-    end_stalled,
-    overshoots_vertex,
-)
+from contfric.continuation.vertex_ends import Overshoot, end_stalled, overshoots_vertex
 from contfric.errors import ConvergenceError, function_of
 from contfric.orbit.orbit import Orbit
 from contfric.remember.advance import foresee, foreseeable

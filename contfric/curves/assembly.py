@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.continuation.events import (
-    Kind,
-)
+from contfric.continuation.events import Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import Point
 from contfric.curves.curve import Curve, CurvePart

@@ -25,20 +25,12 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import allocating_helper, f8, helper, i8, indices
-from contfric.curves.bordered import (
-    BorderedWorkspace,
-    bordered_workspace,
-    spectral_value,
-    spread_end,
-)
+from contfric.curves.bordered import spectral_value, spread_end
+from contfric.curves.chain import BorderedWorkspace, bordered_workspace
 from contfric.models.definition import FloatArray
 from contfric.orbit.after_reset import apply_reset
 from contfric.orbit.cyclic import Elimination, elimination_workspace
-from contfric.orbit.equations import (
-    EquationWorkspace,
-    equation_workspace,
-    segment_jacobian,
-)
+from contfric.orbit.equations import EquationWorkspace, equation_workspace, segment_jacobian
 from contfric.orbit.followed import Followed, followed_values
 from contfric.orbit.spectrum import SpectralWorkspace, spectral_workspace
 from contfric.orbit.stationary import (

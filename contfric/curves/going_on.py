@@ -14,11 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.candidates import candidates
-from contfric.continuation.events import (
-    TERMINAL,
-    Bifurcation,
-    Kind,
-)
+from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import EXTRA, Point, Rows
 from contfric.curves.naming import MARGINAL
@@ -197,11 +193,7 @@ def starts_of(event: Bifurcation, box: Box, largest: float) -> Iterator[Start]:
 
 
 def prove(
-    problem: Problem,
-    start: Point,
-    border: FloatArray,
-    largest: float,
-    born: bool = False,
+    problem: Problem, start: Point, border: FloatArray, largest: float, born: bool = False
 ) -> Problem | None:
     """Return a curve's problem if its orbits are admissible a short step away from a point.
 

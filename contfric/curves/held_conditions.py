@@ -8,6 +8,7 @@ leaves values and rows there.
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,15 +16,10 @@ from numba import types
 
 from contfric.compiled import blocks, f8, helper, i8, matrix, vector
 from contfric.continuation.geometry import copy_to, copy_vector
-from contfric.curves.lagrangian import (
-    add_bend,
-    differentiated_extreme,
-    place_found,
-    quantity_row,
-)
+from contfric.curves.lagrangian import add_bend, differentiated_extreme, place_found, quantity_row
 from contfric.handle import HandleType
 from contfric.models.definition import FloatArray
-from contfric.orbit.equations import close_chain
+from contfric.orbit.equations import LayoutType, close_chain
 from contfric.orbit.peak import Extreme, ExtremeType
 from contfric.orbit.system import Layout
 
@@ -65,12 +61,19 @@ ConditionsType = types.NamedTuple(
 )
 
 
-_NONE = np.empty((0, 0)), np.empty(0), np.empty(0), np.empty((0, 0, 0)), np.empty((0, 0))
+def _nothing(kind: Any) -> Any:
+    """Return a value of a type of a layout's member that holds nothing."""
+    if not isinstance(kind, types.Array):
+        return 0.0 if kind == f8 else 0
+    return np.empty((0,) * kind.ndim, dtype=str(kind.dtype))
 
 
-def no_quantity(layout: Layout) -> Conditions:
+@cache
+def no_quantity() -> Conditions:
     """Return what stands where nothing is asked of a quantity."""
-    return Conditions(CALLED, 0.0, Extreme(-1, 0, 1.0, layout), 0, *_NONE)
+    extreme = Extreme(-1, 0, 1.0, Layout(*map(_nothing, LayoutType.types)))
+    none, grid = np.empty(0), np.empty((0, 0))
+    return Conditions(CALLED, 0.0, extreme, 0, grid, none, none, np.empty((0, 0, 0)), grid)
 
 
 @helper

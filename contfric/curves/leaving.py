@@ -26,11 +26,7 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.candidates import edited_orbit
-from contfric.continuation.events import (
-    TERMINAL,
-    Bifurcation,
-    Kind,
-)
+from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.outcomes import outcome_at
 from contfric.continuation.points import Point

@@ -25,13 +25,8 @@ from __future__ import annotations
 
 from contfric.compiled import helper
 from contfric.curves.bending import bend_flow, bend_mean_rate, bend_observable
-from contfric.curves.bordered import (
-    _THIRD,
-    chain_solve,
-    end_of,
-    segment_direction,
-    set_border,
-)
+from contfric.curves.bordered import _THIRD, end_of, segment_direction
+from contfric.curves.chain import chain_solve, set_border
 from contfric.orbit.short_exits import is_divided
 
 

@@ -8,11 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.continuation.events import (
-    TERMINAL,
-    Bifurcation,
-    Kind,
-)
+from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.touching import resting_domain
 from contfric.curves.ranges import Box, limits_of
@@ -68,7 +64,7 @@ class Problem:
         """Return what vanishes, as the compiled engine takes it: nothing is asked of a quantity."""
         from contfric.curves.held_conditions import no_quantity
 
-        return self.condition, no_quantity(self.system.layout)
+        return self.condition, no_quantity()
 
     def raise_kept(self) -> None:
         """Raise nothing: the engine calls no function of Python for this problem."""

@@ -17,13 +17,7 @@ from contfric.plot.names import full_title
 from contfric.plot.response import draw_overlay
 from contfric.plot.rows import draw_row, model_of
 from contfric.plot.save import axes_or_new, figure_or_new, for_journal, legend_of
-from contfric.plot.style import (
-    NEXT_TO,
-    SMALL,
-    TEXT,
-    row_of,
-    sized,
-)
+from contfric.plot.style import NEXT_TO, SMALL, TEXT, row_of, sized
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram

@@ -48,10 +48,7 @@ class Mark:
 
 
 def marks_of(
-    events: Sequence[Bifurcation],
-    branches: Sequence[Branch],
-    row: QuantityLike,
-    parameter: str,
+    events: Sequence[Bifurcation], branches: Sequence[Branch], row: QuantityLike, parameter: str
 ) -> list[Mark]:
     """Return the marks of a row, with the images of each event on all branches.
 
