@@ -43,7 +43,7 @@ def march_cost(bifurcation, points=60, runs=40):
         rows = Rows.empty(problem.system, points, 2)
         rows.put(0, start)
         began = time.process_time()
-        _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), STEP, STEP, 3e-13)
+        _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), STEP, STEP)
         best = min(best, (time.process_time() - began) / max(last, 1))
     return 1e6 * best, last
 

@@ -8,7 +8,8 @@ from dataclasses import replace
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
 from contfric.continuation.branch import Branch
-from contfric.continuation.crossing import Crossing, Direction, starts_along
+from contfric.continuation.crossing import Crossing, Direction
+from contfric.continuation.crossing_ends import starts_along
 from contfric.continuation.events import EndReason, Verdict
 from contfric.continuation.points import Settings, settings_of
 from contfric.continuation.switching import leave_along

@@ -25,14 +25,11 @@ from contfric.curves.assembly import join_sides
 from contfric.curves.curve import CurvePart
 from contfric.curves.going_on import Start
 from contfric.curves.leaving import leaving, other_words
-from contfric.curves.problem import Problem, box_of, problem_of
+from contfric.curves.problem import Problem, problem_of
+from contfric.curves.ranges import box_of
+from contfric.curves.side import CurveSide
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
-from contfric.curves.trace import (
-    CurveSide,
-    largest_step,
-    start_of_curve,
-    trace_curve_side,
-)
+from contfric.curves.trace import largest_step, start_of_curve, trace_curve_side
 from contfric.errors import (
     ConvergenceError,
     ParameterError,

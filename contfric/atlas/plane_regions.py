@@ -19,7 +19,7 @@ from contfric.atlas.matching import identity
 from contfric.atlas.plane import Family, Region
 from contfric.base.interrupts import held_back
 from contfric.curves.curve import Curve
-from contfric.curves.problem import Box
+from contfric.curves.ranges import Box
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import Word
 from contfric.remember.journal import remembered

@@ -14,7 +14,7 @@ from contfric.atlas.seeds import Seeds
 from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import follow_orbit
-from contfric.curves.problem import Box
+from contfric.curves.ranges import Box
 from contfric.errors import ContfricError, ParameterError, mapping_of, real_number, shown
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from contfric.atlas.diagram import Diagram
 from contfric.continuation.events import Kind
 from contfric.curves.curve import Curve
-from contfric.curves.problem import Box, Problem
+from contfric.curves.problem import Problem
+from contfric.curves.ranges import Box
+from contfric.curves.side import CurveSide
 from contfric.curves.special import SpecialPoint
-from contfric.curves.trace import CurveSide
 from contfric.models.definition import FloatArray
 
 Progress = Callable[[str], None]

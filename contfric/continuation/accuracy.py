@@ -18,16 +18,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from contfric.base.interrupts import held_back
+from contfric.continuation.doubling_point import opening
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.gradients import carried, closing, gradient_of, surface_gradient
+from contfric.continuation.moved_by_errors import UNITS, fold_error, moved_by_errors
 from contfric.continuation.points import Point, Settings
-from contfric.continuation.vertices import opening
 from contfric.continuation.zero_acceleration import joint_within, stationary_values
 from contfric.models.definition import FloatArray
-from contfric.orbit.linear import linearised
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
 from contfric.orbit.system import Margin, Test
@@ -35,8 +33,6 @@ from contfric.orbit.system import Margin, Test
 #: Least accuracy that is claimed, relative to the range: two ways to one event differ by a little more than
 #: the rounding of one, and no diagram resolves it.
 LEAST = 1e-11
-#: Units of rounding in one equation of a segment: its phases, its duration and its state have some each.
-_UNITS = 4.0
 #: Differences of a margin, relative: its second derivative costs this much of the first, which is enough.
 _DIFFERENCE = 1e-7
 #: Neighbours at which a multiplier is evaluated: distance in the parameter, as a share of 1 + its value and
@@ -47,8 +43,6 @@ _NEIGHBOURS = (-2.0, -1.0, 1.0, 2.0)
 _CLOSER = (1.0, 1e-2, 1e-4)
 #: Four points leave one of their errors in what a parabola misses: this many times that bounds them all.
 _MISSED = 10.0
-#: Unknowns of the largest system that is solved as a full matrix; a longer one is solved as a sparse one.
-_FULL = 200
 #: Kinds that a multiplier on the unit circle makes, and how far it may be from there: the root of rounding
 #: times the largest multiplier (a fold is located that well along the branch), or a share of what it
 #: changes by over the step, where it changes fast.
@@ -110,7 +104,7 @@ class Estimate:
         if self.tests:
             return self._of_margins(active), _SINGULAR
         if kind is Kind.SN:
-            return _fold_error(here, active, self.sides, self.point), _SINGULAR
+            return fold_error(here, active, self.sides, self.point), _SINGULAR
         return _multiplier_error(kind, here, active, self.width), ACCURACY
 
     def _of_margins(self, active: int) -> float | None:
@@ -197,7 +191,7 @@ def _error_of(orbit: Orbit, active: int, condition: _Condition) -> float | None:
         return None
     scale = 1.0 + float(np.max(np.abs(orbit.joints)))
     left = abs(value) + orbit.model.rounding * scale
-    return _moved(orbit, active, _gradient(orbit, active, condition, value), left)
+    return moved_by_errors(orbit, active, _gradient(orbit, active, condition, value), left)
 
 
 def _gradient(orbit: Orbit, active: int, condition: _Condition, value: float) -> FloatArray:
@@ -226,89 +220,11 @@ def _gradient(orbit: Orbit, active: int, condition: _Condition, value: float) ->
     return row
 
 
-def _moved(orbit: Orbit, active: int, row: FloatArray, left: float) -> float | None:
-    """Return how far the errors of all equations move the parameter.
-
-    ``row`` is the gradient of the condition, and ``left`` its error.
-    """
-    a, b, c, close, residual = linearised(orbit.system, orbit.joints, orbit.vector)
-    b[-1] = b[-1] @ close
-    weights = _weights(a, b, c[:, :, active], row)
-    if weights is None or not np.all(np.isfinite(weights)):
-        return None
-    errors = np.abs(residual) + _rounding(orbit)
-    own = np.finfo(float).eps * abs(float(orbit.vector[active]))
-    return float(np.abs(weights[:-1]) @ errors + abs(weights[-1]) * left + own)
-
-
-def _rounding(orbit: Orbit) -> FloatArray:
-    """Return the rounding of every equation of a chain, shape (N m,)."""
-    size = np.max(np.abs(orbit.joints), axis=1)
-    size = 1.0 + np.maximum(size, np.append(size[1:], size[0]))
-    unit = _UNITS * np.finfo(float).eps + orbit.model.rounding
-    return np.repeat(unit * size, orbit.joints.shape[1])
-
-
-def _weights(a: FloatArray, b: FloatArray, c: FloatArray, row: FloatArray) -> FloatArray | None:
-    """Return the last row of the inverse of the Jacobian of a chain with one parameter and one condition."""
-    count, m = c.shape
-    size = count * m
-    wanted = np.zeros(size + 1)
-    wanted[size] = 1.0
-    try:
-        if size <= _FULL:
-            full = np.zeros((size + 1, size + 1))
-            for i in range(count):
-                rows, following = slice(i * m, (i + 1) * m), (i + 1) % count * m
-                full[rows, rows] += a[i]
-                full[rows, following : following + m] += b[i]
-            full[:size, size], full[size] = c.ravel(), row
-            return np.asarray(np.linalg.solve(full.T, wanted), dtype=np.float64)
-        return _sparse_weights(a, b, c, row, wanted)
-    except (np.linalg.LinAlgError, RuntimeError, ValueError):
-        return None
-
-
-def _sparse_weights(
-    a: FloatArray, b: FloatArray, c: FloatArray, row: FloatArray, wanted: FloatArray
-) -> FloatArray:
-    """Do the same for a long chain."""
-    with held_back():
-        from scipy.sparse import csc_matrix
-        from scipy.sparse.linalg import splu
-
-    count, m = c.shape
-    size = count * m
-    places: NDArray[np.int64] = np.arange(size).reshape(count, m)
-    across = np.repeat(places[:, :, None], m, axis=2).ravel()
-    own = np.repeat(places[:, None, :], m, axis=1)
-    rows = np.concatenate([across, across, places.ravel(), np.full(size + 1, size)])
-    following = np.roll(own, -1, axis=0).ravel()
-    columns = np.concatenate([own.ravel(), following, np.full(size, size), np.arange(size + 1)])
-    values = np.concatenate([a.ravel(), b.ravel(), c.ravel(), row])
-    matrix = csc_matrix((values, (rows, columns)), shape=(size + 1, size + 1))
-    return np.asarray(splu(matrix).solve(wanted, trans="T"), dtype=np.float64)
-
-
-def _fold_error(
-    orbit: Orbit, active: int, sides: tuple[Point, Point | None], point: Point
-) -> float | None:
-    """Return the error of the parameter at a fold, where it is stationary along the branch."""
-    before, after = sides
-    if after is None or after.arc == before.arc or orbit.joints.shape != point.tangent.shape:
-        return None
-    error = _moved(orbit, active, np.append(point.tangent.ravel(), point.slope), 0.0)
-    bend = (after.slope - before.slope) / (after.arc - before.arc)
-    if error is None or bend == 0.0:
-        return None
-    return error + 0.5 * point.slope**2 / abs(bend)
-
-
 def _multiplier_error(kind: Kind, here: Orbit, active: int, width: float) -> float | None:
     """Return the error of the parameter at which a multiplier is on the unit circle."""
     value = float(here.vector[active])
     distance = min(_BESIDE * (1.0 + abs(value)), _BESIDE_RANGE * width)
-    own = _UNITS * float(np.finfo(float).eps) * (1.0 + abs(value))
+    own = UNITS * float(np.finfo(float).eps) * (1.0 + abs(value))
     least: float | None = None
     for share in _CLOSER:
         clear = 1.0 if share == 1.0 else _MISSED

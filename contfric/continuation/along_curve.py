@@ -1,6 +1,6 @@
 """Orbits on a curve of orbits through one of them, solved normal to its tangent: also where the curve turns.
 
-A fold of the simpler orbits may lie so near to a vertex that there is no orbit at parameters beside it, or
+A fold of the simpler orbits may lie so near to a vertex that there is no orbit at parameters near it, or
 that Newton's method at fixed parameters goes to the other side of the fold. With the unit tangent (t, r) of
 the curve at (z*, p*) the orbit at the distance s solves
 
@@ -19,7 +19,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.linear import equations_at, tangent_of
 from contfric.orbit.orbit import Orbit, Status
 
-#: Most corrections: from beside the curve it takes three to five.
+#: Most corrections: from near the curve it takes three to five.
 _MOST_CORRECTIONS = 12
 #: A correction (relative to 1 + the size of the orbit) that is rounding of the equations, and one below which
 #: the next would be.
@@ -28,7 +28,7 @@ _ROUNDING, _LAST = 1e-14, 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A curve of orbits near one of them: an orbit on or beside the curve, and its unit tangent there.
+    """A curve of orbits near one of them: an orbit on or near the curve, and its unit tangent there.
 
     Attributes
     ----------

@@ -72,7 +72,7 @@ def turning_passages(orbit: Orbit) -> dict[int, FloatArray]:
 
 @dataclass(frozen=True, eq=False)
 class Arms:
-    """The motion at a fold, and its two arms at one value of the parameter beside it.
+    """The motion at a fold, and its two arms at one value of the parameter near it.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Arms:
         return int(2 ** len(self.turning))
 
     def beside(self, distance: float, settings: Settings) -> Arms | None:
-        """Return the same with both arms solved beside the fold, this far in the lengths of holds."""
+        """Return the same with both arms solved near the fold, this far in the lengths of holds."""
         fold = self.fold
         direction = np.sum(list(self.turning.values()), axis=0)
         point = first_point(

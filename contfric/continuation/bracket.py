@@ -1,42 +1,29 @@
-"""Location of an event on a branch or curve, compiled: a bracket, each trial a solved point.
-
-A trial is predicted by the cubic through both ends of the step and their tangents, and corrected
-normal to the tangent between them. Places are chosen by Chandrupatla's method (Adv. Eng. Software 28
-(1997) 145-149): inverse quadratic interpolation where the values are monotone enough for it, bisection
-elsewhere; the bracket shrinks to the resolution of the arithmetic, or of the flow where that is integrated.
-Along a branch only the value that is sought is evaluated on the way.
-"""
+"""Location of an event on a branch, compiled: only the value that is sought is evaluated on the way."""
 
 from __future__ import annotations
 
-import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
-from contfric.compiled import f8, helper, i8, indices, kernel, vector
+from contfric.compiled import f8, helper, i8, indices, kernel, matrix
 from contfric.compiling.references import by_reference
-from contfric.continuation.geometry import (
-    PointsType,
-    copy_to,
-    copy_vector,
-    distance,
-    interpolate,
-    largest_state,
-)
+from contfric.continuation.bracketing import Rules, bracketing, copy_row
+from contfric.continuation.geometry import PointsType, largest_state
 from contfric.continuation.steps import (
     AT_EVENT,
     CHI_MINUS,
     CHI_ONE,
     FOLD,
-    Along,
+    BranchProblemType,
+    along_branch,
     correct_branch,
     observe_branch,
-    step_workspace,
 )
-from contfric.flow.layouts import FlowType
-from contfric.orbit.equations import LayoutType, close_chain
+from contfric.models.definition import FloatArray
+from contfric.orbit.convergence import ALONG, INTEGRATED
+from contfric.orbit.equations import close_chain
 from contfric.orbit.monitor import (
     count_margins,
     crossings,
@@ -46,7 +33,7 @@ from contfric.orbit.monitor import (
     lasting_margin,
     regular_margin,
 )
-from contfric.orbit.newton import ALONG, CHECKS, INTEGRATED, MULTIPLIERS, SOLVES
+from contfric.orbit.newton import CHECKS, MULTIPLIERS, SOLVES
 from contfric.orbit.spectrum import multipliers
 from contfric.orbit.stationary import find_behind, find_stationary
 from contfric.orbit.system import IntArray
@@ -64,14 +51,6 @@ _COARSEST = 0.01
 #: Share of a step below which it is not narrowed down any further where Newton is lost: the multiplier that
 #: is sought is behind that.
 _LOST = 1e-6
-#: Share of the value at the start of a step that may be left at a place where trials fail: it is found, and
-#: they fail by rounding, as they do where joints are at times of many periods.
-_LEFT = 1e-9
-#: Two trials that are farther apart than this many times the way between their places lie on two sheets: a
-#: step is refused whose ends differ by a third of a radian in direction.
-_APART = 100.0
-#: Trials after which a bracket has the width of the arithmetic, whatever the function.
-_MOST_TRIALS = 120
 
 
 @helper
@@ -80,29 +59,6 @@ def resolution(rounding, length, size):  # type: ignore[no-untyped-def]
     if rounding <= INTEGRATED or not length > 0.0:
         return _SHORTEST
     return max(_SHORTEST, min(_COARSEST, rounding * (1.0 + size) / length))
-
-
-@helper
-def next_trial(low, high, f_low, f_high, x_old, f_old, x, closest):  # type: ignore[no-untyped-def]
-    """Return Chandrupatla's next abscissa: inverse quadratic where it is monotone, else the middle.
-
-    It is not closer to either end of the bracket than ``closest``.
-    """
-    a, fa = x, (f_low if x == low else f_high)
-    b, fb = (high, f_high) if x == low else (low, f_low)
-    c, fc = x_old, f_old
-    share = 0.5
-    if fb != fa and fc != fb and fc != fa and b != c:
-        xi = (a - b) / (c - b)
-        phi = (fa - fb) / (fc - fb)
-        if phi * phi < xi and (1 - phi) * (1 - phi) < 1 - xi:
-            share = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (
-                fc - fb
-            )
-    width = abs(b - a)
-    least = min(0.5, closest / width if width > 0.0 else 0.5)
-    share = min(1.0 - least, max(least, share))
-    return a + share * (b - a)
 
 
 @helper
@@ -141,20 +97,25 @@ def plain_margin(functions, layout, index, z, p, workspace):  # type: ignore[no-
 
 
 class Sought(NamedTuple):
-    """The value whose change of sign is sought along a branch.
+    """The value whose change of sign is sought along a branch or curve.
 
     Attributes
     ----------
     kind : BY_TEST, BY_LABEL or BY_PARAMETER
     number : column of the tests, or row of the labels
-    target : the label before, or the value of the parameter
+    target : the label before, or the value of the parameter of a branch
+    planes : of a curve by parameters: rows (a, b, c), of which the least of ``a p + b q + c`` vanishes
     plain : counts the values for which a label was that of one of the two points, shape (1,)
     """
 
     kind: int
     number: int
     target: float
+    planes: FloatArray
     plain: IntArray
+
+
+SoughtType = types.NamedTuple([i8, i8, f8, matrix, indices], Sought)
 
 
 @helper
@@ -191,12 +152,6 @@ def watched_value(way, sought, points, row):  # type: ignore[no-untyped-def]
 
 
 @helper
-def limited(value):  # type: ignore[no-untyped-def]
-    """Return a value fit for interpolation: a margin without stationary points is infinite."""
-    return -1.0 if math.isnan(value) else min(value, 1e3)
-
-
-@helper
 def values_at_ends(way, sought, points):  # type: ignore[no-untyped-def]
     """Return the value that is sought at rows 0 and 1."""
     ws, tests = points.w, points.tests
@@ -213,118 +168,33 @@ def values_at_ends(way, sought, points):  # type: ignore[no-untyped-def]
     return first, watched_value(way, sought, points, 1)
 
 
-@helper
-def copy_row(points, target, source):  # type: ignore[no-untyped-def]
-    """Copy one row of points to another."""
-    zs, ws, tzs, tws, arc, tests, labels, mu = points
-    copy_to(zs[target], zs[source])
-    copy_to(tzs[target], tzs[source])
-    copy_vector(ws[target], ws[source])
-    copy_vector(tws[target], tws[source])
-    copy_vector(tests[target], tests[source])
-    copy_vector(labels[target], labels[source])
-    copy_vector(mu[target], mu[source])
-    arc[target] = arc[source]
-
-
-def bracketing(correct_at: Any, value_at: Any) -> Any:
-    """Return the bracket of branches or curves, as a helper.
-
-    Parameters
-    ----------
-    correct_at : that of :func:`contfric.continuation.march.marching`
-    value_at : returns the value that is sought, ``(way, sought, points, row)``
-    """
-
-    @helper
-    def bracket(way, sought, points, ends, rules):  # type: ignore[no-untyped-def]
-        """Find where a value changes sign between rows 0 and 1 of the points.
-
-        Parameters
-        ----------
-        way, sought : what the two functions need
-        points : four rows; the third one is for trials, the place is left in the fourth
-        ends : (value at row 0, value at row 1)
-        rules : (accuracy of a trial; whether the value has the sign that it has, or is positive before;
-            value that is rounding; width of a bracket that is as narrow as can be; width below which it is
-            not narrowed down where trials fail, 0 where sheets are not told apart)
-
-        Returns
-        -------
-        tuple
-            (position in the step, value there, whether trials fail behind it or go over to another sheet,
-            whether any did not).
-        """
-        way = by_reference(way)
-        zs, ws, tzs, tws = points.joints, points.w, points.tangents, points.directions
-        accuracy, two_sided, noise, narrowest, given_up = rules
-        sign = -1.0 if two_sided and ends[0] < 0.0 else 1.0
-        f_low, f_high = limited(sign * ends[0]), limited(sign * ends[1])
-        low, high, x, best, best_f, left = 0.0, 1.0, 0.5, 0.0, f_low, _LEFT * f_low
-        x_old, f_old, lost, solved = low, f_low, False, False
-        reach = _APART * distance(zs[0], ws[0], zs[1], ws[1], way.scale)
-        copy_row(points, 3, 0)
-        if f_low > 0.0 and f_high < 0.0:
-            x = min(0.99, max(0.01, f_low / (f_low - f_high)))
-        for _ in range(_MOST_TRIALS):
-            if f_low <= 0.0 or f_high > 0.0:
-                if f_low > 0.0:
-                    best, best_f = 1.0, f_high
-                    copy_row(points, 3, 1)
-                break
-            interpolate(points, x)
-            fine, _ = correct_at(way, zs[2], ws[2], tzs[2], tws[2], accuracy)
-            f = -1.0
-            if fine:
-                f, solved = limited(sign * value_at(way, sought, points, 2)), True
-                if f >= 0.0:
-                    best, best_f = x, f
-                    copy_row(points, 3, 2)
-            if f > 0.0:
-                x_old, f_old = low, f_low
-                low, f_low = x, f
-            else:
-                x_old, f_old = high, f_high
-                high, f_high = x, f
-                lost = not fine
-                if fine and given_up > 0.0:
-                    lost = distance(zs[2], ws[2], zs[3], ws[3], way.scale) > reach * (x - low)
-                    if lost:
-                        break
-            if f == 0.0 or high - low <= narrowest or (f_low <= noise and f_high >= -noise):
-                break
-            if lost and high - low < given_up:
-                break
-            x = next_trial(low, high, f_low, f_high, x_old, f_old, x, 0.25 * narrowest)
-        return best, best_f, lost and best_f > left, solved
-
-    return bracket
-
-
 _bracket = bracketing(correct_branch, watched_value)
+
+
+@helper
+def rules_of(way, sought, kinked, points):  # type: ignore[no-untyped-def]
+    """Return how the bracket of a value along a branch is narrowed down."""
+    layout, kind = way.layout, sought.kind
+    of_branch = kind == BY_TEST and sought.number >= count_margins(layout)
+    # margins and distances are positive before the event, the others have the sign that they have
+    two_sided = kind == BY_PARAMETER or of_branch
+    noise = 0.1 * _NOISE if two_sided else _NOISE  # slopes and products of multipliers have less
+    # slopes and multipliers are those of the last Jacobian. Near a touch of a kink it changes with the root
+    # of a distance: it must be that of the orbit, not one from which Newton is known to end there
+    accuracy = ALONG if kinked and of_branch else AT_EVENT
+    length, size = abs(points.arc[1] - points.arc[0]), largest_state(points.joints[0])
+    given_up = _LOST if two_sided and layout.rounding > INTEGRATED else 0.0
+    return Rules(accuracy, two_sided, noise, resolution(layout.rounding, length, size), given_up)
 
 
 @helper
 def located(way, sought, kinked, points):  # type: ignore[no-untyped-def]
     """Find where the value that is sought changes sign; what :func:`locate` returns."""
-    way = by_reference(way)
-    layout, workspace, kind, index = way.layout, way.workspace, sought.kind, sought.number
-    zs, ws, tzs, tws, arc, tests, labels, mu = points
-    margins = count_margins(layout)
+    way, points = by_reference(way), by_reference(points)
+    zs, ws, tzs, tws = points.joints, points.w, points.tangents, points.directions
     ends = values_at_ends(way, sought, points)
-    # margins and distances are positive before the event, the others have the sign that they have
-    two_sided = kind == BY_PARAMETER or (kind == BY_TEST and index >= margins)
-    noise = 0.1 * _NOISE if two_sided else _NOISE  # slopes and products of multipliers have less
-    accuracy = AT_EVENT
-    if kinked and kind == BY_TEST and index >= margins:
-        # slopes and multipliers are those of the last Jacobian. Beside a touch of a kink it changes with the
-        # root of a distance: it must be that of the orbit, not one from which Newton is known to end there
-        accuracy = ALONG
-    narrowest = resolution(layout.rounding, abs(arc[1] - arc[0]), largest_state(zs[0]))
-    given_up = _LOST if two_sided and layout.rounding > INTEGRATED else 0.0
-    rules = accuracy, two_sided, noise, narrowest, given_up
     before, sought.plain[0] = way.counts[SOLVES], 0
-    best, _, lost, _ = _bracket(way, sought, points, ends, rules)
+    best, _, lost, _ = _bracket(way, sought, points, ends, rules_of(way, sought, kinked, points))
     plain = sought.plain[0] == way.counts[SOLVES] - before
     # the last Jacobian at the located point, for its rates and multipliers; the point itself stays
     copy_row(points, 2, 3)
@@ -332,38 +202,28 @@ def located(way, sought, kinked, points):  # type: ignore[no-untyped-def]
     if not fine:
         return -1.0, False
     way.p[way.which[0]] = ws[3, 0]
-    close_chain(way.functions, layout, zs[3], way.p, workspace.equations.none, workspace.equations)
-    observe_branch(way, zs[3], ws[3], tws[3], tests[3], labels[3], mu[3])
+    workspace = way.workspace
+    close_chain(
+        way.functions, way.layout, zs[3], way.p, workspace.equations.none, workspace.equations
+    )
+    observe_branch(way, zs[3], ws[3], tws[3], points.tests[3], points.labels[3], points.mu[3])
     return -2.0 - best if lost else best, plain
 
 
 @kernel(
     types.Tuple((f8, types.boolean))(
-        FlowType,
-        LayoutType,
-        vector,
-        indices,
-        vector,
-        types.boolean,
-        i8,
-        i8,
-        f8,
-        types.boolean,
-        PointsType,
-        indices,
+        BranchProblemType, SoughtType, types.boolean, PointsType, indices
     )
 )
-def locate(  # type: ignore[no-untyped-def]
-    functions, layout, p, which, scale, stability, kind, index, target, kinked, points, counts
-):
+def locate(problem, sought, kinked, points, counts):  # type: ignore[no-untyped-def]
     """Find where a watched value changes sign between two points of a branch.
 
     Parameters
     ----------
-    which, scale : index of the parameter that is free, and its weight in the scaled product, shapes (1,)
-    kind, index, target : those of :class:`Sought`
+    problem, sought : the branch, and the value
     kinked : whether the fields have kinks
     points : four rows: both points, one for trials, and the place with what is watched there
+    counts : what is counted
 
     Returns
     -------
@@ -373,8 +233,6 @@ def locate(  # type: ignore[no-untyped-def]
         all trials were solved and had that of one of the points: then it changes at one place only, as far
         as is seen.
     """
-    zs, followed = points.joints, min(index, 0)  # nothing, but no literal
-    workspace = step_workspace(zs.shape[1], zs.shape[2], p.shape[0], followed, followed)
-    way = Along(functions, layout, p.copy(), which, scale, stability, counts, workspace)
-    plain = np.zeros(1, dtype=np.int64)
-    return located(way, Sought(kind, index, target, plain), kinked, points)
+    zs, followed = points.joints, min(sought.number, 0)  # nothing, but no literal
+    way = along_branch(problem, zs.shape[1], zs.shape[2], followed, followed, counts)
+    return located(way, sought, kinked, points)

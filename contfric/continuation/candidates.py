@@ -132,7 +132,7 @@ def _candidate(unit: Unit, forms: tuple[Form, ...], reason: str) -> Candidate:
         return Candidate(reason, None, str(error))
     words = frozenset(form.word for form in forms)
     if not np.any(away):
-        plain = canonical(orbit)  # joints on sections are of no use beside others
+        plain = canonical(orbit)  # joints on sections would stand among others
         orbit = plain.as_half() if orbit.system.half and plain is not orbit else plain
         return Candidate(reason, orbit, words=words)
     moves = np.zeros(orbit.joints.shape)
@@ -161,7 +161,7 @@ def edited_orbit(orbit: Orbit, outcomes: list[Outcome]) -> tuple[Orbit, FloatArr
     Raises
     ------
     NotationError
-        If the transition graph has no such walk.
+        If the transition graph has no such path.
     """
     edited, moves = edited_whole(orbit, outcomes)
     half = half_of(edited.model, edited.word, edited.periods)

@@ -20,10 +20,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contfric.continuation.branch import Branch
 from contfric.continuation.points import Point, Settings
 from contfric.models.definition import FloatArray
-from contfric.orbit.clock import clocked
 from contfric.orbit.linear import equations_at
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.system import System
@@ -56,10 +54,6 @@ _TURNS = 1e-6
 _BESIDE = 1e-3
 #: A located branch point is good to far less than this (scaled product).
 LOCATED = 1e-5
-#: Cosine above which two directions are the same.
-_ALONG = 0.9
-#: Joints that agree to this are those of the same motion: ends of branches at a branch point are located.
-_SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,51 +265,3 @@ def crossing_point(crossing: Crossing, before: Point, arc: float, settings: Sett
         arc=before.arc + arc,
         lost=False,
     )
-
-
-def starts_along(branch: Branch, crossing: Crossing, direction: Direction, scale: float) -> bool:
-    """Tell whether a branch has an end at a branch point and leaves it in a direction."""
-    orbit = crossing.orbit
-    if len(branch) < 2 or branch.system.half != orbit.system.half:
-        return False
-    for tip, inner in ((0, 1), (-1, -2)):
-        end = _aligned(branch, tip, tip, orbit)
-        near = _aligned(branch, inner, tip, orbit)
-        if end is None or near is None or np.max(np.abs(end - orbit.joints)) > _SAME:
-            continue
-        slope = float(branch.values[inner] - branch.values[tip])
-        if direction.cosine(near - end, slope, scale) > _ALONG:
-            return True
-    return False
-
-
-def _aligned(branch: Branch, k: int, reference: int, orbit: Orbit) -> FloatArray | None:
-    """Return the joints of a point, turned so that those of another one are next to an orbit's.
-
-    A branch may begin with another segment of the same motion, and in another period.
-    """
-    word, wanted = branch.system.word, orbit.system.word
-    if len(word) != len(wanted) or branch.system.half:
-        return branch.joints[k] if word == wanted else None
-    best: tuple[float, FloatArray] | None = None
-    for first in range(len(word)):
-        if word[first:] + word[:first] != wanted:
-            continue
-        turned = [_turned(branch[i], first) for i in (reference, k)]
-        shift = 0.0
-        if not orbit.model.autonomous:
-            unit = orbit.period / orbit.periods
-            shift = unit * round(float(turned[0][0, 0] - orbit.joints[0, 0]) / unit)
-        for joints in turned:
-            joints[:, 0] -= shift
-        gap = float(np.max(np.abs(turned[0] - orbit.joints)))
-        if best is None or gap < best[0]:
-            best = gap, turned[1]
-    return None if best is None else best[1]
-
-
-def _turned(orbit: Orbit, first: int) -> FloatArray:
-    """Return the joints of an orbit from another segment on."""
-    joints = np.roll(orbit.joints, -first, axis=0)
-    joints[len(joints) - first :, 0] += orbit.period
-    return clocked(orbit.model, joints, float(joints[0, 0]) + orbit.period)

@@ -29,7 +29,7 @@ _NO_HEIGHT = 1e-8
 #: distance there is rounding, over the factor by which it grows on the way out.
 _AT_EQUILIBRIUM = 1e-6
 #: Duration, in parts of a segment, over which its field is asked for an equilibrium: short enough that no
-#: eigenvalue makes a whole turn, long enough to be seen beside rounding.
+#: eigenvalue makes a whole turn, long enough to be seen above rounding.
 _PART = 1e-2
 
 
@@ -73,8 +73,8 @@ def equilibrium_met(orbit: Orbit) -> str | None:
     .. math:: d = (D\varphi_h - 1)^{-1} (x - \varphi_h(x)).
 
     Where a joint is at the equilibrium of the mode that ends or begins there, a boundary equilibrium, the
-    orbit needs for ever: its period grows as the logarithm of the distance :math:`|d|`, and what conditions
-    are met there besides is of no meaning, as every rate vanishes.
+    orbit needs for ever: its period grows as the logarithm of the distance :math:`|d|`, and other
+    conditions that are met there mean nothing, as every rate vanishes.
     """
     if not orbit.model.autonomous:
         return None

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.continuation.hermite import along, point_between
+from contfric.continuation.hermite import along, point_between, zero_between
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import tangent_of
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 #: Halvings of a step with a pair of extrema: a sixteenth of a step resolves what a branch of it can do.
 _HALVINGS = 4
-#: Resolution of a place, as a share of a step: that of the arithmetic.
-_SHORTEST = 1e-15
 #: A slope at an extremum above this share of those at the ends of the step: a kink, at which it jumps.
 _KINK = 1e-4
 #: A slope at an end of the branch below this share of that at the other end of its step is zero, and has no
@@ -94,6 +92,10 @@ class _Search:
         orbit = self.orbit(point)
         return differentiated(self.quantity, orbit, along(point, orbit, self.branch.parameter))
 
+    def slope(self, point: Point) -> float:
+        """Return the slope of the quantity along the branch."""
+        return float(self.measured(point).ahead[0])
+
     def orbit(self, point: Point) -> Orbit:
         """Return a point as an orbit."""
         branch = self.branch
@@ -126,9 +128,10 @@ class _Search:
         """Yield (point, whether it is a maximum, slope left) of the extrema inside of a step."""
         p, q = float(step.first.ahead[0]), float(step.last.ahead[0])
         if p * q < 0.0:
-            point = self._zero(step)
+            ends = step.before, step.after
+            point = zero_between(self._start(), *ends, self.settings, self.slope)
             if point is not None:
-                yield point, p > 0.0, abs(float(self.measured(point).ahead[0]))
+                yield point, p > 0.0, abs(self.slope(point))
             return
         rise = step.last.value - step.first.value
         if halvings == 0 or p * rise >= 0.0 or abs(rise) < _ROUNDING * (1.0 + abs(step.last.value)):
@@ -148,25 +151,6 @@ class _Search:
         vector = self.branch.vector.copy()
         vector[self.branch.model.index_of(self.branch.parameter)] = value
         return Orbit(self.branch.system, joints, vector, 0.0)
-
-    def _zero(self, step: _Step) -> Point | None:
-        from scipy.optimize import brentq
-
-        def point_at(share: float) -> Point:
-            point = point_between(self._start(), step.before, step.after, self.settings, share)
-            if point is None:
-                raise ArithmeticError
-            return point
-
-        def slope_at(share: float) -> float:
-            if share in (0.0, 1.0):
-                return float((step.first if share == 0.0 else step.last).ahead[0])
-            return float(self.measured(point_at(share)).ahead[0])
-
-        try:
-            return point_at(float(brentq(slope_at, 0.0, 1.0, xtol=_SHORTEST, rtol=4.0 * _SHORTEST)))
-        except ArithmeticError:
-            return None  # Newton fails inside of the step: near an event
 
 
 def _nearest(slopes: FloatArray) -> Iterator[float]:

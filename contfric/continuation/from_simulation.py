@@ -1,9 +1,9 @@
-"""What follows an event as the flow itself says: the words that motions near it walk.
+"""What follows an event as the flow itself says: the itineraries of solutions near it.
 
 Where the flow is continuous at an event (static and kinetic limit agree, a grazing impact, two surfaces
-met at once), motions near the orbit at the event walk its word or that of the orbit that takes over.
+met at once), solutions near the orbit at the event have its itinerary or that of the orbit that takes over.
 So motions that start near it are followed for one turn, and each word that is new is proposed. It takes
-no knowledge of the event, and finds nothing where what follows repels too fast to be walked.
+no knowledge of the event, and finds nothing where what follows repels too fast to be simulated.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _LEFT = 1e-9
 
 
 def walked(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator[Orbit]:
-    """Yield orbits, not solved, of the words that motions near an orbit walk in one turn.
+    """Yield orbits, not solved, with the itineraries of solutions near an orbit over one turn.
 
     The same word may come again, as a guess from a motion farther away.
 
@@ -82,7 +82,7 @@ def _beside(
 ) -> Iterator[tuple[float, FloatArray, FloatArray]]:
     """Yield the distance, the parameters and the state of motions near an orbit, the nearest first."""
     start = orbit.state(time)
-    data = orbit.system.layout.conserved  # which are given: motions beside the orbit have the same
+    data = orbit.system.layout.conserved  # which are given: solutions near the orbit have the same
     for size in _BESIDE:
         for k in range(len(start)):
             apart = np.zeros(len(start))

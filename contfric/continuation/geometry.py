@@ -17,7 +17,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from contfric.compiled import blocks, helper, matrix, table, vector
+from contfric.compiled import blocks, helper, i8, indices, matrix, table, vector
 from contfric.models.definition import FloatArray
 from contfric.orbit.system import IntArray
 
@@ -46,6 +46,36 @@ class Points(NamedTuple):
 PointsType = types.NamedTuple(
     [blocks, matrix, blocks, matrix, vector, matrix, table, types.complex128[:, ::1]], Points
 )
+
+
+class Course(NamedTuple):
+    """One call of a march: from where, how far, in which steps, and where to.
+
+    Attributes
+    ----------
+    options : (first step, largest step, smallest step, step below which none is refused for its angle, most
+        points that are solved for in this call, whether the last trial was not finite, size of a correction
+        after which no other is asked for)
+    box : lower corner, upper corner, widths of the free parameters, shape (3, q)
+    last : last row that is given; an earlier one serves the prediction. -1: row 0 alone is solved, normal to
+        the tangent given there
+    start_z, start_w : first point with its tangent, shapes (2, N, m) and (2, q)
+    taken : points since then
+    points : filled from row ``last + 1``
+    counts : what is counted
+    """
+
+    options: FloatArray
+    box: FloatArray
+    last: int
+    start_z: FloatArray
+    start_w: FloatArray
+    taken: int
+    points: Points
+    counts: IntArray
+
+
+CourseType = types.NamedTuple([vector, matrix, i8, blocks, matrix, i8, PointsType, indices], Course)
 
 
 @helper

@@ -1,35 +1,74 @@
-"""Points between two solved points of a branch: predicted by the cubic through both, and solved."""
+"""Points between two solved points of a branch or curve: predicted by the cubic through both, and solved."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import first_point
+from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.motion import Directions
+
+#: Resolution of a place, as a share of a step: that of the arithmetic.
+_SHORTEST = 1e-15
+
+
+def cubic_between(
+    a: Point, b: Point, x: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return joints, parameters, tangent and direction at a share of a step, by the cubic through both ends.
+
+    It is Hermite's, as in :func:`contfric.continuation.geometry.interpolate`.
+    """
+    y, length = 1.0 - x, b.arc - a.arc
+    ha, hb = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x)
+    ga, gb = x * y * y * length, -x * x * y * length
+    joints = ha * a.joints + hb * b.joints + ga * a.tangent + gb * b.tangent
+    w = ha * a.w + hb * b.w + ga * a.direction + gb * b.direction
+    return joints, w, y * a.tangent + x * b.tangent, y * a.direction + x * b.direction
 
 
 def point_between(
     orbit: Orbit, before: Point, after: Point, settings: Settings, share: float
 ) -> Point | None:
-    """Return the solved point at a share of a step, normal to the tangent there; None if Newton fails.
-
-    The prediction is Hermite's cubic, as in :func:`contfric.continuation.geometry.interpolate`.
-    """
-    x, y, length = share, 1.0 - share, after.arc - before.arc
-    ha, hb = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x)
-    ga, gb = x * y * y * length, -x * x * y * length
-    joints = ha * before.joints + hb * after.joints + ga * before.tangent + gb * after.tangent
-    value = ha * before.value + hb * after.value + ga * before.slope + gb * after.slope
+    """Return the solved point at a share of a step, normal to the tangent there; None if it fails."""
+    joints, w, tangent, direction = cubic_between(before, after, share)
     vector = orbit.vector.copy()
-    vector[orbit.model.index_of(settings.parameter)] = value
+    vector[orbit.model.index_of(settings.parameter)] = w[0]
     guess = Orbit(orbit.system, joints, vector, np.inf)
-    tangent, slope = y * before.tangent + x * after.tangent, y * before.slope + x * after.slope
-    found = first_point(guess, settings, tangent, slope)
-    return None if found is None else replace(found, arc=before.arc + x * length)
+    found = first_point(guess, settings, tangent, float(direction[0]))
+    arc = before.arc + share * (after.arc - before.arc)
+    return None if found is None else replace(found, arc=arc)
+
+
+def zero_between(
+    orbit: Orbit, before: Point, after: Point, settings: Settings, value: Callable[[Point], float]
+) -> Point | None:
+    """Return the point of a step at which a value of its solved points is zero; None if Newton fails.
+
+    The value has different signs at both ends; the place is found by Brent's method.
+    """
+    from scipy.optimize import brentq
+
+    def point_at(share: float) -> Point:
+        if share in (0.0, 1.0):
+            return before if share == 0.0 else after
+        point = point_between(orbit, before, after, settings, share)
+        if point is None:
+            raise ArithmeticError
+        return point
+
+    def value_at(share: float) -> float:
+        return value(point_at(share))
+
+    try:
+        return point_at(float(brentq(value_at, 0.0, 1.0, xtol=_SHORTEST, rtol=4.0 * _SHORTEST)))
+    except ArithmeticError:
+        return None  # inside of the step, near an event
 
 
 def along(point: Point, orbit: Orbit, parameter: str) -> Directions:

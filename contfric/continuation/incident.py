@@ -22,18 +22,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contfric.continuation.events import (
-    ACCURACY,
-    Bifurcation,
-    Kind,
-)
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
-from contfric.continuation.outcomes import (
-    NO_LENGTH_AT_TOUCH,
-    Outcome,
-    RestsForEver,
-    outcome_at,
-)
+from contfric.continuation.outcomes import NO_LENGTH_AT_TOUCH, Outcome, RestsForEver, outcome_at
 from contfric.continuation.places import normal_place, places_of
 from contfric.continuation.unit import Form, Unit, form_of, pieces, unit_of
 from contfric.errors import NotationError
@@ -256,7 +247,7 @@ def edited_whole(
     Raises
     ------
     NotationError
-        If the transition graph has no such walk.
+        If the transition graph has no such path.
     """
     edit, joints, speeds = outcomes[0].edit, dict(outcomes[0].joints), dict(outcomes[0].away)
     for outcome in outcomes[1:]:

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contfric.base.tally import tally
 from contfric.continuation.points import Point, Rows, Settings
+from contfric.continuation.side import branch_problem
+from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
+
+if TYPE_CHECKING:
+    from contfric.continuation.bracket import Sought
 
 
 def locate_change(
@@ -60,24 +66,25 @@ def _located(
     rows = Rows.empty(orbit.system, 4)
     rows.put(0, before)
     rows.put(1, after)
-    at, plain = locate(
-        orbit.system.functions(),
-        orbit.system.layout,
-        orbit.vector,
-        np.array([orbit.model.index_of(settings.parameter)]),
-        np.array([settings.scale]),
-        settings.stability,
-        kind,
-        index,
-        target,
-        bool(orbit.model.kinks),
-        rows.arrays(),
-        tally(),
-    )
+    problem, sought = branch_problem(orbit, settings), sought_of(kind, index, target)
+    at, plain = locate(problem, sought, bool(orbit.model.kinks), rows.arrays(), tally())
     # behind -2 Newton fails: the last good point, marked as such
     if at == -1.0 or (at < 0.0 and kind != BY_TEST):
         return None, False
     return replace(rows.point(3), lost=at < 0.0), plain
+
+
+_NO_PLANES = np.empty((0, 3))
+
+
+def sought_of(
+    kind: int, index: int = 0, target: float = 0.0, planes: FloatArray = _NO_PLANES
+) -> Sought:
+    """Return a value whose change of sign is sought, as the compiled bracket takes it."""
+    from contfric.continuation.bracket import Sought
+
+    plain = np.zeros(1, dtype=np.int64)
+    return Sought(kind, index, target, np.ascontiguousarray(planes, dtype=np.float64), plain)
 
 
 def locate_value(

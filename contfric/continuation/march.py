@@ -1,7 +1,7 @@
 """Pseudo-arclength continuation, compiled: of branches, and of curves in two parameters.
 
 A branch is a curve ``(z(s), w(s))`` of joints and free parameters of the chain of segments: of one parameter,
-or of two with a condition (:mod:`contfric.curves.march`). From two points with unit tangents the
+or of q with q - 1 conditions (:mod:`contfric.curves.march`). From two points with unit tangents the
 next one is predicted by the cubic through both (Hermite), and corrected in the plane normal to the
 last tangent (H. B. Keller, 1977). The step follows the curvature: the angle between consecutive
 tangents is kept near a target. Arclength between points is the chord c with the correction for its
@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, vector
+from contfric.compiled import f8, helper, i8, kernel
 from contfric.compiling.references import by_reference
 from contfric.continuation.dips import dips
 from contfric.continuation.geometry import (
-    PointsType,
+    CourseType,
     copy_to,
     copy_vector,
     distance,
@@ -38,22 +38,19 @@ from contfric.continuation.geometry import (
 )
 from contfric.continuation.pairs import hidden_pair, recall
 from contfric.continuation.steps import (
-    Along,
+    BranchProblemType,
     accept_branch,
+    along_branch,
     changed,
     correct_branch,
     observe_branch,
-    step_workspace,
 )
-from contfric.flow.layouts import FlowType
-from contfric.orbit.equations import LayoutType
 from contfric.orbit.followed import count_followed
-from contfric.orbit.newton import ALONG, INTEGRATED, ON_THE_WAY
 
 #: Why a march stopped.
 FULL, EVENT, OUTSIDE, STEP, CLOSED, BROKEN, UNBOUNDED, ENDLESS, MORE = range(9)
-#: Places in the options of a march.
-BUDGET, LOST = 4, 5
+#: Places in the options of a march (:class:`contfric.continuation.geometry.Course`).
+GIVES_WAY, BUDGET, LOST, ACCURACY = 3, 4, 5, 6
 
 #: Angle between consecutive tangents (rad): wanted, and the most that is accepted. At the wanted
 #: angle a branch is smooth to the eye; beyond the other one, the step may change branches.
@@ -69,15 +66,16 @@ _ENDLESS = 1e4
 
 
 @helper
-def arrival(way, points, k, start_z, start_w, taken, step, box):  # type: ignore[no-untyped-def]
+def arrival(way, course, k, taken, step):  # type: ignore[no-untyped-def]
     """Return why the march stops at row k, or FULL if it goes on."""
-    zs, ws, _, _, _, tests, labels, _ = points
+    points = course.points
+    zs, ws, tests, labels = points.joints, points.w, points.tests, points.labels
     if changed(tests[k - 1], tests[k], labels[k - 1], labels[k]):
         return EVENT
-    if outside(ws[k], box):
+    if outside(ws[k], course.box):
         return OUTSIDE
     if taken > 3 and returned(
-        zs[k], ws[k], start_z, start_w, zs[k - 1], ws[k - 1], way.scale, step
+        zs[k], ws[k], course.start_z, course.start_w, zs[k - 1], ws[k - 1], way.scale, step
     ):
         return CLOSED
     if largest_state(zs[k]) > _UNBOUNDED:
@@ -85,6 +83,56 @@ def arrival(way, points, k, start_z, start_w, taken, step, box):  # type: ignore
     if way.layout.turn == 0.0 and -zs[k, 0, 0] > _ENDLESS:
         return ENDLESS
     return FULL
+
+
+@helper
+def accepted_share(way, points, k, length, step):  # type: ignore[no-untyped-def]
+    """Return up to which share a step is taken again, as something may be undone in it; 1 if it is not."""
+    if k > 0 and dips(way, points.tests, k, points.arc, points.tests[k + 1], step):
+        return 0.25
+    share = hidden_pair(way, points, k, length)
+    return share if share > 0.0 else 1.0
+
+
+@helper
+def following_step(way, z, angle, step, largest):  # type: ignore[no-untyped-def]
+    """Return the step behind an accepted point, from the angle between its tangent and the last one."""
+    factor = min(_GROWTH, max(0.4, _WANTED_ANGLE / max(angle, 1e-6)))
+    size = largest_state(z)
+    if way.layout.turn == 0.0:  # the duration is one of the unknowns
+        size = max(size, -z[0, 0])
+    return min(largest * (1.0 + size), step * factor)
+
+
+def trying(correct_at: Any, observe_at: Any) -> Any:
+    """Return a trial of the march of branches or curves, as a helper; parameters as of :func:`marching`."""
+
+    @helper
+    def trial(way, course, k, step, first, guess_z, guess_w):  # type: ignore[no-untyped-def]
+        """Correct and watch the point behind row k, predicted there unless it is the first.
+
+        (Whether it is solved and near enough; whether all is finite; angle between its tangent and the last.)
+        """
+        points, options, row, angle = course.points, course.options, k + 1, 0.0
+        zs, ws, tzs, tws = points.joints, points.w, points.tangents, points.directions
+        if not first:
+            predict(points, k, step)
+            keep(way.layout.conserved, zs[k], zs[row])
+            copy_to(guess_z, zs[row])
+            copy_vector(guess_w, ws[row])
+        fine, finite = correct_at(way, zs[row], ws[row], tzs[row], tws[row], options[ACCURACY])
+        if fine and not first:
+            miss = distance(zs[row], ws[row], guess_z, guess_w, way.scale)
+            cosine = product(tzs[row], tws[row], tzs[k], tws[k], way.scale)
+            angle = math.acos(min(1.0, max(-1.0, cosine)))
+            if (angle > _MOST_ANGLE or miss > _MOST_MISS * step) and step > options[GIVES_WAY]:
+                return False, finite, angle
+        if fine:
+            tests, labels, mu = points.tests[row], points.labels[row], points.mu[row]
+            finite = observe_at(way, zs[row], ws[row], tws[row], tests, labels, mu)
+        return fine, finite, angle
+
+    return trial
 
 
 def marching(correct_at: Any, observe_at: Any, accept: Any) -> Any:
@@ -96,51 +144,28 @@ def marching(correct_at: Any, observe_at: Any, accept: Any) -> Any:
     observe_at : fills what is watched on a point; whether that is finite
     accept : is told of every point that is accepted
     """
+    trial = trying(correct_at, observe_at)
 
     @helper
-    def march_points(  # type: ignore[no-untyped-def]
-        way, accuracy, options, box, k, start_z, start_w, taken, points, guess
-    ):
-        """Continue from the point in row k until something happens.
+    def march_points(way, course, guess_z, guess_w):  # type: ignore[no-untyped-def]
+        """Continue until something happens: ``way`` is what the three functions need, the guess overwritten.
 
-        Parameters
-        ----------
-        way : what the three functions need
-        guess : a prediction (joints, parameters), overwritten
-        others : those of :func:`march`
+        (Why it stopped; last row written; next step.)
         """
-        way = by_reference(way)
-        zs, ws, tzs, tws, arc, tests, labels, mu = points
-        guess_z, guess_w = guess
-        step, largest, smallest, gives_way, budget, lost = options
-        first, finite, solved, angle = k < 0, lost == 0.0, 0.0, 0.0
+        way, course = by_reference(way), by_reference(course)
+        points, options, k, taken = course.points, course.options, course.last, course.taken
+        step, largest, smallest = options[0], options[1], options[2]
+        first, finite, solved = k < 0, options[LOST] == 0.0, 0.0
         recall(way, points, k - 1)
         recall(way, points, k)
-        while k + 1 < ws.shape[0]:
-            row = k + 1
-            if solved >= budget:
+        while k + 1 < points.w.shape[0]:
+            if solved >= options[BUDGET]:
                 options[LOST] = 0.0 if finite else 1.0
                 return MORE, k, step
             solved += 1.0
-            if not first:
-                if step < smallest:
-                    return (STEP if finite else BROKEN), k, step
-                predict(points, k, step)
-                keep(way.layout.conserved, zs[k], zs[row])
-                copy_to(guess_z, zs[row])
-                copy_vector(guess_w, ws[row])
-            fine, finite = correct_at(way, zs[row], ws[row], tzs[row], tws[row], accuracy)
-            if fine and not first:
-                miss = distance(zs[row], ws[row], guess_z, guess_w, way.scale)
-                cosine = product(tzs[row], tws[row], tzs[k], tws[k], way.scale)
-                angle = math.acos(min(1.0, max(-1.0, cosine)))
-                if (angle > _MOST_ANGLE or miss > _MOST_MISS * step) and step > gives_way:
-                    step *= 0.5
-                    continue
-            if fine:
-                finite = observe_at(
-                    way, zs[row], ws[row], tws[row], tests[row], labels[row], mu[row]
-                )
+            if not first and step < smallest:
+                return (STEP if finite else BROKEN), k, step
+            fine, finite, angle = trial(way, course, k, step, first, guess_z, guess_w)
             if first:
                 if fine:
                     accept(way)
@@ -153,25 +178,19 @@ def marching(correct_at: Any, observe_at: Any, accept: Any) -> Any:
                     return BROKEN, k, step
                 step *= 0.25
                 continue
-            if k > 0 and step > 1e-4 * largest and dips(way, tests, k, arc, tests[row], step):
-                step *= 0.25
-                continue
+            zs, ws, row = points.joints, points.w, k + 1
             chord = distance(zs[row], ws[row], zs[k], ws[k], way.scale)
             length = chord * (1.0 + angle * angle / 24.0)
             if step > 1e-4 * largest:
-                share = hidden_pair(way, points, k, length)
-                if share > 0.0:
+                share = accepted_share(way, points, k, length, step)
+                if share < 1.0:
                     step *= share
                     continue
             k, taken = row, taken + 1
             accept(way)
-            arc[k] = arc[k - 1] + length
-            factor = min(_GROWTH, max(0.4, _WANTED_ANGLE / max(angle, 1e-6)))
-            size = largest_state(zs[k])
-            if way.layout.turn == 0.0:  # the duration is one of the unknowns
-                size = max(size, -zs[k, 0, 0])
-            following = min(largest * (1.0 + size), step * factor)
-            why = arrival(way, points, k, start_z, start_w, taken, step, box)
+            points.arc[k] = points.arc[k - 1] + length
+            following = following_step(way, zs[k], angle, step, largest)
+            why = arrival(way, course, k, taken, step)
             if why != FULL:
                 return why, k, following
             step = following
@@ -183,64 +202,20 @@ def marching(correct_at: Any, observe_at: Any, accept: Any) -> Any:
 _march_branch = marching(correct_branch, observe_branch, accept_branch)
 
 
-@kernel(
-    types.Tuple((i8, i8, f8))(
-        FlowType,
-        LayoutType,
-        vector,
-        indices,
-        types.boolean,
-        vector,
-        matrix,
-        i8,
-        blocks,
-        matrix,
-        i8,
-        PointsType,
-        indices,
-    )
-)
-def march(  # type: ignore[no-untyped-def]
-    functions, layout, p, which, stability, options, box, k, start_z, start_w, taken, points, counts
-):
-    """Continue from the point in row k (with its tangent and watched values) until something happens.
+@kernel(types.Tuple((i8, i8, f8))(BranchProblemType, CourseType))
+def march(problem, course):  # type: ignore[no-untyped-def]
+    """Continue a branch from a point, with its tangent and watched values, until something happens.
 
-    With k = -1, row 0 alone is solved, normal to the tangent given there. A call that has used up its budget
-    ends with MORE: called again with the last row, the next step and the same options, it goes on as if
-    nothing had been.
-
-    Parameters
-    ----------
-    p, which : parameters, and the index of the one that is free, shape (1,)
-    options : (first step, largest step, smallest step, step below which it is not refused for its angle,
-        budget: most points that are solved for, whether the last trial was not finite)
-    box : lower limit, upper limit and width of what is free, shape (3, 1)
-    k : last row that is given; an earlier one serves the prediction
-    start_z, start_w, taken : where the branch began (point, tangent; shapes (2, N, m) and (2, 1)), and points
-        since then
-    points : of the branch, one a row; filled from row k + 1
+    A call that has used up its budget ends with MORE: called again with the last row, the next step and the
+    same options, it goes on as if nothing had been.
 
     Returns
     -------
     tuple
         (why it stopped, index of the last row written, next step).
     """
-    zs = points.joints
+    zs, layout = course.points.joints, problem.layout
     rows, surfaces = count_followed(layout), layout.observables.shape[0]
-    workspace = step_workspace(zs.shape[1], zs.shape[2], p.shape[0], rows, surfaces)
-    way = Along(functions, layout, p.copy(), which, 1.0 / box[2] ** 2, stability, counts, workspace)
-    integrated = layout.rounding > INTEGRATED
-    accuracy = ON_THE_WAY if integrated and k >= 0 else ALONG
-    guess = np.empty((zs.shape[1], zs.shape[2])), np.empty(1)
-    return _march_branch(
-        way,
-        accuracy,
-        options,
-        box,
-        k,
-        start_z,
-        start_w,
-        taken,
-        points,
-        guess,
-    )
+    way = along_branch(problem, zs.shape[1], zs.shape[2], rows, surfaces, course.counts)
+    guess_z, guess_w = np.empty((zs.shape[1], zs.shape[2])), np.empty(1)
+    return _march_branch(way, course, guess_z, guess_w)

@@ -15,10 +15,10 @@ import numpy as np
 
 from contfric.continuation.accuracy import LEAST
 from contfric.continuation.branch import Branch
+from contfric.continuation.doubling_point import opening, place_error, refined_opening
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.points import Settings
 from contfric.continuation.side import first_point
-from contfric.continuation.vertices import opening, place_error, refined_opening
 from contfric.orbit.index import opening_sign
 from contfric.orbit.orbit import Orbit
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from contfric.continuation.events import (
-    Bifurcation,
-)
+from contfric.continuation.events import Bifurcation
 from contfric.continuation.kinds import hold_of_test
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test

@@ -322,9 +322,6 @@ def _stops(model: Model, stop_at: object) -> tuple[tuple[str, float], ...]:
         return ()
     given = mapping_of("stop_at", stop_at, "{'x_max': 1.4}")
     return tuple(
-        (
-            number_quantity(name, model, "stop_at").name,
-            real_number(f"stop_at['{name}']", value),
-        )
+        (number_quantity(name, model, "stop_at").name, real_number(f"stop_at['{name}']", value))
         for name, value in given.items()
     )

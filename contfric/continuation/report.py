@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.continuation.accuracy import Estimate
-from contfric.continuation.events import (
-    Bifurcation,
-    Kind,
-)
+from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.kinds import outward_rate
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.split_touch import splits

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.pace import Pace
 from contfric.orbit.system import IntArray, System
 from contfric.remember.advance import heed
+
+if TYPE_CHECKING:
+    from contfric.continuation.steps import BranchProblem
 
 #: Points that the rows hold at a time: enough to cost nothing.
 CHUNK = 512
@@ -189,34 +192,28 @@ class Side:
 
     def march(self, orbit: Orbit, settings: Settings, step: float) -> tuple[int, float]:
         """March on; return (why it stopped, next step)."""
+        from contfric.continuation.geometry import Course
         from contfric.continuation.march import BUDGET, MORE, march
+        from contfric.orbit.convergence import ALONG, INTEGRATED
+        from contfric.orbit.newton import ON_THE_WAY
 
         if self.last + 1 >= CHUNK:
             self._keep_full_rows()
         stop = min(CHUNK, self.last + 1 + settings.most_points - self.count)
         largest = min(self.largest, settings.largest_of(orbit.system))
-        options = march_options(step, largest)
+        integrated = orbit.system.layout.rounding > INTEGRATED
+        options = march_options(step, largest, ON_THE_WAY if integrated else ALONG)
         why, most = MORE, _MOST_SOLVES * settings.most_points
+        problem, start, counts = branch_problem(orbit, settings), self.first.as_start(), tally()
+        box, arrays = settings.box, self.rows.arrays(stop)
         while why == MORE and self.solves < most:  # between the calls Ctrl-C is heard
             heed()
-            options[BUDGET], before, began = self._pace.budget, int(tally()[0]), perf_counter()
-            why, last, options[0] = march(
-                orbit.system.functions(),
-                orbit.system.layout,
-                orbit.vector,
-                np.array([orbit.model.index_of(settings.parameter)]),
-                settings.stability,
-                options,
-                settings.box,
-                self.last,
-                *self.first.as_start(),
-                self.count - 1,
-                self.rows.arrays(stop),
-                tally(),
-            )
+            options[BUDGET], before, began = self._pace.budget, int(counts[0]), perf_counter()
+            course = Course(options, box, self.last, *start, self.count - 1, arrays, counts)
+            why, last, options[0] = march(problem, course)
             self.count += last - self.last
             self.last = last
-            done = int(tally()[0]) - before
+            done = int(counts[0]) - before
             self.solves += done
             self._pace.took(done, perf_counter() - began)
         return why, float(options[0])
@@ -239,16 +236,23 @@ class Side:
         return self._kept
 
 
-def march_options(step: float, largest: float) -> FloatArray:
-    """Return the numbers that steer the march, with space for a single point in its budget."""
-    return np.array([min(step, largest), largest, SMALLEST_STEP, _GIVES_WAY, 1.0, 0.0])
+def march_options(step: float, largest: float, accuracy: float) -> FloatArray:
+    """Return the numbers that steer the march, with a single point in its budget."""
+    return np.array([min(step, largest), largest, SMALLEST_STEP, _GIVES_WAY, 1.0, 0.0, accuracy])
+
+
+def branch_problem(orbit: Orbit, settings: Settings) -> BranchProblem:
+    """Return the branch of an orbit as the compiled engine takes it."""
+    from contfric.continuation.steps import BranchProblem
+
+    system, which = orbit.system, np.array([orbit.model.index_of(settings.parameter)])
+    scale = np.array([settings.scale])
+    functions, layout = system.functions(), system.layout
+    return BranchProblem(functions, layout, orbit.vector, which, scale, settings.stability)
 
 
 def first_point(
-    orbit: Orbit,
-    settings: Settings,
-    tangent: FloatArray | None = None,
-    slope: float = 1.0,
+    orbit: Orbit, settings: Settings, tangent: FloatArray | None = None, slope: float = 1.0
 ) -> Point | None:
     """Solve for the first point of a branch; None if it has no unique tangent there.
 
@@ -256,25 +260,15 @@ def first_point(
     ----------
     tangent, slope : direction to solve normal to; by default along the parameter
     """
+    from contfric.continuation.geometry import Course
     from contfric.continuation.march import BROKEN, march
+    from contfric.orbit.convergence import ALONG
 
-    active = orbit.model.index_of(settings.parameter)
     direction = np.zeros_like(orbit.joints) if tangent is None else tangent
     rows = Rows.empty(orbit.system, 1)
-    rows.joints[0], rows.w[0] = orbit.joints, orbit.vector[active]
+    rows.joints[0], rows.w[0] = orbit.joints, orbit.vector[orbit.model.index_of(settings.parameter)]
     rows.tangents[0], rows.directions[0] = direction, slope
-    why, _, _ = march(
-        orbit.system.functions(),
-        orbit.system.layout,
-        orbit.vector,
-        np.array([active]),
-        settings.stability,
-        march_options(0.0, settings.largest),
-        settings.box,
-        -1,
-        *rows.point(0).as_start(),
-        0,
-        rows.arrays(1),
-        tally(),
-    )
+    options, start = march_options(0.0, settings.largest, ALONG), rows.point(0).as_start()
+    course = Course(options, settings.box, -1, *start, 0, rows.arrays(1), tally())
+    why, _, _ = march(branch_problem(orbit, settings), course)
     return None if why == BROKEN else rows.point(0)

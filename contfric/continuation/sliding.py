@@ -6,10 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.continuation.events import (
-    Bifurcation,
-    Kind,
-)
+from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.kinds import hold_of_test, kind_of_margin
 from contfric.continuation.locate_change import locate_change
 from contfric.continuation.points import Point, Settings

@@ -5,23 +5,18 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 
-from contfric.compiled import allocating_helper, helper
-from contfric.continuation.geometry import anchor, take_tangent
+from contfric.compiled import allocating_helper, helper, indices, vector
+from contfric.continuation.geometry import anchor, copy_to, copy_vector, take_tangent
+from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
+from contfric.orbit.convergence import CONVERGED, NOT_FINITE
 from contfric.orbit.cyclic import Elimination, elimination_workspace
-from contfric.orbit.equations import EquationWorkspace, close_chain, equation_workspace
+from contfric.orbit.equations import EquationWorkspace, LayoutType, close_chain, equation_workspace
 from contfric.orbit.followed import Followed, followed_values, remember
 from contfric.orbit.monitor import watch
-from contfric.orbit.newton import (
-    CHECKS,
-    CONVERGED,
-    MULTIPLIERS,
-    NOT_FINITE,
-    SOLVES,
-    correcting,
-    normal_to_tangent,
-)
+from contfric.orbit.newton import CHECKS, MULTIPLIERS, SOLVES, correcting, normal_to_tangent
 from contfric.orbit.spectrum import SpectralWorkspace, multipliers, spectral_workspace
 from contfric.orbit.stationary import StationaryPoints, stationary_workspace
 from contfric.orbit.system import IntArray
@@ -71,16 +66,34 @@ def step_workspace(count, m, parameters, rows, surfaces):  # type: ignore[no-unt
     )
 
 
-class Along(NamedTuple):
-    """What a step along a branch needs besides its points.
+class BranchProblem(NamedTuple):
+    """A branch to follow, as the compiled engine takes it.
 
     Attributes
     ----------
     functions, layout : the model's flow and the chain
-    p : parameters, those that are free overwritten
-    which, scale : indices of the free parameters, and their weights in the scaled product
+    p : parameters
+    which, scale : index of the one that is free, and its weight in the scaled product, shapes (1,)
     stability : whether multipliers are evaluated
-    counts, workspace : what is counted, and what is allocated once
+    """
+
+    functions: Any
+    layout: Any
+    p: FloatArray
+    which: IntArray
+    scale: FloatArray
+    stability: bool
+
+
+BranchProblemType = types.NamedTuple(
+    [FlowType, LayoutType, vector, indices, vector, types.boolean], BranchProblem
+)
+
+
+class Along(NamedTuple):
+    """What a step along a branch needs besides its points: the problem, what is counted, workspace.
+
+    The free one of the parameters ``p`` is overwritten.
     """
 
     functions: Any
@@ -93,26 +106,66 @@ class Along(NamedTuple):
     workspace: StepWorkspace
 
 
-_correct = correcting(normal_to_tangent)
+@allocating_helper
+def along_branch(problem, count, m, rows, surfaces, counts):  # type: ignore[no-untyped-def]
+    """Return what steps along a branch need; ``rows`` of stationary values are followed."""
+    functions, layout, p, which, scale, stability = problem
+    workspace = step_workspace(count, m, p.shape[0], rows, surfaces)
+    return Along(functions, layout, p.copy(), which, scale, stability, counts, workspace)
+
+
+def correcting_along(border: Any, again: Any) -> Any:
+    """Return the corrector of branches or curves, as a helper.
+
+    Parameters
+    ----------
+    border : that of :func:`contfric.orbit.newton.correcting`
+    again : is told before the first attempt (0), and after each one whether it has converged; returns whether
+        to try once more
+    """
+    correct = correcting(border)
+
+    @helper
+    def correct_at(way, z, w, tz, tw, accuracy):  # type: ignore[no-untyped-def]
+        """Correct (z, w) normal to the tangent (tz, tw), and replace it; (converged, all is finite)."""
+        p, which, workspace = way.p, way.which, way.workspace
+        copy_free(p, which, w)
+        anchor(workspace, z, p, which, tz, tw, way.scale)
+        way.counts[SOLVES] += 1
+        attempt, tries, status = 0, True, NOT_FINITE
+        again(way, attempt, True)
+        while tries:
+            status, _, _, _ = correct(way, z, (np.inf, accuracy, 0.0))
+            attempt += 1
+            tries = again(way, attempt, status == CONVERGED)
+            if tries:
+                copy_to(z, workspace.z_ref)
+                copy_vector(p, workspace.p_ref)
+        for k in range(which.shape[0]):
+            w[k] = p[which[k]]
+        if status != CONVERGED:
+            return False, status != NOT_FINITE
+        close_chain(way.functions, way.layout, z, p, which, workspace.equations)
+        fine = take_tangent(workspace.elimination, tz, tw, way.scale)
+        return fine, fine
+
+    return correct_at
 
 
 @helper
-def correct_branch(way, z, w, tz, tw, accuracy):  # type: ignore[no-untyped-def]
-    """Correct (z, w) normal to the tangent (tz, tw), and replace the tangent; (converged, all is finite)."""
-    functions, layout, p, workspace = way.functions, way.layout, way.p, way.workspace
-    p[way.which[0]] = w[0]
-    anchor(workspace, z, p, way.which, tz, tw, way.scale)
-    way.counts[SOLVES] += 1
-    status, _, _, _ = _correct(
-        functions, layout, z, p, way.which, np.inf, accuracy, 0.0, workspace, 0
-    )
-    w[0] = p[way.which[0]]
-    if status != CONVERGED:
-        return False, status != NOT_FINITE
-    if not take_tangent(workspace.elimination, tz, tw, way.scale):
-        return False, False
-    close_chain(functions, layout, z, p, workspace.equations.none, workspace.equations)
-    return True, True
+def copy_free(p, which, w):  # type: ignore[no-untyped-def]
+    """Write the free ones of the parameters."""
+    for k in range(which.shape[0]):
+        p[which[k]] = w[k]
+
+
+@helper
+def once(way, attempt, converged):  # type: ignore[no-untyped-def]
+    """Return whether Newton's method is tried again along a branch: never."""
+    return False
+
+
+correct_branch = correcting_along(normal_to_tangent, once)
 
 
 @helper

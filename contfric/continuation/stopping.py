@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contfric.continuation.events import End, EndReason
-from contfric.continuation.hermite import along, point_between
+from contfric.continuation.hermite import along, point_between, zero_between
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
 from contfric.orbit.orbit import Orbit
@@ -29,8 +29,6 @@ from contfric.quantities.registry import Quantity, number_quantity
 _AT_VALUE = 1e-9
 #: How near to the value the cubic has to come, as a share of the nearer end of a step, to be looked at.
 _NEAR = 0.1
-#: Resolution of the place, as a share of a step: that of the arithmetic.
-_SHORTEST = 1e-15
 
 
 @dataclass(frozen=True)
@@ -83,26 +81,15 @@ class _Sought:
 
     def crossing(self, before: Point, after: Point) -> Stop | None:
         """Return the place between two points on both sides of the value."""
-        from scipy.optimize import brentq
-
         last = before
 
-        def miss_at(share: float) -> float:
+        def miss_at(point: Point) -> float:
             nonlocal last
-            if share in (0.0, 1.0):
-                return self.miss(before if share == 0.0 else after)
-            point = point_between(self.orbit, before, after, self.settings, share)
-            if point is None:
-                raise ArithmeticError
-            last = point
+            last = last if point is after else point
             return self.miss(point)
 
         reached = f"{self.quantity.name} = {self.value:g}"
-        try:
-            share = float(brentq(miss_at, 0.0, 1.0, xtol=_SHORTEST, rtol=4.0 * _SHORTEST))
-            point = point_between(self.orbit, before, after, self.settings, share)
-        except ArithmeticError:
-            point = None
+        point = zero_between(self.orbit, before, after, self.settings, miss_at)
         if point is None:
             lies = f"{reached} lies beyond this point, and Newton fails on the way"
             return Stop(last, End(EndReason.STOP, lies))

@@ -67,11 +67,7 @@ def leave_branch_point(
 
 @foreseeable()
 def leave_along(
-    orbit: Orbit,
-    settings: Settings,
-    direction: Direction,
-    reason: str,
-    distance: float = LEAVE,
+    orbit: Orbit, settings: Settings, direction: Direction, reason: str, distance: float = LEAVE
 ) -> Departure | None:
     """Return a start on the branch that leaves a singular orbit in a direction."""
     origin = first_point(orbit, settings)

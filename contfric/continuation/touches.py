@@ -10,13 +10,7 @@ import math
 
 from contfric.compiled import helper
 from contfric.continuation.dips import changes_much, cubic_dip, earlier_of
-from contfric.orbit.followed import (
-    BEFORE,
-    EARLIER,
-    HERE,
-    segment_and_observable,
-    stationary_slope,
-)
+from contfric.orbit.followed import BEFORE, EARLIER, HERE, segment_and_observable, stationary_slope
 from contfric.orbit.monitor import count_margins
 
 #: Within a step nothing changes by more than this times its length: an observable of the motion changes a few

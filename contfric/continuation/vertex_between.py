@@ -12,9 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from contfric.continuation.doubling_point import moved, opening
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import first_point
-from contfric.continuation.vertices import joints_like, moved, opening, symmetrised, undoubled
+from contfric.continuation.vertices import joints_like, symmetrised, undoubled
 from contfric.orbit.orbit import Orbit
 
 #: Halvings of a step to the resolution of the parameter.

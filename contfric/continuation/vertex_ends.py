@@ -7,9 +7,9 @@ from enum import Enum, auto
 import numpy as np
 
 from contfric.continuation.events import Bifurcation, End, EndReason
+from contfric.continuation.folds import overshot_vertex, vertex_at
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
-from contfric.continuation.smooth import overshot_vertex, vertex_at
 from contfric.continuation.stalls import stalled_at
 from contfric.continuation.vertex_between import left_at
 from contfric.continuation.vertices import at_vertex, passed_vertex

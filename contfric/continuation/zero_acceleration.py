@@ -17,14 +17,14 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import inside_sign, mode_domains
 
 #: Pieces of a rest between two stationary points of its observables: where the acceleration that it
-#: would be left with depends on them monotonically, as in every model of a load, one would do.
+#: would be left with depends on them monotonically, one would be enough, as in every model of a load.
 _PIECES = 8
 #: An acceleration this small (relative to 1) at the start of a rest is zero: the rest begins at a touch.
 _ZERO = 1e-9
 #: Heights of touches that agree to this (relative to 1 + the level) are equal: far above their rounding.
 _EQUAL = 1e-11
 #: A touch this share of the period after another one is another one; how far before a touch, as a share of
-#: it, stationary points are looked for at other parameters; and how far beside those are.
+#: it, stationary points are looked for at other parameters; and how far away those are.
 _LATER, _BACK, _ASIDE = 1e-4, 0.02, 1e-3
 #: Halvings of a bracket: to the resolution of time.
 _HALVINGS = 60
@@ -156,7 +156,7 @@ def touches_again(orbit: Orbit, i: int, surface: str, start: float) -> bool:
     """Tell whether a rest whose load touches a surface at its start does so at the same height later.
 
     Not by chance, but for all parameters: under an even excitation a load at rest has maxima of equal height
-    by twos, and it has the same ones in every period. Heights are compared at parameters beside, too.
+    by twos, and it has the same ones in every period. Heights are compared at neighbouring parameters, too.
     """
     observable, mode = orbit.model.surface_by_name[surface].observable, orbit.word[i][0]
     back, lasts = _BACK * orbit.period, float(orbit.ends[i, 0]) - start

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.continuation.events import (
-    Kind,
-)
+from contfric.continuation.events import Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import Point
 from contfric.curves.curve import Curve, CurvePart
@@ -19,7 +17,7 @@ from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialP
 from contfric.models.definition import FloatArray
 
 if TYPE_CHECKING:
-    from contfric.curves.trace import CurveSide
+    from contfric.curves.side import CurveSide
 
 
 def join_sides(behind: CurveSide | None, ahead: CurveSide, first: CurveEnd | None = None) -> Curve:

@@ -29,10 +29,10 @@ DIFFERENCE = 6e-6
 
 
 @helper
-def bend_flow(  # type: ignore[no-untyped-def]
-    functions, second, layout, i, start, duration, p, which, along, out, bordered, equations
-):
+def bend_flow(way, i, start, duration, along, out):  # type: ignore[no-untyped-def]
     """Write the derivative of the flow's jacobian in a direction."""
+    functions, second, layout, p, which = way.functions, way.second, way.layout, way.p, way.which
+    bordered, equations = way.workspace.bordered, way.workspace.equations
     mode = layout.modes[i]
     none = min(mode, 0) - 1  # -1, but no literal
     if layout.resets[i] < 0 and second.second(
@@ -54,8 +54,10 @@ def bend_flow(  # type: ignore[no-untyped-def]
 
 
 @helper
-def bend_mean_rate(functions, layout, i, start, duration, p, which, along, workspace):  # type: ignore[no-untyped-def]
+def bend_mean_rate(way, i, start, duration, along):  # type: ignore[no-untyped-def]
     """Write the derivative of a divided exit row in a direction of (t, y, duration)."""
+    functions, layout, p, which = way.functions, way.layout, way.p, way.which
+    workspace = way.workspace
     bordered, equations, rows = workspace.bordered, workspace.equations, workspace.elimination.rows
     m, free, step = start.shape[0], which.shape[0], bordered.difference[0]
     bordered.difference[1] = 1.0
@@ -79,8 +81,10 @@ def bend_mean_rate(functions, layout, i, start, duration, p, which, along, works
 
 
 @helper
-def bend_observable(functions, second, c, at, p, which, along, out, bordered, equations):  # type: ignore[no-untyped-def]
+def bend_observable(way, c, at, along, out):  # type: ignore[no-untyped-def]
     """Write the derivative of an observable's gradient in a direction of (t, y) to the first row."""
+    functions, second, p, which = way.functions, way.second, way.p, way.which
+    bordered, equations = way.workspace.bordered, way.workspace.equations
     if second.second(0, c, at[0], at[1:], 0.0, p, which, along, out, bordered.numbers):
         return
     m, step = at.shape[0], bordered.difference[0]

@@ -29,169 +29,17 @@ duration u scales with it, and g by a factor that is not zero.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from contfric.compiled import allocating_helper, helper
-from contfric.curves.bending import DIFFERENCE, bend_flow, bend_mean_rate, bend_observable
-from contfric.models.definition import FloatArray
-from contfric.orbit.cyclic import (
-    Elimination,
-    elimination_workspace,
-    finish,
-    next_rows,
-    start_border,
-    take_out,
-)
-from contfric.orbit.equations import segment_rows
+from contfric.compiled import helper
+from contfric.curves.bending import bend_flow, bend_mean_rate, bend_observable
+from contfric.curves.chain import chain_solve, fill_blocks, set_border
 from contfric.orbit.short_exits import is_divided
 
 #: Step of the third derivatives along a null vector of size 1: with Richardson's extrapolation its error
 #: and its rounding are both about 1e-11.
 _THIRD = 2e-3
-
-
-class BorderedWorkspace(NamedTuple):
-    """Workspace for the bordered solves of one chain; allocated once.
-
-    Attributes
-    ----------
-    a, b : blocks of the Jacobian on both joints of each segment, shape (N, m, m)
-    columns : its derivatives by the free parameters, shape (N, m, q)
-    v, u : null vectors of the chain and of its transpose, shape (N, m)
-    even : second-order response of the orbit to its null vector, shape (N, m)
-    work, d, e, s, close, close_w : for the elimination with one border row
-    along, other : a direction of a segment, shape (2 + n,)
-    bent, plus : derivatives of the flow's and of an observable's in a direction, shape (n, 2 + n + q)
-    divided : the same of a divided exit row, shape (2 + n + q,)
-    start, after : displaced joints, shape (m,)
-    numbers : scratch for the flow, shape (8,)
-    difference : step of the differences, and whether any was taken, shape (2,)
-    """
-
-    a: FloatArray
-    b: FloatArray
-    columns: FloatArray
-    v: FloatArray
-    u: FloatArray
-    even: FloatArray
-    work: Elimination
-    d: FloatArray
-    e: FloatArray
-    s: FloatArray
-    close: FloatArray
-    close_w: FloatArray
-    along: FloatArray
-    other: FloatArray
-    bent: FloatArray
-    plus: FloatArray
-    divided: FloatArray
-    start: FloatArray
-    after: FloatArray
-    numbers: FloatArray
-    difference: FloatArray
-
-
-@allocating_helper
-def bordered_workspace(count, m, free):  # type: ignore[no-untyped-def]
-    """Return the workspace for chains of ``count`` segments and ``free`` parameters."""
-    one = max(1 - count, 1)  # 1, but no literal
-    return BorderedWorkspace(
-        np.empty((count, m, m)),
-        np.empty((count, m, m)),
-        np.empty((count, m, free)),
-        np.empty((count, m)),
-        np.empty((count, m)),
-        np.empty((count, m)),
-        elimination_workspace(count, m, one, one),
-        np.empty((1, count, m)),
-        np.empty((1, 1)),
-        np.empty((1, 1)),
-        np.empty((m, m)),
-        np.zeros((m, 1)),
-        np.empty(1 + m),
-        np.empty(1 + m),
-        np.empty((m - 1, 1 + m + free)),
-        np.empty((m - 1, 1 + m + free)),
-        np.empty(1 + m + free),
-        np.empty(m),
-        np.empty(m),
-        np.empty(8),
-        np.array([DIFFERENCE, 0.0]),
-    )
-
-
-@helper
-def fill_blocks(functions, layout, z, p, which, workspace):  # type: ignore[no-untyped-def]
-    """Write the blocks of the Jacobian on both joints of each segment, and its columns of the parameters."""
-    count, m = z.shape
-    rows, bordered = workspace.elimination.rows, workspace.bordered
-    for i in range(count):
-        after = z[i + 1] if i + 1 < count else workspace.equations.last
-        worst = segment_rows(
-            functions, layout, i, m, z[i], after, p, which, workspace.equations, rows
-        )
-        if worst == np.inf:
-            return False
-        for j in range(m):
-            for k in range(m):
-                bordered.a[i, j, k] = rows[m + j, m + k]
-                bordered.b[i, j, k] = rows[m + j, 2 * m + k]
-            for k in range(which.shape[0]):
-                bordered.columns[i, j, k] = rows[m + j, 3 * m + k]
-    return True
-
-
-@helper
-def chain_solve(bordered, sign, column, rhs, transposed, close, pencil):  # type: ignore[no-untyped-def]
-    """Solve the chain (its transpose) with one border row, which is in d, e, s of the workspace.
-
-    ``column`` stands next to the rows, shape (N, m); ``rhs`` on their right-hand sides. False if singular.
-    """
-    work, rows = bordered.work, bordered.work.rows
-    count, m = column.shape
-    for i in range(m):
-        for j in range(m):
-            unit = 1.0 if i == j else 0.0
-            bordered.close[i, j] = unit if transposed else sign * close[i, j]
-    start_border(work, bordered.d, bordered.e, bordered.s, m)
-    for i in range(count):
-        if i > 0:
-            next_rows(work, bordered.d, i, m)
-        at = 0 if i == 0 else m
-        after = i + 1 if i + 1 < count else 0
-        for j in range(m):
-            for k in range(rows.shape[1]):
-                rows[m + j, k] = 0.0
-            for k in range(m):
-                if not transposed:
-                    rows[m + j, at + k] = bordered.a[i, j, k]
-                    rows[m + j, 2 * m + k] = bordered.b[i, j, k]
-                    continue
-                value = bordered.b[i, k, j]
-                if i + 1 == count:
-                    value = 0.0
-                    for n in range(m):
-                        value += bordered.b[i, k, n] * sign * close[n, j]
-                rows[m + j, at + k] = value
-                rows[m + j, 2 * m + k] = bordered.a[after, k, j]
-            row = after if transposed else i
-            rows[m + j, 3 * m] = column[row, j]
-            rows[m + j, 3 * m + 1] = rhs[row, j]
-        if i > 0 and not take_out(work, i, m):
-            return False
-    return finish(work, bordered.close, bordered.close_w, bordered.d, pencil[0], pencil[1])
-
-
-@helper
-def set_border(bordered, row, corner, value):  # type: ignore[no-untyped-def]
-    """Set the border row: on the unknowns (times ``1 - corner``), on the extra one, right-hand side."""
-    for i in range(row.shape[0]):
-        for j in range(row.shape[1]):
-            bordered.d[0, i, j] = (1.0 - corner) * row[i, j]
-    bordered.e[0, 0] = corner
-    bordered.s[0, 0] = value
 
 
 @helper
@@ -241,23 +89,21 @@ def end_of(vectors, i, sign, close, j):  # type: ignore[no-untyped-def]
 
 
 @helper
-def add_curvature(functions, second, layout, i, sign, z, p, which, workspace):  # type: ignore[no-untyped-def]
+def add_curvature(way, i, z):  # type: ignore[no-untyped-def]
     """Add what segment i contributes to the gradient ``-u^T dJ v``."""
-    from_ = z[i]
+    from_, sign, layout, workspace = z[i], way.condition.sign, way.layout, way.workspace
     bordered, equations = workspace.bordered, workspace.equations
     count, m = z.shape
-    n, free = m - 1, which.shape[0]
+    n, free = m - 1, way.which.shape[0]
     after = z[i + 1] if i + 1 < count else equations.last
     along, u, grad = bordered.along, bordered.u, equations.grad
     segment_direction(bordered.v, i, sign, equations.close, along)
     lasts = after[0] - from_[0]
     bent = bordered.bent
-    bend_flow(
-        functions, second, layout, i, from_, lasts, p, which, along, bent, bordered, equations
-    )
-    divided = is_divided(functions, layout, i, from_, lasts, p, which, equations)
+    bend_flow(way, i, from_, lasts, along, bent)
+    divided = is_divided(way.functions, layout, i, from_, lasts, way.p, way.which, equations)
     if divided:
-        bend_mean_rate(functions, layout, i, from_, lasts, p, which, along, workspace)
+        bend_mean_rate(way, i, from_, lasts, along)
     for k in range(grad.shape[0]):
         grad[k] = 0.0
     for k in range(2 + n + free):
@@ -285,10 +131,7 @@ def add_curvature(functions, second, layout, i, sign, z, p, which, workspace):  
     params = bordered.plus[0]
     for k in range(free):
         params[k] = grad[m + k]
-    c = layout.observables[layout.exits[i]]
-    bend_observable(
-        functions, second, c, after, p, which, along, bordered.bent, bordered, equations
-    )
+    bend_observable(way, layout.observables[layout.exits[i]], after, along, bordered.bent)
     for k in range(m):
         grad[k] = (flow_part[0] if k == 0 else 0.0) - u[i, n] * bordered.bent[0, k]
     for k in range(free):
@@ -320,13 +163,13 @@ def spread_end(grad, i, workspace):  # type: ignore[no-untyped-def]
 
 
 @helper
-def spectral_value(functions, second, layout, sign, z, p, which, border, workspace):  # type: ignore[no-untyped-def]
+def spectral_value(way, z):  # type: ignore[no-untyped-def]
     """Return g, with its gradient in the second border row (cleared before)."""
-    if not fill_blocks(functions, layout, z, p, which, workspace):
+    if not fill_blocks(way, z):
         return np.nan
-    g = null_vectors(border, sign, workspace)
+    g = null_vectors(way.border, way.condition.sign, way.workspace)
     if not math.isfinite(g):
         return np.nan
     for i in range(z.shape[0]):
-        add_curvature(functions, second, layout, i, sign, z, p, which, workspace)
+        add_curvature(way, i, z)
     return g

@@ -9,6 +9,7 @@ EXIT        rate of the exit's observable at the end of a segment: a tangential 
 INTERIOR    value of a stationary point inside a segment, less the level (AS, GS, T)
 SPECTRAL    the bordered function of the chain's Jacobian (SN, BP, PD), in
             :mod:`contfric.curves.bordered`
+QUANTITY    what is asked of a quantity (:mod:`contfric.curves.held_conditions`); there may be several
 ==========  ==================================================================================
 
 At a stationary point the derivative with respect to its time is zero, so the gradient of its value is
@@ -24,20 +25,12 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import allocating_helper, f8, helper, i8, indices
-from contfric.curves.bordered import (
-    BorderedWorkspace,
-    bordered_workspace,
-    spectral_value,
-    spread_end,
-)
+from contfric.curves.bordered import spectral_value, spread_end
+from contfric.curves.chain import BorderedWorkspace, bordered_workspace
 from contfric.models.definition import FloatArray
 from contfric.orbit.after_reset import apply_reset
 from contfric.orbit.cyclic import Elimination, elimination_workspace
-from contfric.orbit.equations import (
-    EquationWorkspace,
-    equation_workspace,
-    segment_jacobian,
-)
+from contfric.orbit.equations import EquationWorkspace, equation_workspace, segment_jacobian
 from contfric.orbit.followed import Followed, followed_values
 from contfric.orbit.spectrum import SpectralWorkspace, spectral_workspace
 from contfric.orbit.stationary import (
@@ -48,7 +41,7 @@ from contfric.orbit.stationary import (
 )
 from contfric.orbit.system import IntArray
 
-JOINT, START, EXIT, INTERIOR, SPECTRAL = range(5)
+JOINT, START, EXIT, INTERIOR, SPECTRAL, QUANTITY = range(6)
 
 
 class Condition(NamedTuple):
@@ -116,8 +109,16 @@ def curve_workspace(count, m, parameters, rows, surfaces, free):  # type: ignore
 
 
 @helper
-def interior_value(functions, layout, condition, z, p, which, workspace):  # type: ignore[no-untyped-def]
+def interior_value(way, z):  # type: ignore[no-untyped-def]
     """Return the stationary value nearest to the level; NaN if the segment has none."""
+    functions, layout, condition, p, which = (
+        way.functions,
+        way.layout,
+        way.condition,
+        way.p,
+        way.which,
+    )
+    workspace = way.workspace
     equations, stationary = workspace.equations, workspace.stationary
     i, surface = condition.segment, condition.surface
     c, n = layout.observables[surface], z.shape[1] - 1
@@ -148,9 +149,10 @@ def interior_value(functions, layout, condition, z, p, which, workspace):  # typ
 
 
 @helper
-def start_condition(functions, layout, i, c, target, z, p, which, workspace):  # type: ignore[no-untyped-def]
+def start_condition(way, i, c, target, z):  # type: ignore[no-untyped-def]
     """Return an observable less a level where segment i begins, and add the gradient to the border row."""
-    equations = workspace.equations
+    functions, layout, p, which = way.functions, way.layout, way.p, way.which
+    workspace, equations = way.workspace, way.workspace.equations
     grad, behind = equations.grad, equations.behind
     n = z.shape[1] - 1
     if layout.resets[i] < 0:
@@ -172,19 +174,19 @@ def start_condition(functions, layout, i, c, target, z, p, which, workspace):  #
 
 
 @helper
-def condition_value(functions, second, layout, condition, z, p, which, border, workspace):  # type: ignore[no-untyped-def]
+def condition_value(way, z):  # type: ignore[no-untyped-def]
     """Return what vanishes along the curve, and write its gradient to the second border row.
 
-    The closure of the chain is in ``workspace``.
+    The closure of the chain is in the workspace.
     """
+    functions, layout, p, which = way.functions, way.layout, way.p, way.which
+    condition, workspace = way.condition, way.workspace
     workspace.d[1, :, :] = 0.0
     workspace.e[1, :] = 0.0
     if condition.kind == SPECTRAL:
-        return spectral_value(
-            functions, second, layout, condition.sign, z, p, which, border, workspace
-        )
+        return spectral_value(way, z)
     if condition.kind == INTERIOR:
-        return interior_value(functions, layout, condition, z, p, which, workspace)
+        return interior_value(way, z)
     equations = workspace.equations
     i, surface, grad = condition.segment, condition.surface, equations.grad
     c = layout.observables[surface]
@@ -201,4 +203,4 @@ def condition_value(functions, second, layout, condition, z, p, which, border, w
         value = functions.observe(c, after[0], after[1:], p, which, grad) - target
         spread_end(grad, i, workspace)
         return value
-    return start_condition(functions, layout, i, c, target, z, p, which, workspace)
+    return start_condition(way, i, c, target, z)

@@ -1,6 +1,7 @@
 """One point of a curve, compiled: the corrector normal to the tangent, the watch, the border vectors.
 
-As :mod:`contfric.continuation.steps` for a branch; the second border row is the condition's gradient.
+As :mod:`contfric.continuation.steps` for a branch; the border rows after the first are the gradients of the
+conditions. Along a curve on which a quantity is held changes of stability and labels are no events.
 """
 
 from __future__ import annotations
@@ -9,26 +10,31 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 
-from contfric.compiled import helper
-from contfric.continuation.geometry import anchor, copy_to, copy_vector, take_tangent
-from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, EXTRA
+from contfric.compiled import allocating_helper, helper, indices, vector
+from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, EXTRA, correcting_along
 from contfric.curves.bending import DIFFERENCE
-from contfric.curves.conditions import EXIT, JOINT, SPECTRAL, CurveWorkspace, condition_value
+from contfric.curves.conditions import (
+    EXIT,
+    JOINT,
+    QUANTITY,
+    SPECTRAL,
+    Condition,
+    ConditionType,
+    CurveWorkspace,
+    condition_value,
+    curve_workspace,
+)
+from contfric.curves.held_conditions import Conditions, ConditionsType, fill_conditions
+from contfric.curves.lagrangian import LagrangianWorkspace, lagrangian_workspace
 from contfric.curves.normal_form import cubic_coefficient
+from contfric.flow.layouts import FlowType, SecondType
 from contfric.models.definition import FloatArray
-from contfric.orbit.equations import close_chain
+from contfric.orbit.equations import LayoutType
 from contfric.orbit.followed import remember
 from contfric.orbit.monitor import watch
-from contfric.orbit.newton import (
-    CHECKS,
-    CONVERGED,
-    MULTIPLIERS,
-    NOT_FINITE,
-    SOLVES,
-    correcting,
-    off_normal,
-)
+from contfric.orbit.newton import CHECKS, MULTIPLIERS, off_normal
 from contfric.orbit.spectrum import multipliers
 from contfric.orbit.stationary import find_behind, find_stationary
 from contfric.orbit.system import IntArray
@@ -43,83 +49,107 @@ _TOUCHES = 1e-9
 _ATTEMPTS, _SHORTER = 3, 1e-2
 
 
-class AlongCurve(NamedTuple):
-    """What a step along a curve needs besides its points.
+class CurveProblem(NamedTuple):
+    """A curve to follow, as the compiled engine takes it.
 
     Attributes
     ----------
     functions, second, layout : the model's flow, its second derivatives, and the chain
-    condition, border : what vanishes along the curve, and the vectors b and c, shape (2, N, m), which follow
-        the null vectors
-    p : parameters, those that are free overwritten
-    which, scale : indices of the free parameters, and their weights in the scaled product
-    counts, workspace : what is counted, and what is allocated once
+    condition, held : what vanishes along the curve: a bifurcation, or (QUANTITY) what is asked of a quantity
+    p : parameters
+    which, widths : indices of the q that are free, and the widths of their ranges
     """
 
     functions: Any
     second: Any
     layout: Any
-    condition: Any
-    border: FloatArray
+    condition: Condition
+    held: Conditions
     p: FloatArray
     which: IntArray
+    widths: FloatArray
+
+
+CurveProblemType = types.NamedTuple(
+    [FlowType, SecondType, LayoutType, ConditionType, ConditionsType, vector, indices, vector],
+    CurveProblem,
+)
+
+
+class AlongCurve(NamedTuple):
+    """What a step along a curve needs besides its points: the problem, what is counted, workspace.
+
+    The free ones of the parameters ``p`` are overwritten; ``border`` are the vectors b and c, shape
+    (2, N, m), which follow the null vectors; ``scale`` the weights of the free parameters.
+    """
+
+    functions: Any
+    second: Any
+    layout: Any
+    condition: Condition
+    held: Conditions
+    p: FloatArray
+    which: IntArray
+    widths: FloatArray
+    border: FloatArray
     scale: FloatArray
     counts: IntArray
     workspace: CurveWorkspace
+    own: LagrangianWorkspace
+
+
+@allocating_helper
+def along_curve(problem, border, count, m, rows, counts):  # type: ignore[no-untyped-def]
+    """Return what steps along a curve need; ``rows`` of stationary values are followed, -1: nothing is."""
+    functions, second, layout, condition, held, p, which, widths = problem
+    free, surfaces = which.shape[0], layout.observables.shape[0] if rows >= 0 else 0
+    whole = held.extreme.whole.modes.shape[0]
+    return AlongCurve(
+        functions,
+        second,
+        layout,
+        condition,
+        held,
+        p.copy(),
+        which,
+        widths,
+        border,
+        1.0 / widths**2,
+        counts,
+        curve_workspace(count, m, p.shape[0], max(rows, 0), surfaces, free),
+        lagrangian_workspace(count, whole, m, free),
+    )
 
 
 @helper
-def normal_and_condition(functions, layout, z, p, which, workspace, way):  # type: ignore[no-untyped-def]
-    """Border a curve with the plane normal to its tangent, and with its condition."""
-    condition, s = way.condition, workspace.s
-    value = condition_value(
-        functions, way.second, layout, condition, z, p, which, way.border, workspace
-    )
-    s[0, 0], s[0, 1] = -off_normal(workspace, z, p, which), 1.0
+def normal_and_condition(way, z):  # type: ignore[no-untyped-def]
+    """Border a curve with the plane normal to its tangent, and with its conditions."""
+    condition, s, values = way.condition, way.workspace.s, way.held.values
+    s[0, 0], s[0, 1] = -off_normal(way, z), 1.0
+    if condition.kind == QUANTITY:
+        worst = fill_conditions(way, z)
+        for k in range(values.shape[0]):
+            s[1 + k, 0], s[1 + k, 1] = -values[k], 0.0
+        return worst, -1
+    value = condition_value(way, z)
     s[1, 0], s[1, 1] = -value, 0.0
     return value, condition.segment if condition.kind == EXIT else -1
 
 
-_correct = correcting(normal_and_condition)
-
-
 @helper
-def correct_curve(way, z, w, tz, tw, accuracy):  # type: ignore[no-untyped-def]
-    """Correct (z, w) normal to the tangent (tz, tw), and replace the tangent; (converged, all is finite).
+def with_shorter_differences(way, attempt, converged):  # type: ignore[no-untyped-def]
+    """Return whether Newton's method is tried again: where second derivatives by differences fail.
 
-    Where it fails with second derivatives by differences it is tried again with shorter ones: near a touch
-    of a kink the first derivatives change within less than the difference.
+    Near a touch of a kink the first derivatives change within less than the difference.
     """
-    functions, layout, p, which, workspace = (
-        way.functions,
-        way.layout,
-        way.p,
-        way.which,
-        way.workspace,
-    )
-    for k in range(which.shape[0]):
-        p[which[k]] = w[k]
-    anchor(workspace, z, p, which, tz, tw, way.scale)
-    way.counts[SOLVES] += 1
-    difference, status = workspace.bordered.difference, NOT_FINITE
-    for attempt in range(_ATTEMPTS):
-        difference[0], difference[1] = DIFFERENCE * _SHORTER**attempt, 0.0
-        if attempt > 0:
-            copy_to(z, workspace.z_ref)
-            copy_vector(p, workspace.p_ref)
-        status, _, _, _ = _correct(
-            functions, layout, z, p, which, np.inf, accuracy, 0.0, workspace, way
-        )
-        if status == CONVERGED or difference[1] == 0.0:
-            break
-    difference[0] = DIFFERENCE
-    for k in range(which.shape[0]):
-        w[k] = p[which[k]]
-    if status != CONVERGED:
-        return False, status != NOT_FINITE
-    close_chain(functions, layout, z, p, which, workspace.equations)
-    fine = take_tangent(workspace.elimination, tz, tw, way.scale)
-    return fine, fine
+    difference = way.workspace.bordered.difference
+    again = not converged and difference[1] != 0.0 and attempt < _ATTEMPTS
+    difference[0] = DIFFERENCE * _SHORTER**attempt if again else DIFFERENCE
+    difference[1] = 0.0
+    return again
+
+
+correct_curve = correcting_along(normal_and_condition, with_shorter_differences)
 
 
 @helper
@@ -148,10 +178,11 @@ def follow_border(border, workspace):  # type: ignore[no-untyped-def]
 
 
 @helper
-def bend_value(functions, second, layout, condition, z, p, which, workspace):  # type: ignore[no-untyped-def]
+def bend_value(way, z):  # type: ignore[no-untyped-def]
     """Return the coefficient or rate whose zero is a point of codimension two; 1 if there is none."""
+    condition, layout, workspace = way.condition, way.layout, way.workspace
     if condition.kind == SPECTRAL and condition.sign < 0.0:
-        return cubic_coefficient(functions, second, layout, condition.sign, z, p, which, workspace)
+        return cubic_coefficient(way, z)
     if condition.kind == SPECTRAL:
         bordered, value = workspace.bordered, 0.0
         for i in range(z.shape[0]):
@@ -162,21 +193,18 @@ def bend_value(functions, second, layout, condition, z, p, which, workspace):  #
         i, equations = condition.segment, workspace.equations
         after = z[i + 1] if i + 1 < z.shape[0] else equations.last
         c = layout.observables[condition.surface]
-        return functions.rate(
-            condition.rest, c, after[0], after[1:], p, equations.none, equations.empty
-        )
+        none, empty = equations.none, equations.empty
+        return way.functions.rate(condition.rest, c, after[0], after[1:], way.p, none, empty)
     return 1.0
 
 
 @helper
-def other_touches(functions, layout, row, z, p, workspace):  # type: ignore[no-untyped-def]
+def other_touches(way, row, z):  # type: ignore[no-untyped-def]
     """Return an interior margin without the one stationary point that lies on the surface."""
+    functions, layout, p = way.functions, way.layout, way.p
     i, surface = layout.interior[row, 0], layout.interior[row, 1]
-    sign, stationary, equations = (
-        float(layout.interior[row, 2]),
-        workspace.stationary,
-        workspace.equations,
-    )
+    stationary, equations = way.workspace.stationary, way.workspace.equations
+    sign = float(layout.interior[row, 2])
     c = layout.observables[surface]
     if layout.resets[i] >= 0:
         found = find_behind(functions, layout, i, c, z, p, equations, stationary)
@@ -197,21 +225,25 @@ def other_touches(functions, layout, row, z, p, workspace):  # type: ignore[no-u
 @helper
 def observe_curve(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped-def]
     """Fill everything that is watched on a corrected point; False if something is not finite."""
-    functions, second, layout, condition = way.functions, way.second, way.layout, way.condition
-    p, which, workspace = way.p, way.which, way.workspace
+    functions, layout, condition, workspace = (
+        way.functions,
+        way.layout,
+        way.condition,
+        way.workspace,
+    )
     way.counts[CHECKS] += 1
     way.counts[MULTIPLIERS] += 1
     equations = workspace.equations
     at = tests.shape[0] - EXTRA
     one, minus = multipliers(layout, workspace.pencil, equations.close, mu, workspace.spectral)
-    tests[at + BEND] = bend_value(functions, second, layout, condition, z, p, which, workspace)
+    tests[at + BEND] = bend_value(way, z)
     stationary, followed = workspace.stationary, workspace.followed
-    finite = watch(functions, layout, z, p, equations, stationary, tests, labels, followed)
+    finite = watch(functions, layout, z, way.p, equations, stationary, tests, labels, followed)
     for k in range(condition.pinned.shape[0]):
         row = condition.pinned[k]
         tests[row] = 1.0
         if row < layout.interior.shape[0]:
-            tests[row] = other_touches(functions, layout, row, z, p, workspace)
+            tests[row] = other_touches(way, row, z)
     distances = at - labels.shape[0]
     for k in range(condition.quiet.shape[0]):
         labels[condition.quiet[k]] = 0
@@ -222,9 +254,10 @@ def observe_curve(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped-
     tests[at + CHI_PAIR] = 1.0
     if layout.rank > 1:
         tests[at + CHI_PAIR] = 1.0 - abs(mu[0]) * abs(mu[1])
-    if condition.kind == EXIT:  # multipliers are infinite there
+    if condition.kind == EXIT or condition.kind == QUANTITY:
         for k in range(CHI_ONE, EXTRA):
             tests[at + k] = 1.0
+    if condition.kind == EXIT:  # multipliers are infinite there
         for k in range(mu.shape[0]):
             mu[k] = np.inf
     return finite

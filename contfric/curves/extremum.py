@@ -25,10 +25,10 @@ import numpy as np
 from contfric.continuation.extrema import Extremum
 from contfric.continuation.points import MOST_POINTS, Point
 from contfric.continuation.trace import continue_orbit
-from contfric.curves.problem import Ranges, ranges_of
 from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.quantity_step import Defects, Held
 from contfric.curves.quantity_trace import both_sides
+from contfric.curves.ranges import Ranges, ranges_of
 from contfric.curves.trace import largest_step
 from contfric.errors import ConvergenceError, ParameterError, items_of, shown, whole_number
 from contfric.models.definition import FloatArray

@@ -14,16 +14,13 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.candidates import candidates
-from contfric.continuation.events import (
-    TERMINAL,
-    Bifurcation,
-    Kind,
-)
+from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import EXTRA, Point, Rows
 from contfric.curves.naming import MARGINAL
 from contfric.curves.points import first_curve_point, march_rows
-from contfric.curves.problem import Box, Problem, problem_of, tangency
+from contfric.curves.problem import Problem, problem_of, tangency
+from contfric.curves.ranges import Box
 from contfric.curves.special import SpecialPoint
 from contfric.errors import ContfricError, ParameterError
 from contfric.models.definition import FloatArray
@@ -196,11 +193,7 @@ def starts_of(event: Bifurcation, box: Box, largest: float) -> Iterator[Start]:
 
 
 def prove(
-    problem: Problem,
-    start: Point,
-    border: FloatArray,
-    largest: float,
-    born: bool = False,
+    problem: Problem, start: Point, border: FloatArray, largest: float, born: bool = False
 ) -> Problem | None:
     """Return a curve's problem if its orbits are admissible a short step away from a point.
 
@@ -250,5 +243,5 @@ def _step_away(problem: Problem, start: Point, border: FloatArray, step: float) 
     """Return the point a step away from the first one; None if there is none."""
     rows = Rows.empty(problem.system, 2, 2)
     rows.put(0, start)
-    _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), step, step, 3e-13)
+    _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), step, step)
     return rows.point(1) if last == 1 else None

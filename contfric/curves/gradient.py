@@ -18,7 +18,8 @@ import numpy as np
 
 from contfric.continuation.events import Bifurcation
 from contfric.curves.points import first_curve_point
-from contfric.curves.problem import Box, Problem, problem_of
+from contfric.curves.problem import Problem, problem_of
+from contfric.curves.ranges import Box
 from contfric.errors import ConvergenceError, ParameterError
 from contfric.orbit.gradient import Gradient
 

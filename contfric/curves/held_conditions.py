@@ -8,6 +8,7 @@ leaves values and rows there.
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,19 +16,12 @@ from numba import types
 
 from contfric.compiled import blocks, f8, helper, i8, matrix, vector
 from contfric.continuation.geometry import copy_to, copy_vector
-from contfric.curves.conditions import CurveWorkspace
-from contfric.curves.lagrangian import (
-    LagrangianWorkspace,
-    add_bend,
-    differentiated_extreme,
-    quantity_row,
-)
+from contfric.curves.lagrangian import add_bend, differentiated_extreme, place_found, quantity_row
 from contfric.handle import HandleType
 from contfric.models.definition import FloatArray
-from contfric.orbit.equations import close_chain
-from contfric.orbit.newton import off_normal
-from contfric.orbit.peak import Extreme, ExtremeType, find_place
-from contfric.orbit.system import IntArray
+from contfric.orbit.equations import LayoutType, close_chain
+from contfric.orbit.peak import Extreme, ExtremeType
+from contfric.orbit.system import Layout
 
 #: What the conditions are: an extremum that has a value, one that is stationary in all free parameters but
 #: the last, a function that is called.
@@ -67,34 +61,27 @@ ConditionsType = types.NamedTuple(
 )
 
 
-class AlongHeld(NamedTuple):
-    """What a step along such a curve needs besides its points.
+def _nothing(kind: Any) -> Any:
+    """Return a value of a type of a layout's member that holds nothing."""
+    if not isinstance(kind, types.Array):
+        return 0.0 if kind == f8 else 0
+    return np.empty((0,) * kind.ndim, dtype=str(kind.dtype))
 
-    Attributes
-    ----------
-    functions, layout, conditions : the model's flow, the chain, and what vanishes
-    p : parameters, those that are free overwritten
-    which, widths, scale : indices of the free parameters, their ranges, and weights in the scaled product
-    counts, workspace, own : what is counted, and what is allocated once
-    """
 
-    functions: Any
-    layout: Any
-    conditions: Conditions
-    p: FloatArray
-    which: IntArray
-    widths: FloatArray
-    scale: FloatArray
-    counts: IntArray
-    workspace: CurveWorkspace
-    own: LagrangianWorkspace
+@cache
+def no_quantity() -> Conditions:
+    """Return what stands where nothing is asked of a quantity."""
+    extreme = Extreme(-1, 0, 1.0, Layout(*map(_nothing, LayoutType.types)))
+    none, grid = np.empty(0), np.empty((0, 0))
+    return Conditions(CALLED, 0.0, extreme, 0, grid, none, none, np.empty((0, 0, 0)), grid)
 
 
 @helper
-def call_conditions(z, p, conditions, workspace):  # type: ignore[no-untyped-def]
+def call_conditions(way, z):  # type: ignore[no-untyped-def]
     """Ask a function for the conditions; return the largest of them, NaN if it fails."""
+    conditions, workspace = way.held, way.workspace
     copy_to(conditions.z, z)
-    copy_vector(conditions.p, p)
+    copy_vector(conditions.p, way.p)
     if conditions.call.fill(0) == 0:
         return np.nan
     worst = 0.0
@@ -106,48 +93,30 @@ def call_conditions(z, p, conditions, workspace):  # type: ignore[no-untyped-def
 
 
 @helper
-def fill_conditions(functions, layout, z, p, which, workspace, way):  # type: ignore[no-untyped-def]
-    """Write what vanishes to ``conditions.values``, and its rows to the border; the largest value."""
-    conditions, own, d, e = way.conditions, way.own, workspace.d, workspace.e
-    extreme, values = conditions.extreme, conditions.values
+def fill_conditions(way, z):  # type: ignore[no-untyped-def]
+    """Evaluate the conditions, and write their rows to the border; return the largest value."""
+    conditions, widths, d, e = way.held, way.widths, way.workspace.d, way.workspace.e
+    values = conditions.values
     if conditions.kind == CALLED:
-        return call_conditions(z, p, conditions, workspace)
+        return call_conditions(way, z)
     if conditions.kind == AT_VALUE:
-        if not find_place(functions, layout, extreme, z, p, own.extreme, workspace.stationary):
+        if not place_found(way, z):
             return np.nan
-        value = quantity_row(functions, layout, extreme, z, p, which, workspace, own, d[1], e[1])
-        values[0] = value - conditions.value
+        values[0] = quantity_row(way, z, d[1], e[1]) - conditions.value
         return abs(values[0])
-    value = differentiated_extreme(functions, layout, extreme, z, p, which, workspace, own)
-    if not math.isfinite(value):
+    if not math.isfinite(differentiated_extreme(way, z)):
         return np.nan
     worst = 0.0
     for k in range(values.shape[0]):
-        values[k] = own.on_parameters[0, k] * way.widths[k]
+        values[k] = way.own.on_parameters[0, k] * widths[k]
     for k in range(values.shape[0]):
-        if not add_bend(
-            functions, layout, extreme, k, z, p, which, workspace, own, d[1 + k], e[1 + k]
-        ):
+        if not add_bend(way, k, z, d[1 + k], e[1 + k]):
             return np.nan
         for i in range(z.shape[0]):
             for j in range(z.shape[1]):
-                d[1 + k, i, j] *= way.widths[k]
-        for j in range(which.shape[0]):
-            e[1 + k, j] *= way.widths[k]
-        close_chain(functions, layout, z, p, which, workspace.equations)
+                d[1 + k, i, j] *= widths[k]
+        for j in range(way.which.shape[0]):
+            e[1 + k, j] *= widths[k]
+        close_chain(way.functions, way.layout, z, way.p, way.which, way.workspace.equations)
         worst = max(worst, abs(values[k]))
     return worst
-
-
-@helper
-def normal_and_held(functions, layout, z, p, which, workspace, way):  # type: ignore[no-untyped-def]
-    """Border a curve with the plane normal to its tangent, and with its conditions."""
-    worst, s, values = (
-        fill_conditions(functions, layout, z, p, which, workspace, way),
-        workspace.s,
-        way.conditions.values,
-    )
-    s[0, 0], s[0, 1] = -off_normal(workspace, z, p, which), 1.0
-    for k in range(values.shape[0]):
-        s[1 + k, 0], s[1 + k, 1] = -values[k], 0.0
-    return worst, -1

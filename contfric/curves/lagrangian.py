@@ -25,7 +25,7 @@ import numpy as np
 
 from contfric.compiled import allocating_helper, helper
 from contfric.curves.bending import DIFFERENCE
-from contfric.curves.bordered import chain_solve, fill_blocks, set_border
+from contfric.curves.chain import chain_solve, fill_blocks, set_border
 from contfric.models.definition import FloatArray
 from contfric.orbit.equations import close_chain, segment_rows
 from contfric.orbit.peak import ExtremeWorkspace, extreme_row, extreme_workspace, find_place
@@ -67,29 +67,42 @@ def lagrangian_workspace(count, whole, m, free):  # type: ignore[no-untyped-def]
 
 
 @helper
-def quantity_row(functions, layout, extreme, z, p, which, workspace, own, on_joints, on_parameters):  # type: ignore[no-untyped-def]
+def place_found(way, z):  # type: ignore[no-untyped-def]
+    """Tell whether the extremum has a place on the orbit, which is noted."""
+    stationary = way.workspace.stationary
+    return find_place(
+        way.functions, way.layout, way.held.extreme, z, way.p, way.own.extreme, stationary
+    )
+
+
+@helper
+def quantity_row(way, z, on_joints, on_parameters):  # type: ignore[no-untyped-def]
     """Return Q at the place that was found, and write Q'."""
+    equations, stationary = way.workspace.equations, way.workspace.stationary
     return extreme_row(
-        functions,
-        layout,
-        extreme,
+        way.functions,
+        way.layout,
+        way.held.extreme,
         z,
-        p,
-        which,
-        workspace.equations,
-        workspace.stationary,
-        own.extreme,
+        way.p,
+        way.which,
+        equations,
+        stationary,
+        way.own.extreme,
         on_joints,
         on_parameters,
     )
 
 
 @helper
-def subtract_equations(  # type: ignore[no-untyped-def]
-    functions, layout, z, p, which, workspace, factors, on_joints, on_parameters
-):
-    """Subtract ``factors^T F'`` from a row; False if something is not finite."""
-    equations, rows = workspace.equations, workspace.elimination.rows
+def subtract_equations(way, z, on_joints, on_parameters):  # type: ignore[no-untyped-def]
+    """Subtract ``lambda^T F'`` from a row; False if something is not finite."""
+    functions, layout, p, which = way.functions, way.layout, way.p, way.which
+    equations, rows, factors = (
+        way.workspace.equations,
+        way.workspace.elimination.rows,
+        way.own.multipliers,
+    )
     count, m = z.shape
     close_chain(functions, layout, z, p, which, equations)
     close, close_w = equations.close, equations.close_w
@@ -115,16 +128,11 @@ def subtract_equations(  # type: ignore[no-untyped-def]
 
 
 @helper
-def lagrangian_row(functions, layout, extreme, z, p, which, workspace, own, side):  # type: ignore[no-untyped-def]
+def lagrangian_row(way, z, side):  # type: ignore[no-untyped-def]
     """Return Q, and write the row G with the multipliers that are known; NaN if something is not finite."""
-    on_joints, on_parameters = own.on_joints[side], own.on_parameters[side]
-    value = quantity_row(
-        functions, layout, extreme, z, p, which, workspace, own, on_joints, on_parameters
-    )
-    fine = subtract_equations(
-        functions, layout, z, p, which, workspace, own.multipliers, on_joints, on_parameters
-    )
-    return value if fine else np.nan
+    on_joints, on_parameters = way.own.on_joints[side], way.own.on_parameters[side]
+    value = quantity_row(way, z, on_joints, on_parameters)
+    return value if subtract_equations(way, z, on_joints, on_parameters) else np.nan
 
 
 @helper
@@ -143,21 +151,19 @@ def solve_plainly(workspace, rhs, transposed, out):  # type: ignore[no-untyped-d
 
 
 @helper
-def differentiated_extreme(functions, layout, extreme, z, p, which, workspace, own):  # type: ignore[no-untyped-def]
+def differentiated_extreme(way, z):  # type: ignore[no-untyped-def]
     """Return Q, and write its multipliers and the row G: that of the parameters is dQ/dp.
 
     The closure of the chain is in the workspace, and is again. NaN where the orbit has no derivative.
     """
-    turned = z.shape[0] > 0  # a flag, but no literal
-    if not fill_blocks(functions, layout, z, p, which, workspace):
-        return np.nan
-    if not find_place(functions, layout, extreme, z, p, own.extreme, workspace.stationary):
+    workspace, own, turned = way.workspace, way.own, z.shape[0] > 0  # a flag, but no literal
+    if not fill_blocks(way, z) or not place_found(way, z):
         return np.nan
     on_joints, on_parameters = own.on_joints[0], own.on_parameters[0]
-    quantity_row(functions, layout, extreme, z, p, which, workspace, own, on_joints, on_parameters)
+    quantity_row(way, z, on_joints, on_parameters)
     if not solve_plainly(workspace, on_joints, turned, own.multipliers):
         return np.nan
-    return lagrangian_row(functions, layout, extreme, z, p, which, workspace, own, 0)
+    return lagrangian_row(way, z, 0)
 
 
 @helper
@@ -176,8 +182,9 @@ def moves_with(k, workspace, own):  # type: ignore[no-untyped-def]
 
 
 @helper
-def add_bend(functions, layout, extreme, k, z, p, which, workspace, own, d, e):  # type: ignore[no-untyped-def]
+def add_bend(way, k, z, d, e):  # type: ignore[no-untyped-def]
     """Write the derivative of the row G as parameter k moves the orbits; False if it fails."""
+    p, which, workspace, own = way.p, way.which, way.workspace, way.own
     if not moves_with(k, workspace, own):
         return False
     here, direction, displaced = p[which[k]], own.direction, own.displaced
@@ -192,10 +199,7 @@ def add_bend(functions, layout, extreme, k, z, p, which, workspace, own, d, e): 
         for i in range(z.shape[0]):
             for j in range(z.shape[1]):
                 displaced[i, j] = z[i, j] + h * direction[i, j]
-        value = lagrangian_row(
-            functions, layout, extreme, displaced, p, which, workspace, own, side
-        )
-        fine = fine and math.isfinite(value)
+        fine = fine and math.isfinite(lagrangian_row(way, displaced, side))
     p[which[k]] = here
     for i in range(z.shape[0]):
         for j in range(z.shape[1]):

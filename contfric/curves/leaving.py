@@ -26,11 +26,7 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.candidates import edited_orbit
-from contfric.continuation.events import (
-    TERMINAL,
-    Bifurcation,
-    Kind,
-)
+from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.outcomes import outcome_at
 from contfric.continuation.points import Point
@@ -38,7 +34,8 @@ from contfric.continuation.vertices import symmetric_part, undoubled_part
 from contfric.curves.curve import CurvePart
 from contfric.curves.going_on import Start, prove, starts_of, words_at
 from contfric.curves.points import solve_point
-from contfric.curves.problem import Box, Problem, border_of, problem_of
+from contfric.curves.problem import Problem, border_of, problem_of
+from contfric.curves.ranges import Box
 from contfric.curves.special import CodimTwo, SpecialPoint
 from contfric.errors import ContfricError, NotationError
 from contfric.models.definition import FloatArray

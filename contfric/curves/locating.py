@@ -7,97 +7,70 @@ them; its watched value decides on which side the place is.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contfric.base.tally import tally
+from contfric.continuation.hermite import cubic_between
+from contfric.continuation.locate_change import sought_of
 from contfric.continuation.points import Point, Rows
-from contfric.curves.points import solve_point
+from contfric.curves.points import Conditioned, compiled_problem, solve_point
 from contfric.curves.problem import Problem
 from contfric.models.definition import FloatArray
 
+if TYPE_CHECKING:
+    from contfric.continuation.bracket import Sought
+
 #: Share of a step to which a place is bracketed: the resolution of the arithmetic.
 _RESOLUTION = 4e-16
-#: Bisections after which a bracket has that width, whatever the function.
-_MOST_TRIALS = 120
+#: Rounding of a number.
+_ROUNDING = float(np.finfo(float).eps)
 #: Values below this are rounding: a narrower bracket would follow noise.
 _NOISE = 2e-15
 
 Value = Callable[[Point], float]
 
 
-def between(a: Point, b: Point, x: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return joints, parameters, tangent and slope at a share of a step, by the cubic through both ends."""
-    y, length = 1.0 - x, b.arc - a.arc
-    ha, hb = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x)
-    ga, gb = x * y * y * length, -x * x * y * length
-    joints = ha * a.joints + hb * b.joints + ga * a.tangent + gb * b.tangent
-    w = ha * a.w + hb * b.w + ga * a.direction + gb * b.direction
-    return joints, w, y * a.tangent + x * b.tangent, y * a.direction + x * b.direction
-
-
 def point_between(
-    problem: Problem, a: Point, b: Point, x: float, border: FloatArray
+    problem: Conditioned, a: Point, b: Point, x: float, border: FloatArray
 ) -> Point | None:
     """Return the solved point at a share of a step."""
-    point = solve_point(problem, *between(a, b, x), border.copy())
+    point = solve_point(problem, *cubic_between(a, b, x), border.copy())
     if point is not None:
         point.arc = a.arc + x * (b.arc - a.arc)
     return point
 
 
 def locate_zero(
-    problem: Problem, a: Point, b: Point, border: FloatArray, value: Value
+    problem: Conditioned, a: Point, b: Point, border: FloatArray, value: Value
 ) -> tuple[Point, bool]:
     """Return the place where a value changes sign, and whether it is bracketed to its last digits.
 
-    By regula falsi with Illinois' halving of the end that stays, and a bisection every fourth trial. A
-    trial that is not solved counts as beyond the place.
+    By Brent's method. A trial that is not solved counts as beyond the place, and so does the far end.
     """
-    low, high, f_low, f_high = 0.0, 1.0, value(a), value(b)
-    best, sign, side, lost = a, np.sign(f_low) or 1.0, 0, False
-    for trial in range(_MOST_TRIALS):
-        x = low + (high - low) * f_low / (f_low - f_high) if f_low != f_high else 0.5
-        if trial % 4 == 3 or not low < x < high or not np.isfinite(x):
-            x = 0.5 * (low + high)
+    from scipy.optimize import brentq
+
+    first, last = value(a), value(b)
+    sign = float(np.sign(first)) or 1.0
+    best, left, lost = a, abs(first), False
+
+    def value_at(x: float) -> float:
+        nonlocal best, left, lost
+        if x in (0.0, 1.0):
+            return first if x == 0.0 else -sign * max(-sign * last, _NOISE)
         point = point_between(problem, a, b, x, border)
         f = -sign if point is None else value(point)
-        if not np.isfinite(f):
-            f = sign
-        if point is not None and (abs(f) < abs(value(best)) or f * sign >= 0.0):
-            best = point
-        if abs(f) <= _NOISE and point is not None:
-            return point, True
-        if f * sign > 0.0:
-            low, f_low = x, f
-            f_high = 0.5 * f_high if side == 1 else f_high
-            side = 1
-        else:
-            high, f_high, lost = x, f, point is None
-            f_low = 0.5 * f_low if side == -1 else f_low
-            side = -1
-        if high - low <= _RESOLUTION:
-            break
-    return best, not lost and abs(value(best)) < 1e-6
+        f = f if np.isfinite(f) else sign
+        if f * sign <= 0.0:
+            lost = point is None
+        if point is not None and (abs(f) < left or f * sign >= 0.0):
+            best, left = point, abs(f)
+        return 0.0 if abs(f) <= _NOISE else f
 
-
-@dataclass(frozen=True, eq=False)
-class Sought:
-    """What is sought between two points: a test, a label, or a place in the plane.
-
-    Attributes
-    ----------
-    kind : BY_TEST, BY_LABEL or BY_PARAMETER of the compiled bracket
-    index : column of the tests, or row of the labels
-    target : the label before
-    planes : rows (a, b, c): the least of ``a p + b q + c`` vanishes
-    """
-
-    kind: int
-    index: int = 0
-    target: int = 0
-    planes: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    if first != 0.0:
+        brentq(value_at, 0.0, 1.0, xtol=_RESOLUTION, rtol=4.0 * _ROUNDING)
+    return best, not lost and left < 1e-6
 
 
 def locate(
@@ -109,41 +82,27 @@ def locate(
     rows = Rows.empty(problem.system, 4, 2)
     rows.put(0, a)
     rows.put(1, b)
-    status, _ = locate_on_curve(
-        problem.system.functions(),
-        problem.model.flow.second_derivatives,
-        problem.system.layout,
-        problem.condition,
-        problem.vector,
-        problem.which,
-        1.0 / problem.box.widths**2,
-        sought.kind,
-        sought.index,
-        sought.target,
-        np.ascontiguousarray(sought.planes, dtype=np.float64),
-        border.copy(),
-        rows.arrays(),
-        tally(),
-    )
+    compiled = compiled_problem(problem)
+    status, _ = locate_on_curve(compiled, border.copy(), sought, rows.arrays(), tally())
     return (a, False) if status < 0 else (rows.point(3), status == 1)
 
 
 def by_test(index: int) -> Sought:
     """Return the search for the zero of one test."""
-    from contfric.curves.bracket import BY_TEST
+    from contfric.continuation.bracket import BY_TEST
 
-    return Sought(BY_TEST, index)
+    return sought_of(BY_TEST, index)
 
 
 def by_label(row: int, before: int) -> Sought:
     """Return the search for the change of one label."""
-    from contfric.curves.bracket import BY_LABEL
+    from contfric.continuation.bracket import BY_LABEL
 
-    return Sought(BY_LABEL, row, before)
+    return sought_of(BY_LABEL, row, float(before))
 
 
 def by_place(planes: FloatArray) -> Sought:
     """Return the search for where the least of ``a p + b q + c`` vanishes."""
-    from contfric.curves.bracket import BY_PARAMETER
+    from contfric.continuation.bracket import BY_PARAMETER
 
-    return Sought(BY_PARAMETER, planes=planes)
+    return sought_of(BY_PARAMETER, planes=planes)

@@ -1,7 +1,8 @@
-"""Pseudo-arclength continuation of a condition in the plane of two parameters, compiled.
+"""Pseudo-arclength continuation of conditions in q free parameters, compiled.
 
-The march is that of :mod:`contfric.continuation.march`. The unknowns are the joints and both parameters; the
-second border row is the condition.
+The march is that of :mod:`contfric.continuation.march`. The unknowns are the joints and the free parameters;
+the border rows after the first are the q - 1 conditions: a bifurcation in two parameters, or what is asked of
+a quantity.
 """
 
 from __future__ import annotations
@@ -9,91 +10,36 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from contfric.compiled import blocks, f8, i8, indices, kernel, matrix, vector
-from contfric.continuation.geometry import PointsType
+from contfric.compiled import blocks, f8, i8, kernel
+from contfric.continuation.geometry import CourseType
 from contfric.continuation.march import marching
-from contfric.curves.conditions import ConditionType, curve_workspace
-from contfric.curves.correct import AlongCurve, accept_curve, correct_curve, observe_curve
-from contfric.flow.layouts import FlowType, SecondType
-from contfric.orbit.equations import LayoutType
+from contfric.curves.correct import (
+    CurveProblemType,
+    accept_curve,
+    along_curve,
+    correct_curve,
+    observe_curve,
+)
 from contfric.orbit.followed import count_followed
 
 _march_points = marching(correct_curve, observe_curve, accept_curve)
 
 
-@kernel(
-    types.Tuple((i8, i8, f8))(
-        FlowType,
-        SecondType,
-        LayoutType,
-        ConditionType,
-        vector,
-        indices,
-        f8,
-        vector,
-        matrix,
-        i8,
-        blocks,
-        matrix,
-        i8,
-        blocks,
-        PointsType,
-        indices,
-    )
-)
-def march_curve(  # type: ignore[no-untyped-def]
-    functions,
-    second,
-    layout,
-    condition,
-    p,
-    which,
-    accuracy,
-    options,
-    box,
-    k,
-    start_z,
-    start_w,
-    taken,
-    border,
-    points,
-    counts,
-):
-    """Continue from the point in row k until something happens; with k = -1 solve row 0 alone.
+@kernel(types.Tuple((i8, i8, f8))(CurveProblemType, blocks, CourseType))
+def march_curve(problem, border, course):  # type: ignore[no-untyped-def]
+    """Continue from a point of a curve until something happens.
 
     Parameters
     ----------
-    accuracy : size of a correction after which no other is asked for
-    options : those of :func:`contfric.continuation.march.march`
-    box : lower corner, upper corner, widths; shape (3, 2)
-    start_z, start_w : first point of the curve and its tangent, shapes (2, N, m) and (2, 2)
-    taken : points since then
     border : the vectors b and c, shape (2, N, m); they follow the null vectors
-    points : rows that are filled from k + 1
+    course : as that of :func:`contfric.continuation.march.march`
 
     Returns
     -------
     tuple
         (why it stopped, index of the last row written, next step).
     """
-    zs, scale = points.joints, 1.0 / box[2] ** 2
-    rows, surfaces = count_followed(layout), layout.observables.shape[0]
-    workspace = curve_workspace(
-        zs.shape[1], zs.shape[2], p.shape[0], rows, surfaces, which.shape[0]
-    )
-    way = AlongCurve(
-        functions, second, layout, condition, border, p.copy(), which, scale, counts, workspace
-    )
-    guess = np.empty((zs.shape[1], zs.shape[2])), np.empty(2)
-    return _march_points(
-        way,
-        accuracy,
-        options,
-        box,
-        k,
-        start_z,
-        start_w,
-        taken,
-        points,
-        guess,
-    )
+    zs, rows = course.points.joints, count_followed(problem.layout)
+    way = along_curve(problem, border, zs.shape[1], zs.shape[2], rows, course.counts)
+    guess_z, guess_w = np.empty((zs.shape[1], zs.shape[2])), np.empty(problem.which.shape[0])
+    return _march_points(way, course, guess_z, guess_w)

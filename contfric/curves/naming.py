@@ -7,9 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contfric.continuation.events import (
-    Kind,
-)
+from contfric.continuation.events import Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import EXTRA, Point
 from contfric.curves.locating import by_label, by_test, locate

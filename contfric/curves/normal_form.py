@@ -25,69 +25,62 @@ from __future__ import annotations
 
 from contfric.compiled import helper
 from contfric.curves.bending import bend_flow, bend_mean_rate, bend_observable
-from contfric.curves.bordered import (
-    _THIRD,
-    chain_solve,
-    end_of,
-    segment_direction,
-    set_border,
-)
+from contfric.curves.bordered import _THIRD, end_of, segment_direction
+from contfric.curves.chain import chain_solve, set_border
 from contfric.orbit.short_exits import is_divided
 
 
 @helper
-def second_order(  # type: ignore[no-untyped-def]
-    functions, second, layout, i, ends, p, which, sign, others, twist, divided, workspace, out
-):
+def second_order(way, i, ends, sign, others, twist, divided, out):  # type: ignore[no-untyped-def]
     """Write F_i,zz v w (m numbers) between two joints; w is ``others``, closed by ``twist``.
 
     ``divided`` says whether the exit row is divided by the duration: that of the orbit, near it as well.
     """
-    bordered, equations, (start, after) = workspace.bordered, workspace.equations, ends
+    bordered, equations, (start, after) = way.workspace.bordered, way.workspace.equations, ends
     m = start.shape[0]
     n, close, along, other = m - 1, equations.close, bordered.along, bordered.other
     segment_direction(bordered.v, i, sign, close, along)
     segment_direction(others, i, twist, close, other)
     lasts, bent = after[0] - start[0], bordered.bent
-    bend_flow(
-        functions, second, layout, i, start, lasts, p, which, along, bent, bordered, equations
-    )
+    bend_flow(way, i, start, lasts, along, bent)
     for j in range(n):
         out[j] = 0.0
         for k in range(1 + m):
             out[j] += bent[j, k] * other[k]
     out[n] = 0.0
     if divided:
-        bend_mean_rate(functions, layout, i, start, lasts, p, which, along, workspace)
+        bend_mean_rate(way, i, start, lasts, along)
         for k in range(1 + m):
             out[n] += bordered.divided[k] * other[k]
         return
     for j in range(m):
         along[j] = end_of(bordered.v, i, sign, close, j)
-    c = layout.observables[layout.exits[i]]
-    bend_observable(
-        functions, second, c, after, p, which, along, bordered.bent, bordered, equations
-    )
+    bend_observable(way, way.layout.observables[way.layout.exits[i]], after, along, bordered.bent)
     for k in range(m):
         out[n] += bordered.bent[0, k] * end_of(others, i, twist, close, k)
 
 
 @helper
-def divides_exit(functions, layout, i, z, p, which, workspace):  # type: ignore[no-untyped-def]
+def divides_exit(way, i, z):  # type: ignore[no-untyped-def]
     """Tell whether the exit row of segment i of an orbit is divided by its duration."""
-    after = z[i + 1] if i + 1 < z.shape[0] else workspace.equations.last
+    equations = way.workspace.equations
+    after = z[i + 1] if i + 1 < z.shape[0] else equations.last
     lasts = after[0] - z[i, 0]
-    return is_divided(functions, layout, i, z[i], lasts, p, which, workspace.equations)
+    return is_divided(way.functions, way.layout, i, z[i], lasts, way.p, way.which, equations)
 
 
 @helper
-def third_order(functions, second, layout, i, z, p, which, sign, workspace, out):  # type: ignore[no-untyped-def]
+def third_order(way, i, z, sign, out):  # type: ignore[no-untyped-def]
     """Return ``u_i^T F_i,zzz v v v``."""
-    bordered, close = workspace.bordered, workspace.equations.close
+    workspace, bordered, close = (
+        way.workspace,
+        way.workspace.bordered,
+        way.workspace.equations.close,
+    )
     v, u = bordered.v, bordered.u
     count, m = z.shape
     start, after = ends = workspace.z_ref[i], bordered.after
-    divided = divides_exit(functions, layout, i, z, p, which, workspace)
+    divided = divides_exit(way, i, z)
     slopes = 0.0
     for level in range(2):
         step = _THIRD if level == 0 else 0.5 * _THIRD
@@ -98,34 +91,30 @@ def third_order(functions, second, layout, i, z, p, which, sign, workspace, out)
                 end = z[i + 1, j] if i + 1 < count else workspace.equations.last[j]
                 start[j] = z[i, j] + h * v[i, j]
                 after[j] = end + h * end_of(v, i, sign, close, j)
-            second_order(
-                functions, second, layout, i, ends, p, which, sign, v, sign, divided, workspace, out
-            )
+            second_order(way, i, ends, sign, v, sign, divided, out)
             for j in range(m):
                 slopes += weight * u[i, j] * out[j] / (2.0 * h)
     return slopes
 
 
 @helper
-def bend_segment(functions, second, layout, i, z, p, which, sign, others, twist, workspace, out):  # type: ignore[no-untyped-def]
+def bend_segment(way, i, z, sign, others, twist, out):  # type: ignore[no-untyped-def]
     """Write F_i,zz v w of segment i of the orbit; w is ``others``, closed by ``twist``."""
-    ends = z[i], (z[i + 1] if i + 1 < z.shape[0] else workspace.equations.last)
-    divided = divides_exit(functions, layout, i, z, p, which, workspace)
-    second_order(
-        functions, second, layout, i, ends, p, which, sign, others, twist, divided, workspace, out
-    )
+    ends = z[i], (z[i + 1] if i + 1 < z.shape[0] else way.workspace.equations.last)
+    second_order(way, i, ends, sign, others, twist, divides_exit(way, i, z), out)
 
 
 @helper
-def cubic_coefficient(functions, second, layout, sign, z, p, which, workspace):  # type: ignore[no-untyped-def]
+def cubic_coefficient(way, z):  # type: ignore[no-untyped-def]
     """Return b; the blocks of the Jacobian and the null vectors are in the workspace."""
+    workspace, sign = way.workspace, way.condition.sign
     bordered, close = workspace.bordered, workspace.equations.close
     v, u, even = bordered.v, bordered.u, bordered.even
     count, m = z.shape
     spare = workspace.pencil[0, 0]
     total = 0.0
     for i in range(count):
-        bend_segment(functions, second, layout, i, z, p, which, sign, v, sign, workspace, spare)
+        bend_segment(way, i, z, sign, v, sign, spare)
         for j in range(m):
             even[i, j] = -spare[j]
     workspace.z_ref[:, :] = 0.0
@@ -137,12 +126,8 @@ def cubic_coefficient(functions, second, layout, sign, z, p, which, workspace): 
         for j in range(m):
             even[i, j] = bordered.work.z[i, j, 0]
     for i in range(count):
-        bend_segment(
-            functions, second, layout, i, z, p, which, sign, even, periodic, workspace, spare
-        )
+        bend_segment(way, i, z, sign, even, periodic, spare)
         for j in range(m):
             total += 0.5 * u[i, j] * spare[j]
-        total += (
-            third_order(functions, second, layout, i, z, p, which, sign, workspace, spare) / 6.0
-        )
+        total += third_order(way, i, z, sign, spare) / 6.0
     return total

@@ -2,74 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.continuation.events import (
-    TERMINAL,
-    Bifurcation,
-    Kind,
-)
+from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.touching import resting_domain
-from contfric.errors import ParameterError, checked_range, did_you_mean, items_of, mapping_of, shown
+from contfric.curves.ranges import Box, limits_of
+from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.linear import jacobian_blocks
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, Margin, System, Test
+
+if TYPE_CHECKING:
+    from contfric.curves.conditions import Condition
+    from contfric.curves.held_conditions import Conditions
 
 #: Margins below this at the start (nondimensional) vanish along the curve, with its condition: located
 #: events are zero to about 1e-12, and those of a group agree to their conditioning.
 _VANISHES = 1e-6
 #: A multiplier this far from +-1 does not belong to a located bifurcation.
 _MULTIPLIER = 1e-2
-
-
-@dataclass(frozen=True, eq=False)
-class Ranges:
-    """Parameters that vary, with their ranges.
-
-    Attributes
-    ----------
-    names : the q parameters
-    low, high : corners, shape (q,)
-    """
-
-    names: tuple[str, ...]
-    low: FloatArray
-    high: FloatArray
-
-    @property
-    def widths(self) -> FloatArray:
-        """Widths of the ranges, in which arclength is measured."""
-        return self.high - self.low
-
-    @property
-    def edges(self) -> FloatArray:
-        """The sides: rows (a, c) with ``a . p + c >= 0`` inside, in widths, shape (2 q, q + 1)."""
-        rows = []
-        for k, side in enumerate(np.eye(len(self.names)) / self.widths[:, None]):
-            rows += [
-                [*side, -self.low[k] / self.widths[k]],
-                [*-side, self.high[k] / self.widths[k]],
-            ]
-        return np.array(rows)
-
-    def contains(self, w: FloatArray, slack: float = 1e-9) -> bool:
-        """Tell whether a point lies in the box."""
-        margin = slack * self.widths
-        return bool(np.all(w >= self.low - margin) and np.all(w <= self.high + margin))
-
-
-@dataclass(frozen=True, eq=False)
-class Box(Ranges):
-    """A plane: two parameters with their ranges."""
-
-    names: tuple[str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +47,7 @@ class Problem:
     system: System
     vector: FloatArray
     box: Box
-    condition: Any
+    condition: Condition
     test: Test | None
 
     @property
@@ -102,6 +59,15 @@ class Problem:
     def which(self) -> IntArray:
         """Indices of the two parameters."""
         return np.array([self.model.index_of(n) for n in self.box.names], dtype=np.int64)
+
+    def conditions(self) -> tuple[Condition, Conditions]:
+        """Return what vanishes, as the compiled engine takes it: nothing is asked of a quantity."""
+        from contfric.curves.held_conditions import no_quantity
+
+        return self.condition, no_quantity()
+
+    def raise_kept(self) -> None:
+        """Raise nothing: the engine calls no function of Python for this problem."""
 
     @cached_property
     def limits(self) -> FloatArray:
@@ -119,67 +85,6 @@ class Problem:
         vector = self.vector.copy()
         vector[self.which] = w
         return Orbit(self.system, joints.copy(), vector, 0.0)
-
-
-def box_of(
-    model: Model, parameters: tuple[str, str], ranges: Mapping[str, tuple[float, float]]
-) -> Box:
-    """Check two parameters with their ranges.
-
-    Raises
-    ------
-    ParameterError
-        For anything but two different parameters of the model with a finite range each.
-    """
-    if len(items_of(parameters)) != 2:
-        raise ParameterError(
-            f"a curve needs a pair of parameters, such as {model.parameter_names[:2]}, got "
-            f"{shown(parameters)}"
-        )
-    found = ranges_of(model, parameters, ranges)
-    return Box(parameters, found.low, found.high)
-
-
-def ranges_of(
-    model: Model, parameters: tuple[str, ...], ranges: Mapping[str, tuple[float, float]]
-) -> Ranges:
-    """Check parameters with their ranges.
-
-    Raises
-    ------
-    ParameterError
-        For anything but different parameters of the model with a finite range each.
-    """
-    for k, name in enumerate(parameters):
-        model.index_of(name)
-        if name in parameters[:k]:
-            raise ParameterError(f"a curve needs different parameters, got '{name}' twice")
-    for name in mapping_of("ranges", ranges, f"{{'{parameters[0]}': (lower, upper), ..}}"):
-        if name not in parameters:
-            raise ParameterError(
-                f"'{name}' is not one of the parameters that vary, {', '.join(parameters)}"
-                f"{did_you_mean(str(name), parameters)}"
-            )
-    corners = [_range_of(name, ranges) for name in parameters]
-    low, high = (np.array(side) for side in zip(*corners, strict=True))
-    return Ranges(parameters, low, high)
-
-
-def limits_of(model: Model, vector: FloatArray, box: Ranges) -> FloatArray:
-    """Return the constraints that bound parameters: rows (a, c) with ``a . p + c >= 0``, shape (k, q + 1)."""
-    params, nothing = model.mapping(vector), dict.fromkeys(box.names, 0.0)
-    rows = [
-        [*(c.coefficients.get(name, 0.0) for name in box.names), c.value({**params, **nothing})]
-        for c in model.constraints
-        if any(name in c.coefficients for name in box.names)
-    ]
-    return np.array(rows, dtype=np.float64).reshape(len(rows), len(box.names) + 1)
-
-
-def _range_of(name: str, ranges: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
-    if name not in ranges:
-        raise ParameterError(f"the range of '{name}' is missing: {{'{name}': (lower, upper), ..}}")
-    return checked_range(name, ranges[name])
 
 
 def problem_of(bifurcation: Bifurcation, box: Box) -> Problem:

@@ -22,27 +22,25 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from contfric.base.tally import tally
 from contfric.continuation.points import Point, Rows
-from contfric.curves.points import paced
-from contfric.curves.problem import Ranges, limits_of
+from contfric.curves.points import solve_point
+from contfric.curves.ranges import Ranges, limits_of
 from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.errors import ConvergenceError
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import equations_at
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import IntArray
+from contfric.orbit.system import IntArray, System
 from contfric.quantities.extreme import peak_of
 from contfric.quantities.measure import differentiated
 from contfric.quantities.motion import Directions
 from contfric.quantities.registry import Quantity
 
 if TYPE_CHECKING:
+    from contfric.curves.conditions import Condition
     from contfric.curves.held_conditions import Conditions
     from contfric.orbit.peak import Extreme
 
-#: Size of a correction after which no other is asked for: that of branches.
-_ACCURACY = 3e-13
 #: A first point this near to the orbit (scaled) is the one that belongs to it.
 _NEAR = 0.02
 
@@ -105,10 +103,20 @@ class Held:
         """Indices of the parameters that vary."""
         return np.array([self.orbit.model.index_of(n) for n in self.box.names], dtype=np.int64)
 
-    @cached_property
-    def corners(self) -> FloatArray:
-        """Lower corner, upper corner and widths, shape (3, q)."""
-        return np.array([self.box.low, self.box.high, self.box.widths])
+    @property
+    def system(self) -> System:
+        """Boundary-value problem of the orbits."""
+        return self.orbit.system
+
+    @property
+    def vector(self) -> FloatArray:
+        """All parameters of the orbit."""
+        return self.orbit.vector
+
+    @property
+    def border(self) -> FloatArray:
+        """Space where a bifurcation has its null vectors, shape (2, N, m)."""
+        return np.zeros((2, *self.orbit.joints.shape))
 
     @cached_property
     def weights(self) -> FloatArray:
@@ -182,9 +190,21 @@ class Held:
 
         return AT_VALUE
 
+    def conditions(self) -> tuple[Condition, Conditions]:
+        """Return what vanishes, as the compiled engine takes it."""
+        return self._compiled[:2]
+
+    def raise_kept(self) -> None:
+        """Raise what the function of the conditions has raised."""
+        called = self._compiled[2]
+        if called.raised is not None:
+            error, called.raised = called.raised, None
+            raise error
+
     @cached_property
-    def _compiled(self) -> tuple[Conditions, _Called, object]:
+    def _compiled(self) -> tuple[Condition, Conditions, _Called, object]:
         """The conditions as the march takes them, what it calls, and what keeps that alive."""
+        from contfric.curves.conditions import QUANTITY, Condition
         from contfric.curves.held_conditions import CALLED, FILL, Conditions
         from contfric.handle import Block
         from contfric.orbit.peak import Extreme
@@ -210,48 +230,17 @@ class Held:
         extreme = self.extreme or Extreme(-1, 0, 1.0, self.orbit.system.layout)
         kind = CALLED if self.extreme is None else self.kind
         arrays = joints, vector, values, on_joints, on_parameters
-        return Conditions(kind, self.value, extreme, block.address, *arrays), called, block
+        held = Conditions(kind, self.value, extreme, block.address, *arrays)
+        quiet = np.arange(len(self.system.layout.labels))
+        condition = Condition(QUANTITY, 0, 0, 1.0, -1, np.empty(0, dtype=np.int64), quiet)
+        return condition, held, called, block
 
     # ------------------------------------------------------------------ points of the curve
 
-    def march(
-        self, rows: Rows, k: int, start: Point, taken: int, step: float, largest: float
-    ) -> tuple[int, int, float]:
-        """March on from row k; return (why it stopped, last row, next step)."""
-        from contfric.curves.held_march import march_held
-
-        conditions, called, _ = self._compiled
-        system, first, arrays = self.orbit.system, start.as_start(), rows.arrays()
-
-        def call(options: FloatArray, at: int, passed: int) -> tuple[int, int, float]:
-            found = march_held(
-                *(system.functions(), system.layout, conditions, self.orbit.vector, self.which),
-                *(_ACCURACY, options, self.corners, at, *first, passed, arrays, tally()),
-            )
-            if called.raised is not None:
-                error, called.raised = called.raised, None
-                raise error
-            return found  # type: ignore[no-any-return]
-
-        return paced(call, k, taken, step, largest)
-
     def solve(self, guess: Point) -> Point | None:
         """Solve for the point normal to the tangent of a guess, through it; None if Newton fails."""
-        from contfric.continuation.march import BROKEN
-
-        rows = Rows.empty(self.orbit.system, 1, len(self.box.names))
-        rows.put(0, guess)
-        why, _, _ = self.march(rows, -1, guess, 0, 0.0, 1.0)
-        return None if why == BROKEN else rows.point(0)
-
-    def between(self, before: Point, after: Point, share: float, normal: Point) -> Point | None:
-        """Solve for the point at a share of the chord between two, normal to the tangent of a third."""
-        joints = before.joints + share * (after.joints - before.joints)
-        w = before.w + share * (after.w - before.w)
-        found = self.solve(replace(normal, joints=joints, w=w))
-        if found is not None:
-            found.arc = before.arc + self.apart(before, found)
-        return found
+        given = guess.joints, guess.w, guess.tangent, guess.direction
+        return solve_point(self, *given, self.border)
 
     def first(self) -> Point | None:
         """Return the point next to the orbit, with one of the parameters fixed: the last, if it goes."""

@@ -1,8 +1,7 @@
 """A quantity held at a value while two parameters vary: the curve of such orbits, both ways, to its ends.
 
-The march is that of :mod:`contfric.curves.held_march`. A curve ends at the edge of the ranges, at a limit of
-the model's parameters, and where a margin of its orbits vanishes; all three are zeros of one function, the
-least of what has to be positive, and are located by Brent's method.
+A curve ends at the edge of the ranges, at a limit of the model's parameters, and where a margin of its orbits
+vanishes; all three are zeros of one function, the least of what has to be positive.
 """
 
 from __future__ import annotations
@@ -12,16 +11,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from contfric.continuation.events import (
-    EndReason,
-)
+from contfric.continuation.events import EndReason
 from contfric.continuation.kinds import kind_of_margin
-from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point, Rows
+from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point
 from contfric.continuation.trace import continue_orbit
-from contfric.curves.points import CHUNK
-from contfric.curves.problem import Box, box_of
+from contfric.curves.locating import locate_zero
+from contfric.curves.points import end_of_march, march_on
 from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.quantity_step import Held
+from contfric.curves.ranges import Box, box_of
 from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.curves.trace import largest_step
 from contfric.errors import ConvergenceError, ParameterError, real_number, whole_number
@@ -128,7 +126,7 @@ def both_sides(held: Held, first: Point, largest: float, max_points: int) -> Qua
 def trace_both(
     held: Held, first: Point, largest: float, max_points: int
 ) -> tuple[list[Point], FloatArray, tuple[CurveEnd, CurveEnd]]:
-    """Return the points of a curve with arclengths from its first one, and why it ends at both."""
+    """Return the points of a curve in one direction, with arclengths, and why it ends at both."""
     ahead = HeldSide(held, [first], largest)
     ahead.trace(max_points)
     behind = HeldSide(held, [first.reversed()], largest)
@@ -136,8 +134,9 @@ def trace_both(
         behind.end = CurveEnd(ahead.end.reason)
     else:
         behind.trace(max_points)
-    arc = np.array([*(-p.arc for p in behind.points[:0:-1]), *(p.arc for p in ahead.points)])
-    points = [*behind.points[:0:-1], *ahead.points]
+    back = [replace(p.reversed(), arc=-p.arc) for p in behind.points[:0:-1]]
+    points = [*back, *ahead.points]
+    arc = np.array([point.arc for point in points])
     return points, arc - arc[0], (behind.end, ahead.end)
 
 
@@ -191,17 +190,8 @@ class HeldSide:
 
     def _advance(self, step: float, most: int) -> float | None:
         """March once and keep the points up to an end; return the next step, None if there is one."""
-        from contfric.continuation import march as codes
-
-        last, known = min(2, len(self.points)), len(self.points)
-        room = last + min(CHUNK, most - known)
-        rows = Rows.empty(self.held.orbit.system, room, len(self.held.box.names))
-        for k in range(last):
-            rows.put(k, self.points[known - last + k])
-        why, k, step = self.held.march(
-            rows, last - 1, self.points[0], known - 1, step, self.largest
-        )
-        for point in rows.points(last, k + 1):
+        found = march_on(self.held, self.points, self.held.border, step, self.largest, most)
+        for point in found.rows.points(found.first, found.stop):
             if min(self.held.inside(point)) < 0.0:
                 self._finish(self.points[-1], point)
                 return None
@@ -209,17 +199,11 @@ class HeldSide:
             if len(self.points) > 4 and self._returned():
                 self.end = CurveEnd(CurveEndReason.CLOSED)
                 return None
-        ends = {
-            codes.STEP: CurveEndReason.STEP,
-            codes.BROKEN: CurveEndReason.STEP,
-            codes.CLOSED: CurveEndReason.CLOSED,
-            codes.UNBOUNDED: CurveEndReason.UNBOUNDED,
-            codes.ENDLESS: CurveEndReason.PERIOD,
-        }
-        if why in ends:
-            self.end = CurveEnd(ends[why])
+        reason = end_of_march(found.why)
+        if reason is not None:
+            self.end = CurveEnd(reason)
             return None
-        return step
+        return found.step
 
     def _returned(self) -> bool:
         """Tell whether the last step has passed the start again, in its direction.
@@ -257,26 +241,16 @@ class HeldSide:
 
     def _finish(self, before: Point, after: Point) -> None:
         """Locate where the orbits leave what is allowed, and end there."""
-        from scipy.optimize import brentq
 
-        def solved_at(share: float) -> Point:
-            found = self.held.between(before, after, share, before)
-            if found is None:
-                raise ArithmeticError
-            return found
+        def least(point: Point) -> float:
+            return min(self.held.inside(point))
 
-        def least_at(share: float) -> float:
-            return min(self.held.inside(solved_at(share) if share < 1.0 else after))
-
-        try:
-            if min(self.held.inside(before)) > 0.0:
-                # to the last digits of a step
-                share = float(brentq(least_at, 0.0, 1.0, xtol=1e-15, rtol=1e-14))
-                self.points.append(solved_at(share))
-        except ArithmeticError:
-            self.end = CurveEnd(CurveEndReason.STEP)
-            return
-        self.end = _end_at(self.held, self.points[-1])
+        fine = True
+        if least(before) > 0.0:
+            found, fine = locate_zero(self.held, before, after, self.held.border, least)
+            self.points += [found] if found is not before else []
+        stopped = CurveEnd(CurveEndReason.STEP)
+        self.end = _end_at(self.held, self.points[-1]) if fine else stopped
 
 
 def _end_at(held: Held, point: Point) -> CurveEnd:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,10 @@ from numpy.typing import NDArray
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.points import MOST_POINTS, Point
 from contfric.curves.curve import Curve, CurvePart
-from contfric.curves.problem import Box
+from contfric.curves.locating import locate_zero
 from contfric.curves.quantity_step import Defects, Held
 from contfric.curves.quantity_trace import trace_both
+from contfric.curves.ranges import Box
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.errors import ConvergenceError, ParameterError
 from contfric.models.definition import FloatArray
@@ -141,7 +142,7 @@ def _joined(
         np.array([orbit.labels for orbit in orbits], dtype=np.int64).reshape(len(orbits), -1),
         np.array([orbit.turn_multipliers for orbit in orbits]),
     )
-    special = _resonances(held, points, arc)
+    special = _resonances(held, points)
     ends = []
     for end, position in zip(both, (0.0, float(arc[-1])), strict=True):
         if end.special is not None:
@@ -159,36 +160,23 @@ def _special(kind: CodimTwo, orbit: Orbit, position: float) -> SpecialPoint:
     return SpecialPoint(kind, kind.name, orbit.params, orbit, position=position)
 
 
-def _resonances(held: OnCircle, points: list[Point], arc: FloatArray) -> list[SpecialPoint]:
+def _resonances(held: OnCircle, points: list[Point]) -> list[SpecialPoint]:
     """Return the strong resonances 1:3 and 1:4 between the points, located."""
     found = []
-    angles = [angle_of(held.orbit_of(point)) for point in points]
+    angles = [_angle_at(held, point) for point in points]
     for k, (a, b) in enumerate(itertools.pairwise(points)):
         for kind, angle in _RESONANCES.items():
             if not (angles[k] - angle) * (angles[k + 1] - angle) < 0.0:
                 continue
-            place = _located(held, a, b, angle)
-            if place is not None:
-                share, orbit = place
-                position = float(arc[k] + share * (arc[k + 1] - arc[k]))
-                found.append(_special(kind, orbit, position))
+
+            def beyond(point: Point, angle: float = angle) -> float:
+                return _angle_at(held, point) - angle
+
+            point, fine = locate_zero(held, a, b, held.border, beyond)
+            if fine and point is not a and min(held.inside(point)) >= 0.0:
+                found.append(_special(kind, held.orbit_of(point), point.arc - points[0].arc))
     return found
 
 
-def _located(held: OnCircle, a: Point, b: Point, angle: float) -> tuple[float, Orbit] | None:
-    """Return where between two points the pair has an angle; None where Newton fails."""
-    from scipy.optimize import brentq
-
-    chord = replace(a, tangent=b.joints - a.joints, direction=b.w - a.w)
-
-    def orbit_at(share: float) -> Orbit:
-        point = held.between(a, b, share, chord)
-        if point is None or min(held.inside(point)) < 0.0:
-            raise ArithmeticError
-        return held.orbit_of(point)
-
-    try:  # to the last digits of a step
-        share = brentq(lambda s: angle_of(orbit_at(s)) - angle, 0.0, 1.0, xtol=1e-15, rtol=1e-14)
-        return float(share), orbit_at(float(share))
-    except (ArithmeticError, ValueError):
-        return None
+def _angle_at(held: OnCircle, point: Point) -> float:
+    return angle_of(held.orbit_of(point))

@@ -3,32 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contfric.continuation.events import Bifurcation, Kind
-from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS, Point, Rows
+from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS, Point
 from contfric.curves.assembly import join_sides
-from contfric.curves.births import birth_among, birth_between
+from contfric.curves.births import birth_among
 from contfric.curves.curve import Curve
 from contfric.curves.going_on import Start, goes_on, is_continuum, prove
-from contfric.curves.locating import by_place, locate
-from contfric.curves.naming import crossings
-from contfric.curves.points import CHUNK, first_curve_point, march_rows
-from contfric.curves.problem import Problem, box_of, check_start, problem_of
-from contfric.curves.special import CurveEnd, CurveEndReason, SpecialPoint
+from contfric.curves.points import end_of_march, first_curve_point, march_on
+from contfric.curves.problem import Problem, check_start, problem_of
+from contfric.curves.ranges import box_of
+from contfric.curves.side import CurveSide, end_at_birth, end_at_limit, near_limit, resolve
+from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.errors import ConvergenceError, ParameterError, real_number, whole_number
 from contfric.models.definition import FloatArray, Model
 from contfric.remember.journal import remembered
 
 #: A first point farther than this from the bifurcation (in widths of the ranges) is another one.
 _SAME_START = 1e-4
-#: Share of a range within which a curve that gets no farther has come to a physical limit, where
-#: conditions degenerate together.
-_NEAR_LIMIT = 1e-3
 #: A segment that lasts less than minus this does not exist.
 _NO_TIME = 1e-9
 #: Most changes of the signature along one side of a curve: a chain longer than this goes round.
@@ -37,39 +33,6 @@ _MOST_CHANGES = 24
 _AT_ONE_PLACE = 1e-6
 
 Progress = Callable[[str], None]
-
-
-@dataclass(eq=False)
-class CurveSide:
-    """One side of a curve: its points, what it has met, why it ended.
-
-    Attributes
-    ----------
-    problem : what is followed
-    points : rows of points, in order
-    special : points of codimension two
-    end : why it ended
-    tip : the last point, with its tangent
-    border : the vectors b and c there
-    following : what it goes on as behind its end, where its signature changes
-    """
-
-    problem: Problem
-    points: list[Point]
-    border: FloatArray
-    special: list[SpecialPoint] = field(default_factory=list)
-    end: CurveEnd = field(default_factory=lambda: CurveEnd(CurveEndReason.POINTS))
-    following: CurveSide | None = None
-
-    @property
-    def tip(self) -> Point:
-        """The last point."""
-        return self.points[-1]
-
-    @property
-    def last(self) -> CurveSide:
-        """What it goes on as at its very end."""
-        return self if self.following is None else self.following.last
 
 
 def continue_bifurcation(
@@ -270,116 +233,39 @@ def _trace_piece(
 
 def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[bool, float]:
     """March once and deal with what stopped it; (whether the side is finished, next step)."""
-    from contfric.continuation import march as codes
+    from contfric.continuation.march import EVENT, OUTSIDE
 
     if len(side.points) >= most:
         side.end = CurveEnd(CurveEndReason.POINTS)
         return True, step
-    problem, last = side.problem, min(2, len(side.points))
-    rows = Rows.empty(problem.system, last + min(CHUNK, most - len(side.points)), 2)
-    for k in range(last):
-        rows.put(k, side.points[len(side.points) - last + k])
-    border = side.border.copy()
-    why, k, step = march_rows(
-        problem, rows, last - 1, side.points[0], len(side.points) - 1, border, step, largest, 3e-13
-    )
-    fresh = rows.points(last, k + 1)
-    located = 1 if why == codes.EVENT else 0  # the last point lies behind an event
-    lasts = np.all(np.diff(rows.joints[last : k + 1 - located, :, 0]) > -_NO_TIME, axis=1)
-    gone = _first(~lasts)
+    problem, border = side.problem, side.border.copy()
+    rows, first, stop, why, step = march_on(problem, side.points, border, step, largest, most)
+    fresh = rows.points(first, stop)
+    lasting = stop - 1 if why == EVENT else stop  # the last point lies behind an event
+    gone = _first(~np.all(np.diff(rows.joints[first:lasting, :, 0]) > -_NO_TIME, axis=1))
     if gone is not None:
         side.points += fresh[:gone]
         side.end = CurveEnd(CurveEndReason.LOST)
         return True, step
-    limit = _first(problem.within_limits(rows.w[last : k + 1]) < 0.0)
+    limit = _first(problem.within_limits(rows.w[first:stop]) < 0.0)
     birth = birth_among(problem, [*side.points[-1:], *fresh]) if fresh else None
     if birth is not None and (limit is None or birth <= limit):
-        return _end_at_birth(side, fresh, birth), step
+        return end_at_birth(side, fresh, birth), step
     if limit is not None:
         side.points += fresh[:limit]
-        return _end_at_limit(side, fresh[limit]), step
-    if why in (codes.EVENT, codes.OUTSIDE):
+        return end_at_limit(side, fresh[limit]), step
+    if why in (EVENT, OUTSIDE):
         side.points += fresh[:-1]
-        return _resolve(side, fresh[-1], border), step
+        return resolve(side, fresh[-1], border), step
     side.points += fresh
     side.border = border
-    ends = {
-        codes.STEP: CurveEndReason.STEP,
-        codes.BROKEN: CurveEndReason.LOST,
-        codes.CLOSED: CurveEndReason.CLOSED,
-        codes.UNBOUNDED: CurveEndReason.UNBOUNDED,
-        codes.ENDLESS: CurveEndReason.PERIOD,
-    }
-    if why in ends:
-        side.end = _near_limit(problem, side.tip) or CurveEnd(ends[why])
-        return True, step
-    return False, step
+    reason = end_of_march(why)
+    if reason is not None:
+        side.end = near_limit(problem, side.tip) or CurveEnd(reason)
+    return reason is not None, step
 
 
 def _first(flags: NDArray[np.bool_]) -> int | None:
     """Return the first index that is true; None if none is."""
     places = np.flatnonzero(flags)
     return int(places[0]) if len(places) else None
-
-
-def _beyond(problem: Problem, point: Point) -> float:
-    """Return the least value of the model's constraints at a point."""
-    return float(problem.within_limits(point.w[None, :])[0])
-
-
-def _end_at_birth(side: CurveSide, fresh: list[Point], at: int) -> bool:
-    """End a fold curve of asymmetric (doubled) orbits where they become symmetric (undoubled)."""
-    side.points += fresh[:at]
-    point, special = birth_between(side.problem, side.tip, fresh[at], side.border)
-    side.points.append(point)
-    side.special.append(special)
-    side.end = CurveEnd(CurveEndReason.BIRTH, special=special)
-    return True
-
-
-def _end_at_limit(side: CurveSide, after: Point) -> bool:
-    """End a side where the model's parameters end."""
-    problem = side.problem
-    point, _ = locate(problem, side.tip, after, side.border, by_place(problem.limits))
-    if point is not side.tip:
-        side.points.append(point)
-    side.end = CurveEnd(CurveEndReason.LIMIT)
-    return True
-
-
-def _near_limit(problem: Problem, point: Point) -> CurveEnd | None:
-    near = _beyond(problem, point) < _NEAR_LIMIT * float(np.min(problem.box.widths))
-    return CurveEnd(CurveEndReason.LIMIT) if near else None
-
-
-def _resolve(side: CurveSide, after: Point, border: FloatArray) -> bool:
-    """Locate what happened over the last step; True if the side ends there."""
-    problem, before = side.problem, side.tip
-    limit = _range_crossed(side, after)
-    for crossing in crossings(problem, before, after, side.border):
-        if limit is not None and crossing.point.arc > limit.arc:
-            break
-        side.special.append(crossing.special)
-        if crossing.terminal:
-            side.points.append(crossing.point)
-            side.end = CurveEnd(CurveEndReason.MEETS, special=crossing.special)
-            return True
-    if limit is not None:
-        side.points.append(limit)
-        side.end = CurveEnd(CurveEndReason.RANGE)
-        return True
-    side.points.append(after)
-    side.border = border
-    return False
-
-
-def _range_crossed(side: CurveSide, after: Point) -> Point | None:
-    """Return the point on the edge of the box that the last step has crossed."""
-    box, before = side.problem.box, side.tip
-    if np.all(after.w >= box.low) and np.all(after.w <= box.high):
-        return None
-    inside = before.w @ box.edges[:, :2].T + box.edges[:, 2]
-    if np.min(inside) <= 0.0:
-        return before
-    point, _ = locate(side.problem, before, after, side.border, by_place(box.edges))
-    return point

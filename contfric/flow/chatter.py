@@ -26,10 +26,13 @@ with Lagrange's weights w_i at 0. Those of the nodes are products of the derivat
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.layouts import FLOW, SECOND
+from contfric.flow.variations import FloatArray
 from contfric.handle import TABLE, HandleType
 
 #: By modes: the flight between the impacts (-1: no mode of chatter), observable of the gap, surface of the
@@ -193,6 +196,59 @@ def settle(motion, mode, limit, p):  # type: ignore[no-untyped-def]
             y[i] += here / change * (image[i] - y[i])
 
 
+class Nodes(NamedTuple):
+    """Impacts through which a polynomial in their speed is extrapolated to rest.
+
+    Attributes
+    ----------
+    speeds, values : of each, and its time and state, shapes (count,) and (count, 1 + n)
+    speeds_by, values_by : their derivatives by the start, shapes (count, width) and (count, 1 + n, width)
+    weights : of the extrapolation, shape (count,)
+    """
+
+    speeds: FloatArray
+    values: FloatArray
+    speeds_by: FloatArray
+    values_by: FloatArray
+    weights: FloatArray
+
+
+@allocating_helper
+def keep_node(nodes, count, v, t, y, slopes, side, grad):  # type: ignore[no-untyped-def]
+    """Keep an impact (speed v, time t, state y behind it) as the next node; return their number."""
+    most, n, width = nodes.speeds.shape[0], y.shape[0], nodes.speeds_by.shape[1]
+    if count == most:
+        for i in range(most - 1):
+            nodes.speeds[i], nodes.values[i] = nodes.speeds[i + 1], nodes.values[i + 1]
+            nodes.speeds_by[i], nodes.values_by[i] = nodes.speeds_by[i + 1], nodes.values_by[i + 1]
+        count -= 1
+    nodes.speeds[count], nodes.values[count, 0], nodes.values[count, 1:] = v, t, y
+    speed_by = nodes.speeds_by[count]
+    for j in range(width):
+        speed_by[j] = side * grad[0] * slopes[0, j]
+        if j > n:
+            speed_by[j] += side * grad[j]
+        for i in range(n):
+            speed_by[j] += side * grad[1 + i] * slopes[1 + i, j]
+    if width > 0:
+        nodes.values_by[count] = slopes
+    return count + 1
+
+
+@helper
+def write_limit(nodes, count, limit, jac):  # type: ignore[no-untyped-def]
+    """Write the extrapolated limit, with its derivatives where there is space for them."""
+    for q in range(limit.shape[0]):
+        limit[q] = extrapolated(nodes.speeds, nodes.values, 0, count, nodes.weights, q)
+    for q in range(jac.shape[0]):
+        jac[q, :] = 0.0
+        for i in range(count):
+            slope = slope_at_node(nodes.speeds, nodes.values, count, i, q)
+            for j in range(jac.shape[1]):
+                change = nodes.values_by[i, q, j] - slope * nodes.speeds_by[i, j]
+                jac[q, j] += nodes.weights[i] * change
+
+
 @allocating_helper
 def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-untyped-def]
     """Write the limit (t*, y*) of the impacts from behind one of them; return its error, -1 if there is none.
@@ -200,21 +256,21 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
     ``jac`` (1 + n, 1 + n + k), if it has space: its derivatives by t0, y0 and the parameters.
     """
     n, k = y0.shape[0], which.shape[0]
-    width = 1 + n + k if jac.shape[0] > 0 else 0
+    width, rows = (1 + n + k, 1 + n) if jac.shape[0] > 0 else (0, 0)
     t, y, grad = t0, y0.copy(), np.empty(width)
-    slopes = np.zeros((1 + n if width > 0 else 0, width))
-    for i in range(slopes.shape[0]):
+    slopes = np.zeros((rows, width))
+    for i in range(rows):
         slopes[i, i] = 1.0
-    speeds, weights, nodes = np.empty(_NODES), np.empty(_NODES), np.empty((_NODES, 1 + n))
-    speeds_by = np.zeros((_NODES, width))
-    nodes_by = np.zeros((_NODES, 1 + n if width > 0 else 0, width))
-    none, empty = which[:0], grad[:0]
-    c, node_side = motion.gaps[mode], 0
-    unit, longest = motion.period(p, which[:0], grad[:0]), np.inf
-    if unit > 0.0:
-        longest = _LONGEST * unit
-    else:
-        unit = 1.0
+    nodes = Nodes(
+        np.empty(_NODES),
+        np.empty((_NODES, 1 + n)),
+        np.zeros((_NODES, width)),
+        np.zeros((_NODES, rows, width)),
+        np.empty(_NODES),
+    )
+    none, empty, speeds, weights = which[:0], grad[:0], nodes.speeds, nodes.weights
+    c, node_side, period = motion.gaps[mode], 0, motion.period(p, which[:0], grad[:0])
+    unit, longest = (period, _LONGEST * period) if period > 0.0 else (1.0, np.inf)
     count, highest, last, found, before = 0, 0.0, np.inf, False, np.inf
     for _ in range(MOST_IMPACTS):
         flight, side = flight_at(motion, mode, t, y, p, none, empty)
@@ -223,7 +279,7 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
         highest = max(highest, abs(v))
         if not v > _REST * max(1.0, highest):  # without restitution at once
             limit[0], limit[1:] = t, y
-            for i in range(slopes.shape[0]):
+            for i in range(rows):
                 jac[i, :] = slopes[i, :]
             return 0.0 if v > -1e-6 * max(1.0, highest) else -1.0
         if thrown or t - t0 > longest:
@@ -234,28 +290,10 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
         if count == 0:
             node_side = side
         if count == 0 or (side == node_side and v <= _SHARE * speeds[count - 1]):
-            if count == _NODES:
-                for i in range(_NODES - 1):
-                    speeds[i], nodes[i], speeds_by[i] = (
-                        speeds[i + 1],
-                        nodes[i + 1],
-                        speeds_by[i + 1],
-                    )
-                    nodes_by[i] = nodes_by[i + 1]
-                count -= 1
-            speeds[count], nodes[count, 0], nodes[count, 1:] = v, t, y
-            for j in range(width):
-                speeds_by[count, j] = side * grad[0] * slopes[0, j]
-                if j > n:
-                    speeds_by[count, j] += side * grad[j]
-                for i in range(n):
-                    speeds_by[count, j] += side * grad[1 + i] * slopes[1 + i, j]
-            if width > 0:
-                nodes_by[count] = slopes
-            count += 1
+            count = keep_node(nodes, count, v, t, y, slopes, side, grad)
             if count > 2:
-                shorter = extrapolated(speeds, nodes, 1, count, weights, 0)
-                error = abs(extrapolated(speeds, nodes, 0, count, weights, 0) - shorter)
+                shorter = extrapolated(speeds, nodes.values, 1, count, weights, 0)
+                error = abs(extrapolated(speeds, nodes.values, 0, count, weights, 0) - shorter)
                 rounding = error >= last and last <= _CLOSE * unit
                 last = error
                 if error <= _EXACT * (1.0 + abs(t)) or rounding:
@@ -267,13 +305,6 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
         t += tau
     if not found:
         return -1.0
-    for q in range(1 + n):
-        limit[q] = extrapolated(speeds, nodes, 0, count, weights, q)
-    for q in range(jac.shape[0]):
-        jac[q, :] = 0.0
-        for i in range(count):
-            slope = slope_at_node(speeds, nodes, count, i, q)
-            for j in range(width):
-                jac[q, j] += weights[i] * (nodes_by[i, q, j] - slope * speeds_by[i, j])
+    write_limit(nodes, count, limit, jac)
     settle(motion, mode, limit, p)
     return last

@@ -127,18 +127,7 @@ class Description:
             "departures": [
                 {"where": dict(d.where), "leaves": dict(d.leaves)} for d in self.departures
             ],
-            "resets": {
-                name: {
-                    **texts,
-                    **(
-                        {"to": {lead.mode: dict(lead.where) for lead in self.leads[name]}}
-                        if name in self.leads
-                        else {}
-                    ),
-                    **({"from": list(self.acts[name])} if name in self.acts else {}),
-                }
-                for name, texts in self.resets.items()
-            },
+            "resets": {name: self._reset(name, texts) for name, texts in self.resets.items()},
             "spread": dict(zip(self.states, self.spread, strict=True)),
             "integration": {"method": self.method, "tolerance": self.tolerance},
         }
@@ -150,24 +139,27 @@ class Description:
             }
         if self.symmetry is not None:
             found["symmetry"] = dict(self.symmetry)
-        if self.kinks:
-            found["kinks"] = list(self.kinks)
-        if self.angles:
-            found["angles"] = list(self.angles)
-        if self.stop_surface:
-            found["stop_surface"] = self.stop_surface
         if self.max_step is not None:
             found["max_step"] = self.max_step
-        if self.quantities:
-            found["quantities"] = dict(self.quantities)
         if self.laws:
             found[LAWS] = written(self.laws)
-        if self.units:
-            found["in_units"] = dict(self.units)
-        if self.phase:
-            found["phase"] = self.phase
-        if self.structure:
-            found[STRUCTURE] = dict(self.structure)
+        optional = {
+            "kinks": list(self.kinks),
+            "angles": list(self.angles),
+            "stop_surface": self.stop_surface,
+            "quantities": dict(self.quantities),
+            "in_units": dict(self.units),
+            "phase": self.phase,
+            STRUCTURE: dict(self.structure),
+        }
+        return {**found, **{key: value for key, value in optional.items() if value}}
+
+    def _reset(self, name: str, texts: Mapping[str, str]) -> dict[str, Any]:
+        found: dict[str, Any] = dict(texts)
+        if name in self.leads:
+            found["to"] = {lead.mode: dict(lead.where) for lead in self.leads[name]}
+        if name in self.acts:
+            found["from"] = list(self.acts[name])
         return found
 
     def _mode(self, mode: ModeText) -> dict[str, Any]:

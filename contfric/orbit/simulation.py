@@ -64,23 +64,23 @@ class EventRows(NamedTuple):
     times: FloatArray
     states: FloatArray
 
+    @classmethod
+    def empty(cls, count: int, states: int) -> EventRows:
+        """Return rows for so many events of so many states."""
+        whole = np.empty((count, 2), dtype=np.int64), np.empty(count, dtype=np.int64)
+        return cls(*whole, np.empty(count), np.empty((count, states)))
+
     def first(self, count: int) -> EventRows:
         """Return the first rows, as views."""
-        return EventRows(
-            self.joints[:count], self.cycles[:count], self.times[:count], self.states[:count]
-        )
+        j, c, t, y = self
+        return EventRows(j[:count], c[:count], t[:count], y[:count])
 
 
 def joined(pieces: list[EventRows]) -> EventRows:
     """Return rows of events one after the other; a single piece, as almost always, is not copied."""
     if len(pieces) == 1:
         return pieces[0]
-    return EventRows(
-        np.concatenate([piece.joints for piece in pieces]),
-        np.concatenate([piece.cycles for piece in pieces]),
-        np.concatenate([piece.times for piece in pieces]),
-        np.concatenate([piece.states for piece in pieces]),
-    )
+    return EventRows(*map(np.concatenate, zip(*pieces, strict=True)))
 
 
 @dataclass(frozen=True, repr=False)
@@ -233,8 +233,7 @@ def run(
 
     ``progress`` hears the number of events where that takes more than a tenth of a second.
     """
-    from contfric.orbit.trajectory import ALL_EVENTS, CARRIED, UNIT
-    from contfric.orbit.trajectory import simulate as kernel
+    from contfric.orbit.trajectory import ALL_EVENTS, CARRIED, UNIT, simulate
 
     composed = isinstance(model, ComposedModel)
     model_tables = growing_tables(model).tables() if composed else tables(model)
@@ -243,26 +242,10 @@ def run(
     done, carry, pace = 0, np.zeros(CARRIED), Pace(_FIRST_EVENTS)
     carry[UNIT] = time_scale(model)
     while True:  # between the calls Ctrl-C is heard
-        rows, began = min(pace.budget, events - done), perf_counter()
-        written = EventRows(
-            np.empty((rows, 2), dtype=np.int64),
-            np.empty(rows, dtype=np.int64),
-            np.empty(rows),
-            np.empty((rows, y.shape[0])),
-        )
-        end, count, mode, cycle, phase = kernel(
-            model.flow.following(),
-            model_tables,
-            mode,
-            on,
-            time,
-            y,
-            vector,
-            float(periods),
-            written,
-            carry,
-            pace.budget,
-        )
+        began = perf_counter()
+        written = EventRows.empty(min(pace.budget, events - done), len(y))
+        start = model.flow.following(), model_tables, mode, on, time, y, vector, float(periods)
+        end, count, mode, cycle, phase = simulate(*start, written, carry, pace.budget)
         tally()[3] += count
         pieces.append(written.first(count))
         done += count
@@ -279,19 +262,11 @@ def run(
         time = phase
         pace.took(count if grown else pace.budget, perf_counter() - began)
     found = joined(pieces)
-    last_mode = model.modes[mode].name if mode >= 0 else ""
-    return Trajectory(
-        model,
-        model.mapping(vector),
-        found.joints[:, 0],
-        found.joints[:, 1],
-        found.cycles,
-        found.times,
-        found.states,
-        list(SimulationEnd)[end],
-        (cycle, float(phase), y, last_mode),
-        began_at,
-    )
+    at_last = cycle, float(phase), y, model.modes[mode].name if mode >= 0 else ""
+    modes, exits = found.joints.T
+    columns = modes, exits, found.cycles, found.times, found.states
+    how, params = list(SimulationEnd)[end], model.mapping(vector)
+    return Trajectory(model, params, *columns, how, at_last, began_at)
 
 
 #: Events that a trajectory goes on for.

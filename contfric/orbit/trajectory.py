@@ -263,15 +263,48 @@ def write_event(rows, event, mode, surface, cycle, t):  # type: ignore[no-untype
 
 
 @helper
+def sides_behind(functions, tables, mode, surface, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
+    """Return the sides of all surfaces behind an event, by which the mode that follows is known."""
+    if tables.flights[mode] >= 0:
+        return code_ahead(functions, tables, mode, surface, t, y, p, unit, workspace)
+    landed, none, empty = tables.landed[surface], workspace.none, workspace.empty
+    return sign_code(functions, tables.observables, landed, t, y, p, none, empty)
+
+
+@helper
+def behind_impact(  # type: ignore[no-untyped-def]
+    functions, tables, mode, surface, target, t, struck_at, y, p, unit, carry, workspace
+):
+    """Return (whether the wall is pressed from now on, mode of the chatter that begins; -1 if none does).
+
+    All impacts behind another event, or behind a throw, are one chatter, or none is. ``struck_at`` is the
+    state before the impact, y that behind it.
+    """
+    pressed = is_pressed(
+        functions, tables, mode, surface, target, t, struck_at, y, p, unit, workspace
+    )
+    chatter = tables.chatters[target, surface] if target >= 0 else -1
+    if chatter < 0:
+        return pressed, -1
+    before, c = carry[SPEED], tables.observables[surface]
+    carry[SPEED] = abs(functions.rate(target, c, t, y, p, workspace.none, workspace.empty))
+    anew = int(carry[BOUNCED]) != 1 + surface
+    anew = anew or carry[SPEED] > FASTER * before or carry[AT_ONCE] > MOST_AT_ONCE
+    if pressed or (
+        anew and leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace)
+    ):
+        return pressed, chatter
+    return pressed, -1
+
+
+@helper
 def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, workspace):  # type: ignore[no-untyped-def]
     """Follow a trajectory; see :func:`simulate`."""
-    none, after = workspace.none, workspace.after
+    none, nothing, after = workspace.none, workspace.nothing, workspace.after
     period = functions.period(p, none, workspace.empty)
     unit = period if period > 0.0 else max(1.0, carry[UNIT])
     cycle, t, on = begin(carry, on, t, period)
     event, waited, at_most = 0, 0.0, shortest_flight(tables, mode)
-    at_once, struck = int(carry[AT_ONCE]), carry[STRUCK] != 0.0
-    bounced, speed = int(carry[BOUNCED]), carry[SPEED]
     for _ in range(budget):
         if event == rows.joints.shape[0]:
             break
@@ -283,72 +316,60 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
             waited += stretch
             if left > stretch and not waited < allowance:
                 return never_left(tables, mode), event, mode, cycle, t
-            functions.flow(mode, t, y, stretch, p, none, after, workspace.nothing)
+            functions.flow(mode, t, y, stretch, p, none, after, nothing)
             tau, on = stretch, 0
         copy_state(after, y)
         turns, t = whole_turns(t + tau, period)
         cycle += turns
         if surface < 0:
-            if (  # the impacts that follow are another segment: a mode of chatter begins behind an impact
-                tables.flights[mode] >= 0
-                and bounced > 0
-                and in_flight(functions, tables, mode, bounced - 1, t, y, p, workspace)
-            ):
-                wall, bounced = bounced - 1, 0
+            wall = int(carry[BOUNCED]) - 1
+            # the impacts that follow are another segment: a mode of chatter begins behind an impact
+            chatters = tables.flights[mode] >= 0 and wall >= 0
+            if chatters and in_flight(functions, tables, mode, wall, t, y, p, workspace):
+                carry[BOUNCED] = 0.0
                 mode = flight_of(functions, tables, mode, wall, t, y, p, workspace)
             if left > stretch:
                 continue
             return ALL_TIME, event, mode, cycle, t
         waited = 0.0
         if too_large(y):  # or, where flights were short, they are too short to be resolved
-            chatters = struck and at_once > 0
+            chatters = carry[STRUCK] != 0.0 and carry[AT_ONCE] > 0.0
             return (CHATTER if chatters else INFINITE), event, mode, cycle, t
         reset = tables.bounds[mode, surface] == 2
         if reset:  # rows keep the state before it, as the joints of orbits do
             copy_state(y, rows.states[event])
-            functions.reset(surface, t, rows.states[event], p, none, y, workspace.nothing)
+            functions.reset(surface, t, rows.states[event], p, none, y, nothing)
         on = tables.landed[surface]
-        code = sign_code(functions, tables.observables, on, t, y, p, none, workspace.empty)
-        if tables.flights[mode] >= 0:
-            code = code_ahead(functions, tables, mode, surface, t, y, p, unit, workspace)
+        code = sides_behind(functions, tables, mode, surface, t, y, p, unit, workspace)
         target = mode_after(tables, mode, surface, code)
-        at_once = at_once + 1 if tau <= at_most * unit else 0
-        struck = reset or (struck and at_once > 0)
-        if reset and target == -1:
-            return IMPOSSIBLE, event, mode, cycle, t
-        chatter = tables.chatters[target, surface] if reset and target >= 0 else -1
-        pressed = reset and is_pressed(
-            functions,
-            tables,
-            mode,
-            surface,
-            target,
-            t,
-            rows.states[event],
-            y,
-            p,
-            unit,
-            workspace,
-        )
-        anew, before = bounced != 1 + surface, speed
-        if chatter >= 0:
-            c = tables.observables[surface]
-            speed = abs(functions.rate(target, c, t, y, p, none, workspace.empty))
-            # all impacts behind another event, or behind a throw, are one chatter, or none is
-            anew = anew or speed > FASTER * before or at_once > MOST_AT_ONCE
-        if chatter >= 0 and (
-            pressed
-            or (
-                anew
-                and leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace)
+        carry[AT_ONCE] = carry[AT_ONCE] + 1.0 if tau <= at_most * unit else 0.0
+        struck = reset or (carry[STRUCK] != 0.0 and carry[AT_ONCE] > 0.0)
+        carry[STRUCK] = 1.0 if struck else 0.0
+        pressed, chatter = False, -1
+        if reset:
+            if target == -1:
+                return IMPOSSIBLE, event, mode, cycle, t
+            pressed, chatter = behind_impact(
+                functions,
+                tables,
+                mode,
+                surface,
+                target,
+                t,
+                rows.states[event],
+                y,
+                p,
+                unit,
+                carry,
+                workspace,
             )
-        ):
-            target, at_once = chatter, 0
-        elif pressed or at_once > MOST_AT_ONCE:
+        if chatter >= 0:
+            target, carry[AT_ONCE] = chatter, 0.0
+        elif pressed or carry[AT_ONCE] > MOST_AT_ONCE:
             return (CHATTER if struck else IMPOSSIBLE), event, mode, cycle, t
         if target == -1:
             continue  # nothing leads there: the surface is touched and left to the same side
-        bounced = 1 + surface if reset else 0
+        carry[BOUNCED] = float(1 + surface) if reset else 0.0
         write_event(rows, event, mode, surface, cycle, t)
         if not reset:
             copy_state(y, rows.states[event])
@@ -359,9 +380,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         event += 1
         if mode < 0:  # not visited yet: the tables are to be extended
             break
-    carry[CYCLE], carry[AT_ONCE], carry[ON] = float(cycle), float(at_once), float(on)
-    carry[BOUNCED], carry[SPEED] = float(bounced), speed
-    carry[STRUCK] = 1.0 if struck else 0.0
+    carry[CYCLE], carry[ON] = float(cycle), float(on)
     return ALL_EVENTS, event, mode, cycle, t
 
 

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
-from contfric.plot.lyapunov import edges_of
+from contfric.plot.cells import draw_cells
 from contfric.plot.save import axes_or_new, name_axes
-from contfric.plot.style import BESIDE, GREY, SMALL, branch_colours, lighter, sized
+from contfric.plot.style import GREY, NEXT_TO, SMALL, branch_colours, lighter, sized
 
 if TYPE_CHECKING:
     from contfric.response.basins import Basins
@@ -40,29 +40,20 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     '$x$'
     """
     ax = axes_or_new(ax)
-    (first, across), (second, up) = found.axes.items()
+    first, second = found.axes
     colours = [lighter(c, 0.35) for c in branch_colours(found.names).values()]
     kinds = np.unique(found.motions[found.labels < 0]).tolist()
     number = found.labels.copy()
     for k, code in enumerate(kinds):
         number[(found.labels < 0) & (found.motions == code)] = len(colours) + k
         colours.append(_OTHERS[min(k, len(_OTHERS) - 1)])
-    mesh = ax.pcolormesh(
-        edges_of(across),
-        edges_of(up),
-        number.T,
-        cmap=ListedColormap(colours or [GREY]),
-        vmin=-0.5,
-        vmax=max(1, len(colours)) - 0.5,
-    )
-    mesh.set_rasterized(True)  # a vector file of a million rectangles opens nowhere
+    shades, most = ListedColormap(colours or [GREY]), max(1, len(colours)) - 0.5
+    draw_cells(ax, found.axes, number, cmap=shades, vmin=-0.5, vmax=most)
     _draw_orbits(ax, found, first, second)
     names = [f"{s.name}: {s.share:.1%}" for s in found.shares]
     handles = [Patch(color=c, label=n) for c, n in zip(_shown(found, colours), names, strict=False)]
-    ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **BESIDE)
+    ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **NEXT_TO)
     name_axes(ax, f"${first}$", f"${second}$")
-    ax.set_xlim(edges_of(across)[0], edges_of(across)[-1])
-    ax.set_ylim(edges_of(up)[0], edges_of(up)[-1])
     return ax
 
 

@@ -20,15 +20,10 @@ from matplotlib.axes import Axes
 
 from contfric.plot.events import draw_event
 from contfric.plot.graph import draw_node, frame_nodes
-from contfric.plot.labels import Anchor, place_labels, settle
+from contfric.plot.labels import Anchor, lay_out, place_labels
+from contfric.plot.names import event_label, parameter_label
 from contfric.plot.save import axes_or_new
-from contfric.plot.style import (
-    BRIDGE_COLOUR,
-    GREY,
-    branch_colours,
-    event_label,
-    parameter_label,
-)
+from contfric.plot.style import BRIDGE_COLOUR, GREY, branch_colours
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
@@ -79,7 +74,7 @@ def plot_branch_graph(diagram: Diagram, ax: Axes | None = None) -> Axes:
         draw_node(new, branch.name, place, colour, faded=False)
     anchors = _events(new, joints, places, diagram.parameter)
     frame_nodes(new, places)
-    settle(new)
+    lay_out(new)
     place_labels(new, anchors)
     return new
 

@@ -8,41 +8,23 @@ from typing import TYPE_CHECKING
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from contfric.plot.events import Mark, draw_marks, label_marks, marks_of
+from contfric.plot.events import Mark, label_marks, marks_of
 from contfric.plot.inset import Inset, add_inset
-from contfric.plot.labels import settle
+from contfric.plot.labels import lay_out
 from contfric.plot.legend import handles_of
 from contfric.plot.look import LineStyle, Look
+from contfric.plot.names import full_title
 from contfric.plot.response import draw_overlay
-from contfric.plot.runs import stability_runs
-from contfric.plot.save import axes_or_new, figure_or_new, for_journal, legend_of, name_axes
-from contfric.plot.style import (
-    BESIDE,
-    BRIDGE_COLOUR,
-    BRIDGE_WIDTH,
-    LINE_WIDTH,
-    MIRROR_WIDTH,
-    SMALL,
-    TEXT,
-    UNKNOWN_WIDTH,
-    full_title,
-    greyish,
-    lighter,
-    parameter_label,
-    row_of,
-    sized,
-)
+from contfric.plot.rows import draw_row, model_of
+from contfric.plot.save import axes_or_new, figure_or_new, for_journal, legend_of
+from contfric.plot.style import NEXT_TO, SMALL, TEXT, row_of, sized
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
     from contfric.continuation.branch import Branch
     from contfric.continuation.events import Bifurcation
-    from contfric.models.definition import Model
     from contfric.quantities.registry import QuantityLike
     from contfric.response.sweep import Sweep
-
-#: Width of a figure (inches) below which numbers along its axis would meet, and its parts then.
-_COLUMN, _TICKS = 4.5, 5
 
 
 def plot_branches(
@@ -87,7 +69,7 @@ def plot_branches(
     >>> plot_branches([branch], "psi").get_ylabel()
     '$\\psi$'
     """
-    row_of(row, _model_of(branches))  # before a figure is opened for it
+    row_of(row, model_of(branches))  # before a figure is opened for it
     found = [b for branch in branches for b in branch.bifurcations] if events else []
     look = Look.of(branches, names, colours, linestyles, legend=legend)
     return _plot_row(axes_or_new(ax), branches, found, row, look, outside=ax is None)
@@ -134,7 +116,7 @@ def plot_diagram_row(
     >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     >>> ax = plot_diagram_row(cf.explore(orbit, "Omega", (0.4, 0.6)), "psi")
     """
-    row_of(row, _model_of(diagram.branches))  # before a figure is opened for it
+    row_of(row, model_of(diagram.branches))  # before a figure is opened for it
     found = diagram.bifurcations if events else ()
     look = Look.of(diagram.branches, names, colours, linestyles, legend=legend, inset=inset)
     new = axes_or_new(ax)
@@ -183,7 +165,7 @@ def plot_diagram(
     >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     >>> axes = plot_diagram(cf.explore(orbit, "Omega", (0.4, 0.6)), rows=("x_max", "psi"))
     """
-    looks = [row_of(row, _model_of(diagram.branches)) for row in rows]
+    looks = [row_of(row, model_of(diagram.branches)) for row in rows]
     look = Look.of(diagram.branches, names, colours, linestyles, legend=legend, inset=inset)
     fig = figure_or_new(fig, 8.4, 1.2 + 2.4 * len(rows))
     axes = list(fig.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0])
@@ -197,24 +179,20 @@ def plot_diagram(
         marks_of(diagram.bifurcations, diagram.branches, row, diagram.parameter) for row in rows
     ]
     for ax, row, found in zip(axes, rows, marks, strict=True):
-        _draw_row(ax, diagram.branches, found, row, look)
+        draw_row(ax, diagram.branches, found, row, look)
         ax.label_outer()
     fig.align_ylabels(axes)
     if legend:
         mirrors = any(not shown.even for shown in looks)
         handles = handles_of(diagram.branches, marks[0], look, mirrors=mirrors)
         if fig.get_layout_engine() is None:
-            axes[0].legend(handles=handles, fontsize=sized(SMALL), **BESIDE)
+            axes[0].legend(handles=handles, fontsize=sized(SMALL), **NEXT_TO)
         else:
             legend_of(fig, handles)
-    settle(axes[0])
+    lay_out(axes[0])
     for ax, row, found in zip(axes, rows, marks, strict=True):
         _label_row(ax, diagram.branches, found, row, look)
     return axes
-
-
-def _model_of(branches: Sequence[Branch]) -> Model | None:
-    return branches[0].model if branches else None
 
 
 def fixed_parameters(branches: Sequence[Branch]) -> dict[str, float]:
@@ -238,15 +216,15 @@ def _plot_row(
 ) -> Axes:
     parameter = branches[0].parameter if branches else ""
     marks = marks_of(events, branches, row, parameter)
-    mirrors = not row_of(row, _model_of(branches)).even
-    _draw_row(ax, branches, marks, row, look)
+    mirrors = not row_of(row, model_of(branches)).even
+    draw_row(ax, branches, marks, row, look)
     if look.legend and outside:
         handles = handles_of(branches, marks, look, mirrors=mirrors)
         if for_journal() and isinstance(ax.figure, Figure):
             legend_of(ax.figure, handles)
         else:
-            ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **BESIDE)
-    settle(ax)
+            ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **NEXT_TO)
+    lay_out(ax)
     _label_row(ax, branches, marks, row, look)
     if look.legend and not outside:  # there is no space for the meaning of the markers
         handles = handles_of(branches, (), look, mirrors=mirrors)
@@ -259,65 +237,9 @@ def _label_row(
 ) -> None:
     """Write the labels of a row: those in an inset there."""
     inner, others = add_inset(
-        ax, marks, look.inset, lambda inner: _draw_row(inner, branches, marks, row, look)
+        ax, marks, look.inset, lambda inner: draw_row(inner, branches, marks, row, look)
     )
     label_marks(ax, others)
     if inner is not None:
         low, high = inner.get_xlim()
         label_marks(inner, [m for m in marks if low <= m.x <= high])
-
-
-def _draw_row(
-    ax: Axes, branches: Sequence[Branch], marks: Sequence[Mark], row: QuantityLike, look: Look
-) -> None:
-    label = row_of(row, _model_of(branches))
-    twins = {b.name for b in branches if not b.mirrored} if label.even else set()
-    for branch in sorted(branches, key=lambda b: not b.mirrored):
-        if branch.mirrored and branch.name in twins:
-            continue  # it lies on its original
-        if branch.bridge:
-            _draw_bridge(ax, branch, row, look)
-        else:
-            _draw_branch(ax, branch, row, look)
-    draw_marks(ax, marks)
-    ax.margins(y=0.12)
-    displacement = branches[0].model.states[0] if branches else "x"
-    across = parameter_label(branches[0].parameter) if branches else None
-    name_axes(ax, across, label.name(displacement))
-    if ax.figure.bbox.width / ax.figure.dpi < _COLUMN:
-        ax.locator_params(axis="x", nbins=_TICKS)
-
-
-def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> None:
-    width = MIRROR_WIDTH if branch.mirrored else LINE_WIDTH
-    colour = look.colours[branch.name]
-    colour = lighter(colour) if branch.mirrored else colour
-    for run in stability_runs(branch, row):
-        known = run.stable is not None
-        lines = ax.plot(
-            run.x,
-            run.y,
-            color=colour if known else greyish(colour),
-            linestyle=look.styles[
-                "unknown" if not known else "stable" if run.stable else "unstable"
-            ],
-            linewidth=sized(width if known else UNKNOWN_WIDTH),
-            solid_capstyle="butt",
-            zorder=2.0 + 0.5 * bool(run.stable) - 0.3 * branch.mirrored,
-        )
-        for line in lines:
-            line.set_gid(branch.name)
-
-
-def _draw_bridge(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> None:
-    for run in stability_runs(branch, row):
-        lines = ax.plot(
-            run.x,
-            run.y,
-            color=lighter(BRIDGE_COLOUR, 0.3) if branch.mirrored else BRIDGE_COLOUR,
-            linestyle=look.styles["bridge"],
-            linewidth=sized(BRIDGE_WIDTH),
-            zorder=1.6 - 0.1 * branch.mirrored,
-        )
-        for line in lines:
-            line.set_gid(branch.name)

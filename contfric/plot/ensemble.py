@@ -7,16 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
+from contfric.plot.names import event_label, parameter_label
 from contfric.plot.save import axes_or_new, name_axes
 from contfric.plot.style import (
-    BESIDE,
     LINE_WIDTH,
+    NEXT_TO,
     SMALL,
     STABLE,
     UNSTABLE,
     branch_colours,
-    event_label,
-    parameter_label,
     row_of,
     sized,
 )
@@ -73,7 +72,7 @@ def plot_ensemble(found: Ensemble, ax: Axes | None = None, *, bridges: bool = Fa
     ax.set_xlim(*found.range)
     label = row_of(found.row, found.model).name(found.model.states[0])
     name_axes(ax, parameter_label(found.parameter), label)
-    ax.legend(fontsize=sized(SMALL), frameon=False, **BESIDE)
+    ax.legend(fontsize=sized(SMALL), frameon=False, **NEXT_TO)
     return ax
 
 

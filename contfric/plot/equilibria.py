@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
+from contfric.plot.names import event_label, parameter_label
 from contfric.plot.save import axes_or_new, name_axes
 from contfric.plot.style import (
     BLACK,
@@ -19,9 +20,7 @@ from contfric.plot.style import (
     UNSTABLE,
     YELLOW,
     Marker,
-    event_label,
     lighter,
-    parameter_label,
     sized,
 )
 

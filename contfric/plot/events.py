@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 
 from contfric.models.definition import FloatArray
 from contfric.plot.labels import Anchor, near, place_labels
+from contfric.plot.names import event_label
 from contfric.plot.runs import quantity
-from contfric.plot.style import MARKERS, OTHER_MARKER, event_label, sized
+from contfric.plot.style import MARKERS, OTHER_MARKER, sized
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
@@ -47,10 +48,7 @@ class Mark:
 
 
 def marks_of(
-    events: Sequence[Bifurcation],
-    branches: Sequence[Branch],
-    row: QuantityLike,
-    parameter: str,
+    events: Sequence[Bifurcation], branches: Sequence[Branch], row: QuantityLike, parameter: str
 ) -> list[Mark]:
     """Return the marks of a row, with the images of each event on all branches.
 

@@ -10,17 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch
 
 from contfric.models import Model
+from contfric.plot.names import surface_label
 from contfric.plot.save import axes_or_new
-from contfric.plot.style import (
-    BLACK,
-    GREY,
-    SMALL,
-    TEXT,
-    domain_colours,
-    lighter,
-    sized,
-    surface_label,
-)
+from contfric.plot.style import BLACK, GREY, SMALL, TEXT, domain_colours, lighter, sized
 
 if TYPE_CHECKING:
     from contfric.signature import Signature
@@ -43,7 +35,7 @@ def plot_transition_graph(
     ax : Axes, optional
         Where to draw; new axes by default.
     signature : Signature, optional
-        Its walk is highlighted, each step numbered.
+        Its path is highlighted, each step numbered.
 
     Examples
     --------
@@ -94,8 +86,8 @@ def domain_places(model: Model) -> dict[str, tuple[float, float]]:
 def _steps(signature: Signature | None) -> list[tuple[str, str]]:
     if signature is None:
         return []
-    walk = list(signature.segments)
-    return list(zip(walk, [*walk[1:], walk[0]], strict=True))
+    path = list(signature.segments)
+    return list(zip(path, [*path[1:], path[0]], strict=True))
 
 
 def _draw_transition(
@@ -105,10 +97,10 @@ def _draw_transition(
     target: str,
     surface: str,
     numbers: Sequence[int],
-    walked: bool,
+    highlighted: bool,
 ) -> None:
     start, end = np.array(places[source]), np.array(places[target])
-    colour = BLACK if numbers or not walked else "#C4C4C4"
+    colour = BLACK if numbers or not highlighted else "#C4C4C4"
     arrow = FancyArrowPatch(
         (float(start[0]), float(start[1])),
         (float(end[0]), float(end[1])),
@@ -135,7 +127,7 @@ def _draw_transition(
         float(middle[1]),
         text,
         fontsize=sized(SMALL),
-        color=colour if numbers or walked else GREY,
+        color=colour if numbers or highlighted else GREY,
         ha="center",
         va="center",
         bbox=box,

@@ -7,16 +7,9 @@ from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 
+from contfric.plot.names import parameter_label
 from contfric.plot.save import axes_or_new, name_axes
-from contfric.plot.style import (
-    BLUE,
-    LINE_WIDTH,
-    SMALL,
-    STABLE,
-    UNSTABLE,
-    parameter_label,
-    sized,
-)
+from contfric.plot.style import BLUE, LINE_WIDTH, SMALL, STABLE, UNSTABLE, sized
 
 if TYPE_CHECKING:
     from contfric.curves.quantity_curve import QuantityCurve

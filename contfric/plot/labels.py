@@ -43,7 +43,7 @@ def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
 
     Equal texts at points that cannot be told apart are written once, and a text for which there is no place
     left inside of the axes and off the others is left out. Call it when everything else is drawn, the limits
-    of the axes are set and the layout has converged (:func:`settle`).
+    of the axes are set and the layout has converged (:func:`lay_out`).
     """
     pixels = _point_size(ax)
     todo = _merged(ax, sorted(anchors, key=lambda a: (a.x, a.y)), _ONE * pixels)
@@ -81,7 +81,7 @@ def near(ax: Axes, anchor: Anchor, others: Sequence[Anchor]) -> bool:
     return any(np.hypot(*(ax.transData.transform((o.x, o.y)) - at)) < reach for o in others)
 
 
-def settle(ax: Axes) -> None:
+def lay_out(ax: Axes) -> None:
     """Let the layout of the figure decide where its axes are; labels are placed in pixels."""
     root = _root(ax)
     engine = root.get_layout_engine() if root is not None else None

@@ -9,17 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
-from contfric.models.definition import FloatArray
+from contfric.plot.cells import draw_cells
+from contfric.plot.names import fixed_text, parameter_label
 from contfric.plot.save import axes_or_new, name_axes
-from contfric.plot.style import (
-    GREY,
-    SMALL,
-    TEXT,
-    fixed_text,
-    lighter,
-    parameter_label,
-    sized,
-)
+from contfric.plot.style import GREY, SMALL, TEXT, lighter, sized
 
 if TYPE_CHECKING:
     from contfric.chaos.map import LyapunovMap
@@ -51,52 +44,29 @@ def plot_lyapunov_map(lmap: LyapunovMap, ax: Axes | None = None) -> Axes:
     '$\\Omega$'
     """
     ax = axes_or_new(ax)
-    (first, across), (second, up) = lmap.axes.items()
-    edges = edges_of(across), edges_of(up)
-    _draw_ground(ax, lmap, edges)
-    shown = np.ma.masked_where(~(lmap.chaotic & (lmap.values > 0.0)), lmap.values).T
+    _draw_ground(ax, lmap)
+    shown = np.ma.masked_where(~(lmap.chaotic & (lmap.values > 0.0)), lmap.values)
     highest = float(shown.max()) if shown.count() else 1.0
-    mesh = ax.pcolormesh(*edges, shown, cmap=_SHADES, vmin=0.0, vmax=highest, zorder=1.5)
-    mesh.set_rasterized(True)  # a vector file of a million rectangles opens nowhere
+    mesh = draw_cells(ax, lmap.axes, shown, cmap=_SHADES, vmin=0.0, vmax=highest, zorder=1.5)
     root = ax.figure
     if root is not None:
         bar = root.colorbar(mesh, ax=ax)
         bar.set_label(r"largest Lyapunov exponent $\lambda$", fontsize=sized(TEXT))
         bar.ax.tick_params(labelsize=sized(SMALL + 1))
-    ax.set_xlim(edges[0][0], edges[0][-1])
-    ax.set_ylim(edges[1][0], edges[1][-1])
-    name_axes(ax, parameter_label(first), parameter_label(second))
+    name_axes(ax, *map(parameter_label, lmap.axes))
     ax.set_title(fixed_text(lmap.params), fontsize=sized(TEXT))
     return ax
 
 
-def _draw_ground(ax: Axes, lmap: LyapunovMap, edges: tuple[FloatArray, FloatArray]) -> None:
+def _draw_ground(ax: Axes, lmap: LyapunovMap) -> None:
     """Mark in grey where there are no exponents, and say why."""
     handles = []
     for missing, colour in ((False, _UNBOUNDED), (True, _MISSING)):
         cells = lmap.absent(missing)
         if not cells.any():
             continue
-        ground = np.ma.masked_where(~cells, np.ones(cells.shape)).T
-        ax.pcolormesh(*edges, ground, cmap=ListedColormap([colour]), zorder=1.0).set_rasterized(
-            True
-        )
+        ground = np.ma.masked_where(~cells, np.ones(cells.shape))
+        draw_cells(ax, lmap.axes, ground, cmap=ListedColormap([colour]), zorder=1.0)
         handles.append(Patch(color=colour, label="not computed" if missing else "no exponent"))
     if handles:
         ax.legend(handles=handles, fontsize=sized(SMALL), loc="best")
-
-
-def edges_of(centres: FloatArray) -> FloatArray:
-    """Return the edges of cells around their centres.
-
-    Examples
-    --------
-    >>> edges_of(np.array([1.0, 2.0, 4.0])).tolist()
-    [0.5, 1.5, 3.0, 5.0]
-    """
-    if len(centres) == 1:
-        half = 0.5 * abs(float(centres[0])) or 0.5
-        return np.array([centres[0] - half, centres[0] + half])
-    between = 0.5 * (centres[1:] + centres[:-1])
-    first, last = 2.0 * centres[0] - between[0], 2.0 * centres[-1] - between[-1]
-    return np.concatenate([[first], between, [last]])

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from contfric.errors import ParameterError
-from contfric.plot.labels import Anchor, place_labels, settle
+from contfric.plot.labels import Anchor, lay_out, place_labels
+from contfric.plot.names import fixed_text, parameter_label
 from contfric.plot.orbit_artists import (
     BAND,
     along,
@@ -26,7 +27,7 @@ from contfric.plot.orbit_artists import (
 )
 from contfric.plot.pieces import Piece, pieces_of, rest_bounds
 from contfric.plot.save import axes_or_new, figure_or_new, name_axes
-from contfric.plot.style import BESIDE, SMALL, TEXT, fixed_text, parameter_label, sized
+from contfric.plot.style import NEXT_TO, SMALL, TEXT, sized
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
@@ -71,10 +72,10 @@ def plot_orbit(
     if legend:
         handles = legend_handles(orbit, pieces_of(orbit))
         if ax is None:
-            new.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **BESIDE)
+            new.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **NEXT_TO)
         else:
             new.legend(handles=handles, fontsize=sized(SMALL - 1.0), loc="best")
-    settle(new)
+    lay_out(new)
     place_labels(new, named)
     return new
 
@@ -210,7 +211,7 @@ def plot_orbit_panels(orbit: Orbit, fig: Figure | None = None) -> list[Axes]:
         handlelength=1.5,
         columnspacing=1.3,
     )
-    settle(left[0])
+    lay_out(left[0])
     for ax, labels in zip(left, named, strict=True):
         place_labels(ax, labels)
     return [*left, *right]

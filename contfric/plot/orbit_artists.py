@@ -14,6 +14,7 @@ from contfric.errors import ParameterError, did_you_mean
 from contfric.models import Model
 from contfric.models.definition import FloatArray
 from contfric.plot.labels import Anchor
+from contfric.plot.names import parameter_label, surface_label
 from contfric.plot.pieces import (
     Piece,
     is_sliding,
@@ -23,16 +24,7 @@ from contfric.plot.pieces import (
     rest_bounds,
     rest_limits,
 )
-from contfric.plot.style import (
-    BLACK,
-    GREY,
-    SMALL,
-    domain_colours,
-    domain_labels,
-    parameter_label,
-    sized,
-    surface_label,
-)
+from contfric.plot.style import BLACK, GREY, SMALL, domain_colours, domain_labels, sized
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit

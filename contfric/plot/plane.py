@@ -12,14 +12,15 @@ from matplotlib.lines import Line2D
 
 from contfric.errors import either
 from contfric.models.definition import FloatArray
-from contfric.plot.labels import Anchor, place_labels, settle
+from contfric.plot.labels import Anchor, lay_out, place_labels
+from contfric.plot.names import event_label, parameter_label
 from contfric.plot.save import axes_or_new, name_axes
 from contfric.plot.style import (
-    BESIDE,
     BLACK,
     BLUE,
     GREEN,
     GREY,
+    NEXT_TO,
     ORANGE,
     PURPLE,
     SKY,
@@ -27,8 +28,6 @@ from contfric.plot.style import (
     STABLE,
     UNSTABLE,
     VERMILLION,
-    event_label,
-    parameter_label,
     sized,
 )
 
@@ -87,7 +86,7 @@ def plot_curves(curves: Sequence[Curve], ax: Axes | None = None, *, special: boo
     """
     points = [s for curve in curves for s in curve.special] if special else []
     return _draw(
-        axes_or_new(ax), curves, range(len(curves)), points, BESIDE if ax is None else _INSIDE
+        axes_or_new(ax), curves, range(len(curves)), points, NEXT_TO if ax is None else _INSIDE
     )
 
 
@@ -110,7 +109,7 @@ def plot_plane(
     new.set_xlim(*plane.ranges[0])
     new.set_ylim(*plane.ranges[1])
     points = plane.special if special else ()
-    where = BESIDE if ax is None else _BELOW if legend_below else _INSIDE
+    where = NEXT_TO if ax is None else _BELOW if legend_below else _INSIDE
     return _draw(new, plane.curves, plane.twins, points, where)
 
 
@@ -135,7 +134,7 @@ def _draw(
     name_axes(ax, parameter_label(names[0]), parameter_label(names[1]))
     _mark(ax, special, names)
     _legend(ax, curves, special, legend)
-    settle(ax)
+    lay_out(ax)
     shown = [c for k, c in enumerate(curves) if twins[k] == k]
     shown.sort(key=lambda c: -float(_lengths(ax, c)[-1]))
     anchors = [a for a in (_label_of(ax, c) for c in shown[:_MOST_LABELS]) if a is not None]

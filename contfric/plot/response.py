@@ -9,16 +9,9 @@ from matplotlib.axes import Axes
 
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray
+from contfric.plot.names import fixed_text, parameter_label
 from contfric.plot.save import axes_or_new, name_axes
-from contfric.plot.style import (
-    GREY,
-    SMALL,
-    TEXT,
-    fixed_text,
-    lighter,
-    parameter_label,
-    sized,
-)
+from contfric.plot.style import GREY, SMALL, TEXT, lighter, sized
 
 if TYPE_CHECKING:
     from contfric.quantities.registry import QuantityLike

@@ -12,8 +12,9 @@ from matplotlib.axes import Axes
 
 from contfric.errors import ParameterError, path_of, whole_number
 from contfric.models.definition import FloatArray
+from contfric.plot.names import parameter_label
 from contfric.plot.save import axes_or_new, new_figure
-from contfric.plot.style import BESIDE, BLACK, SMALL, branch_colours, parameter_label, sized
+from contfric.plot.style import BLACK, NEXT_TO, SMALL, branch_colours, sized
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
@@ -61,7 +62,7 @@ def plot_trajectory(trajectory: Trajectory, ax: Axes | None = None, points: int 
     ax.plot(columns[across][0], columns[up][0], "o", color=BLACK, ms=_POINT, label="start")
     ax.set_xlabel(parameter_label(across))
     ax.set_ylabel(parameter_label(up))
-    ax.legend(fontsize=sized(SMALL), frameon=False, **BESIDE)
+    ax.legend(fontsize=sized(SMALL), frameon=False, **NEXT_TO)
     return ax
 
 

@@ -74,10 +74,7 @@ def _check_kind(x: object) -> None:
 def _write_csv(path: Path, table: Columns) -> None:
     rows = zip(*(values.tolist() for values in table.values.values()), strict=True)
     units = (table.units[name] for name in table.values)
-    with (
-        replacing(path) as temporary,
-        temporary.open("w", encoding="utf-8", newline="") as file,
-    ):
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerows(chain([list(table.values), list(units)], rows))
 

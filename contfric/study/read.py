@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from contfric.base.yaml_lines import Address, LocatedYaml, read_yaml
 from contfric.base.yaml_schema import validated
-from contfric.errors import (
-    NotationError,
-    ParameterError,
-    ResultFileError,
-    StudyError,
-    did_you_mean,
-)
+from contfric.errors import NotationError, ParameterError, ResultFileError, StudyError, did_you_mean
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.models.files import relative_model

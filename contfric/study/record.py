@@ -18,15 +18,7 @@ from contfric.study.plan import Plan
 from contfric.study.tasks.task import Found
 
 #: Modules that a run loads only if the study needs them.
-WATCHED = (
-    "numba",
-    "matplotlib",
-    "networkx",
-    "scipy.optimize",
-    "pandas",
-    "pydantic",
-    "yaml",
-)
+WATCHED = ("numba", "matplotlib", "networkx", "scipy.optimize", "pandas", "pydantic", "yaml")
 
 
 def package_version() -> str:
@@ -38,10 +30,7 @@ def package_version() -> str:
 
 
 def record_of(
-    plan: Plan,
-    counts: Counts,
-    timings: Mapping[str, float],
-    found: Found,
+    plan: Plan, counts: Counts, timings: Mapping[str, float], found: Found
 ) -> dict[str, Any]:
     """Return the record of a run as plain data; status and files are added by the run."""
     record: dict[str, Any] = {

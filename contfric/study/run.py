@@ -13,13 +13,7 @@ from typing import Any, TypeVar
 from contfric.errors import ContfricError, ResultFileError, path_of
 from contfric.orbit.counts import Counts, counts
 from contfric.results import save
-from contfric.study.checkpoint import (
-    Checkpoint,
-    check_unfinished,
-    checkpoint_in,
-    goes_on,
-    key_of,
-)
+from contfric.study.checkpoint import Checkpoint, check_unfinished, checkpoint_in, goes_on, key_of
 from contfric.study.drawings import draw
 from contfric.study.folder import Folder, open_folder
 from contfric.study.plan import RECORD, Plan, make_plan

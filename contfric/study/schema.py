@@ -79,8 +79,7 @@ class StudyFile(Part):
         description="'simulate', or a mapping with one of simulate, signature, orbit",
     )
     want: Wants = Field(
-        [],
-        description="a list with any of stability, asymmetry, extrema, stops, and of quantities",
+        [], description="a list with any of stability, asymmetry, extrema, stops, and of quantities"
     )
     figures: list[Figure] = Field([], description="a list of mappings, each with its kind")
 

@@ -9,7 +9,8 @@ import contfric as cf
 from contfric.continuation.points import Settings
 from contfric.continuation.switching import leave_branch_point
 from contfric.curves.leaving import leaving
-from contfric.curves.problem import box_of, problem_of
+from contfric.curves.problem import problem_of
+from contfric.curves.ranges import box_of
 from contfric.curves.trace import trace_curve_side
 
 PLANE = ("Omega", "S")

@@ -466,7 +466,7 @@ def tangent_miss(found: cf.Curve, index: int) -> float:
     for point in (start, start.reversed()):  # a step of the same length to each side
         rows = Rows.empty(problem.system, 2, 2)
         rows.put(0, point)
-        _, last, _ = march_rows(problem, rows, 0, point, 0, border.copy(), 1e-4, 1e-4, 3e-13)
+        _, last, _ = march_rows(problem, rows, 0, point, 0, border.copy(), 1e-4, 1e-4)
         assert last == 1
         sides.append(np.concatenate([rows.joints[1].ravel(), rows.w[1]]))
     chord = sides[0] - sides[1]

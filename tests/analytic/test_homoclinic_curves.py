@@ -41,15 +41,15 @@ def distance(period: float) -> float:
 
 def test_curve_comes_to_the_homoclinic_one_exponentially() -> None:
     """The upright wheel has the eigenvalue 1: two units of time more are a factor e^-2 in the parameter."""
-    errors = [distance(period) for period in (6.0, 8.0, 10.0)]
-    assert errors[-1] < 1e-5
+    errors = [distance(period) for period in (8.0, 10.0, 12.0, 14.0)]
+    assert errors[2] < 5e-6
     for longer, shorter in zip(errors[1:], errors[:-1], strict=True):
         assert longer / shorter == pytest.approx(math.exp(-2.0), rel=0.02)
 
 
-@pytest.mark.xfail(reason="Newton's corrections do not fall where motions part by 1e5 in a period")
 def test_curve_of_a_long_period() -> None:
-    assert distance(12.0) < 5e-6
+    """Solutions part by 1e7 in a period: Newton converges at the ends from the cubic, not from the chord."""
+    assert distance(16.0) < 5e-8
 
 
 def test_what_is_no_homoclinic_end_is_refused() -> None:

@@ -42,6 +42,7 @@ from contfric.plot import (
 )
 from contfric.plot.events import marks_of
 from contfric.plot.labels import Anchor, place_labels
+from contfric.plot.names import event_label, parameter_label, surface_label
 from contfric.plot.orbit import _columns
 from contfric.plot.pieces import level, observe, pieces_of
 from contfric.plot.runs import aligned, stability_runs
@@ -51,10 +52,7 @@ from contfric.plot.style import (
     UNSTABLE,
     branch_colours,
     domain_colours,
-    event_label,
     lighter,
-    parameter_label,
-    surface_label,
 )
 
 FIG5 = {"Omega": 0.5, "S": 0.32, "S0": 0.4}

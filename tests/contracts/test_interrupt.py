@@ -33,14 +33,12 @@ from contfric.chaos.cells import follow_cells
 from contfric.continuation.bracket import locate
 from contfric.continuation.march import march
 from contfric.curves.bracket import locate_on_curve
-from contfric.curves.held_march import march_held
 from contfric.curves.march import march_curve
 from contfric.orbit.trajectory import simulate
 from contfric.response.capture import capture
 from contfric.response.section import cut_solutions
 
-kernels = (sweep, follow_cells, locate, march, locate_on_curve, march_curve, march_held, simulate, capture,
-           cut_solutions)
+kernels = (sweep, follow_cells, locate, march, locate_on_curve, march_curve, simulate, capture, cut_solutions)
 for kernel in kernels:
     kernel.dispatcher  # compiled before anything is interrupted
 model, start, parameter, bounds, other, span = {

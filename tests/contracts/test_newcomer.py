@@ -11,7 +11,7 @@ import pytest
 import contfric as cf
 from contfric.atlas.plane_sections import sections_of
 from contfric.base.extras import MissingPackageError
-from contfric.curves.problem import box_of
+from contfric.curves.ranges import box_of
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 RANGES = {"Omega": (0.5, 0.6), "S": (0.3, 0.34)}

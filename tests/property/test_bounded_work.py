@@ -17,7 +17,8 @@ import contfric as cf
 from contfric.continuation.points import settings_of
 from contfric.continuation.side import first_point
 from contfric.curves.points import solve_point
-from contfric.curves.problem import border_of, box_of, problem_of
+from contfric.curves.problem import border_of, problem_of
+from contfric.curves.ranges import box_of
 from contfric.orbit.solve import polish
 
 #: Starts, and time that they may take together (s): each is a few thousand evaluations at worst.

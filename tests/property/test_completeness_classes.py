@@ -14,8 +14,8 @@ import pytest
 
 import contfric as cf
 from contfric.continuation.along_curve import Line
+from contfric.continuation.doubling_point import _LOCATED, opening
 from contfric.continuation.report import ROUGH
-from contfric.continuation.vertices import _LOCATED, opening
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "stress"))
 import restarts

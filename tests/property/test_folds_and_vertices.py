@@ -15,13 +15,14 @@ from contfric.atlas.follow import _through
 from contfric.atlas.matching import same_kind, telling_kind
 from contfric.base.tally import tally
 from contfric.continuation import kinds, smooth
+from contfric.continuation.doubling_point import moved, opening, refined_opening
+from contfric.continuation.folds import _is_idle
 from contfric.continuation.points import Point, settings_of
 from contfric.continuation.side import first_point
-from contfric.continuation.smooth import _is_idle
 from contfric.continuation.switching import LEAVE, leave_branch_point, overshoots
 from contfric.continuation.trace import trace_side
 from contfric.continuation.vertex_between import left_at
-from contfric.continuation.vertices import moved, opening, passed_vertex, refined_opening
+from contfric.continuation.vertices import passed_vertex
 from contfric.orbit.simulation import tables
 from contfric.orbit.system import Margin
 

@@ -14,6 +14,7 @@ from contfric.base.extras import need_bokeh
 from contfric.base.files import replacing
 from contfric.plot.diagram import fixed_parameters
 from contfric.plot.live.collect import Detail, collect, symbol
+from contfric.plot.names import parameter_label
 from contfric.plot.style import (
     BLACK,
     BLUE,
@@ -26,7 +27,6 @@ from contfric.plot.style import (
     SKY,
     UNKNOWN_WIDTH,
     VERMILLION,
-    parameter_label,
 )
 
 if TYPE_CHECKING:

@@ -33,10 +33,7 @@ class ExploreTask(OneParameter):
         "is discontinuous",
     )
     max_periods: int | None = Field(
-        None,
-        ge=1,
-        le=16,
-        description="a whole number from 1 to 16: longest orbits, in periods",
+        None, ge=1, le=16, description="a whole number from 1 to 16: longest orbits, in periods"
     )
     copies: int | None = Field(
         None,

@@ -102,7 +102,8 @@ class LyapunovTask(Task):
     def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
         """Draw the map."""
         from contfric.plot.lyapunov import plot_lyapunov_map
-        from contfric.plot.style import TEXT, full_title, sized
+        from contfric.plot.names import full_title
+        from contfric.plot.style import TEXT, sized
 
         lmap: LyapunovMap = found["lyapunov"]
         axes = plot_lyapunov_map(lmap, ax=figure.add_subplot())

@@ -112,7 +112,8 @@ class OneParameter(Task):
         diagram: Diagram = found["diagram"]
         if drawing.kind == "branches":
             from contfric.plot.branch_graph import plot_branch_graph
-            from contfric.plot.style import TEXT, sized, title_label
+            from contfric.plot.names import title_label
+            from contfric.plot.style import TEXT, sized
 
             axes = figure.add_subplot()
             plot_branch_graph(diagram, ax=axes)

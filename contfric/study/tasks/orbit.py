@@ -44,10 +44,7 @@ class Start(Task):
     name = "orbit"
     result = "orbit"
     saved_as = "orbit.npz"
-    figures: ClassVar = {
-        "orbit": FigureKind(9.0, 6.2),
-        "transitions": FigureKind(7.0, 5.0),
-    }
+    figures: ClassVar = {"orbit": FigureKind(9.0, 6.2), "transitions": FigureKind(7.0, 5.0)}
 
     simulate: Simulated | None = Field(None, description=keys_of(Simulated))
     signature: str | None = Field(

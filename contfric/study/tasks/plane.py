@@ -73,7 +73,7 @@ class PlaneTask(Task):
     ) -> None:
         """Check ranges, sections and kinds."""
         from contfric.continuation.events import Kind
-        from contfric.curves.problem import box_of
+        from contfric.curves.ranges import box_of
 
         one, other = self.parameters
         ranges = {name: (pair[0], pair[-1]) for name, pair in self.range.items()}
@@ -138,8 +138,9 @@ class PlaneTask(Task):
     def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
         """Draw the curves, over a map of Lyapunov exponents of the same plane."""
         from contfric.plot.lyapunov import plot_lyapunov_map
+        from contfric.plot.names import title_label
         from contfric.plot.plane import plot_plane
-        from contfric.plot.style import TEXT, sized, title_label
+        from contfric.plot.style import TEXT, sized
 
         plane, lmap, axes = found["plane"], found.get("lyapunov"), figure.add_subplot()
         if lmap is not None and tuple(lmap.axes) == plane.parameters:

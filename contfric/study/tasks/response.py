@@ -31,7 +31,8 @@ class Response(Task):
 
     def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
         """Let the result draw itself, with the parameters that it keeps in the title."""
-        from contfric.plot.style import TEXT, full_title, sized
+        from contfric.plot.names import full_title
+        from contfric.plot.style import TEXT, sized
 
         response = found[self.result]
         fixed = dict(response.params)
