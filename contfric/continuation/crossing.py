@@ -136,19 +136,33 @@ class _Problem:
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return F, shape (N,), and J, shape (N, N + 1)."""
-        residual, jacobian, by_parameters = equations_at(self.system, *self.split(x))
-        column = by_parameters[:, self.active] * self.width
-        return residual, np.column_stack([jacobian, column])
+        joints, vector = self.split(x)
+        residual, jacobian, column = equations_at(self.system, joints, vector, (self.active,))
+        return residual, np.column_stack([jacobian, self.width * column])
 
     def hessian(self, x: FloatArray, psi: FloatArray) -> FloatArray:
-        """Return the second derivatives of psi . F, shape (N + 1, N + 1), by central differences."""
-        rows = np.empty((len(x), len(x)))
-        for k in range(len(x)):
-            step = _STEP * (1.0 + abs(float(x[k])))
+        """Return the second derivatives of psi . F, shape (N + 1, N + 1), by central differences.
+
+        The equations of a segment depend on its two joints. So every second joint is moved at once (every
+        third one where their number is odd), and what changes in the equations of a segment is due to the
+        one of its joints that moves.
+        """
+        count, rows = self.system.segments, np.zeros((len(x), len(x)))
+        size, shares = len(psi) // count, psi.reshape(count, 1, -1)
+        steps = _STEP * (1.0 + np.abs(x))
+        colours = np.arange(count) % 2
+        colours[-1] += 2 * (count % 2)
+        moves = [np.flatnonzero(colours == c) * size + i for c in range(4) for i in range(size)]
+        for moved in [*(m for m in moves if len(m)), np.array([len(x) - 1])]:
             ahead, behind = x.copy(), x.copy()
-            ahead[k] += step
-            behind[k] -= step
-            rows[k] = (psi @ (self.at(ahead)[1] - self.at(behind)[1])) / (2.0 * step)
+            ahead[moved] += steps[moved]
+            behind[moved] -= steps[moved]
+            change = self.at(ahead)[1] - self.at(behind)[1]
+            change = (shares @ change.reshape(count, size, -1))[:, 0]  # by equations of segments
+            for k in moved:
+                own = {k // size, (k // size - 1) % count} if k < len(psi) else range(count)
+                rows[k] = change[sorted(own)].sum(axis=0)
+        rows /= 2.0 * steps[:, None]
         return np.asarray(0.5 * (rows + rows.T))
 
 

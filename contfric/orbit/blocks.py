@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import types
 
-from contfric.compiled import blocks, helper, kernel, matrix, vector
+from contfric.compiled import blocks, helper, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.orbit.equations import (
     LayoutType,
@@ -45,17 +45,18 @@ def rates_at_joint(functions, layout, i, after, p, which, workspace, rows):  # t
         rows[m + j, m] -= change
 
 
-@kernel(types.boolean(FlowType, LayoutType, matrix, vector, blocks, blocks, blocks, blocks, matrix))
-def linearise(functions, layout, z, p, a, b, c, r, close):  # type: ignore[no-untyped-def]
+@kernel(
+    types.boolean(
+        *(FlowType, LayoutType, matrix, vector, indices, blocks, blocks, blocks, blocks, matrix)
+    )
+)
+def linearise(functions, layout, z, p, which, a, b, c, r, close):  # type: ignore[no-untyped-def]
     """Fill the blocks of the full Jacobian for use outside of the engine.
 
-    The first parameters are differentiated by, as many as ``c`` has columns: none or all.
+    Differentiated by the parameters ``which``, as many as ``c`` has columns.
     """
     count, m = z.shape
     free = c.shape[2]
-    which = np.empty(free, dtype=np.int64)
-    for k in range(free):
-        which[k] = k
     workspace, rows = equation_workspace(count, m, free), np.empty((2 * m, 3 * m + free + 1))
     close_chain(functions, layout, z, p, which, workspace)
     for i in range(m):

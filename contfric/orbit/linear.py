@@ -5,6 +5,8 @@ For single orbits; along a branch the engine has the pencil from the elimination
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,36 +19,38 @@ _NULL = 1e-7
 
 
 def jacobian_blocks(
-    system: System, joints: FloatArray, vector: FloatArray, parameters: bool = True
+    system: System, joints: FloatArray, vector: FloatArray, parameters: bool | Sequence[int] = True
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the blocks on z_i, z_{i+1} and the parameters, and the closure.
 
-    Shapes (N, m, m), (N, m, m), (N, m, parameters) and (m, m). Without ``parameters`` the third has none:
-    where motion is integrated most of the time goes to them.
+    Shapes (N, m, m), (N, m, m), (N, m, parameters) and (m, m). The third has all parameters, some or none:
+    most of the time goes to them where motion is integrated, or they are in the matrices of linear motion.
     """
     a, b, c, close, _ = linearised(system, joints, vector, parameters)
     return a, b, c, close
 
 
 def linearised(
-    system: System, joints: FloatArray, vector: FloatArray, parameters: bool = True
+    system: System, joints: FloatArray, vector: FloatArray, parameters: bool | Sequence[int] = True
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the blocks and, as the last one, what is left of every equation, shape (N m,)."""
     from contfric.orbit.blocks import linearise
 
     count, m = joints.shape
     a, b = np.empty((count, m, m)), np.empty((count, m, m))
-    c, r = np.empty((count, m, len(vector) if parameters else 0)), np.empty((count, m, 1))
+    chosen = parameters if not isinstance(parameters, bool) else range(len(vector) * parameters)
+    which = np.array(chosen, dtype=np.int64)
+    c, r = np.empty((count, m, len(which))), np.empty((count, m, 1))
     close = np.empty((m, m))
-    linearise(system.functions(), system.layout, joints, vector, a, b, c, r, close)
+    linearise(system.functions(), system.layout, joints, vector, which, a, b, c, r, close)
     return a, b, c, close, r.ravel()
 
 
 def equations_at(
-    system: System, joints: FloatArray, vector: FloatArray
+    system: System, joints: FloatArray, vector: FloatArray, parameters: bool | Sequence[int] = True
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return residuals and Jacobians by joints and parameters: (N m,), (N m, N m), (N m, parameters)."""
-    a, b, c, close, correction = linearised(system, joints, vector)
+    a, b, c, close, correction = linearised(system, joints, vector, parameters)
     return -correction, stacked(a, b, close), c.reshape(joints.size, -1)
 
 
@@ -84,11 +88,11 @@ def tangent_of(
     numpy.linalg.LinAlgError
         If the curve has no unique direction.
     """
-    a, b, c, close = jacobian_blocks(system, joints, vector)
+    a, b, c, close = jacobian_blocks(system, joints, vector, (active,))
     size = joints.size
     full = np.empty((size + 1, size + 1))
     full[:size, :size] = stacked(a, b, close)
-    full[:size, size] = c[:, :, active].ravel()
+    full[:size, size] = c.ravel()
     wanted = np.zeros(size + 1)
     wanted[size] = 1.0
     null: FloatArray = np.cos(np.arange(1.0, size + 2.0))  # no direction of an orbit
@@ -113,8 +117,8 @@ def null_space(
     The null vectors of the Jacobian with the parameter's column, shapes (k, N, m) and (k,): one where the
     curve has a unique direction.
     """
-    a, b, c, close = jacobian_blocks(system, joints, vector)
-    full = np.hstack([stacked(a, b, close), c[:, :, active].reshape(-1, 1)])
+    a, b, c, close = jacobian_blocks(system, joints, vector, (active,))
+    full = np.hstack([stacked(a, b, close), c.reshape(-1, 1)])
     _, size, right = np.linalg.svd(full)
     rank = int(np.sum(size > _NULL * size[0]))
     found = right[rank:]

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from math import comb
+
+import numba
 import numpy as np
 import pytest
 
 import contfric as cf
 from contfric.flow import forced_oscillator as by_hand
+from contfric.flow.linear.search import first_root, sixth_of
+from contfric.flow.linear.system import TERMS
 
 NONE, EMPTY, ALL = np.empty(0, dtype=np.int64), np.empty(0), np.arange(5)
 LOAD, SPEED, STICK = 0, 1, 2
@@ -40,3 +45,28 @@ def test_segments_agree(seed: int) -> None:
         n = flow.stationary(mode, c, t0, y, dt, p, times[0], values[0])
         assert n == by_hand.stationary(mode, c, t0, y, dt, p, times[1], values[1])
         assert np.all(np.abs(np.diff(values[:, :n], axis=0)) < 1e-12)
+
+
+@numba.njit  # type: ignore[untyped-decorator]
+def root_in_step(poly, terms):  # type: ignore[no-untyped-def]
+    """The first root of a polynomial that is positive at first."""
+    return first_root(poly, 0, terms, 0.0, 1.0, sixth_of(poly, 0, terms))
+
+
+@pytest.mark.parametrize("order", [2, 3, 4, 6])
+@pytest.mark.parametrize("factor", [1.0, 1e-3, 1e-6])
+@pytest.mark.parametrize("moved", [0.0, 1e-17, -1e-17, 2e-16, -2e-16, 1e-9, -1e-9])
+def test_a_level_that_is_touched_at_the_end_of_a_step(
+    order: int, factor: float, moved: float
+) -> None:
+    """A root or none where a zero of some order is rounding: never a search without an end."""
+    poly = np.zeros(TERMS + 2)
+    poly[: order + 1] = [factor * comb(order, k) * (-1.0) ** k for k in range(order + 1)]
+    poly[0] += moved
+    at, _ = root_in_step(poly, order)
+    rounding = 1e-15 * (1.0 + factor * 2.0**order)
+    if at >= 0.0:
+        assert abs(factor * (1.0 - at) ** order + moved) <= rounding
+    else:
+        assert at == -1.0
+        assert moved >= -rounding

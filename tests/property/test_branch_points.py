@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.continuation.crossing import crossing_near
+from contfric.continuation.crossing import _Problem, crossing_near
 from contfric.continuation.events import EndReason
 from contfric.continuation.points import settings_of
 from contfric.continuation.side import first_point
@@ -136,3 +136,20 @@ def test_a_stalled_branch_says_whether_a_multiplier_is_at_one(
     message, event = stalled_at(orbit, tip, settings)
     assert message.startswith(EndReason.STEP.value) and text in message
     assert event is None  # the curve of the orbit passes there, or there is none
+
+
+@pytest.mark.parametrize("signature", ["2s", "1a"])
+def test_second_derivatives_from_several_joints_at_once(signature: str) -> None:
+    """Those of each unknown moved alone, with an even and an odd number of segments."""
+    orbit = cf.solve_orbit("coulomb", signature, {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    active = orbit.model.index_of("Omega")
+    problem = _Problem(orbit.system, orbit.vector, active, 0.3)
+    x = np.append(orbit.joints.ravel(), orbit.vector[active] / 0.3)
+    psi = np.random.default_rng(3).normal(size=len(x) - 1)
+    plain = np.empty((len(x), len(x)))
+    for k in range(len(x)):
+        step = np.zeros(len(x))
+        step[k] = 1e-5
+        plain[k] = psi @ (problem.at(x + step)[1] - problem.at(x - step)[1]) / 2e-5
+    found = problem.hessian(x, psi)
+    assert np.allclose(found, 0.5 * (plain + plain.T), atol=1e-6 * np.abs(plain).max())

@@ -23,6 +23,7 @@ from contfric.compiled import allocating_helper, inlined_helper
 from contfric.compiling.shared import numbers_at, try_lock, unlock
 from contfric.flow.folding import folded
 from contfric.flow.linear.kept import NUMBERS, advance_kept, space_of
+from contfric.flow.linear.responses import pairs_space
 from contfric.flow.linear.steps import SMALL, advance, exponential
 from contfric.flow.linear.system import (
     REACH,
@@ -56,7 +57,7 @@ def flow_in(motion, piece, t, y0, dt, p, which, y1, jac, workspace):  # type: ig
         full = jac.shape[0] > 0
         if not (
             memory.shape[0] > 0
-            and advance_kept(motion, piece, t, dt, rate, spread, y1, memory, system)
+            and advance_kept(motion, piece, t, dt, rate, spread, y1, memory, workspace[4], system)
         ):
             advance(motion, piece, t, dt, rate, spread, y1, system)
             if full:
@@ -93,7 +94,8 @@ def linear_flow(motion, piece, t0, y0, dt, p, which, y1, jac):  # type: ignore[n
     locked = keeps and try_lock(motion.memory) != 0
     space = space_of(n, coefficients.shape[1], waves.shape[1]) if keeps and not locked else 0
     memory = numbers_at(motion.memory, NUMBERS) if locked else np.zeros(space)
-    workspace = (coefficients, waves, rows, memory)
+    pairs = np.empty(pairs_space(n, motion.waves_count, free) if keeps else 0)
+    workspace = (coefficients, waves, rows, memory, pairs)
     flow_in(motion, piece, t0 - cycles * period, y0, dt, p, wanted, y1, jac, workspace)
     if locked:
         unlock(motion.memory)

@@ -4,11 +4,11 @@ Along a branch, and from step to step of Newton's method, durations d change lit
 the free parameter does not change. So d is taken apart: ``d = k h + r``, with h a power of two that is a
 sixteenth to an eighth of 1 / rate, and ``|r| <= h / 2``. Of the part k h are kept
 
-    E_k = exp(A k h)   and, for a unit force in each row with waves, its response U_k from rest,
+    E_k = exp(A k h)   and, for a unit force in each row with waves, its responses from rest,
 
-to ``cos(w t)`` and to ``sin(w t)``. A force ``a cos(w (t0 + t)) + b sin(w (t0 + t))`` is, with c and s the
-cosine and sine of ``w t0``, ``(a c + b s) cos(w t) + (b c - a s) sin(w t)``. So the state at k h, and its
-derivatives by t0 and by parameters that are factors of waves, are sums of kept columns. The part r is a
+where E_k is a product of kept powers (:mod:`contfric.flow.linear.ladder`). So the state at k h, and its
+derivatives by t0 and by parameters that are factors of waves, are sums of kept columns; where a frequency is
+free, or the motion long, responses are found anew (:mod:`contfric.flow.linear.responses`). The part r is a
 series of ten terms. Nothing depends on what was asked before: E_k is a function of A, h and k alone.
 
 The memory belongs to the model. Two threads may ask at the same time: the second one computes anew.
@@ -19,47 +19,50 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from contfric.compiled import inlined_helper
-from contfric.flow.linear.steps import advance, carry_by_series, exponential, step_over, steps_of
-from contfric.flow.linear.system import TERMS, FloatArray, start_waves, sum_of, terms_for
+from contfric.compiled import helper, inlined_helper
+from contfric.flow.linear.ladder import (
+    FIRST,
+    LEVELS,
+    ROWS,
+    STAMP,
+    H,
+    add_product,
+    begin,
+    ladder_in,
+    ladder_length,
+    note_waves,
+    power_of,
+)
+from contfric.flow.linear.responses import pairs_in, respond_to_forces, respond_to_units
+from contfric.flow.linear.steps import advance, carry_by_series, step_over
+from contfric.flow.linear.system import TERMS, FloatArray, start_waves, terms_for
 
-#: Numbers that a model's memory has, 8 MB: it is taken from the system as it is used.
-NUMBERS = 2**20
-#: Most motions that are kept.
-_SLOTS = 64
-#: h is at most this over the rate, and at least half of it; steps are those of the rate _SHARE / h.
+#: Numbers that a model's memory has, 32 MB: it is taken from the system as it is used.
+NUMBERS = 2**22
+#: Most motions that are kept, and most matrices.
+_SLOTS, _LADDERS = 64, 32
+#: h is at most this over the rate, and at least half of it.
 _SHARE = 0.125
-#: A longer motion adds up too much rounding: forces of a rigid body that cancel are kept one by one.
-_LONGEST = 1024.0
-#: Where things are in the memory: the lock, the length of a slot, the slot that is overwritten next; then
-#: the number of the piece (from 1), and k, of each slot; then the slots.
-_LOCK, _LENGTH, _NEXT, _KEYS = range(4)
-#: Where things are in a slot: h, first coefficient of a wave, rows with waves, whether responses are there.
-H, FIRST, ROWS, FORCED, _HEAD = range(5)
+#: Most steps of a motion whose responses to unit forces are kept.
+_LONGEST = 1024
+#: Where things are in the memory: the lock, the lengths of a slot and of the powers of a matrix, those that
+#: are overwritten next, matrices so far; then the number of the piece (from 1), and k, of each slot; the
+#: piece of each matrix; then the slots, and the powers.
+_LOCK, _LENGTH, _HEIGHT, _NEXT, _NEXT_LADDER, _COUNT, _KEYS = range(7)
+_BEGIN = _KEYS + 2 * _SLOTS + _LADDERS
+#: Where things are in a slot: the matrix that it is of, whether what depends on frequencies is there.
+OF, FORCED, HEAD = range(3)
 
 
 @inlined_helper
 def cut(rate, dt):  # type: ignore[no-untyped-def]
     """Return (k, h) of a duration; k = 0 where nothing is to be kept of it."""
     if not 0.0 < rate * dt < math.inf:
-        return 0.0, 0.0
+        return 0, 0.0
     _, power = math.frexp(rate / _SHARE)
     h = math.ldexp(1.0, -power)
     k = math.floor(dt / h + 0.5)
-    return (k, h) if k <= _LONGEST else (0.0, 0.0)
-
-
-@inlined_helper
-def acts_on_waves(system, first):  # type: ignore[no-untyped-def]
-    """Tell whether all parameters are factors of waves: neither in the matrix nor in a frequency."""
-    for k in range(system.slopes.shape[0]):
-        for j in range(first):
-            if system.slopes[k, j] != 0.0:
-                return False
-        for j in range(system.dw.shape[1]):
-            if system.dw[k, j] != 0.0:
-                return False
-    return True
+    return (int(k), h) if k < 2**LEVELS else (0, 0.0)
 
 
 class Slot(NamedTuple):
@@ -67,52 +70,40 @@ class Slot(NamedTuple):
 
     Attributes
     ----------
-    head : h, first coefficient of a wave, number of rows with waves, and whether their responses are there
-    co, w : the coefficients and frequencies that it belongs to
-    harmonics : of the rows with waves
-    exponential : E, (n, n)
-    responses : U of each row with waves, to cosine and sine, (2 rows, n)
+    head : the matrix that it is of, and whether responses are there
+    w : the frequencies that these belong to
+    exponential : E, transposed, (n, n)
+    responses : to a unit force in each row with waves, at the phases 0 and a quarter, (2 rows, n)
     """
 
     head: FloatArray
-    co: FloatArray
     w: FloatArray
-    harmonics: FloatArray
     exponential: FloatArray
     responses: FloatArray
 
 
 @inlined_helper
-def head_of(entries, waves, n):  # type: ignore[no-untyped-def]
-    """Return the numbers of a slot before what is kept."""
-    return _HEAD + entries + waves + n
-
-
-@inlined_helper
-def length_of(n, entries, waves):  # type: ignore[no-untyped-def]
+def slot_length(n, entries, waves):  # type: ignore[no-untyped-def]
     """Return the numbers that a slot needs."""
-    return head_of(entries, waves, n) + entries + 3 * n * max(n, TERMS + 1)
+    return HEAD + waves + entries + 3 * n * max(n, TERMS + 1)
 
 
 @inlined_helper
 def space_of(n, entries, waves):  # type: ignore[no-untyped-def]
-    """Return the numbers of a memory of one call that finds the other one taken: two slots."""
-    return min(NUMBERS, _KEYS + 2 * _SLOTS + 2 * length_of(n, entries, waves))
+    """Return the numbers of a memory of one call that finds the other one taken."""
+    return min(NUMBERS, _BEGIN + 2 * slot_length(n, entries, waves) + ladder_length(n, entries))
 
 
 @inlined_helper
-def slot_in(memory, at, n, entries, waves):  # type: ignore[no-untyped-def]
+def slot_in(memory, at, n, waves):  # type: ignore[no-untyped-def]
     """Return a slot; of rows with waves it has space for n."""
-    a = at + _HEAD
-    b, c = a + entries, a + entries + waves
-    d, e = c + n, c + n + n * n
+    a, b = at + HEAD, at + HEAD + waves
+    c = b + n * n
     return Slot(
         memory[at:a],
         memory[a:b],
-        memory[b:c],
-        memory[c:d],
-        memory[d:e].reshape((n, n)),
-        memory[e : e + 2 * n * n].reshape((2 * n, n)),
+        memory[b:c].reshape((n, n)),
+        memory[c : c + 2 * n * n].reshape((2 * n, n)),
     )
 
 
@@ -125,187 +116,202 @@ def same(first, second, count):  # type: ignore[no-untyped-def]
     return True
 
 
-@inlined_helper
-def same_waves(slot, system):  # type: ignore[no-untyped-def]
+@helper
+def places_in(memory, n, entries, waves):  # type: ignore[no-untyped-def]
+    """Return how many slots there are, and how many matrices; none where there is no space."""
+    length, height = slot_length(n, entries, waves), ladder_length(n, entries)
+    space = memory.shape[0] - _BEGIN
+    ladders = min(_LADDERS, max(1, space // (2 * height)))
+    slots = min(_SLOTS, (space - ladders * height) // length)
+    if memory[_LENGTH] != length:  # modes came that have more coefficients
+        for j in range(_LENGTH, _BEGIN):
+            if j != _COUNT:
+                memory[j] = 0.0
+        memory[_LENGTH], memory[_HEIGHT] = length, height
+    return (slots, ladders) if slots >= 2 else (0, 0)
+
+
+@helper
+def ladder_of(motion, piece, h, rate, spread, memory, system):  # type: ignore[no-untyped-def]
+    """Return where the powers of a matrix are, the first of which is there; -1 without space."""
+    n, entries, waves = system.work.shape[1], system.co.shape[0], system.w.shape[0]
+    slots, ladders = places_in(memory, n, entries, waves)
+    if slots == 0:
+        return -1
+    keys, found = _KEYS + 2 * _SLOTS, -1
+    for j in range(ladders):
+        if memory[keys + j] == piece + 1:
+            found = j
+            break
+    place = found if found >= 0 else int(memory[_NEXT_LADDER])
+    at = memory.shape[0] - (place + 1) * int(memory[_HEIGHT])
+    ladder = ladder_in(memory, at, n, entries)
+    if found < 0:
+        memory[_NEXT_LADDER], memory[keys + place] = (place + 1) % ladders, piece + 1
+        note_waves(motion, piece, system.scratch, system.waves[5], ladder)
+    elif ladder.head[H] == h and same(ladder.co, system.co, int(ladder.head[FIRST])):
+        return at
+    memory[_COUNT] += 1.0
+    ladder.head[STAMP] = memory[_COUNT]
+    for j in range(entries):
+        ladder.co[j] = system.co[j]
+    begin(motion, piece, h, rate, spread, ladder, system)
+    return at
+
+
+@helper
+def find(memory, piece, k, stamp, spare, slots):  # type: ignore[no-untyped-def]
+    """Return where the slot of a motion is, and whether it is of this matrix.
+
+    Parameters
+    ----------
+    spare : a slot that is not to be overwritten, or -1
+    """
+    length = int(memory[_LENGTH])
+    for j in range(slots):
+        if memory[_KEYS + 2 * j] == piece + 1 and memory[_KEYS + 2 * j + 1] == k:
+            at = _BEGIN + j * length
+            # where it is of another matrix no other slot has this motion
+            return at, memory[at + OF] == stamp
+    j = int(memory[_NEXT])
+    if _BEGIN + j * length == spare:
+        j = (j + 1) % slots
+    memory[_NEXT] = (j + 1) % slots
+    memory[_KEYS + 2 * j], memory[_KEYS + 2 * j + 1] = piece + 1, k
+    return _BEGIN + j * length, False
+
+
+@helper
+def kept_slot(piece, k, ladder, spare, spare_matrix, memory, system):  # type: ignore[no-untyped-def]
+    """Return where a motion is kept, whose exponential is found where it has to be."""
+    n, waves = system.work.shape[1], system.w.shape[0]
+    slots, _ = places_in(memory, n, system.co.shape[0], waves)
+    at, known = find(memory, piece, k, ladder.head[STAMP], spare, slots)
+    if not known:
+        slot = slot_in(memory, at, n, waves)
+        power_of(ladder, k, slot.exponential, spare_matrix)
+        slot.head[OF], slot.head[FORCED] = ladder.head[STAMP], 0.0
+    return at
+
+
+@helper
+def same_waves(slot, ladder, system):  # type: ignore[no-untyped-def]
     """Tell whether responses are those to the frequencies of a system, of what is heard of them."""
-    first = int(slot.head[FIRST])
-    for row in range(int(slot.head[ROWS])):
-        j, at = int(slot.harmonics[row]), first + 2 * row
+    first = int(ladder.head[FIRST])
+    for row in range(int(ladder.head[ROWS])):
+        j, at = int(ladder.harmonics[row]), first + 2 * row
         heard = system.w[j] != 0.0 or system.co[at] != 0.0 or system.co[at + 1] != 0.0
         if heard and slot.w[j] != system.w[j]:
             return False
     return True
 
 
-@inlined_helper
-def find(memory, piece, k, h, n, spare, system):  # type: ignore[no-untyped-def]
-    """Return where the slot of a motion is, and whether it is known; -1 without space.
-
-    Parameters
-    ----------
-    spare : a slot that is not to be overwritten, or -1
-    """
-    entries, waves = system.co.shape[0], system.w.shape[0]
-    length, begin = length_of(n, entries, waves), _KEYS + 2 * _SLOTS
-    slots = min(_SLOTS, (memory.shape[0] - begin) // length)
-    if slots < 2:
-        return -1, False
-    if memory[_LENGTH] != length:  # modes came that have more coefficients
-        memory[_LENGTH], memory[_NEXT] = length, 0.0
-        for j in range(2 * _SLOTS):
-            memory[_KEYS + j] = 0.0
-    for j in range(slots):
-        if memory[_KEYS + 2 * j] == piece + 1 and memory[_KEYS + 2 * j + 1] == k:
-            at = begin + j * length
-            head, co = memory[at : at + _HEAD], memory[at + _HEAD : at + _HEAD + entries]
-            # where it is of another matrix no other slot has this motion
-            return at, head[H] == h and same(co, system.co, int(head[FIRST]))
-    j = int(memory[_NEXT])
-    if begin + j * length == spare:
-        j = (j + 1) % slots
-    memory[_NEXT] = (j + 1) % slots
-    memory[_KEYS + 2 * j], memory[_KEYS + 2 * j + 1] = piece + 1, k
-    return begin + j * length, False
-
-
-@inlined_helper
-def note_waves(motion, piece, unit, audible, slot):  # type: ignore[no-untyped-def]
-    """Write which coefficients are those of waves, and of which harmonic each row is."""
-    head, entries, n = slot.head, unit.shape[0], slot.harmonics.shape[0]
-    head[FIRST], head[ROWS], head[FORCED] = entries, 0.0, 0.0
-    for q in range(entries):
-        unit[q] = 0.0
-    for q in range(entries):
-        if q > head[FIRST] and (q - int(head[FIRST])) % 2 == 1:
-            continue
-        for j in range(audible.shape[0]):
-            audible[j] = 0.0
-        unit[q] = 1.0
-        motion.audible(piece, unit, audible)
-        unit[q] = 0.0
-        for j in range(audible.shape[0]):
-            if audible[j] != 0.0:
-                row = int(head[ROWS])
-                if row == 0:
-                    head[FIRST] = q
-                if row < n:
-                    slot.harmonics[row] = j
-                head[ROWS] = row + 1.0
-
-
-@inlined_helper
-def respond(motion, piece, k, h, spread, slot, system):  # type: ignore[no-untyped-def]
-    """Write the responses from rest to a unit force in each row with waves."""
-    first, rows, n = int(slot.head[FIRST]), int(slot.head[ROWS]), system.work.shape[1]
-    unit = system.scratch
-    steps, step, terms = steps_of(_SHARE / h, spread, k * h)
-    for j in range(first):
-        unit[j] = system.co[j]
-    for j in range(first, unit.shape[0]):
-        unit[j] = 0.0
-    for q in range(2 * rows):
-        unit[first + q] = 1.0
-        y = slot.responses[q]
+@helper
+def know_responses(motion, piece, k, rate, spread, ladder, space, slot, system):  # type: ignore[no-untyped-def]
+    """Write the responses to unit forces where they are not there, or not those to these frequencies."""
+    if slot.head[FORCED] != 0.0 and same_waves(slot, ladder, system):
+        return
+    n, rows, pairs = (
+        system.work.shape[1],
+        int(ladder.head[ROWS]),
+        pairs_in(space, system.work.shape[1]),
+    )
+    respond_to_units(motion, piece, k, rate, spread, ladder, rows, pairs, system)
+    for r in range(2 * rows):
         for i in range(n):
-            y[i] = 0.0
-        for m in range(steps):
-            start_waves(system, m * step)
-            motion.expand(
-                piece,
-                unit,
-                y,
-                system.waves[0],
-                system.waves[1],
-                system.w,
-                step,
-                terms,
-                system.other,
-            )
-            sum_of(system.other, terms, y)
-        unit[first + q] = 0.0
+            slot.responses[r, i] = pairs.total[r, i]
     for j in range(system.w.shape[0]):
         slot.w[j] = system.w[j]
     slot.head[FORCED] = 1.0
 
 
 @inlined_helper
-def add_responses(slot, co, c, s, out):  # type: ignore[no-untyped-def]
+def add_responses(slot, ladder, co, c, s, out):  # type: ignore[no-untyped-def]
     """Add the response to waves with some coefficients and phases."""
-    first = int(slot.head[FIRST])
-    for row in range(int(slot.head[ROWS])):
-        j, a, b = int(slot.harmonics[row]), co[first + 2 * row], co[first + 2 * row + 1]
-        cosine, sine = a * c[j] + b * s[j], b * c[j] - a * s[j]
+    first = int(ladder.head[FIRST])
+    for row in range(int(ladder.head[ROWS])):
+        j, a, b = int(ladder.harmonics[row]), co[first + 2 * row], co[first + 2 * row + 1]
+        cosine, sine = a * c[j] + b * s[j], a * s[j] - b * c[j]
+        if cosine == 0.0 and sine == 0.0:
+            continue
         for i in range(out.shape[0]):
             out[i] += cosine * slot.responses[2 * row, i] + sine * slot.responses[2 * row + 1, i]
 
 
-@inlined_helper
-def advance_by_responses(slot, t, y, system):  # type: ignore[no-untyped-def]
+@helper
+def move(slot, y, system):  # type: ignore[no-untyped-def]
+    """Multiply a state by the exponential."""
+    rows = system.work[:1]
+    for i in range(y.shape[0]):
+        rows[0, i] = y[i]
+        system.work[1, i] = 0.0
+    add_product(system.work, 1, rows, 0, slot.exponential)
+    for i in range(y.shape[0]):
+        y[i] = system.work[1, i]
+
+
+@helper
+def advance_by_responses(slot, ladder, t, y, system):  # type: ignore[no-untyped-def]
     """Advance a state over the part that is kept, with its derivatives by time and by parameters."""
-    n, old, by_start = y.shape[0], system.work[0], system.work[5]
+    by_start, waves = system.work[5], system.waves
     start_waves(system, t)
-    waves = system.waves
-    for i in range(n):
-        old[i], by_start[i] = y[i], 0.0
-    for i in range(n):
-        total = 0.0
-        for j in range(n):
-            total += slot.exponential[i, j] * old[j]
-        y[i] = total
-    add_responses(slot, system.co, waves[0], waves[1], y)
-    add_responses(slot, system.co, waves[6], waves[7], by_start)
+    move(slot, y, system)
+    add_responses(slot, ladder, system.co, waves[0], waves[1], y)
+    add_responses(slot, ladder, system.co, waves[6], waves[7], by_start)
     for k in range(system.varied.shape[0]):  # they are zero at the start
-        add_responses(slot, system.slopes[k], waves[0], waves[1], system.varied[k])
+        add_responses(slot, ladder, system.slopes[k], waves[0], waves[1], system.varied[k])
+
+
+@helper
+def in_matrix(system, first):  # type: ignore[no-untyped-def]
+    """Tell whether a parameter is in the matrix."""
+    for k in range(system.slopes.shape[0]):
+        for j in range(first):
+            if system.slopes[k, j] != 0.0:
+                return True
+    return False
+
+
+@helper
+def in_frequency(system):  # type: ignore[no-untyped-def]
+    """Tell whether a parameter is in a frequency that is heard."""
+    for k in range(system.dw.shape[0]):
+        for j in range(system.dw.shape[1]):
+            if system.dw[k, j] != 0.0:
+                return True
+    return False
 
 
 @inlined_helper
-def respond_anew(motion, piece, k, h, spread, slot, system):  # type: ignore[no-untyped-def]
-    """Write the responses where they are not there, or not those to these frequencies."""
-    if slot.head[FORCED] == 0.0 or not same_waves(slot, system):
-        respond(motion, piece, k, h, spread, slot, system)
-
-
-@inlined_helper
-def kept_slot(motion, piece, k, h, spread, spare, memory, system):  # type: ignore[no-untyped-def]
-    """Return where a motion is kept, whose exponential is found where it has to be; -1 without space."""
-    n = system.work.shape[1]
-    at, known = find(memory, piece, k, h, n, spare, system)
-    if at < 0 or known:
-        return at
-    slot = slot_in(memory, at, n, system.co.shape[0], system.w.shape[0])
-    slot.head[H] = h
-    note_waves(motion, piece, system.scratch, system.waves[5], slot)
-    for j in range(system.co.shape[0]):
-        slot.co[j] = system.co[j]
-    exponential(motion, piece, k * h, _SHARE / h, spread, system)
-    for i in range(n):
-        for j in range(n):
-            slot.exponential[i, j] = system.maps[i, j]
-    return at
-
-
-@inlined_helper
-def advance_kept(motion, piece, t, dt, rate, spread, y, memory, system):  # type: ignore[no-untyped-def]
+def advance_kept(motion, piece, t, dt, rate, spread, y, memory, space, system):  # type: ignore[no-untyped-def]
     """Advance a state, its derivatives and the exponential by what is kept; False if nothing is."""
     k, h = cut(rate, dt)
-    if k == 0.0:
+    if k == 0:
         return False
     n, long = y.shape[0], k * h
-    at = kept_slot(motion, piece, k, h, spread, -1, memory, system)
+    at = ladder_of(motion, piece, h, rate, spread, memory, system)
     if at < 0:
         return False
-    slot = slot_in(memory, at, n, system.co.shape[0], system.w.shape[0])
-    forced = slot.head[ROWS] <= n and acts_on_waves(system, int(slot.head[FIRST]))
+    ladder = ladder_in(memory, at, n, system.co.shape[0])
+    place = kept_slot(piece, k, ladder, -1, system.maps[n:], memory, system)
+    slot = slot_in(memory, place, n, system.w.shape[0])
     for i in range(n):
         for j in range(n):
-            system.maps[i, j] = slot.exponential[i, j]
+            system.maps[i, j] = slot.exponential[j, i]
+        system.work[5, i] = 0.0
     rest = dt - long
     terms = terms_for(rate * abs(rest), spread)
-    if forced:
-        respond_anew(motion, piece, k, h, spread, slot, system)
-        advance_by_responses(slot, t, y, system)
-        step_over(motion, piece, t + long, rest, terms, y, system)
-    else:
+    if in_matrix(system, int(ladder.head[FIRST])):
         advance(motion, piece, t, dt, rate, spread, y, system)
+    else:
+        if k > _LONGEST or ladder.head[ROWS] > n or in_frequency(system):
+            move(slot, y, system)
+            respond_to_forces(
+                motion, piece, k, rate, spread, t, ladder, pairs_in(space, n), y, system
+            )
+        else:
+            know_responses(motion, piece, k, rate, spread, ladder, space, slot, system)
+            advance_by_responses(slot, ladder, t, y, system)
+        step_over(motion, piece, t + long, rest, terms, y, system)
     carry_by_series(motion, piece, rest, terms, system, system.maps[:n])
     return True

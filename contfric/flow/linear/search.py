@@ -17,6 +17,7 @@ from contfric.compiling.shared import numbers_at, try_lock, unlock
 from contfric.flow.folding import folded
 from contfric.flow.linear.flow import MOST_STEPS
 from contfric.flow.linear.kept import NUMBERS, space_of
+from contfric.flow.linear.responses import pairs_space
 from contfric.flow.linear.sighted import advance_seen, sight_of, write_seen
 from contfric.flow.linear.steps import SMALL
 from contfric.flow.linear.system import (
@@ -41,6 +42,9 @@ SHORTEST = 1e-8
 #: Rounding of a value, against the sum of the terms: a few units in the last place, in the unit of the
 #: certificates' bound of values.
 _ROUNDING = 1e-15 * 46080.0
+#: A piece whose values are all below this, against the sum of the terms, is rounding whatever its length:
+#: the level is touched there by a zero of high order.
+ROUNDED = 2e-15
 #: Most pieces of a step: a regular one has one to ten, each double root about 30 more.
 MOST_PIECES = 3000
 #: Error of a stationary time, relative to 1 + the time: one within it of a joint is at the joint.
@@ -165,7 +169,10 @@ def first_root(poly, first, terms, begin, sign, bound):  # type: ignore[no-untyp
             return refine(
                 poly, first, terms, sign, low, high, low + (high - low) * root_of(here)
             ), high
-        if outcome != FREE and length <= SHORTEST:
+        size = max(
+            abs(ends[0]), abs(ends[1]), abs(ends[2]), abs(ends[3]), abs(ends[4]), abs(ends[5])
+        )
+        if outcome != FREE and (length <= SHORTEST or size <= ROUNDED * bound[1]):
             if sign * r <= 0.0:
                 return refine(poly, first, terms, sign, a, b, 0.5 * (a + b)), b
             outcome = FREE
@@ -303,14 +310,14 @@ def stationary_in(motion, piece, c, t0, dt, p, reach, system, sight, seen, polys
     y, near, poly, slope = system.work[4], _AT_JOINT * (1.0 + dt), polys[0], polys[1]
     span = (min(near, 0.5 * dt), max(dt - near, 0.5 * dt))
     done, sign, count = 0.0, 0.0, 0
-    at, by, step, memory = seen
+    place, at, by, step, forces, memory, pairs, waves = seen
     while done < dt:
         h = next_length(rate if at < 0 else REACH / step, dt - done)
         terms, first, size = terms_for(rate * h, spread), 0, 0.0
         if at < 0:
             write_series(motion, piece, sight, c, 0.0, t0 + done, y, h, terms, system, poly)
         else:
-            write_seen(motion, c, memory, at, t0 + done, y, h, terms, system, poly)
+            write_seen(motion, c, memory, at, t0 + done, y, h, step, terms, waves, system, poly)
         for k in range(1, terms + 1):
             slope[k - 1] = k * poly[k]
             size += abs(poly[k])
@@ -334,7 +341,7 @@ def stationary_in(motion, piece, c, t0, dt, p, reach, system, sight, seen, polys
         if at < 0:
             state_at(system.series, terms, 1.0, y)
         elif h != dt - done:
-            advance_seen(memory, by, t0 + done, y, system)
+            advance_seen(memory, place, by, t0 + done, y, forces, pairs, system)
         done = dt if h == dt - done else done + h
     return count
 
@@ -353,7 +360,9 @@ def linear_stationary(motion, piece, c, t0, y0, dt, p, times, values):  # type: 
     locked = keeps and try_lock(motion.memory) != 0
     space = space_of(n, entries, waves.shape[1]) if keeps and not locked else 0
     memory = numbers_at(motion.memory, NUMBERS) if locked else np.zeros(space)
-    workspace = (coefficients, waves, rows, poly, memory)
+    pairs = np.empty(pairs_space(n, motion.waves_count, 0) if keeps else 0)
+    seen = np.empty((2 * motion.waves_count + 2 if keeps else 0, TERMS + 1))
+    workspace = (coefficients, waves, rows, poly, memory, pairs, seen)
     found = search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, values)
     if locked:
         unlock(motion.memory)
@@ -363,7 +372,7 @@ def linear_stationary(motion, piece, c, t0, y0, dt, p, times, values):  # type: 
 @inlined_helper
 def search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, values):  # type: ignore[no-untyped-def]
     """Search all stationary points, from a folded time, in a workspace that is given."""
-    sight, memory = workspace[0][0], workspace[4]
+    sight, memory, pairs, waves = workspace[0][0], workspace[4], workspace[5], workspace[6]
     system = system_in(workspace[0][1:], workspace[1], workspace[2], 0)
     found, shorter = -1, 1.0
     for _ in range(
@@ -373,10 +382,12 @@ def search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, va
         if math.isnan(rate):
             return -1
         reach = (rate * shorter, spread)
-        at, by, step = -1, -1, 0.0
+        place, at, by, step, forces = -1, -1, -1, 0.0, -1
         if memory.shape[0] > 0 and shorter == 1.0:
-            at, by, step = sight_of(motion, piece, c, rate, spread, dt, sight, memory, system)
-        seen = (at, by, step, memory)
+            place, at, by, step, forces = sight_of(
+                motion, piece, c, rate, spread, dt, sight, memory, pairs, waves, system
+            )
+        seen = (place, at, by, step, forces, memory, pairs, waves)
         found = stationary_in(
             motion, piece, c, t, dt, p, reach, system, sight, seen, workspace[3], times, values
         )

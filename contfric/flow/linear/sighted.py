@@ -1,13 +1,14 @@
 """An observable along an affine mode without its states: rows that are kept.
 
-The Taylor terms of an observable ``u = c y`` along a step are linear in state and phases at its start::
+The Taylor terms of an observable ``u = c y`` along a step of length h are linear in the state and the phases
+at its start. With ``W_m = c A^m h^m / m!`` they are, for forces ``a cos(w t) + b sin(w t)``,
 
-    u_m = W_m y + sum (a c + b s) P_m + (b c - a s) Q_m,    W_m = c A^m h^m / m!,
+    u_m = W_m y + P_m cos(w t) + Q_m sin(w t),
+    P_{m+1} = h / (m + 1) (W_m a + w Q_m),    Q_{m+1} = h / (m + 1) (W_m b - w P_m),    P_0 = Q_0 = 0.
 
-with P and Q the terms of c U, the responses to unit forces (:mod:`contfric.flow.linear.kept`). W, P and Q
-of a step of a fixed length are kept; those of a shorter one are powers of its share. The state itself is
-only needed where the next step begins, and is moved there by the kept exponential. Rows cost as much as ten
-searches: they are made when the same matrix and frequencies have been asked for some times.
+The rows W_m of a step of a fixed length are kept; terms of a shorter one are multiplied by powers of its
+share. The state itself is only needed where the next step begins, and is moved there by what is kept of
+that step.
 """
 
 from __future__ import annotations
@@ -15,31 +16,30 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from contfric.compiled import inlined_helper
+from contfric.compiled import helper, inlined_helper
 from contfric.flow.linear.kept import (
-    FIRST,
     FORCED,
-    ROWS,
-    H,
-    Slot,
+    HEAD,
+    OF,
     advance_by_responses,
     cut,
     find,
-    head_of,
     kept_slot,
-    note_waves,
-    respond_anew,
+    know_responses,
+    ladder_of,
+    move,
+    places_in,
     same,
-    same_waves,
     slot_in,
 )
+from contfric.flow.linear.ladder import FIRST, ROWS, STAMP, add_product, ladder_in
+from contfric.flow.linear.responses import add_pair, double, pairs_in, write_pairs
 from contfric.flow.linear.system import REACH, TERMS, FloatArray, start_waves, terms_for
 
-#: How often an observable is asked for before its rows are made: along a branch in a frequency, or in a
-#: parameter of the matrix, they would serve one point.
-_ASKED = 8.0
 #: Longest step that the kept terms are enough for, in steps.
-_LONGER = 1.06
+LONGER = 1.06
+#: Rows with waves, against the number of frequencies, up to which responses to unit forces are kept.
+_FEW = 4
 
 
 class Sight(NamedTuple):
@@ -47,120 +47,148 @@ class Sight(NamedTuple):
 
     Attributes
     ----------
-    slot : whose head, coefficients, frequencies and harmonics it has
+    head : the matrix that it is of
     co : coefficients of the observable
-    rows : W of each state, then P and Q of each row with waves, (n + 2 rows, TERMS + 1)
+    rows : W_m in columns, (n, TERMS + 1)
     """
 
-    slot: Slot
+    head: FloatArray
     co: FloatArray
     rows: FloatArray
 
 
 @inlined_helper
-def sight_in(memory, at, n, entries, waves):  # type: ignore[no-untyped-def]
+def sight_in(memory, at, n, entries):  # type: ignore[no-untyped-def]
     """Return what is kept of an observable in a slot."""
-    a = at + head_of(entries, waves, n)
-    b = a + entries
+    a, b = at + HEAD, at + HEAD + entries
     return Sight(
-        slot_in(memory, at, n, entries, waves),
+        memory[at:a],
         memory[a:b],
-        memory[b : b + 3 * n * (TERMS + 1)].reshape((3 * n, TERMS + 1)),
+        memory[b : b + (TERMS + 1) * n].reshape((n, TERMS + 1)),
     )
 
 
-@inlined_helper
-def write_rows(motion, piece, c, h, terms, target, system):  # type: ignore[no-untyped-def]
-    """Write W, P and Q of a step."""
-    n, unit, silence, y = system.work.shape[1], system.scratch, system.waves[4], system.work[0]
-    head = target.slot.head
-    first, waves, w = int(head[FIRST]), system.waves, system.w
-    for j in range(unit.shape[0]):
-        unit[j] = system.co[j] if j < first else 0.0
-    start_waves(system, 0.0)
-    for q in range(n + 2 * int(head[ROWS])):
+@helper
+def write_rows(motion, c, h, ladder, sight, system):  # type: ignore[no-untyped-def]
+    """Write W of a step."""
+    n, silence, unit, value = system.work.shape[1], system.waves[4], system.other, system.work[0]
+    row, following = 1, 2
+    for i in range(n):
+        unit[0, i] = 0.0
+    for i in range(n):
+        unit[0, i] = 1.0
+        motion.look(c, sight.co, silence, silence, silence, h, 0, unit, value)
+        unit[0, i] = 0.0
+        system.work[row, i] = value[0]
+    for m in range(TERMS + 1):
         for i in range(n):
-            y[i] = 1.0 if i == q else 0.0
-        if q >= n:
-            unit[first + q - n] = 1.0
-        motion.expand(piece, unit, y, waves[0], waves[1], w, h, terms, system.other)
-        if q >= n:
-            unit[first + q - n] = 0.0
-        motion.look(c, target.co, silence, silence, w, h, terms, system.other, target.rows[q])
+            sight.rows[i, m] = system.work[row, i]
+            system.work[following, i] = 0.0
+        add_product(system.work, following, system.work, row, ladder.matrix)
+        row, following = following, row
+        for i in range(n):
+            system.work[row, i] *= h / (m + 1.0)
+    sight.head[OF], sight.head[FORCED] = ladder.head[STAMP], 1.0
 
 
-@inlined_helper
-def sight_of(motion, piece, c, rate, spread, dt, sight, memory, system):  # type: ignore[no-untyped-def]
-    """Return where an observable is kept, and where the exponential of its step is; -1: nowhere.
+@helper
+def write_waves(motion, piece, h, sight, seen, system):  # type: ignore[no-untyped-def]
+    """Write P and Q of each harmonic for a step, two rows each."""
+    n, silence, phase, work = system.work.shape[1], system.waves[4], system.waves[5], system.work
+    scratch = seen.shape[0] - 2
+    for i in range(n):
+        work[0, i] = 0.0
+    for j in range(phase.shape[0]):
+        phase[j] = 0.0
+    for j in range(phase.shape[0]):
+        phase[j] = 1.0
+        motion.rates(piece, system.co, work[0], phase, silence, work[1])
+        motion.rates(piece, system.co, work[0], silence, phase, work[2])
+        phase[j] = 0.0
+        for q in range(2):
+            for m in range(TERMS + 1):
+                seen[scratch + q, m] = 0.0
+            add_product(seen, scratch + q, work, 1 + q, sight.rows)
+        p, q = seen[2 * j], seen[2 * j + 1]
+        p[0] = q[0] = 0.0
+        for m in range(TERMS):
+            f, a, b = h / (m + 1.0), seen[scratch, m], seen[scratch + 1, m]
+            p[m + 1], q[m + 1] = f * (a + system.w[j] * q[m]), f * (b - system.w[j] * p[m])
 
-    And the length of a step.
+
+@helper
+def sight_of(motion, piece, c, rate, spread, dt, co, memory, space, seen, system):  # type: ignore[no-untyped-def]
+    """Return where powers, an observable and its step are kept, -1 for nowhere; and the step's length.
+
+    And the number of forces whose responses are in ``space``: those to unit forces are kept instead (-1)
+    where few rows have waves.
     """
     n, entries, waves = system.work.shape[1], system.co.shape[0], system.w.shape[0]
     k, h = cut(rate, dt)
-    if k == 0.0:
-        return -1, -1, 0.0
+    place = ladder_of(motion, piece, h, rate, spread, memory, system) if k > 0 else -1
+    if place < 0:
+        return -1, -1, -1, 0.0, -1
+    ladder, pairs = ladder_in(memory, place, n, entries), pairs_in(space, n)
     k = math.floor(REACH / (rate * h))
     step = k * h
-    at, known = find(memory, piece, -1.0 - c, step, n, -1, system)
-    if at < 0:
-        return -1, -1, 0.0
-    target = sight_in(memory, at, n, entries, waves)
-    slot, head = target.slot, target.slot.head
-    if not (known and same(target.co, sight, entries) and same_waves(slot, system)):
-        head[H] = step
-        note_waves(motion, piece, system.scratch, system.waves[5], slot)
+    slots, _ = places_in(memory, n, entries, waves)
+    at, known = find(memory, piece, -1.0 - c, ladder.head[STAMP], -1, slots)
+    sight = sight_in(memory, at, n, entries)
+    if not (known and same(sight.co, co, entries)):
         for j in range(entries):
-            slot.co[j], target.co[j] = system.co[j], sight[j]
-        for j in range(waves):
-            slot.w[j] = system.w[j]
-        head[FORCED] = -_ASKED
-    if head[ROWS] > n:
-        return -1, -1, 0.0
-    if head[FORCED] < 0.0:
-        head[FORCED] += 1.0
-        if head[FORCED] < 0.0:
-            return -1, -1, 0.0
-        write_rows(motion, piece, c, step, terms_for(_LONGER * rate * step, spread), target, system)
-        head[FORCED] = 1.0
-    by = kept_slot(motion, piece, k, h, spread, at, memory, system)
-    if by < 0:
-        return -1, -1, 0.0
-    moved = slot_in(memory, by, n, entries, waves)
-    respond_anew(motion, piece, k, h, spread, moved, system)
+            sight.co[j] = co[j]
+        write_rows(motion, c, step, ladder, sight, system)
+    write_waves(motion, piece, step, sight, seen, system)
+    by, count = -1, -1
+    if dt > LONGER * step:
+        by = kept_slot(piece, k, ladder, at, system.maps[n:], memory, system)
+        slot = slot_in(memory, by, n, waves)
+        if ladder.head[ROWS] > min(n, _FEW * waves):
+            terms = terms_for(rate * h, spread)
+            count = write_pairs(motion, piece, h, terms, int(ladder.head[FIRST]), pairs, system)
+            double(ladder, k, pairs, count, system)
+        else:
+            know_responses(motion, piece, k, rate, spread, ladder, space, slot, system)
     for m in range(TERMS + 1):
         for i in range(n):
             system.other[m, i] = 0.0
-    return at, by, step
+    return place, at, by, step, count
 
 
-@inlined_helper
-def write_seen(motion, c, memory, at, t, y, h, terms, system, poly):  # type: ignore[no-untyped-def]
+@helper
+def write_seen(motion, c, memory, at, t, y, h, step, terms, seen, system, poly):  # type: ignore[no-untyped-def]
     """Write the Taylor terms of an observable along a step; ``system.other`` has those of rest."""
     n, waves, w = y.shape[0], system.waves, system.w
-    target = sight_in(memory, at, n, system.co.shape[0], w.shape[0])
-    slot = target.slot
+    sight = sight_in(memory, at, n, system.co.shape[0])
     start_waves(system, t)
-    motion.look(c, target.co, waves[0], waves[1], w, h, terms, system.other, poly)
-    first, share = int(slot.head[FIRST]), h / slot.head[H]
-    for row in range(n + 2 * int(slot.head[ROWS])):
-        factor = 0.0
-        if row < n:
-            factor = y[row]
-        else:
-            place = (row - n) // 2
-            j, a, b = int(slot.harmonics[place]), first + 2 * place, first + 2 * place + 1
-            factor = system.co[a] * waves[0, j] + system.co[b] * waves[1, j]
-            if (row - n) % 2 == 1:
-                factor = system.co[b] * waves[0, j] - system.co[a] * waves[1, j]
-        if factor == 0.0:
-            continue
+    motion.look(c, sight.co, waves[0], waves[1], w, h, terms, system.other, poly)
+    total, rows = seen.shape[0] - 1, system.work[:1]
+    for i in range(n):
+        rows[0, i] = y[i]
+    for m in range(terms + 1):
+        seen[total, m] = 0.0
+    for j in range(w.shape[0]):
         for m in range(terms + 1):
-            poly[m] += factor * target.rows[row, m]
-            factor *= share
+            seen[total, m] += seen[2 * j, m] * waves[0, j] + seen[2 * j + 1, m] * waves[1, j]
+    add_product(seen, total, rows, 0, sight.rows)
+    share, factor = h / step, 1.0
+    for m in range(terms + 1):
+        poly[m] += factor * seen[total, m]
+        factor *= share
 
 
-@inlined_helper
-def advance_seen(memory, by, t, y, system):  # type: ignore[no-untyped-def]
+@helper
+def advance_seen(memory, place, by, t, y, count, space, system):  # type: ignore[no-untyped-def]
     """Advance the state over a step."""
-    slot = slot_in(memory, by, y.shape[0], system.co.shape[0], system.w.shape[0])
-    advance_by_responses(slot, t, y, system)
+    n, waves = y.shape[0], system.waves
+    ladder = ladder_in(memory, place, n, system.co.shape[0])
+    slot = slot_in(memory, by, n, system.w.shape[0])
+    if count < 0:
+        advance_by_responses(slot, ladder, t, y, system)
+        return
+    start_waves(system, t)
+    move(slot, y, system)
+    pairs = pairs_in(space, n)
+    for q in range(count):
+        j = int(pairs.harmonics[q])
+        add_pair(pairs, q, waves[0, j], waves[1, j], y)
