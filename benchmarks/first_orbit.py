@@ -44,11 +44,13 @@ def seconds_of(model: str) -> float:
     study = yaml.safe_load((STUDIES / f"{model}.yaml").read_text(encoding="utf-8"))
     start = study.get("start")
     given = start["simulate"] if isinstance(start, dict) else {}
-    code = f"import contfric as cf; cf.find_orbit({model!r}, {study.get('params', {})!r}, **{given!r})"
+    code = (
+        f"import contfric as cf; cf.find_orbit({model!r}, {study.get('params', {})!r}, **{given!r})"
+    )
     took = []
     for _ in range(3):  # the first one may compile
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run([sys.executable, "-c", code], check=True)  # noqa: S603
+        subprocess.run([sys.executable, "-c", code], check=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         took.append(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
     return min(took[1:])
