@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from contfric.models.entries import Part, listed
 from contfric.models.parts import Lead
@@ -25,3 +26,19 @@ def acts_of(entry: Part, modes: list[str]) -> tuple[str, ...]:
     """Return the modes that a reset acts in."""
     named = Part({str(i): v for i, v in enumerate(listed(entry.data[FROM]))}, entry.address)
     return tuple(named.one_of(key, modes, "mode") for key in named.data)
+
+
+def named_parts(
+    resets: Mapping[str, Any], parts: Mapping[str, tuple[str, ...]]
+) -> dict[str, dict[str, Any]]:
+    """Return resets that name the parts of modes that have been divided, in place of the modes."""
+
+    def named(given: Any) -> Any:
+        if isinstance(given, Mapping):
+            return {part: sides for m, sides in given.items() for part in parts.get(m, (m,))}
+        return [part for m in listed(given) for part in parts.get(m, (m,))]
+
+    return {
+        surface: {key: named(value) if key in (TO, FROM) else value for key, value in entry.items()}
+        for surface, entry in resets.items()
+    }

@@ -164,11 +164,11 @@ class TransitionMaps(SectionMaps):
                 ]
                 for target in found:
                     key = tuple(target.signs[s.name] for s in self.surfaces)
-                    fits = {d.own_mode for d in self._domains_by_signs[key]}
+                    fits = {d.mode for d in self._domains_by_signs[key]}
                     named = {d.own_mode for d in found if d.signs == target.signs}
                     mapped = self.maps_at(domain, surface.name)
                     several = len(named) > 1 if mapped else len(fits) > 1
-                    if several and not (not mapped and domain.own_mode in fits):
+                    if several and not (not mapped and domain.mode in fits):
                         return domain.name, surface.name, tuple(sorted(named if mapped else fits))
         return None
 
@@ -315,7 +315,11 @@ class TransitionMaps(SectionMaps):
 
     def _domain_with(self, signs: Mapping[str, int], mode: str = "") -> str | None:
         fits = self._domains_by_signs.get(tuple(signs[s.name] for s in self.surfaces), ())
-        return next((d.name for d in fits if d.own_mode == mode), fits[0].name if fits else None)
+        whole = self.whole_mode(mode)
+        same = [d.name for d in fits if d.own_mode == mode] or [
+            d.name for d in fits if d.mode == whole
+        ]
+        return same[0] if same else fits[0].name if fits else None
 
     @cached_property
     def _domains_by_signs(self) -> dict[tuple[int, ...], tuple[Domain, ...]]:
