@@ -120,9 +120,11 @@ def _divided_by_resets(data: dict[str, Any]) -> dict[str, Any]:
     """Return a model in which a reset acts in modes that lie on both sides of its surface.
 
     A clock is struck as its balance passes the middle on the way up: ``from: [up]`` at ``x = 0``. Each mode
-    that a reset names, and that says no side of its surface, is two: ``up-`` below it and ``up+`` above.
+    that a reset names, and that says no side of its surface, is two: ``up-`` below it and ``up+`` above. A
+    reset at a place of an angle acts in all modes, if none has a side: rotations pass it.
     """
     modes, resets = dict(data.get("modes") or {}), dict(data.get("resets") or {})
+    surfaces, angles = mapping_in(data, "surfaces"), listed(data.get("angles") or ())
     others = (
         *(data.get("domains") or {}).values(),
         *({"mode": mode} for r in resets.values() for mode in listed(r.get("to"))),
@@ -130,6 +132,9 @@ def _divided_by_resets(data: dict[str, Any]) -> dict[str, Any]:
     named = {other.get("mode") for other in others if isinstance(other, Mapping)}
     for surface, entry in resets.items():
         asked = entry.get("from")
+        sided = any(surface in mapping_in(mode, "in") for mode in modes.values())
+        if asked is None and not sided and surfaces.get(surface, {}).get("observable") in angles:
+            asked = [*modes]
         if not isinstance(asked, (list, tuple)):
             continue
         acts: list[str] = []
