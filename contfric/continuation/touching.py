@@ -154,9 +154,10 @@ def entered_at(system: System, test: Test) -> str:
     A mode that holds on both sides of the surface overlaps the one before it: motion that just crosses stays
     in it, motion that does not goes on as before. So the map jumps, and no orbit lies between the two.
     """
-    model, mode = system.model, system.word[test.segment][0]
+    model = system.model
     if model.composed or test.margin not in (Margin.INTERIOR, Margin.EXIT):
         return ""
+    mode = model.whole_mode(system.word[test.segment][0])
     for domain in model.domains_of(mode):
         target = model.transitions.get((domain.name, test.surface), "")
         entered = model.domain_by_name[target].mode if target else mode

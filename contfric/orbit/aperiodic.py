@@ -9,6 +9,8 @@ quasi-periodic one.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from contfric.errors import AperiodicError, ConvergenceError
@@ -81,6 +83,10 @@ def _unbounded(trajectory: Trajectory) -> str:
     )
 
 
+#: Times after which a motion that goes round is somewhere else: no multiples of each other's periods.
+_LATER = 1.2345
+
+
 def _advice(trajectory: Trajectory, done: int) -> str:
     where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
     return (
@@ -94,8 +100,12 @@ def _parting(trajectory: Trajectory) -> str:
     """Return what two motions say that begin close to each other where a trajectory ends."""
     model, (_, time, state, _) = trajectory.model, trajectory.last
     shift = _APART * (1.0 + np.abs(state)) * (-1.0) ** np.arange(len(state))
+    compared = _COMPARED
+    if model.autonomous:  # a unit of time says nothing of how often something happens
+        passed = float(trajectory.last[1]) - trajectory.begin[0]
+        compared = math.ceil(_COMPARED * max(1.0, passed / max(1, len(trajectory))))
     one, other = (
-        simulate(model, trajectory.params, state=begin, time=time, periods=_COMPARED)
+        simulate(model, trajectory.params, state=begin, time=time, periods=compared)
         for begin in (state, state + shift)
     )
     if {one.end, other.end} != {SimulationEnd.TIME}:
@@ -103,7 +113,16 @@ def _parting(trajectory: Trajectory) -> str:
     apart = float(np.max(np.abs(one.last[2] - other.last[2]) / (1.0 + np.abs(one.last[2]))))
     if apart > _CHAOTIC * _APART:
         return (
-            f". Motions that begin {_APART:.0e} apart are {apart:.0e} apart after {_COMPARED} periods: it is "
+            f". Motions that begin {_APART:.0e} apart are {apart:.0e} apart after {compared} periods: it is "
             "chaotic, or a long transient of chaos"
         )
     return ". Motions that begin close stay close: it is quasi-periodic, or it converges slowly"
+
+
+def goes_on_in(trajectory: Trajectory) -> str:
+    """Return the mode in which a motion goes on that meets nothing, and has not come to an equilibrium."""
+    model, (_, time, state, mode) = trajectory.model, trajectory.last
+    flow, whole = model.view(model.vector(trajectory.params)), model.whole_mode(mode)
+    before, after = (flow.state(whole, time, state, d) for d in (_LATER, math.e * _LATER))
+    moves = min(float(np.max(np.abs(y - state))) for y in (before, after))
+    return mode if moves > _APART * (1.0 + float(np.max(np.abs(state)))) else ""
