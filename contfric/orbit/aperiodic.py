@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from contfric.errors import AperiodicError, ConvergenceError
+from contfric.models.clocks import is_clock
 from contfric.models.definition import Model
 from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
 
@@ -99,7 +100,8 @@ def _advice(trajectory: Trajectory, done: int) -> str:
 def _parting(trajectory: Trajectory) -> str:
     """Return what two motions say that begin close to each other where a trajectory ends."""
     model, (_, time, state, _) = trajectory.model, trajectory.last
-    shift = _APART * (1.0 + np.abs(state)) * (-1.0) ** np.arange(len(state))
+    moved = np.array([not is_clock(name) for name in model.states])
+    shift = moved * _APART * (1.0 + np.abs(state)) * (-1.0) ** np.arange(len(state))
     compared = _COMPARED
     if model.autonomous:  # a unit of time says nothing of how often something happens
         passed = float(trajectory.last[1]) - trajectory.begin[0]

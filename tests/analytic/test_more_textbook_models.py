@@ -357,3 +357,17 @@ modes: {up: {in: {stop: +}}, down: {in: {stop: -}}}
 """
     report = cf.check_model(model_of(tmp_path, text))
     assert report.ok and "units" not in str(report)
+
+
+def test_chaos_of_a_converter_beyond_a_corner_collision() -> None:
+    """The unstable orbit of 4 periods meets the corner of the ramp; the attractor is chaotic behind it, too.
+
+    The exponents add up to the trace of the field, -1/(R C), whatever the motion does.
+    """
+    p = cf.load_model("buck").defaults
+    with pytest.raises(cf.AperiodicError, match="chaotic"):
+        cf.find_orbit("buck", {"E": 34.8})
+    found = cf.lyapunov_exponent("buck", {"E": 34.8})
+    assert found.exponents[0] > 0.1
+    trace = -1e-4 / (p["R"] * p["C"])  # times are in 0.1 ms
+    assert found.exponents[0] + found.exponents[1] == pytest.approx(trace, abs=1e-4)
