@@ -182,6 +182,11 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
         return f"grazing: the surface of the reset at '{struck}' is just touched"
     if any(entered_at(orbit.system, test) for test in bifurcation.tests):
         return bifurcation.meaning
+    if {test.surface for test in bifurcation.tests} & orbit.model.settled_sides.keys():
+        return (
+            "incomplete chatter: beyond this point impacts are finitely many, and branches with any number "
+            "of them come together here"
+        )
     if orbit.model.composed and orbit.model.filippov:
         return (
             ""

@@ -131,7 +131,7 @@ class Description:
                 name: {
                     **texts,
                     **(
-                        {"to": {lead.mode: dict(lead.where) for lead in self.leads[name]}}
+                        {"to": {lead.mode: _lead_entry(lead) for lead in self.leads[name]}}
                         if name in self.leads
                         else {}
                     ),
@@ -198,3 +198,8 @@ class Description:
             dict(self.define),
             {o.name: o.formula for o in self.observables},
         )
+
+
+def _lead_entry(lead: Lead) -> dict[str, Any]:
+    """Return what a file says of a mode that a reset leads into."""
+    return {**lead.where, **({"from": list(lead.after)} if lead.after else {})}

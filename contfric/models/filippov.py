@@ -31,6 +31,7 @@ from contfric.models.description import Description, ModeText
 from contfric.models.entries import EntryError, as_identifier
 from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.functions import as_text
+from contfric.models.regions import combinations, engine_order
 from contfric.models.symbols import Formulas
 
 #: States at which the heights of two surfaces must differ by the same, and rounding of that.
@@ -124,6 +125,7 @@ def _are_parallel(description: Description, one: str, other: str) -> bool:
 
 def _pairs(description: Description, surface: str) -> Iterator[tuple[ModeText, ModeText]]:
     """Yield the modes above and below a surface whose regions meet there."""
+    ordered = engine_order(description)
     above, below = (
         [m for m in description.modes if m.sides.get(surface) == side and 0 not in m.sides.values()]
         for side in (1, -1)
@@ -132,6 +134,7 @@ def _pairs(description: Description, surface: str) -> Iterator[tuple[ModeText, M
         (a, b)
         for a, b in itertools.product(above, below)
         if all(b.sides.get(s, v) == v for s, v in a.sides.items() if s != surface)
+        and combinations(ordered, {**a.sides, **b.sides})  # two levels may leave no region to both
     ]
     if not pairs:
         raise EntryError(

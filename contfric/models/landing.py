@@ -114,6 +114,12 @@ class Landing:
             return 1  # a wall that some states still run into: `contfric check` says where
         if passed and any(verdicts[side] for side in (1, -1)):
             return max((1, -1), key=verdicts.__getitem__)  # the mode behind passes it: a label
+        if any(self.surface in wraps_of(a) for a in self.sampler.evaluator.description.angles):
+            raise EntryError(
+                ("angles",),
+                f"a turn ends at '{self.surface}', and no mode holds behind it, so that nothing turns round: "
+                "leave 'angles' out, or write the surface that is in the way as sin((theta - wall)/2) = 0",
+            )
         raise EntryError(
             ("resets", self.surface),
             f"the reset at '{self.surface}' takes states to the surface '{surface}', and some of them to one "
@@ -126,7 +132,7 @@ class Landing:
         """Return the domains that an image may be in, but for the sides of the surfaces that it is on."""
         sides = self.sampler.sides(t, y, [s for s in self.surfaces if s not in met])
         behind = [d for d in self.domains if all(d.signs[s] == v for s, v in sides.items())]
-        return led(behind, (*self.leads, Lead(before.mode, {})))
+        return led(behind, self.leads, before.own_mode)
 
     def _side(
         self,

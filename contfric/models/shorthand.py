@@ -103,14 +103,19 @@ def _with_observables(data: dict[str, Any]) -> dict[str, Any]:
     taken = {*map(str, data.get("states") or ()), *map(str, data.get("parameters") or ()), *parts}
     taken |= {*RESERVED}  # a surface may be called sign
     named: dict[Any, Any] = {}
+    known: dict[str, str] = {}
     for name, entry in surfaces.items():
         named[name] = entry
         text = entry.get("observable")
         if not isinstance(text, str) or (text.strip().isidentifier() and text.strip() not in parts):
             continue
+        if text in known:  # levels of one expression are ordered
+            named[name] = {**entry, "observable": known[text]}
+            continue
         own = as_identifier(str(name))
         while own in taken or own in observables:
             own += "_"
+        known[text] = own
         observables[own] = text
         named[name] = {**entry, "observable": own}
     return {**data, "surfaces": named, "observables": observables} if observables else data

@@ -17,6 +17,7 @@ from contfric.errors import AperiodicError, ConvergenceError
 from contfric.models.clocks import is_clock
 from contfric.models.definition import Model
 from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
+from contfric.orbit.starts import signs_at
 
 #: Longest period that is looked for, in periods of the excitation.
 MOST_PERIODS = 64
@@ -121,10 +122,28 @@ def _parting(trajectory: Trajectory) -> str:
     return ". Motions that begin close stay close: it is quasi-periodic, or it converges slowly"
 
 
-def goes_on_in(trajectory: Trajectory) -> str:
-    """Return the mode in which a motion goes on that meets nothing, and has not come to an equilibrium."""
+def goes_on(trajectory: Trajectory) -> str:
+    """Return what a motion does that meets nothing any more; nothing if it has come to an equilibrium."""
     model, (_, time, state, mode) = trajectory.model, trajectory.last
-    flow, whole = model.view(model.vector(trajectory.params)), model.whole_mode(mode)
+    vector = model.vector(trajectory.params)
+    flow, whole, signs = (
+        model.view(vector),
+        model.whole_mode(mode),
+        signs_at(model, time, state, vector),
+    )
+    for surface, side in signs.items():
+        sides = {d.signs[surface] for d in model.domains_of(whole)}
+        if side and sides == {-side}:
+            return (
+                f"the motion has left the region of '{mode}' at '{surface}', where no mode follows. "
+                "`contfric check` says what is missing"
+            )
     before, after = (flow.state(whole, time, state, d) for d in (_LATER, math.e * _LATER))
     moves = min(float(np.max(np.abs(y - state))) for y in (before, after))
-    return mode if moves > _APART * (1.0 + float(np.max(np.abs(state)))) else ""
+    if not moves > _APART * (1.0 + float(np.max(np.abs(state)))):
+        return ""
+    return (
+        f"the motion goes on in '{mode}' and meets no surface any more. A cycle inside of one mode is found "
+        "at a section: give the model a surface that it crosses, with two modes of the same field on its "
+        "sides"
+    )

@@ -123,7 +123,7 @@ def _at_random(model: ComposedModel, mode: str) -> list[Motion]:
 
 def _at_samples(model: Model, mode: str) -> list[Motion]:
     """Return sampled states of a mode, by its formulas."""
-    found = []
+    found: list[Motion] = []
     description = _samplers(model)[0].evaluator.description
     parts = [
         name for name in model.mode_by_name if model.whole_mode(name) == model.whole_mode(mode)

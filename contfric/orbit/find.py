@@ -11,7 +11,7 @@ from contfric.errors import ConvergenceError, function_of, real_number, whole_nu
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
-from contfric.orbit.aperiodic import MOST, MOST_PERIODS, affordable, goes_on_in, why_none
+from contfric.orbit.aperiodic import MOST, MOST_PERIODS, affordable, goes_on, why_none
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
@@ -180,13 +180,8 @@ def _wanted(orbit: Orbit, periods: int | None) -> Orbit:
 
 
 def _check_motion(trajectory: Trajectory) -> None:
-    if trajectory.end is SimulationEnd.QUIET and (mode := goes_on_in(trajectory)):
-        raise ConvergenceError(
-            f"no periodic orbit: the motion goes on in '{mode}' and meets no surface any more. A cycle "
-            "inside of one mode is found at a section: give the model a surface that it crosses, with two "
-            "modes of the same field on its sides",
-            trajectory,
-        )
+    if trajectory.end is SimulationEnd.QUIET and (why := goes_on(trajectory)):
+        raise ConvergenceError(f"no periodic orbit: {why}", trajectory)
     if trajectory.end not in (SimulationEnd.EVENTS, SimulationEnd.TIME):
         raise ConvergenceError(
             f"no periodic orbit: {trajectory.end.value}. Choose other parameters or another start",
