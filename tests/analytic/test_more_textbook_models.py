@@ -16,8 +16,8 @@ from scipy.integrate import solve_ivp
 import contfric as cf
 
 Field = Callable[[float, np.ndarray], Sequence[float]]
-#: (height, sense in which it is crossed, next mode, map of the state)
-Switch = tuple[Callable[[float, np.ndarray], float], int, str, Callable[[float, np.ndarray], Any]]
+#: (height, sense in which it is crossed, next mode or what chooses it, map of the state)
+Switch = tuple[Callable[[float, np.ndarray], float], int, Any, Callable[[float, np.ndarray], Any]]
 _TIGHT = {"rtol": 1e-11, "atol": 1e-12, "method": "DOP853"}
 
 
@@ -49,8 +49,9 @@ def automaton(
             field, (t, t + longest), state, events=events, max_step=0.05 * longest, **_TIGHT
         )
         k = next(k for k, times in enumerate(run.t_events) if len(times))
-        _, _, mode, mapped = switches[k]
+        _, _, target, mapped = switches[k]
         t = float(run.t_events[k][0])
+        mode = target if isinstance(target, str) else target(t, run.y_events[k][0])
         state = np.array(mapped(t, run.y_events[k][0]), dtype=float)
         found.append((t, mode, state))
         # off the surface, in the time in which scipy would find it again
@@ -371,3 +372,87 @@ def test_chaos_of_a_converter_beyond_a_corner_collision() -> None:
     assert found.exponents[0] > 0.1
     trace = -1e-4 / (p["R"] * p["C"])  # times are in 0.1 ms
     assert found.exponents[0] + found.exponents[1] == pytest.approx(trace, abs=1e-4)
+
+
+HEATER = """
+name: heater
+states: [temp, s]
+parameters: {q: 2.0, c: 0.3, low: 1.0, high: 1.4, wait: 0.2}
+autonomous: true
+surfaces:
+  hot: {observable: temp, level: high}
+  cold: {observable: temp, level: low}
+  ready: {observable: s, level: wait}
+modes:
+  heats: {in: {ready: -}, field: {temp: q - c*temp, s: 1}}
+  may_stop: {in: {ready: +, hot: -}, field: {temp: q - c*temp, s: 1}}
+  cools: {in: {ready: -}, field: {temp: -c*temp, s: 1}}
+  may_start: {in: {ready: +, cold: +}, field: {temp: -c*temp, s: 1}}
+resets:
+  ready: {to: {may_stop: {from: heats}, may_start: {from: cools}}}
+  hot: {s: 0, to: cools, from: [may_stop]}
+  cold: {s: 0, to: heats, from: [may_start]}
+"""
+
+
+def test_the_next_mode_depends_on_the_one_before(tmp_path) -> None:
+    """A waiting time that is shorter than both ways changes nothing: a thermostat in closed form."""
+    model = model_of(tmp_path, HEATER)
+    assert cf.load_model(tmp_path / "model.yaml").definition == model.definition
+    orbit = cf.find_orbit(model)
+    end = 2.0 / 0.3
+    wanted = (np.log((end - 1.0) / (end - 1.4)) + np.log(1.4)) / 0.3
+    assert orbit.period == pytest.approx(wanted, abs=1e-11)
+    assert [mode for mode, _ in orbit.word].count("may_stop") == 1
+
+
+@pytest.mark.parametrize("zone", [0.05, 0.1, 0.2])
+def test_levels_of_one_expression_are_ordered(tmp_path, zone: float) -> None:
+    """A servo with a dead zone and friction: no state is above the upper level and below the lower one."""
+    text = """
+name: dead-zone
+states: [x, v]
+parameters: {K: 4.0, z: 0.1, c: 0.4, f: 0.2, A: 0.5, W: 1.5}
+period: 2*pi/W
+define: {err: A*cos(W*t) - x}
+surfaces:
+  e+: {observable: err, level: z}
+  e-: {observable: err, level: -z}
+  stop: {observable: v, sliding: filippov}
+modes:
+  push+: {in: {e+: +, stop: +}, field: {x: v, v: K*(err - z) - c*v - f}}
+  push-: {in: {e+: +, stop: -}, field: {x: v, v: K*(err - z) - c*v + f}}
+  idle+: {in: {e+: -, e-: +, stop: +}, field: {x: v, v: -c*v - f}}
+  idle-: {in: {e+: -, e-: +, stop: -}, field: {x: v, v: -c*v + f}}
+  pull+: {in: {e-: -, stop: +}, field: {x: v, v: K*(err + z) - c*v - f}}
+  pull-: {in: {e-: -, stop: -}, field: {x: v, v: K*(err + z) - c*v + f}}
+"""
+    model = model_of(tmp_path, text)
+    assert not any(d.signs["e+"] > 0 > d.signs["e-"] for d in model.domains)
+    orbit = cf.find_orbit(model, {"z": zone}, state=[0.4, 0.0])
+
+    def drive(t: float, y: np.ndarray) -> float:
+        error = 0.5 * np.cos(1.5 * t) - y[0]
+        return float(4.0 * np.sign(error) * max(0.0, abs(error) - zone))
+
+    def moving(side: int) -> Field:
+        return lambda t, y: [y[1], drive(t, y) - 0.4 * y[1] - 0.2 * side]
+
+    def stops(t: float, y: np.ndarray) -> str:
+        """It stays at rest while the drive is below the friction."""
+        force = drive(t, y)
+        return "rest" if abs(force) < 0.2 else "up" if force > 0.0 else "down"
+
+    modes: dict[str, Any] = {
+        "up": (moving(1), [(lambda t, y: y[1], -1, stops, lambda t, y: [y[0], 0.0])]),
+        "down": (moving(-1), [(lambda t, y: y[1], 1, stops, lambda t, y: [y[0], 0.0])]),
+        "rest": (
+            lambda t, y: [0.0, 0.0],
+            [
+                (lambda t, y: drive(t, y) - 0.2, 1, "up", same),
+                (lambda t, y: drive(t, y) + 0.2, -1, "down", same),
+            ],
+        ),
+    }
+    found = automaton(modes, "rest", [0.0, 0.0], 60, longest=20.0)
+    assert max(y[0] for _, _, y in found[-10:]) == pytest.approx(orbit.x_max, abs=1e-6)
