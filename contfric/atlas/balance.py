@@ -20,6 +20,7 @@ from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import Bifurcation, EndReason, Kind
 from contfric.continuation.points import settings_of
 from contfric.continuation.side import first_point
+from contfric.continuation.touching import leads_elsewhere
 from contfric.continuation.unit import unit_of
 from contfric.errors import ContfricError
 from contfric.orbit.index import index_at_infinity, index_of
@@ -131,15 +132,10 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
                 beside = _REST_BESIDE * width
                 below += _rests(rest, diagram.parameter, value - beside)
                 above += _rests(rest, diagram.parameter, value + beside)
-            if any(_leads_elsewhere(diagram.nodes[joined].bifurcation) for joined in nodes):
+            events = [diagram.nodes[joined].bifurcation for joined in nodes]
+            if any(leads_elsewhere(e.orbit.system, test) for e in events for test in e.tests):
                 below = above = None
             yield Balance(number, b.label, value, times * period, below, above)
-
-
-def _leads_elsewhere(b: Bifurcation) -> bool:
-    """Tell whether a reset off its surface is touched: nothing lies between motions with and without it."""
-    resets = b.orbit.model.reset_by_surface
-    return any(t.surface in resets and not resets[t.surface].stays for t in b.tests)
 
 
 def _rest_of(diagram: Diagram, node: Node) -> Orbit | None:

@@ -13,7 +13,10 @@ from typing import TYPE_CHECKING
 
 from contfric.base.extras import need_flint
 from contfric.continuation.measured_event import MeasuredEvent
-from contfric.continuation.touching import chosen_at
+from contfric.continuation.touching import (
+    chosen_at,
+    entered_at,
+)
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
@@ -253,6 +256,9 @@ class Bifurcation(MeasuredEvent):
         chosen = filter(None, (chosen_at(self.orbit.system, test) for test in self.tests))
         if reset := next(chosen, ""):
             return f"another mode is chosen at the reset '{reset}'"
+        entered = filter(None, (entered_at(self.orbit.system, test) for test in self.tests))
+        if mode := next(entered, ""):
+            return f"grazing: motion that crosses stays in '{mode}', and the map jumps"
         return meaning_of(self.kind, model, {test.surface for test in self.tests})
 
     def certify(self, parameter: str = "") -> EventCertificate:

@@ -38,7 +38,7 @@ from dataclasses import dataclass, field
 
 from contfric.continuation.composed_outcomes import continuous_edit
 from contfric.continuation.events import Kind
-from contfric.continuation.touching import chosen_at
+from contfric.continuation.touching import chosen_at, entered_at
 from contfric.continuation.zero_acceleration import (
     first_zero_acceleration,
     leaving_rate,
@@ -115,6 +115,10 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
         return _hold_ends(orbit, place)
     if reset := chosen_at(orbit.system, place):
         raise NotationError(f"at '{reset}' another mode is chosen: nothing lies between the two")
+    if entered := entered_at(orbit.system, place):
+        raise NotationError(
+            f"a touch of {place.surface} leads into '{entered}' for good: no orbit is near"
+        )
     if place.margin is Margin.ENTRY:
         raise NotationError(f"another mode follows the impact before segment {place.segment + 1}")
     if place.margin is Margin.JOINT and place.surface in orbit.model.reset_by_surface:

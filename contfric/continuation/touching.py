@@ -146,3 +146,32 @@ def chosen_at(system: System, test: Test) -> str:
     reset = system.model.reset_by_surface.get(exit_)
     chooses = reset is not None and test.surface in reset.chooses_by
     return exit_ if chooses and test.margin in (Margin.JOINT, Margin.ENTRY) else ""
+
+
+def entered_at(system: System, test: Test) -> str:
+    """Return the mode that a touch of its surface leads into for good; else nothing.
+
+    A mode that holds on both sides of the surface overlaps the one before it: motion that just crosses stays
+    in it, motion that does not goes on as before. So the map jumps, and no orbit lies between the two.
+    """
+    model = system.model
+    if model.composed or test.margin not in (Margin.INTERIOR, Margin.EXIT):
+        return ""
+    mode = model.whole_mode(system.word[test.segment][0])
+    for domain in model.domains_of(mode):
+        target = model.transitions.get((domain.name, test.surface), "")
+        entered = model.domain_by_name[target].mode if target else mode
+        if entered != mode and any(d.signs == domain.signs for d in model.domains_of(entered)):
+            return entered
+    return ""
+
+
+def leads_elsewhere(system: System, test: Test) -> bool:
+    """Tell whether nothing lies between the motions on both sides of an event.
+
+    So it is where a reset off its surface is touched, where a reset chooses another mode, and where a touch
+    leads into a mode that overlaps.
+    """
+    reset = system.model.reset_by_surface.get(test.surface)
+    touched = reset is not None and not reset.stays
+    return touched or bool(chosen_at(system, test) or entered_at(system, test))

@@ -4,13 +4,15 @@
 on at the other. So a pendulum oscillates and rotates, and its rotations close. Nothing happens to the motion
 there: the surfaces are joints of orbits that turn, and bound nothing (:class:`contfric.models.parts.Reset`).
 Where a surface of the model lies at pi, such as ``sin(theta) = 0``, they are moved: of two surfaces that are
-always met at once it is not known which is first.
+always met at once it is not known which is first. A surface that is met once only as the angle grows, such as
+``theta = pi`` (and not ``sin(theta) = 0``), has to lie between the two.
 """
 
 from __future__ import annotations
 
+import math
 import random
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -21,7 +23,10 @@ from contfric.models.grammar import FLOATS, TIME, Scope, parse
 #: The key of a model.
 ANGLES = "angles"
 #: Where an angle may begin again, a turn before and there.
-_CUTS = (("-pi", "pi"), ("2.5 - 2*pi", "2.5"), ("2.0 - 2*pi", "2.0"), ("1.0 - 2*pi", "1.0"))
+_CUTS = (
+    *(("-pi", "pi"), ("2.5 - 2*pi", "2.5"), ("2.0 - 2*pi", "2.0"), ("1.0 - 2*pi", "1.0")),
+    *(("4.0 - 2*pi", "4.0"), ("5.0 - 2*pi", "5.0"), ("-0.5", "2*pi - 0.5"), ("0.5", "2*pi + 0.5")),
+)
 #: A surface lies there if it does so for some states, to rounding.
 _STATES, _ON = 3, 1e-9
 
@@ -72,28 +77,84 @@ def with_angles(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _cut(data: Mapping[str, Any], angle: str) -> tuple[str, str]:
-    """Return (a turn before, where an angle begins again): pi, or the first place where no surface lies."""
-    return next((cut for cut in _CUTS if not _is_met_at(data, angle, cut[1])), _CUTS[0])
+    """Return (a turn before, where an angle begins again).
+
+    That is pi, or the first place where no surface lies, and such that all that a growing angle meets once is
+    in between.
+
+    Raises
+    ------
+    EntryError
+        If such a surface is met nowhere: it names a place that the angle never comes to.
+    """
+    heights = {
+        str(name): _heights(data, angle, entry)
+        for name, entry in mapping_in(data, "surfaces").items()
+    }
+    once = {name: height for name, height in heights.items() if _is_met_once(height)}
+    missed: dict[tuple[str, str], list[str]] = {}
+    for cut in _CUTS:
+        low, high = (Scope[float](FLOATS, {}).evaluate(parse(text)) for text in cut)
+        missed[cut] = [n for n, height in once.items() if not _is_between(height, low, high)]
+        if not missed[cut] and not any(_is_on(height, high) for height in heights.values()):
+            return cut
+    for name in once:
+        if all(name in found for found in missed.values()):
+            raise EntryError(
+                ("surfaces", name),
+                f"'{angle}' is an angle, and comes to no place on '{name}': write a level within a turn of "
+                f"0, or sin(({angle} - level)/2) = 0",
+            )
+    return min(_CUTS, key=lambda cut: len(missed[cut]))
 
 
-def _is_met_at(data: Mapping[str, Any], angle: str, cut: str) -> bool:
-    """Tell whether some surface is met wherever an angle has a value, whatever the other states are."""
+#: The height of a surface at an angle, for some values of the other states; nan where it has none.
+Heights = Callable[[float], list[float]]
+
+
+def _heights(data: Mapping[str, Any], angle: str, surface: Mapping[str, Any]) -> Heights:
+    """Return the function of an angle that the height of a surface is."""
     values: dict[str, Any] = {
         name: value.get("default") if isinstance(value, Mapping) else value
         for name, value in mapping_in(data, "parameters").items()
     }
     texts = {**mapping_in(data, "define"), **mapping_in(data, "observables")}
-    draw, at = random.Random(1), Scope[float](FLOATS, {}).evaluate(parse(cut))
 
-    def height(surface: Mapping[str, Any]) -> float:
-        named = {name: parse(str(text)) for name, text in texts.items() if str(text) != name}
-        y = {name: draw.uniform(-1.0, 1.0) for name in (*map(str, data["states"]), TIME)}
-        scope = Scope[float](FLOATS, {**values, **y, angle: at}, named)
-        observable, level = (parse(str(surface.get(key, 0))) for key in ("observable", "level"))
-        return float(scope.evaluate(observable) - scope.evaluate(level))
+    def heights(at: float) -> list[float]:
+        draw, found = random.Random(1), []
+        for _ in range(_STATES):
+            y = {name: draw.uniform(-1.0, 1.0) for name in (*map(str, data["states"]), TIME)}
+            found.append(math.nan)
+            with suppress(
+                ModelError, ArithmeticError, TypeError, ValueError
+            ):  # its reader says why
+                named = {
+                    name: parse(str(text)) for name, text in texts.items() if str(text) != name
+                }
+                scope = Scope[float](FLOATS, {**values, **y, angle: at}, named)
+                observable, level = (parse(str(surface.get(k, 0))) for k in ("observable", "level"))
+                found[-1] = float(scope.evaluate(observable) - scope.evaluate(level))
+        return found
 
-    for surface in mapping_in(data, "surfaces").values():
-        with suppress(ModelError, ArithmeticError, TypeError, ValueError):  # its reader says why
-            if all(abs(height(surface)) < _ON for _ in range(_STATES)):
-                return True
-    return False
+    return heights
+
+
+def _is_on(heights: Heights, at: float) -> bool:
+    """Tell whether a surface is met wherever an angle has a value, whatever the other states are."""
+    return all(abs(height) < _ON for height in heights(at))
+
+
+def _is_met_once(heights: Heights) -> bool:
+    """Tell whether a surface says where an angle is and counts its turns: each changes its height by as much.
+
+    It depends on no other state: else it is met at other angles for others.
+    """
+    here, there, beyond = (heights(1.0 + turn) for turn in (0.0, math.tau, 2.0 * math.tau))
+    changes = [(b - a, c - b) for a, b, c in zip(here, there, beyond, strict=True)]
+    alone = max(here) - min(here) < _ON
+    return alone and all(abs(a) > _ON and abs(a - b) < _ON * abs(a) for a, b in changes)
+
+
+def _is_between(heights: Heights, low: float, high: float) -> bool:
+    """Tell whether a surface is crossed between two angles."""
+    return all(a * b < 0.0 for a, b in zip(heights(low), heights(high), strict=True))

@@ -35,6 +35,8 @@ from contfric.models.sections import clear_surfaces, join_domains, joined_modes
 
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
 _SAME = 1e-9
+#: States on a surface at which its rates are asked for.
+_PLACES = 24
 #: Points at which two expressions must agree to be the same.
 _POINTS = 8
 
@@ -116,14 +118,24 @@ def model_from(description: Description) -> Model:
         phase=description.phase,
         definition=description.text,
     )
-    if undecided := model.undecided():
-        domain, surface, modes = undecided
+    for domain, surface, modes in model.undecided():
+        if not _meets(sampler, domain, surface):
+            continue
         raise EntryError(
             ("modes", modes[-1], "in"),
-            f"motion that meets '{surface}' in '{domain}' could go on in {' or '.join(modes)}: give them "
-            f"a side of a surface that divides them, or write a reset at '{surface}' with 'to: {modes[0]}'",
+            f"motion that meets '{surface}' in '{domain.name}' could go on in {' or '.join(modes)}: give "
+            f"them a side of a surface that divides them, or write a reset at '{surface}' with "
+            f"'to: {modes[0]}'",
         )
     return model
+
+
+def _meets(sampler: Sampler, domain: Domain, surface: str) -> bool:
+    """Tell whether some motion in a domain comes to a surface; so it is, too, where no state was sampled."""
+    mode, side = domain.own_mode, domain.signs[surface]
+    places = list(sampler.on(surface, {}, _PLACES))
+    rates = [side * sampler.rate(mode, surface, side, t, y) for t, y in places]
+    return not rates or min(rates) < 0.0
 
 
 def level_of(evaluator: Evaluator[float], surface: Surface, params: dict[str, float]) -> float:

@@ -157,7 +157,7 @@ class Description:
     def _reset(self, name: str, texts: Mapping[str, str]) -> dict[str, Any]:
         found: dict[str, Any] = dict(texts)
         if name in self.leads:
-            found["to"] = {lead.mode: dict(lead.where) for lead in self.leads[name]}
+            found["to"] = {lead.mode: _lead_entry(lead) for lead in self.leads[name]}
         if name in self.acts:
             found["from"] = list(self.acts[name])
         return found
@@ -190,3 +190,8 @@ class Description:
             dict(self.define),
             {o.name: o.formula for o in self.observables},
         )
+
+
+def _lead_entry(lead: Lead) -> dict[str, Any]:
+    """Return what a file says of a mode that a reset leads into."""
+    return {**lead.where, **({"from": list(lead.after)} if lead.after else {})}

@@ -26,11 +26,16 @@ from typing import Any
 import sympy
 
 from contfric.models.crossing import crossing_parts
+from contfric.models.definition import Surface
 from contfric.models.description import Description, ModeText
 from contfric.models.entries import EntryError, as_identifier
+from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.functions import as_text
+from contfric.models.regions import combinations, engine_order
 from contfric.models.symbols import Formulas
 
+#: States at which the heights of two surfaces must differ by the same, and rounding of that.
+_POINTS, _SAME = 8, 1e-9
 #: The key of a surface, and its value.
 SLIDING, FILIPPOV = "sliding", "filippov"
 
@@ -60,7 +65,7 @@ def sliding_parts(
         key: dict(data.get(key) or {}) for key in ("observables", "surfaces", "modes")
     }
     pairs = [(s, above, below) for s in surfaces for above, below in _pairs(description, s)]
-    if crossing := _crossing(surfaces, pairs):
+    if crossing := _crossing(description, surfaces, pairs):
         return crossing_parts(description, crossing, data)
     for surface, above, below in pairs:
         name = _name(surface, above, below, pairs)
@@ -75,7 +80,9 @@ def sliding_parts(
 
 
 def _crossing(
-    surfaces: tuple[str, ...], pairs: list[tuple[str, ModeText, ModeText]]
+    description: Description,
+    surfaces: tuple[str, ...],
+    pairs: list[tuple[str, ModeText, ModeText]],
 ) -> tuple[str, str] | None:
     """Return the two surfaces that cross where motion may slide on both; None if none do.
 
@@ -88,7 +95,9 @@ def _crossing(
         tuple(sorted((surface, other), key=surfaces.index))
         for surface, above, below in pairs
         for other in surfaces
-        if other != surface and above.sides.get(other, below.sides.get(other, 0)) != 0
+        if other != surface
+        and above.sides.get(other, below.sides.get(other, 0)) != 0
+        and not _are_parallel(description, surface, other)
     }
     if not found:
         return None
@@ -102,8 +111,21 @@ def _crossing(
     return one, other
 
 
+def _are_parallel(description: Description, one: str, other: str) -> bool:
+    """Tell whether two surfaces have no state in common: two belts, whose heights differ by a number."""
+    sampler = Sampler(floats(description), defaults(description))
+    height = sampler.evaluator.height
+    apart = [
+        height(one, sampler.params, t, y) - height(other, sampler.params, t, y)
+        for t, y in sampler.states(_POINTS)
+    ]
+    size = abs(apart[0])
+    return size > 0.0 and max(abs(a - apart[0]) for a in apart) <= _SAME * (1.0 + size)
+
+
 def _pairs(description: Description, surface: str) -> Iterator[tuple[ModeText, ModeText]]:
     """Yield the modes above and below a surface whose regions meet there."""
+    ordered = engine_order(description)
     above, below = (
         [m for m in description.modes if m.sides.get(surface) == side and 0 not in m.sides.values()]
         for side in (1, -1)
@@ -112,6 +134,7 @@ def _pairs(description: Description, surface: str) -> Iterator[tuple[ModeText, M
         (a, b)
         for a, b in itertools.product(above, below)
         if all(b.sides.get(s, v) == v for s, v in a.sides.items() if s != surface)
+        and combinations(ordered, {**a.sides, **b.sides})  # two levels may leave no region to both
     ]
     if not pairs:
         raise EntryError(
@@ -135,6 +158,20 @@ def _name(
     return f"slide_{stems.pop()}" if short else f"slide_{surface}_{above.name}_{below.name}"
 
 
+def _known_on(formulas: Formulas, surface: Surface, observable: Any) -> dict[Any, Any]:
+    """Return a state as the others give it on a surface; nothing where its observable is linear in none.
+
+    What is derived counts on the surface only. Off it the field of the other side may have a pole, such as
+    friction that falls with the speed, read backwards.
+    """
+    level = formulas.read(("surfaces", surface.name, "level"), surface.level)
+    for state in formulas.y:
+        slope = sympy.diff(observable, state)
+        if slope.is_number and slope != 0:
+            return {state: sympy.expand(state - (observable - level) / slope)}
+    return {}
+
+
 class _Sliding:
     """The sliding mode of a surface between two modes: field and rates, as formulas and as texts.
 
@@ -152,7 +189,8 @@ class _Sliding:
         c = [o.name for o in description.observables].index(own.observable)
         fields, rates = formulas.fields(), formulas.rates()
         up, down = names.index(above.name), names.index(below.name)
-        self.rate_up, self.rate_down = rates[up][c], rates[down][c]
+        on = _known_on(formulas, own, formulas.observables()[c])
+        self.rate_up, self.rate_down = (rates[k][c].subs(on) for k in (up, down))
         self.apart = sympy.simplify(self.rate_down - self.rate_up)
         self.somewhere = not self.apart.is_nonpositive
         if not self.somewhere:
@@ -162,12 +200,8 @@ class _Sliding:
             a
             if sympy.expand(a - b) == 0
             else sympy.simplify((self.rate_down * a - self.rate_up * b) / self.apart)
-            for a, b in pair
+            for a, b in ((a.subs(on), b.subs(on)) for a, b in pair)
         ]
-        formula = formulas.observables()[c]
-        if formula in formulas.y:  # on the surface of a state that state is known
-            level = formulas.read(("surfaces", surface, "level"), own.level)
-            self.field = [f.subs(formula, level) for f in self.field]
         self.states = description.states
         known = dict(zip(formulas.y, description.states, strict=True))
         known |= dict(zip(formulas.p, (p.name for p in description.parameters), strict=True))

@@ -93,16 +93,25 @@ class Domain:
 
 @dataclass(frozen=True)
 class Lead:
-    """A mode that a reset leads into from images on some sides of surfaces; on any side if it names none."""
+    """A mode that a reset leads into.
+
+    From images on some sides of surfaces, on any if it names none; and from some modes, from all likewise.
+    """
 
     mode: str
     where: Mapping[str, int]
+    after: tuple[str, ...] = ()
 
 
-def led(behind: Sequence[Domain], leads: Sequence[Lead]) -> list[Domain]:
-    """Return the domains behind a reset: of modes that overlap there the first that it leads into."""
+def led(behind: Sequence[Domain], leads: Sequence[Lead], before: str) -> list[Domain]:
+    """Return the domains behind a reset: of modes that overlap there the first that it leads into.
+
+    Where it leads into none of them, the mode before it goes on.
+    """
     found = list(behind)
-    for lead in leads:
+    for lead in (*leads, Lead(before, {})):
+        if lead.after and before not in lead.after:
+            continue
         kept = [
             d.signs
             for d in found

@@ -19,7 +19,8 @@ from typing import Any
 from contfric.models.description import Description, ModeText
 from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.measuring import proportional
-from contfric.models.regions import domains_of, engine_order, known_sides
+from contfric.models.regions import engine_order, known_sides
+from contfric.models.reset_modes import named_parts
 from contfric.models.sections import joined_modes
 
 #: The key of what has been divided, and the name of the observable and the surface.
@@ -57,6 +58,7 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
     }
     name = next(n for n in (KEY + "_" * k for k in range(len(taken) + 1)) if n not in taken)
     modes: dict[str, Any] = {}
+    parts: dict[str, tuple[str, ...]] = {}
     for mode, entry in data["modes"].items():
         if mode not in staying:
             modes[mode] = entry
@@ -64,6 +66,7 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
         other = f"{mode}-"
         while other in data["modes"]:
             other += "-"
+        parts[mode] = mode, other
         for part, side in (mode, "+"), (other, "-"):
             modes[part] = {**entry, "in": {**(entry.get("in") or {}), name: side}}
     formula = f"sin(2*pi*t/({description.period}) - {_LATE})"
@@ -76,6 +79,7 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
         "observables": {**(data.get("observables") or {}), name: formula},
         "surfaces": {**(data.get("surfaces") or {}), name: {"observable": name, "level": "0"}},
         "modes": modes,
+        "resets": named_parts(data.get("resets") or {}, parts),
         KEY: name,
     }
 
@@ -83,9 +87,6 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
 def _staying(description: Description) -> list[ModeText]:
     """Return the modes in which an orbit may stay and that no section divides."""
     surfaces = engine_order(description)
-    domains = domains_of(description, surfaces)
-    if len({tuple(d.signs.items()) for d in domains}) < len(domains):
-        return []  # modes overlap: which of them motion is in is part of its state, none are joined
     sampler = Sampler(floats(description), defaults(description))
     timed = {s.name for s in surfaces if _is_timed(sampler, s.name)}
     parts = Counter(joined_modes(description).values())

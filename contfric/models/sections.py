@@ -63,7 +63,8 @@ def _joined(key: _Key) -> dict[str, str]:
         return first
     domains = domains_of(description, engine_order(description))
     if len({tuple(d.signs.items()) for d in domains}) < len(domains):
-        return first  # modes overlap: which of them motion is in is part of its state
+        # modes overlap: which of them motion is in is part of its state, none are joined but by the phase
+        return {**first, **_halves(description)}
     places = {tuple(d.signs.items()): d.mode for d in domains}
     lies_on = {m.name: {s for s, side in m.sides.items() if side == 0} for m in description.modes}
     going_on = True
@@ -79,6 +80,21 @@ def _joined(key: _Key) -> dict[str, str]:
                 first.update(dict.fromkeys(both, lead))
                 going_on = True
     return first
+
+
+def _halves(description: Description) -> dict[str, str]:
+    """Return the modes above the phase, by those below it with the same field and sides else."""
+    phase = description.phase
+    found = {}
+    for below in description.modes:
+        if below.sides.get(phase) == -1:
+            wanted = {**below.sides, phase: 1}, below.field
+            found[below.name] = next(
+                m.name
+                for m in description.modes
+                if (m.sides, m.field) == wanted and m.name == below.name[: len(m.name)]
+            )
+    return found
 
 
 def _between(
@@ -197,10 +213,12 @@ def join_domains(domains: tuple[Domain, ...], first: Mapping[str, str]) -> tuple
 
 def clear_surfaces(surfaces: list[Surface], domains: tuple[Domain, ...]) -> list[Surface]:
     """Return the surfaces; where all that meets one goes on in its own mode, it is not switching any more."""
-    place = {tuple(d.signs.items()): d for d in domains}  # of modes that overlap none are joined
+    place: dict[tuple[tuple[str, int], ...], list[Domain]] = {}
+    for domain in domains:
+        place.setdefault(tuple(domain.signs.items()), []).append(domain)
     found = []
     for surface in surfaces:
-        pairs = [(d, place.get(_beyond(d, surface.name))) for d in domains]
+        pairs = [(d, _behind(d, place.get(_beyond(d, surface.name), []))) for d in domains]
         crossed = any(
             e is not None and d.declared != e.declared and d.mode == e.mode for d, e in pairs
         )
@@ -209,6 +227,11 @@ def clear_surfaces(surfaces: list[Surface], domains: tuple[Domain, ...]) -> list
         clear = crossed and not divides and not rested
         found.append(replace(surface, switching=False) if clear else surface)
     return found
+
+
+def _behind(domain: Domain, there: list[Domain]) -> Domain | None:
+    """Return the domain that motion goes on in: of modes that overlap, its own."""
+    return next((d for d in there if d.mode == domain.mode), there[-1] if there else None)
 
 
 def _beyond(domain: Domain, surface: str) -> tuple[tuple[str, int], ...]:

@@ -103,14 +103,19 @@ def _with_observables(data: dict[str, Any]) -> dict[str, Any]:
     taken = {*map(str, data.get("states") or ()), *map(str, data.get("parameters") or ()), *parts}
     taken |= {*RESERVED}  # a surface may be called sign
     named: dict[Any, Any] = {}
+    known: dict[str, str] = {}
     for name, entry in surfaces.items():
         named[name] = entry
         text = entry.get("observable")
         if not isinstance(text, str) or (text.strip().isidentifier() and text.strip() not in parts):
             continue
+        if text in known:  # levels of one expression are ordered
+            named[name] = {**entry, "observable": known[text]}
+            continue
         own = as_identifier(str(name))
         while own in taken or own in observables:
             own += "_"
+        known[text] = own
         observables[own] = text
         named[name] = {**entry, "observable": own}
     return {**data, "surfaces": named, "observables": observables} if observables else data
@@ -120,9 +125,11 @@ def _divided_by_resets(data: dict[str, Any]) -> dict[str, Any]:
     """Return a model in which a reset acts in modes that lie on both sides of its surface.
 
     A clock is struck as its balance passes the middle on the way up: ``from: [up]`` at ``x = 0``. Each mode
-    that a reset names, and that says no side of its surface, is two: ``up-`` below it and ``up+`` above.
+    that a reset names, and that says no side of its surface, is two: ``up-`` below it and ``up+`` above. A
+    reset at a place of an angle acts in all modes, if none has a side: rotations pass it.
     """
     modes, resets = dict(data.get("modes") or {}), dict(data.get("resets") or {})
+    surfaces, angles = mapping_in(data, "surfaces"), listed(data.get("angles") or ())
     others = (
         *(data.get("domains") or {}).values(),
         *({"mode": mode} for r in resets.values() for mode in listed(r.get("to"))),
@@ -130,6 +137,9 @@ def _divided_by_resets(data: dict[str, Any]) -> dict[str, Any]:
     named = {other.get("mode") for other in others if isinstance(other, Mapping)}
     for surface, entry in resets.items():
         asked = entry.get("from")
+        sided = any(surface in mapping_in(mode, "in") for mode in modes.values())
+        if asked is None and not sided and surfaces.get(surface, {}).get("observable") in angles:
+            asked = [*modes]
         if not isinstance(asked, (list, tuple)):
             continue
         acts: list[str] = []

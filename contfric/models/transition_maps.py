@@ -6,12 +6,12 @@ motion stays in the mode that it is in while that holds.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from contfric.errors import ParameterError
-from contfric.models.parts import Lead, led
+from contfric.models.parts import led
 from contfric.models.section_maps import SectionMaps
 
 if TYPE_CHECKING:
@@ -154,8 +154,8 @@ class TransitionMaps(SectionMaps):
                     found[domain.name, lift] = tuple(d.name for d in self.domains_of(flight))
         return found
 
-    def undecided(self) -> tuple[str, str, tuple[str, ...]] | None:
-        """Return (domain, surface, modes) where motion could go on in several modes; else None."""
+    def undecided(self) -> Iterator[tuple[Domain, str, tuple[str, ...]]]:
+        """Yield (domain, surface, modes) where motion could go on in several modes."""
         for domain in self.domains:
             for surface in self.surfaces:
                 found = [
@@ -164,13 +164,13 @@ class TransitionMaps(SectionMaps):
                 ]
                 for target in found:
                     key = tuple(target.signs[s.name] for s in self.surfaces)
-                    fits = {d.own_mode for d in self._domains_by_signs[key]}
+                    fits = {d.mode for d in self._domains_by_signs[key]}
                     named = {d.own_mode for d in found if d.signs == target.signs}
                     mapped = self.maps_at(domain, surface.name)
                     several = len(named) > 1 if mapped else len(fits) > 1
-                    if several and not (not mapped and domain.own_mode in fits):
-                        return domain.name, surface.name, tuple(sorted(named if mapped else fits))
-        return None
+                    if several and not (not mapped and domain.mode in fits):
+                        yield domain, surface.name, tuple(sorted(named if mapped else fits))
+                        break
 
     def maps_at(self, domain: Domain, surface: str) -> bool:
         """Return whether a reset acts on motion that meets a surface.
@@ -211,7 +211,7 @@ class TransitionMaps(SectionMaps):
         asked = {**fixed, **landed}
         behind = self._domains_landed(reset).get(tuple(asked[name] for name in sorted(asked)), [])
         behind = [*behind, *self._departed(asked)]
-        behind = led(behind, (*reset.leads, Lead(domain.own_mode, {})))
+        behind = led(behind, reset.leads, domain.own_mode)
         chatter = self.chatter_at.get((domain.mode, reset.surface))
         resting = self.domains_of(chatter.mode) if chatter else ()
         return tuple(d.name for d in (*behind, *resting))
@@ -315,7 +315,11 @@ class TransitionMaps(SectionMaps):
 
     def _domain_with(self, signs: Mapping[str, int], mode: str = "") -> str | None:
         fits = self._domains_by_signs.get(tuple(signs[s.name] for s in self.surfaces), ())
-        return next((d.name for d in fits if d.own_mode == mode), fits[0].name if fits else None)
+        whole = self.whole_mode(mode)
+        same = [d.name for d in fits if d.own_mode == mode] or [
+            d.name for d in fits if d.mode == whole
+        ]
+        return same[0] if same else fits[0].name if fits else None
 
     @cached_property
     def _domains_by_signs(self) -> dict[tuple[int, ...], tuple[Domain, ...]]:

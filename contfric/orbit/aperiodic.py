@@ -9,11 +9,15 @@ quasi-periodic one.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from contfric.errors import AperiodicError, ConvergenceError
+from contfric.models.clocks import is_clock
 from contfric.models.definition import Model
 from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
+from contfric.orbit.starts import signs_at
 
 #: Longest period that is looked for, in periods of the excitation.
 MOST_PERIODS = 64
@@ -81,6 +85,10 @@ def _unbounded(trajectory: Trajectory) -> str:
     )
 
 
+#: Times after which a motion that goes round is somewhere else: no multiples of each other's periods.
+_LATER = 1.2345
+
+
 def _advice(trajectory: Trajectory, done: int) -> str:
     where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
     return (
@@ -93,9 +101,14 @@ def _advice(trajectory: Trajectory, done: int) -> str:
 def _parting(trajectory: Trajectory) -> str:
     """Return what two motions say that begin close to each other where a trajectory ends."""
     model, (_, time, state, _) = trajectory.model, trajectory.last
-    shift = _APART * (1.0 + np.abs(state)) * (-1.0) ** np.arange(len(state))
+    moved = np.array([not is_clock(name) for name in model.states])
+    shift = moved * _APART * (1.0 + np.abs(state)) * (-1.0) ** np.arange(len(state))
+    compared = _COMPARED
+    if model.autonomous:  # a unit of time says nothing of how often something happens
+        passed = float(trajectory.last[1]) - trajectory.begin[0]
+        compared = math.ceil(_COMPARED * max(1.0, passed / max(1, len(trajectory))))
     one, other = (
-        simulate(model, trajectory.params, state=begin, time=time, periods=_COMPARED)
+        simulate(model, trajectory.params, state=begin, time=time, periods=compared)
         for begin in (state, state + shift)
     )
     if {one.end, other.end} != {SimulationEnd.TIME}:
@@ -103,7 +116,34 @@ def _parting(trajectory: Trajectory) -> str:
     apart = float(np.max(np.abs(one.last[2] - other.last[2]) / (1.0 + np.abs(one.last[2]))))
     if apart > _CHAOTIC * _APART:
         return (
-            f". Motions that begin {_APART:.0e} apart are {apart:.0e} apart after {_COMPARED} periods: it is "
+            f". Motions that begin {_APART:.0e} apart are {apart:.0e} apart after {compared} periods: it is "
             "chaotic, or a long transient of chaos"
         )
     return ". Motions that begin close stay close: it is quasi-periodic, or it converges slowly"
+
+
+def goes_on(trajectory: Trajectory) -> str:
+    """Return what a motion does that meets nothing any more; nothing if it has come to an equilibrium."""
+    model, (_, time, state, mode) = trajectory.model, trajectory.last
+    vector = model.vector(trajectory.params)
+    flow, whole, signs = (
+        model.view(vector),
+        model.whole_mode(mode),
+        signs_at(model, time, state, vector),
+    )
+    for surface, side in signs.items():
+        sides = {d.signs[surface] for d in model.domains_of(whole)}
+        if side and sides == {-side}:
+            return (
+                f"the motion has left the region of '{mode}' at '{surface}', where no mode follows. "
+                "`contfric check` says what is missing"
+            )
+    before, after = (flow.state(whole, time, state, d) for d in (_LATER, math.e * _LATER))
+    moves = min(float(np.max(np.abs(y - state))) for y in (before, after))
+    if not moves > _APART * (1.0 + float(np.max(np.abs(state)))):
+        return ""
+    return (
+        f"the motion goes on in '{mode}' and meets no surface any more. A cycle inside of one mode is found "
+        "at a section: give the model a surface that it crosses, with two modes of the same field on its "
+        "sides"
+    )

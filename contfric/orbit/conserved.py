@@ -30,6 +30,8 @@ _ZERO = 1e-9
 _NOTHING = 1e-12
 #: States at which rates are asked for, beyond the number of states: one more says that none is an accident.
 _MORE = 3
+#: States that are tried for them.
+_TRIES = 200
 #: A second set of parameters: what vanishes at the defaults alone is no datum.
 _MOVED = 1.07
 
@@ -121,7 +123,7 @@ def _at_random(model: ComposedModel, mode: str) -> list[Motion]:
 
 def _at_samples(model: Model, mode: str) -> list[Motion]:
     """Return sampled states of a mode, by its formulas."""
-    found = []
+    found: list[Motion] = []
     description = _samplers(model)[0].evaluator.description
     parts = [
         name for name in model.mode_by_name if model.whole_mode(name) == model.whole_mode(mode)
@@ -130,14 +132,18 @@ def _at_samples(model: Model, mode: str) -> list[Motion]:
     held = [surface for surface, side in text.sides.items() if side == 0]
     for sampler in _samplers(model):
         vector = np.array([sampler.params[name] for name in model.parameter_names])
-        for t, y in sampler.states(len(model.states) + _MORE):
+        wanted = len(found) + len(model.states) + _MORE
+        for t, y in sampler.states(_TRIES):
             place: tuple[float, list[float]] | None = (t, y)
             for surface in (*held, *held):  # twice: one may move a state off the other
                 place = place and sampler.landed(surface, *place)
             if place is not None:
                 at, state = place
                 rate = sampler.evaluator.field(text.name, sampler.params, at, state)
-                found.append((vector, at, np.array(state), np.array(rate)))
+                if np.all(np.isfinite(rate)):  # a root of a negative level has no value
+                    found.append((vector, at, np.array(state), np.array(rate)))
+            if len(found) == wanted:
+                break
     return found
 
 

@@ -11,7 +11,7 @@ from contfric.errors import ConvergenceError, function_of, real_number, whole_nu
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
-from contfric.orbit.aperiodic import MOST, MOST_PERIODS, affordable, why_none
+from contfric.orbit.aperiodic import MOST, MOST_PERIODS, affordable, goes_on, why_none
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
@@ -180,6 +180,8 @@ def _wanted(orbit: Orbit, periods: int | None) -> Orbit:
 
 
 def _check_motion(trajectory: Trajectory) -> None:
+    if trajectory.end is SimulationEnd.QUIET and (why := goes_on(trajectory)):
+        raise ConvergenceError(f"no periodic orbit: {why}", trajectory)
     if trajectory.end not in (SimulationEnd.EVENTS, SimulationEnd.TIME):
         raise ConvergenceError(
             f"no periodic orbit: {trajectory.end.value}. Choose other parameters or another start",

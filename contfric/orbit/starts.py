@@ -132,11 +132,15 @@ def _at_a_tick(model: Model, vector: FloatArray) -> FloatArray:
 
 
 def _is_start(model: Model, y: FloatArray, vector: FloatArray) -> bool:
-    """Tell whether a state at time 0 is in a domain, or leads into one."""
+    """Tell whether a state at time 0 is in a domain, or leads into one, and is no equilibrium of it."""
     signs = signs_at(model, 0.0, y, vector)
-    return bool(
-        model.domain_of(signs, 0.0, y, vector) or _side_of_rates(model, 0.0, y, vector, signs)
-    )
+    name = model.domain_of(signs, 0.0, y, vector)
+    name = name or _side_of_rates(model, 0.0, y, vector, signs)
+    if not name or not model.autonomous:
+        return bool(name)
+    domain = model.domain_by_name[name]
+    moves = model.view(vector).jacobian(domain.mode, 0.0, y, 0.0)[:, 1 + len(y)]
+    return bool(np.any(moves != 0.0)) or model.mode_by_name[domain.own_mode].sliding
 
 
 def checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> FloatArray:

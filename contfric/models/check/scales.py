@@ -17,6 +17,8 @@ _APART = 1e6
 _FAR = 50.0
 #: States that are asked for their times.
 _STATES = 40
+#: An excitation that moves states by less moves none: it multiplies them, and they are at 0.
+_NO_FORCE = 1e-12
 #: Phases of an excitation at which its force is looked at.
 _PHASES = 16
 
@@ -77,7 +79,7 @@ def _propose_units(
     if "clock" in sizes:  # the time since the last tick: half a period is its spread
         shift = sizes["clock"] / math.pi
     for state, size in _forced_sizes(probe).items():
-        if sizes[state] == 1.0:  # nobody has said how large it is
+        if sizes[state] == 1.0 and size > _NO_FORCE:  # nobody has said how large it is
             sizes[state] = size
     angles = {n[:-1] for n in model.reset_by_surface if n[:-1] in sizes}
     wanted = {n: v for n, v in sizes.items() if not is_clock(n) and n not in angles} | {"t": shift}

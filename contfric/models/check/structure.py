@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 
 import numpy as np
 
@@ -53,19 +53,63 @@ def check_transitions(report: ModelReport, probe: Probe) -> None:
             _check_crossings(report, probe, surface)
 
 
-def entered_domains(model: Model) -> set[str]:
-    """Return the domains that motion comes to from others, again and again: all that cycles may visit."""
+def entered_domains(model: Model, made: Set[tuple[str, str, str]] | None = None) -> set[str]:
+    """Return the domains that motion comes to from others, again and again: all that cycles may visit.
+
+    Parameters
+    ----------
+    made : (domain, surface, next domain) of the crossings and resets that count; all that the graph has if
+        left out
+    """
     found = {domain.name for domain in model.domains}
     while True:
         entered = {
             target
-            for (source, _), targets in model.targets.items()
+            for (source, surface), targets in model.targets.items()
             for target in targets
-            if source in found and source != target
+            if source in found
+            and source != target
+            and (made is None or (source, surface, target) in made)
         }
         if not found - entered:
             return found
         found &= entered
+
+
+def _made(probe: Probe) -> set[tuple[str, str, str]]:
+    """Return the crossings and resets that some sampled motion makes, or that none was sampled for.
+
+    The graph has more: a state that is held is on one side of a surface for ever, and a reset to 0 leads
+    to the side of 0 only.
+    """
+    model = probe.model
+    seen: set[tuple[str, str]] = set()
+    found: set[tuple[str, str, str]] = set()
+    for surface in model.surfaces:
+        for t, y in probe.on(surface.name, _ON_SURFACE):
+            signs = probe.signs(t, y)
+            for domain in model.domains:
+                side = domain.signs[surface.name]
+                others = (s for s in signs if s != surface.name)
+                if not side or any(signs[s] != domain.signs[s] for s in others):
+                    continue
+                key = domain.name, surface.name
+                seen.add(key)
+                if not side * probe.rate(domain.own_mode, surface.name, t, y) < -_STILL:
+                    continue
+                targets = model.targets.get(key, ())
+                if model.maps_at(domain, surface.name):
+                    behind = probe.signs(t, probe.reset(surface.name, t, y))
+                    free = {*behind} - model.reset_by_surface[surface.name].lands.keys()
+                    targets = tuple(
+                        d
+                        for d in targets
+                        if all(model.domain_by_name[d].signs[s] == behind[s] for s in free)
+                    )
+                found |= {(*key, target) for target in targets}
+    return found | {
+        (*key, d) for key, targets in model.targets.items() if key not in seen for d in targets
+    }
 
 
 def _behind_wall(probe: Probe, signs: dict[str, int]) -> bool:
@@ -105,6 +149,8 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
                     "negative. Where motion comes there (a normal force vanishes) the model does not hold",
                 )
                 continue
+            if following is None and name in entered:
+                entered = entered_domains(model, _made(probe))
             if following is None and name not in entered:
                 report.note(
                     Topic.TRANSITIONS,
