@@ -180,7 +180,8 @@ def trace_side(
         if progress is not None:
             progress(f"{side.count} points, {settings.parameter} = {side.tip.value:.6g}")
         if finished:
-            if side.end.reason in _MAY_BE_ENDLESS and (end := endless(_tip(orbit, side, settings))):
+            may_be = side.autonomous and side.end.reason in _MAY_BE_ENDLESS
+            if may_be and (end := endless(_tip(orbit, side, settings))):
                 side.end = end
             side.rows = side.rows.first(side.last + 1)
             return side
@@ -331,7 +332,7 @@ def _resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         elif ends_at(orbit, side, bifurcation, point, settings):
             return True
     reached = after if limit is None else limit[0]
-    if np.any(reached.tests[:-EXTRA] < -_VIOLATED):
+    if (reached.tests[:-EXTRA] < -_VIOLATED).any():
         side.drop_tip()
         if is_at_limit(side.tip.value, settings):
             side.end = limit_end(side.tip.value, settings)
