@@ -121,6 +121,7 @@ bench: $(BENCH_STAMP)
 	@$(BIN)/python benchmarks/contacts.py
 	@$(BIN)/python benchmarks/six_segments.py
 	@$(BIN)/python benchmarks/first_orbit.py
+	@$(BIN)/python benchmarks/auto.py
 
 # An hour or more; sequences and restarts go on where they were interrupted.
 stress: $(STAMP)

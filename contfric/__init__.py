@@ -282,7 +282,8 @@ def __getattr__(name: str) -> Any:
 
         with held_back():
             home = import_module(_HOMES[name])
-        return getattr(home, name)
+        globals()[name] = found = getattr(home, name)  # the next look-up costs nothing
+        return found
     raise AttributeError(f"module 'contfric' has no attribute '{name}'")
 
 

@@ -89,6 +89,14 @@ scale_signature = f8(i8, vector)
 #: the first row of ``jac``. ``workspace`` holds 8 + n numbers. 0 where a flow has none.
 second_signature = i8(i8, i8, f8, vector, f8, vector, indices, vector, matrix, vector)
 
+#: together(count, modes, on, times, states, p, longest, tau, surfaces, ends, jac): for many motions, each in
+#: a row, the first surface that is met within ``longest`` (``on``: those that it starts on, as bits), the
+#: time until then, the state there, and the derivatives of the flow; -2 as the surface where that is not
+#: decided, and is to be asked for motion by motion. A mode below 0 is no motion.
+together_signature = types.void(
+    i8, indices, indices, vector, matrix, matrix, vector, vector, indices, matrix, blocks
+)
+
 #: How an entry point is compiled.
 _OPTIONS = {"nogil": True, "error_model": "numpy", "pipeline_class": KernelCompiler}
 

@@ -179,6 +179,7 @@ def _compile(model: Model) -> None:
     from contfric.chaos.cells import follow_cells
 
     model.flow.following()
+    model.flow.hits_together()
     assert follow_cells.dispatcher is not None
 
 

@@ -124,6 +124,7 @@ def follow(
     flag = new_stop() if stop is None else stop
     arguments = (
         model.flow.following(),
+        model.flow.hits_together(),
         tables(model),
         starting(model),
         float(time),

@@ -34,6 +34,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contfric.compiled import allocating_helper, helper
+from contfric.flow.without import SINGLY
 from contfric.models.definition import FloatArray
 from contfric.orbit.system import IntArray
 from contfric.orbit.trajectory import (
@@ -75,6 +76,8 @@ class Walk(NamedTuple):
     end, image : workspace for a state and for the image of a perturbation, shape (n,)
     at_once : number of events in a row that followed each other at once; 1 if the model is autonomous,
         plus 2 if it has resets; whether there was an impact among those events; shape (3,)
+    ahead, meets : duration of the next segment and the surface that ends it, where they are known beforehand,
+        with the state there and the derivatives; else SINGLY as the surface; shapes (1,)
     """
 
     y: FloatArray
@@ -84,6 +87,8 @@ class Walk(NamedTuple):
     end: FloatArray
     image: FloatArray
     at_once: IntArray
+    ahead: FloatArray
+    meets: IntArray
 
 
 @allocating_helper
@@ -97,6 +102,8 @@ def new_walk(n):  # type: ignore[no-untyped-def]
         np.empty(n),
         np.empty(n),
         np.zeros(3, dtype=np.int64),
+        np.zeros(1),
+        np.full(1, SINGLY),
     )
 
 
@@ -128,7 +135,11 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
             on |= lying_on(functions, tables, t, y, p, workspace)
             break
     while True:
-        tau, surface = first_hit(functions, tables, mode, on, t, y, p, longest, period, workspace)
+        tau, surface = walk.ahead[0], walk.meets[0]
+        if surface == SINGLY:
+            tau, surface = first_hit(
+                functions, tables, mode, on, t, y, p, longest, period, workspace
+            )
         if surface < 0:
             held = tables.sliding[mode] != 0
             return HELD if held else QUIET, surface, mode, duration, turns, t
@@ -182,6 +193,7 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
         if reset:
             return IMPOSSIBLE, surface, mode, duration, turns, t
         on = 1 << surface
+        walk.meets[0] = SINGLY  # from here on it was not asked for
 
 
 @helper
@@ -214,7 +226,8 @@ def differentiate(functions, observable, mode, duration, t, p, walk, none):  # t
     """Differentiate the segment that a walk has just finished; return the rate at its exit."""
     n = walk.y.shape[0]
     jac, grad, start = walk.jac, walk.grad, walk.start
-    functions.flow(mode, start[0], start[1:], duration, p, none, walk.end, jac)
+    if walk.meets[0] == SINGLY:
+        functions.flow(mode, start[0], start[1:], duration, p, none, walk.end, jac)
     met = walk.end if walk.at_once[1] & 2 != 0 else walk.y  # before a reset
     functions.observe(observable, t, met, p, none, grad)
     rate = grad[0]

@@ -18,6 +18,7 @@ from numba.core import cgutils
 from numba.core.extending import infer_getattr, intrinsic, models, register_model
 from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate
+from numba.np.arrayobj import make_array
 
 
 class Reference(types.Type):  # type: ignore[misc]
@@ -60,9 +61,9 @@ class _Members(AttributeTemplate):  # type: ignore[misc]
 
 @lower_getattr_generic(Reference)  # type: ignore[untyped-decorator]
 def _member(context: Any, builder: Any, reference: Reference, value: Any, name: str) -> Any:
-    place = cgutils.gep_inbounds(builder, value, 0, reference.target.fields.index(name))
-    kind = reference.type_of(name)
-    if isinstance(kind, Reference):
+    index, kind = reference.target.fields.index(name), reference.type_of(name)
+    place = cgutils.gep_inbounds(builder, value, 0, index)
+    if kind is not reference.target.types[index]:  # a named tuple that lies there
         return place
     return impl_ret_borrowed(context, builder, kind, builder.load(place))
 
@@ -84,3 +85,52 @@ def _refer(typing: Any, value: Any) -> Any:
 #: ``by_reference(value)``: a reference to a named tuple that the caller of this helper holds; of a reference,
 #: itself.
 by_reference: Any = intrinsic(_refer)
+
+
+def _words(context: Any, kind: Any) -> int:
+    return -(-int(context.get_abi_sizeof(context.get_value_type(kind))) // 8)
+
+
+def _words_of(typing: Any, value: Any) -> Any:
+    """Return how many whole numbers a named tuple takes in memory."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return context.get_constant(types.int64, _words(context, value))
+
+    return types.int64(value), code
+
+
+words_of: Any = intrinsic(prefer_literal=False)(_words_of)
+
+
+def _address(context: Any, builder: Any, kinds: Any, arguments: Any, target: Any) -> Any:
+    """Return where the named tuple number k lies in memory."""
+    memory = make_array(kinds[0])(context, builder, arguments[0])
+    words = context.get_constant(types.int64, _words(context, target))
+    at = builder.gep(memory.data, [builder.mul(arguments[1], words)])
+    return builder.bitcast(at, context.get_value_type(target).as_pointer())
+
+
+def _store_at(typing: Any, memory: Any, k: Any, value: Any) -> Any:
+    """Store a named tuple as number k in memory of whole numbers; its arrays must live as long."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        builder.store(arguments[2], _address(context, builder, signature.args, arguments, value))
+        return context.get_dummy_value()
+
+    return types.void(memory, types.int64, value), code
+
+
+store_at: Any = intrinsic(prefer_literal=False)(_store_at)
+
+
+def _reference_at(typing: Any, memory: Any, k: Any, like: Any) -> Any:
+    """Return the reference to number k of those that were stored; ``like`` is a reference to one of them."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _address(context, builder, signature.args, arguments, like.target)
+
+    return like(memory, types.int64, like), code
+
+
+reference_at: Any = intrinsic(prefer_literal=False)(_reference_at)

@@ -27,7 +27,7 @@ _CRITICAL, _NEAR_END = 1e-6, 1e-3
 
 def join(orbit: Orbit, settings: Settings, behind: Side, ahead: Side) -> Branch:
     """Return one branch from the two sides of its start."""
-    shift = behind.tip.arc
+    shift = behind.position
     back = [_turned(b, shift) for b in reversed(behind.bifurcations)]
     front = [replace(b, position=shift + b.position) for b in ahead.bifurcations]
     first, last = behind.end, ahead.end
@@ -102,7 +102,8 @@ def _branch(
     )
     _renew_ends(branch)
     branch = _without_critical_ends(branch, settings)
-    branch = replace(branch, notes=(*branch.notes, *continua_of(branch)))
+    if continua := tuple(continua_of(branch)):
+        branch = replace(branch, notes=(*branch.notes, *continua))
     return with_openings(branch, settings)
 
 
@@ -175,7 +176,7 @@ def _joined(behind: Side | None, ahead: Side, origin: Point | None) -> dict[str,
     if behind is None:
         joined = {name: front.take(name) for name in ahead.names}
     else:
-        back, shift = behind.columns(), behind.tip.arc
+        back, shift = behind.columns(), behind.position
         back.arrays["arc"] *= -1.0
         joined = {name: front.take_behind(name, back) for name in ahead.names}
         joined["arc"] += shift

@@ -109,6 +109,8 @@ def continua_of(branch: Branch) -> Iterator[str]:
 
 def _runs(flags: np.ndarray) -> Iterator[tuple[int, int]]:
     """Yield first and last place of each run of true flags that is long enough."""
+    if not flags.any():
+        return
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     for first, behind in edges.reshape(-1, 2):
         if behind - first >= _RUN:

@@ -46,7 +46,10 @@ def is_point(orbit: Orbit) -> bool:
 
 def never_leaves(orbit: Orbit) -> bool:
     """Tell whether the flights off a wall on which impacts come to rest have shrunk to nothing."""
-    model, least = orbit.model, _NO_HEIGHT * (1.0 + float(np.max(np.abs(orbit.joints[:, 1:]))))
+    model = orbit.model
+    if not model.chatter_by_mode:
+        return False
+    least = _NO_HEIGHT * (1.0 + float(np.max(np.abs(orbit.joints[:, 1:]))))
     for own in {model.chatter_by_mode[m] for m, _ in orbit.word if m in model.chatter_by_mode}:
         gap, highest = model.surface_by_name[own.surface].observable, 0.0
         level = orbit.flow.level(own.surface)

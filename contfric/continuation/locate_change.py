@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import threading
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,9 +13,33 @@ from contfric.continuation.side import branch_problem
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import polish
+from contfric.orbit.system import System
 
 if TYPE_CHECKING:
     from contfric.continuation.bracket import Sought
+    from contfric.continuation.geometry import Points
+
+
+class _Trials(threading.local):
+    """Four rows for locations, of the system last at work in this thread: allocated once a branch."""
+
+    system: System | None = None
+    rows: Rows
+    arrays: Points
+
+    def between(self, system: System, before: Point, after: Point) -> Rows:
+        """Return the rows with both points, and nothing of an earlier location."""
+        if self.system is not system:
+            self.rows, self.system = Rows.empty(system, 4), system
+            self.arrays = self.rows.arrays()
+        rows = self.rows
+        rows.put(0, before)
+        rows.put(1, after)
+        rows.arc[2:], rows.tests[2:], rows.labels[2:], rows.mu[2:] = 0.0, 0.0, 0, 0.0
+        return rows
+
+
+_TRIALS = _Trials()
 
 
 def locate_change(
@@ -63,15 +87,15 @@ def _located(
     """Return the place of one change of sign, and whether a label changes at one place only."""
     from contfric.continuation.bracket import BY_TEST, locate
 
-    rows = Rows.empty(orbit.system, 4)
-    rows.put(0, before)
-    rows.put(1, after)
+    rows = _TRIALS.between(orbit.system, before, after)
     problem, sought = branch_problem(orbit, settings), sought_of(kind, index, target)
-    at, plain = locate(problem, sought, bool(orbit.model.kinks), rows.arrays(), tally())
+    at, plain = locate(problem, sought, bool(orbit.model.kinks), _TRIALS.arrays, tally())
     # behind -2 Newton fails: the last good point, marked as such
     if at == -1.0 or (at < 0.0 and kind != BY_TEST):
         return None, False
-    return replace(rows.point(3), lost=at < 0.0), plain
+    point = rows.point(3)
+    point.lost = bool(at < 0.0)
+    return point, plain
 
 
 _NO_PLANES = np.empty((0, 3))

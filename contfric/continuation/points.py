@@ -89,10 +89,11 @@ class Settings:
     def largest_of(self, system: System) -> float:
         """Return the largest step along a branch of a system's orbits."""
         layout = system.layout
-        watched = any(len(rows) for rows in (layout.interior, layout.joint, layout.labels))
-        if not self.grows or watched or not is_smooth(system.model, system.word):
+        if not self.grows or any(map(len, (layout.interior, layout.joint, layout.labels))):
             return self.largest
-        return max(self.largest, SMOOTH_STEP)
+        return (
+            max(self.largest, SMOOTH_STEP) if is_smooth(system.model, system.word) else self.largest
+        )
 
     @property
     def box(self) -> FloatArray:

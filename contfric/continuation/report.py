@@ -64,4 +64,4 @@ def _is_rough(kind: Kind, here: Orbit, tests: tuple[Test, ...]) -> bool:
 def _stable(point: Point, here: Orbit, settings: Settings) -> bool | None:
     if here.system.holds:
         return False
-    return bool(np.all(np.abs(point.mu) < 1.0)) if settings.stability else None
+    return bool((np.abs(point.mu) < 1.0).all()) if settings.stability else None

@@ -83,7 +83,7 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         elif ends_at(orbit, side, bifurcation, point, settings):
             return True
     reached = after if limit is None else limit[0]
-    if np.any(reached.tests[:-EXTRA] < -VIOLATED):
+    if (reached.tests[:-EXTRA] < -VIOLATED).any():
         side.drop_tip()
         if is_at_limit(side.tip.value, settings):
             side.end = limit_end(side.tip.value, settings)

@@ -140,9 +140,14 @@ class Side:
         return self.rows.point(self.last - 1)
 
     @property
+    def position(self) -> float:
+        """Arclength of the last point."""
+        return float(self.rows.arc[self.last])
+
+    @property
     def length(self) -> float:
         """Arclength from the first point to the last."""
-        return float(self.rows.arc[self.last] - self.first.arc)
+        return self.position - self.first.arc
 
     @property
     def second_multipliers(self) -> NDArray[np.complex128]:

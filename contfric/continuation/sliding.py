@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.kinds import hold_of_test, kind_of_margin
 from contfric.continuation.locate_change import locate_change
@@ -43,10 +41,9 @@ def sliding_events(
     """Return the sliding event that ends the branch between two points, if there is one."""
     from contfric.continuation.bracket import BY_TEST
 
-    margins = len(orbit.system.tests)
     located: list[tuple[int, Point]] = []
-    for k in range(margins):
-        if after.tests[k] < 0.0:
+    for k, value in enumerate(after.tests[: len(orbit.system.tests)].tolist()):
+        if value < 0.0:
             point = locate_change(orbit, before, after, settings, BY_TEST, k)
             if point is not None:
                 located.append((k, point))
@@ -114,7 +111,7 @@ def _pulled_in(
 def _is_inside(here: Orbit) -> bool:
     """Tell whether no margin is negative, and no segment lasts less than nothing."""
     lasts = here.ends[:, 0] - here.cycle[:, 0]
-    return bool(np.min(lasts) >= 0.0 and np.min(here.margins, initial=0.0) > -_NEGATIVE)
+    return bool(lasts.min() >= 0.0 and here.margins.min(initial=0.0) > -_NEGATIVE)
 
 
 def _stop_behind(here: Orbit, point: Point, first: int) -> int:
@@ -217,7 +214,8 @@ def _located_before(
     """Return the margins violated at a located event: they vanish before it, and come back behind."""
     from contfric.continuation.bracket import BY_TEST
 
-    violated = map(int, np.flatnonzero(point.tests[: len(orbit.system.tests)] < -_TOGETHER))
+    tests = point.tests[: len(orbit.system.tests)].tolist()
+    violated = (k for k, value in enumerate(tests) if value < -_TOGETHER)
     found = [(k, locate_change(orbit, before, point, settings, BY_TEST, k)) for k in violated]
     return [(k, p) for k, p in found if p is not None and p.arc < point.arc]
 

@@ -44,11 +44,11 @@ def smooth_events(
 
     base = len(before.tests) - EXTRA
     # events behind a sliding one do not happen; where a stop becomes tangential multipliers are infinite
-    after = beyond if np.all(np.isfinite(beyond.tests[base:])) else after
+    after = beyond if np.isfinite(beyond.tests[base:]).all() else after
+    values = zip(before.tests[base:].tolist(), after.tests[base:].tolist(), strict=True)
     found: list[Located] = []
     folded = False
-    for column in (FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR):
-        a, b = before.tests[base + column], after.tests[base + column]
+    for column, (a, b) in zip((FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR), values, strict=True):
         if not a * b < 0.0 or (column == CHI_ONE and folded):
             continue  # chi(1) of a fold vanishes with it
         if max(abs(a), abs(b)) < LEVEL:

@@ -148,7 +148,8 @@ def trace_side(
         if progress is not None:
             progress(f"{side.count} points, {settings.parameter} = {side.tip.value:.6g}")
         if finished:
-            if side.end.reason in _MAY_BE_ENDLESS and (end := endless(_tip(orbit, side, settings))):
+            may_be = side.autonomous and side.end.reason in _MAY_BE_ENDLESS
+            if may_be and (end := endless(_tip(orbit, side, settings))):
                 side.end = end
             side.rows = side.rows.first(side.last + 1)
             return side

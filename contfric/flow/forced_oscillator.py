@@ -48,6 +48,7 @@ from contfric.flow.response import forced, free
 from contfric.flow.rest import rest_hit, rest_stationary
 from contfric.flow.roots import interior_of, roots_along
 from contfric.flow.second import second
+from contfric.flow.together import together
 
 #: A load this far from a level is not there by rounding: its next hit is one of the closed form's.
 AWAY = 1e-6
@@ -260,4 +261,5 @@ def stationary(mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untype
 
 def compiled_flow() -> CompiledFlow:
     """Return the compiled functions of this flow."""
-    return CompiledFlow(flow, observe, level, stationary, hit, period, rate, second=second)
+    functions = flow, observe, level, stationary, hit, period, rate
+    return CompiledFlow(*functions, second=second, together=together)

@@ -28,6 +28,7 @@ class CompiledFlow:
     reset : state behind the reset at a surface, with its derivatives; None if the model has no resets
     second : second derivatives in a direction, for curves in two parameters; without it they are
         differences of the first ones
+    together : first hits of many motions at once, with derivatives; without it each is asked for by itself
     """
 
     flow: Any
@@ -39,6 +40,7 @@ class CompiledFlow:
     rate: Any
     reset: Any = field(default=None, kw_only=True)
     second: Any = field(default=None, kw_only=True)
+    together: Any = field(default=None, kw_only=True)
 
     def functions(self) -> int:
         """Return the functions as kernels take them: a handle (:mod:`contfric.flow.layouts`)."""
@@ -55,6 +57,18 @@ class CompiledFlow:
     def second_derivatives(self) -> int:
         """Return the second derivatives as kernels take them; what says that there are none by default."""
         return self._blocks[2].address  # type: ignore[no-any-return]
+
+    def hits_together(self) -> int:
+        """Return the first hits of many motions as kernels take them."""
+        return self._together.address  # type: ignore[no-any-return]
+
+    @cached_property
+    def _together(self) -> Any:
+        from contfric.flow.layouts import TOGETHER
+        from contfric.flow.without import no_together
+        from contfric.handle import Block
+
+        return Block(TOGETHER, {"together": self.together or no_together})
 
     @cached_property
     def _blocks(self) -> tuple[Any, Any, Any]:

@@ -23,6 +23,7 @@ from contfric.compiled import (
     scale_signature,
     second_signature,
     stationary_signature,
+    together_signature,
     vector,
 )
 from contfric.handle import ITSELF, TABLE, WEIGHTS, HandleType
@@ -42,6 +43,10 @@ FlowType = HandleType("flow", FLOW)
 #: Its second derivatives, which curves in two parameters take as well.
 SECOND = {"second": second_signature}
 SecondType = HandleType("second", SECOND)
+
+#: The first hits of many motions at once.
+TOGETHER = {"together": together_signature}
+TogetherType = HandleType("together", TOGETHER)
 
 _entries = types.void(i8, vector, indices, vector, matrix)
 _audible = types.void(i8, vector, vector)

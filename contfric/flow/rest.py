@@ -19,10 +19,15 @@ def rest_hit(x, target, w, phase):  # type: ignore[no-untyped-def]
 
     ``phase`` holds sine and cosine of theta at the start.
     """
-    cosine = x - target
+    return time_to_cosine(x - target, math.atan2(phase[0], phase[1]), w)
+
+
+@helper
+def time_to_cosine(cosine, start, w):  # type: ignore[no-untyped-def]
+    """Return the time until cos(theta) takes a value, from an angle in (-pi, pi]; -1 if never."""
     if abs(cosine) > 1.0:
         return -1.0
-    angle, start = math.acos(cosine), math.atan2(phase[0], phase[1])
+    angle = math.acos(cosine)
     first = angle - start
     second = -angle - start
     if first <= 0.0:

@@ -298,7 +298,7 @@ class Model(Shown, TransitionMaps):
 
     def mapping(self, vector: FloatArray) -> dict[str, float]:
         """Return the engine's vector as a mapping name -> float."""
-        return {name: float(v) for name, v in zip(self.parameter_names, vector, strict=True)}
+        return dict(zip(self.parameter_names, vector.tolist(), strict=True))
 
     def columns(
         self, vector: FloatArray, varied: Mapping[str, FloatArray]
