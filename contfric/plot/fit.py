@@ -38,7 +38,8 @@ def plot_fit(found: Fit, ax: Axes | None = None) -> Axes:
             *(x, table["value"][own], table["sigma"][own]), fmt=".", ms=3.0, lw=0.8, label=label
         )
         colour = points.lines[0].get_color()
-        ax.plot(x, table["fitted"][own], "-x", ms=4.0, color=colour, linewidth=LINE_WIDTH)
+        look = "-" if across == "t" else "-x"
+        ax.plot(x, table["fitted"][own], look, ms=4.0, color=colour, linewidth=LINE_WIDTH)
     names = {"t": "$t$", "datum": "datum"}
     name_axes(ax, names.get(across) or parameter_label(across), "measured, and fitted (lines)")
     ax.legend(fontsize=sized(SMALL), loc="best")
