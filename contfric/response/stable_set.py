@@ -52,8 +52,8 @@ _ARCS, _TURN = (0.04, 0.12, 0.4), 0.3
 _SHORTEST = 1e-3
 #: Returns that a start may take to the saddle, and at it.
 _ARRIVALS, _RETURNS = 40, 400
-#: Beyond a break the set is looked for at so many distances, up to this share of the ranges, at so many angles
-#: (rad). A gap is as wide as the map makes it, whatever the step is.
+#: Beyond a break the set is looked for at so many distances, up to this share of the ranges, and at these
+#: angles (rad). A gap is as wide as the map makes it, whatever the step is.
 _GAPS, _REACH, _FAN = 9, 0.02, np.linspace(-1.0, 1.0, 21)
 #: Points between two lines of progress.
 _TOLD = 50
