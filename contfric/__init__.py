@@ -58,7 +58,8 @@ if TYPE_CHECKING:
         StudyError,
     )
     from contfric.fitting.data import Jump, Measured, Series
-    from contfric.fitting.fit import Fit, fit
+    from contfric.fitting.fit import fit
+    from contfric.fitting.result import Fit
     from contfric.models import Model, load_model, model_names
     from contfric.models.check import ModelReport, check_model
     from contfric.models.mechanism import Mechanism
@@ -97,7 +98,7 @@ _HOMES = {
     "ConvergenceError": "contfric.errors",
     "Curve": "contfric.curves.curve",
     "Diagram": "contfric.atlas.diagram",
-    "Fit": "contfric.fitting.fit",
+    "Fit": "contfric.fitting.result",
     "Measured": "contfric.fitting.data",
     "Series": "contfric.fitting.data",
     "Jump": "contfric.fitting.data",

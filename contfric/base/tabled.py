@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,17 @@ Columns: TypeAlias = dict[str, NDArray[Any]]
 
 
 class Tabled(Shown):
-    """A result that is a table, for pandas and for the CSV file of a run."""
+    """A result that is a table, for pandas and for the CSV file of a run.
+
+    Attributes
+    ----------
+    length_columns, time_columns : tuple of str
+        Columns that are displacements, and times, beyond those with the name of a state and ``t``: their
+        units are those of the model.
+    """
+
+    length_columns: ClassVar[tuple[str, ...]] = ()
+    time_columns: ClassVar[tuple[str, ...]] = ()
 
     def columns(self) -> Columns:
         """Return arrays of one length by the names of the columns."""

@@ -147,7 +147,7 @@ def certify_event(event: Bifurcation, parameter: str = "") -> EventCertificate:
     >>> certify_event(branch.bifurcations[0]).proved
     True
     """
-    parameter = parameter or getattr(event.bound, "parameter", "")
+    parameter = parameter or event.parameter
     if not parameter:
         raise ParameterError("say in which parameter the event is located: certify('Omega')")
     event.orbit.model.index_of(parameter)

@@ -109,7 +109,7 @@ def lyapunov_map(
     varied = model.index_of(names[0]), model.index_of(names[1])
     at = checked_time(time)
     whole = Tile(model, limits, vector, varied, (values[0], values[1]), count, states, at)
-    kept = None if folder is None else open_tiles(Path(folder), _record(whole, grid, tile))
+    kept = None if folder is None else open_tiles(folder, _record(whole, grid, tile))
     return LyapunovMap(model, grid, vector, _computed(whole, tile, executor, kept, progress))
 
 

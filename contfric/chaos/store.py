@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from contfric.base.files import replacing, unwritable
-from contfric.errors import ResultFileError
+from contfric.errors import ResultFileError, path_of
 from contfric.models.definition import Model
 
 _RECORD = "map.json"
@@ -54,14 +54,15 @@ class TileFolder:
         return self.path / f"tile-{number:06d}.npz"
 
 
-def open_tiles(path: Path, record: dict[str, Any]) -> TileFolder:
+def open_tiles(folder: str | Path, record: dict[str, Any]) -> TileFolder:
     """Open a folder for the tiles of the map that ``record`` describes.
 
     Raises
     ------
     ResultFileError
-        If it holds those of another map, or cannot be written.
+        If it is no path, holds those of another map, or cannot be written.
     """
+    path = path_of("the folder of finished tiles", folder)
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -52,6 +52,7 @@ from contfric.orbit.trajectory import (
     first_hit,
     leads_to_rest,
     mode_after,
+    mode_together,
     sign_code,
     whole_turns,
 )
@@ -166,6 +167,8 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
         if tables.flights[mode] >= 0:
             code = code_ahead(functions, tables, mode, surface, t, y, p, period, workspace)
         following = mode_after(tables, mode, surface, code)
+        if following == -1 and not reset:
+            following = mode_together(functions, tables, mode, surface, code, t, y, p, workspace)
         if following >= 0:
             pressed = reset and is_pressed(
                 functions,

@@ -191,6 +191,8 @@ class Bifurcation(MeasuredEvent):
         The accuracy, or what returns it when it is asked for.
     proposals : tuple of Proposal
         What an exploration proposed to follow it, in order, and what became of it.
+    parameter : str
+        The parameter along which it was located; empty on a curve in two.
 
     Examples
     --------
@@ -211,6 +213,7 @@ class Bifurcation(MeasuredEvent):
     located: bool = True
     bound: float | Callable[[], float] = ACCURACY
     proposals: tuple[Proposal, ...] = ()
+    parameter: str = ""
 
     @cached_property
     def accuracy(self) -> float:

@@ -69,7 +69,11 @@ def _located(branch: Branch, k: int, before: int, settings: Settings) -> Bifurca
     kind = Kind.BP if branch.system.half else Kind.PD
     position = branch.arc[k] + low * (branch.arc[k + 1] - branch.arc[k])
     bound = ACCURACY if refined is None else max(LEAST, place_error(there, active) / settings.width)
-    return Bifurcation(kind, there.params, there, (), float(position), False, False, bound=bound)
+    return Bifurcation(
+        *(kind, there.params, there, (), float(position), False, False),
+        bound=bound,
+        parameter=branch.parameter,
+    )
 
 
 def _between(branch: Branch, k: int, share: float, active: int, settings: Settings) -> Orbit | None:

@@ -41,6 +41,7 @@ def bifurcation_at(
         point.arc,
         *_stability(kind, here, before, after, point, settings),
         bound=bound,
+        parameter=settings.parameter,
     )
 
 

@@ -52,13 +52,12 @@ def event_gradient(bifurcation: Bifurcation, parameter: str | None) -> Gradient:
 
 def parameter_of(bifurcation: Bifurcation) -> str:
     """Return the parameter along which an event was located."""
-    found = getattr(bifurcation.bound, "parameter", None)
-    if not isinstance(found, str):
+    if not bifurcation.parameter:
         raise ParameterError(
             f"{bifurcation!r} does not know along which parameter it was located: name it, such as "
             f"gradient('{bifurcation.orbit.model.parameter_names[0]}')"
         )
-    return found
+    return bifurcation.parameter
 
 
 def plane_of(bifurcation: Bifurcation, one: str, other: str) -> Problem:

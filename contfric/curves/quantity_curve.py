@@ -5,13 +5,12 @@ from __future__ import annotations
 import operator
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.extras import need_pandas
-from contfric.base.shown import Shown
+from contfric.base.tabled import Columns, Tabled
 from contfric.curves.special import CurveEnd
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
@@ -20,14 +19,13 @@ from contfric.quantities.measure import of_orbits
 from contfric.quantities.registry import quantity_of
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
 
     from contfric.quantities.registry import QuantityLike
 
 
 @dataclass(frozen=True, eq=False)
-class QuantityCurve(Shown):
+class QuantityCurve(Tabled):
     """Orbits of one signature on which a quantity has one value, in the plane of two parameters.
 
     Attributes
@@ -58,6 +56,9 @@ class QuantityCurve(Shown):
     >>> curve.quantity, curve.value
     ('x_max', 1.43)
     """
+
+    length_columns: ClassVar = ("x_max", "x_min")
+    time_columns: ClassVar = ("period",)
 
     quantity: str
     value: float
@@ -104,14 +105,10 @@ class QuantityCurve(Shown):
         """Return another quantity at every point, shape (k,)."""
         return of_orbits(quantity_of(name, self.model), self)
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return the points as a table: parameters, the quantity, stability (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
-        columns: dict[str, Any] = dict(self.params)
-        columns[self.quantity] = self._at_points()
-        return pd.DataFrame({**columns, "stable": self.stable})
+    def columns(self) -> Columns:
+        """Return one row for each point: parameters, the quantity, stability."""
+        measured = np.broadcast_to(self._at_points(), len(self))
+        return {**self.params, self.quantity: measured, "stable": self.stable}
 
     def _at_points(self) -> FloatArray | float:
         """Return the quantity at the points."""

@@ -139,7 +139,7 @@ def ensemble(
     vectors[:, [model.index_of(name) for name in varied.names]] = drawn
     side = whole_number("tile", tile, least=1)
     whole = EnsembleTile(model, vectors, parameter, bounds, row, grid, options)
-    kept = None if folder is None else open_tiles(Path(folder), _record(whole, side))
+    kept = None if folder is None else open_tiles(folder, _record(whole, side))
     rows = _computed(whole, side, executor, kept, progress)
     texts = dict(zip(varied.names, varied.texts, strict=True))
     return Ensemble(model, parameter, bounds, vector, row, grid, texts, seed, drawn, rows)

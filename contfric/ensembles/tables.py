@@ -22,7 +22,7 @@ def frame_of(found: Ensemble, table: str) -> pd.DataFrame:
     import pandas as pd
 
     make: dict[str, Callable[[Ensemble], Any]] = {
-        "samples": _samples,
+        "samples": samples_table,
         "events": events_table,
         "bands": _bands,
         "classes": _classes,
@@ -34,7 +34,8 @@ def _varied(found: Ensemble) -> dict[str, Any]:
     return dict(zip(found.distributions, found.samples.T, strict=True))
 
 
-def _samples(found: Ensemble) -> dict[str, Any]:
+def samples_table(found: Ensemble) -> dict[str, Any]:
+    """Return one row for each sample: parameters, outcome, how much was found."""
     rows = found.rows
     counts = {"branches": rows.branches, "loose_ends": rows.loose, "reason": rows.reasons}
     return {**_varied(found), "outcome": Drawn.words()[rows.outcomes], **counts}

@@ -4,31 +4,32 @@ The weighted residuals :math:`r_i = (Q_i(p) - y_i)/\sigma_i` are functions of th
 solved periodic orbits, with exact derivatives J. Their sum of squares is minimised by a trust-region
 method (``scipy.optimize.least_squares``). At the minimum the covariance of the parameters is :math:`(J^T
 J)^{-1}`, to first order, for independent errors of the given standard deviations.
-
-At each trial the orbit of each condition is refined from the last one by Newton's method. Where that is
-no longer admissible, or fails, the orbit is found anew by simulation: signatures may change on the way.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from concurrent.futures import Executor, Future
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from contfric.base.shown import Shown
-from contfric.continuation.events import Bifurcation
-from contfric.curves.gradient import slope_of
-from contfric.curves.moved import moved_event
-from contfric.errors import ContfricError, ConvergenceError, ParameterError, items_of, shown
+from contfric.chaos.running import Progress, check_executor
+from contfric.errors import (
+    ContfricError,
+    ConvergenceError,
+    ParameterError,
+    function_of,
+    items_of,
+    shown,
+)
+from contfric.fitting.condition import Answer, Condition, Datum, Near, attempt, conditions_of
 from contfric.fitting.data import Jump, Measured, Series
-from contfric.fitting.predict import predicted, signal_of
+from contfric.fitting.predict import signal_of
+from contfric.fitting.result import INTERRUPTED, Fit
 from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import polish
 from contfric.quantities.inside import Inside
 from contfric.quantities.registry import number_quantity
 
@@ -41,74 +42,18 @@ _DEPENDENT = 1e-9
 _CONVERGED = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
-class Fit(Shown):
-    """What :func:`contfric.fit` found.
-
-    Attributes
-    ----------
-    params : dict
-        All parameters, the free ones as they were found.
-    free : tuple of str
-        The free ones.
-    covariance : ndarray, shape (free, free)
-        Of the free ones, in their order.
-    residuals : ndarray
-        Of all data, in standard deviations.
-    jacobian : ndarray, shape (data, free)
-        Derivatives of the residuals.
-    orbits : tuple of Orbit
-        The orbit of each measurement.
-    converged : bool
-        Whether the search ended at a minimum.
-    message : str
-        How the search ended.
-
-    Examples
-    --------
-    >>> import contfric as cf
-    >>> data = [cf.Measured("x_max", 1.42, 0.01, {"Omega": 0.5})]
-    >>> found = cf.fit("coulomb", data, {"S": 0.31, "S0": 0.4}, ["S"])
-    >>> found.free, found.converged
-    (('S',), True)
-    """
-
-    params: dict[str, float]
-    free: tuple[str, ...]
-    covariance: FloatArray
-    residuals: FloatArray
-    jacobian: FloatArray
-    orbits: tuple[Orbit, ...]
-    converged: bool
-    message: str
-
-    @property
-    def sigma(self) -> dict[str, float]:
-        """Standard deviation of each free parameter."""
-        return {
-            name: float(np.sqrt(variance))
-            for name, variance in zip(self.free, np.diag(self.covariance), strict=True)
-        }
-
-    @property
-    def chi_square(self) -> float:
-        """Sum of the squared residuals; about as many as data less free parameters if the model is right."""
-        return float(self.residuals @ self.residuals)
-
-    def __repr__(self) -> str:
-        found = ", ".join(
-            f"{name} = {self.params[name]:.6g} +- {s:.2g}" for name, s in self.sigma.items()
-        )
-        return f"<Fit {found}; chi^2 = {self.chi_square:.4g} of {len(self.residuals)} data>"
-
-
 def fit(
     model: ModelSource,
     data: Sequence[Measured | Series | Jump],
     params: Mapping[str, float],
     free: Sequence[str],
+    *,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
 ) -> Fit:
     """Find the parameters at which a model's periodic orbits agree best with measurements.
+
+    Ctrl-C ends the search; the best trial until then is returned, with ``complete`` False.
 
     Parameters
     ----------
@@ -120,6 +65,11 @@ def fit(
         All other parameters, and where the free ones start.
     free : sequence of str
         Which of them are found.
+    executor : any :class:`concurrent.futures.Executor`, optional
+        Solves conditions side by side. It helps where orbits are expensive: those of the closed form take
+        less time than their way to another process.
+    progress : callable, optional
+        Called with one line of text for each trial.
 
     Raises
     ------
@@ -136,38 +86,32 @@ def fit(
     >>> abs(found.orbits[0].x_max - 1.42) < 1e-9
     True
     """
-    from scipy.optimize import least_squares
-
-    found = load_model(model)
-    names, start = _checked(found, data, params, free)
-    problem = _Problem(found, tuple(data), dict(params), names)
+    model = load_model(model)
+    check_executor(executor)
+    function_of("progress", progress)
+    names, start = check_fit(model, data, params, free)
+    problem = _Problem(model, tuple(data), dict(params), names, executor, progress)
     problem.solve(start)  # an error here is the user's to see
-    solution = least_squares(
-        lambda x: problem.at(x)[0],
-        start,
-        lambda x: problem.at(x)[1],
-        bounds=problem.bounds(start),
-        x_scale="jac",
-        xtol=_CONVERGED,
-        ftol=_CONVERGED,
-        gtol=_CONVERGED,
-    )
-    residuals, jacobian, orbits = problem.solve(solution.x)
-    covariance = _covariance(jacobian)
+    success, message = problem.search(start)
+    best = problem.best
+    assert best is not None
+    covariance = _covariance(best.jacobian)
     if covariance is None:
         raise ConvergenceError(
             f"the data do not determine {', '.join(names)}: their derivatives depend on each other",
-            orbits[0],
+            best.orbits[0],
         )
+    values = {**best.orbits[0].params, **problem.values(best.x)}
     return Fit(
-        {**orbits[0].params, **problem.values(solution.x)},
+        values,
         names,
+        problem.data,
         covariance,
-        residuals,
-        jacobian,
-        orbits,
-        bool(solution.success),
-        str(solution.message),
+        best.residuals,
+        best.jacobian,
+        best.orbits,
+        success,
+        message,
     )
 
 
@@ -183,10 +127,16 @@ def _covariance(jacobian: FloatArray) -> FloatArray | None:
     return np.asarray(half @ half.T, dtype=np.float64)
 
 
-def _checked(
+def check_fit(
     model: Model, data: object, params: Mapping[str, Any], free: object
 ) -> tuple[tuple[str, ...], FloatArray]:
-    """Return the free parameters and where they start; refuse what cannot be fitted."""
+    """Return the free parameters and where they start.
+
+    Raises
+    ------
+    ParameterError
+        If that cannot be fitted.
+    """
     every = items_of(data)
     if not every or not all(isinstance(d, (Measured, Series, Jump)) for d in every):
         raise ParameterError(
@@ -228,25 +178,59 @@ def _check_jump(model: Model, d: Jump) -> None:
         )
 
 
+class _Trial(NamedTuple):
+    """A point of the search: residuals, their derivatives, and the orbit of each datum."""
+
+    x: FloatArray
+    residuals: FloatArray
+    jacobian: FloatArray
+    orbits: tuple[Orbit, ...]
+
+
 class _Problem:
     """Residuals and derivatives as functions of the free parameters; orbits are kept between trials."""
 
     def __init__(
         self,
         model: Model,
-        data: tuple[Measured | Series | Jump, ...],
+        data: tuple[Datum, ...],
         params: dict[str, Any],
         free: tuple[str, ...],
+        executor: Executor | None,
+        progress: Progress | None,
     ) -> None:
         self.model, self.data, self.params, self.free = model, data, params, free
-        self.columns = [model.index_of(name) for name in free]
-        self.near: dict[tuple[tuple[str, float], ...], Orbit] = {}
-        self.events = {k: d.event for k, d in enumerate(data) if isinstance(d, Jump)}
+        self.conditions = conditions_of(model, data, free)
+        self.near: list[Near] = [None] * len(self.conditions)
+        self.best: _Trial | None = None
         self.last: tuple[bytes, FloatArray, FloatArray] | None = None
+        self.trials = 0
+        self._executor, self._progress = executor, progress
 
     def values(self, x: FloatArray) -> dict[str, float]:
         """Return the free parameters by name."""
         return {name: float(value) for name, value in zip(self.free, x, strict=True)}
+
+    def search(self, start: FloatArray) -> tuple[bool, str]:
+        """Minimise the sum of squares; return whether that is done, and how it ended."""
+        from scipy.optimize import least_squares
+
+        try:
+            found = least_squares(
+                lambda x: self.at(x)[0],
+                start,
+                lambda x: self.at(x)[1],
+                bounds=self.bounds(start),
+                x_scale="jac",
+                xtol=_CONVERGED,
+                ftol=_CONVERGED,
+                gtol=_CONVERGED,
+            )
+        except KeyboardInterrupt:
+            return False, INTERRUPTED
+        self.best = None  # equal sums of squares: the last trial is the one that was accepted
+        self.solve(found.x)
+        return bool(found.success), str(found.message)
 
     def bounds(self, start: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return limits of single parameters; a constraint of two free ones is met by orbits that fail."""
@@ -271,56 +255,64 @@ class _Problem:
         key = np.asarray(x).tobytes()
         if self.last is None or self.last[0] != key:
             try:
-                residuals, jacobian, _ = self.solve(x)
+                trial = self.solve(x)
+                residuals, jacobian = trial.residuals, trial.jacobian
             except ContfricError:
                 size = sum(len(d) if isinstance(d, Series) else 1 for d in self.data)
                 residuals, jacobian = np.full(size, _NO_ORBIT), np.zeros((size, len(x)))
             self.last = key, residuals, jacobian
+            self.trials += 1
+            if self._progress is not None:
+                text = ", ".join(f"{name} = {value:.6g}" for name, value in self.values(x).items())
+                self._progress(
+                    f"fit: trial {self.trials}, chi^2 = {residuals @ residuals:.6g} at {text}"
+                )
         return self.last[1], self.last[2]
 
-    def solve(self, x: FloatArray) -> tuple[FloatArray, FloatArray, tuple[Orbit, ...]]:
-        """Return residuals, derivatives, and the orbit of each measurement."""
-        parts, slopes, orbits = [], [], []
-        for k, d in enumerate(self.data):
-            if isinstance(d, Jump):
-                event = self._event(k, d, {**self.params, **d.params, **self.values(x)})
-                by_free = [slope_of(event, d.parameter, name) for name in self.free]
-                parts.append(np.array([event.params[d.parameter] - d.value]) / d.sigma)
-                slopes.append(np.array([by_free]) / d.sigma)
-                orbits.append(event.orbit)
-                continue
-            orbit = self._orbit({**self.params, **d.params, **self.values(x)}, d)
-            values, by_all = predicted(d, orbit)
-            measured = d.values if isinstance(d, Series) else np.array([d.value])
-            parts.append((values - measured) / d.sigma)
-            slopes.append(by_all[:, self.columns] / d.sigma)
-            orbits.append(orbit)
-        return np.concatenate(parts), np.concatenate(slopes), tuple(orbits)
+    def solve(self, x: FloatArray) -> _Trial:
+        """Solve every condition at a point of the search.
 
-    def _event(self, number: int, d: Jump, params: dict[str, Any]) -> Bifurcation:
-        """Return the event of a jump, moved from where it was last."""
-        values = self.model.mapping(self.model.vector({**params, d.parameter: d.value}))
-        self.events[number] = moved_event(self.events[number], values)
-        return self.events[number]
+        Raises
+        ------
+        ContfricError
+            If one of them has no orbit.
+        """
+        parts: dict[int, tuple[FloatArray, FloatArray, Orbit]] = {}
+        for k, answer in enumerate(self._answers({**self.params, **self.values(x)})):
+            self.near[k] = answer.near
+            numbers = self.conditions[k][1]
+            for number, *part in zip(numbers, answer.residuals, answer.slopes, strict=True):
+                parts[number] = (part[0], part[1], answer.orbit)
+        residuals, slopes, orbits = zip(*(parts[k] for k in range(len(self.data))), strict=True)
+        trial = _Trial(x, np.concatenate(residuals), np.concatenate(slopes), orbits)
+        sizes = [np.inf if t is None else t.residuals @ t.residuals for t in (self.best, trial)]
+        if sizes[1] < sizes[0] or self.best is None:
+            self.best = trial
+        return trial
 
-    def _orbit(self, params: dict[str, Any], d: Measured | Series) -> Orbit:
-        """Return the orbit of a condition: refined from the last one, or found by simulation."""
-        condition = tuple(sorted((str(k), float(v)) for k, v in d.params.items()))
-        vector = self.model.vector(params)
-        near = self.near.get(condition)
-        if near is not None:
-            refined = polish(replace(near, vector=vector))
-            if refined.converged and refined.admissible and refined.stable:
-                self.near[condition] = refined
-                return refined
-        found = find_orbit(self.model, params)
-        if self.model.symmetry is not None and not found.symmetric:
-            # a simulation finds one of two images by chance: the data say which of them was measured
-            found = min(found, found.mirror(), key=lambda orbit: self._distance(d, orbit))
-        self.near[condition] = found
-        return found
+    def _answers(self, params: Mapping[str, float]) -> list[Answer]:
+        """Return what the conditions say; what an executor does not solve is solved here."""
+        pairs = [(c, near) for (c, _), near in zip(self.conditions, self.near, strict=True)]
+        asked = [self._submitted(condition, params, near) for condition, near in pairs]
+        return [
+            _result(future) or condition.answer(params, near)
+            for (condition, near), future in zip(pairs, asked, strict=True)
+        ]
 
-    @staticmethod
-    def _distance(d: Measured | Series, orbit: Orbit) -> float:
-        values, _ = predicted(d, orbit)
-        return float(np.sum((values - (d.values if isinstance(d, Series) else d.value)) ** 2))
+    def _submitted(
+        self, condition: Condition, params: Mapping[str, float], near: Near
+    ) -> Future[Answer | None] | None:
+        if self._executor is None:
+            return None
+        try:
+            return self._executor.submit(attempt, condition, dict(params), near)
+        except RuntimeError:  # it was shut down, or is broken
+            return None
+
+
+def _result(future: Future[Answer | None] | None) -> Answer | None:
+    """Return what a worker has found; None if there is none, or it was lost with its worker."""
+    try:
+        return None if future is None else future.result()
+    except Exception:  # executors of others raise errors of their own
+        return None

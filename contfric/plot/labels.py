@@ -89,6 +89,17 @@ def lay_out(ax: Axes) -> None:
         engine.execute(root)
 
 
+def settled(figure: Figure) -> bool:
+    """Tell whether a layout has moved the axes of a figure from where they were put."""
+    for ax in figure.get_axes():
+        spec = ax.get_subplotspec()
+        if spec is not None:
+            return not np.allclose(
+                ax.get_position(original=True).extents, spec.get_position(figure).extents
+            )
+    return False
+
+
 def _point_size(ax: Axes) -> float:
     root = _root(ax)
     return float(root.dpi) / 72.0 if root is not None else 1.0

@@ -139,7 +139,7 @@ def basins(
     )
     try:
         _find_by_seeds(job, attractors)
-        kept = None if folder is None else open_tiles(Path(folder), _record(job, attractors, axes))
+        kept = None if folder is None else open_tiles(folder, _record(job, attractors, axes))
         _label(job, attractors, np.arange(len(states)), rows, kept)
         _resolve(job, attractors, rows)
     except KeyboardInterrupt:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -140,6 +140,8 @@ class ReleaseMap(Tabled):
     >>> len(found) > 50
     True
     """
+
+    time_columns: ClassVar = ("phase", "image", "time")
 
     model: Model
     vector: FloatArray

@@ -9,7 +9,7 @@ leave along the other.
 It is followed without the inverse of f, as a stick has none (J. P. England, B. Krauskopf, H. M. Osinga, SIAM
 J. Appl. Dyn. Syst. 3 (2004) 161-190). The next point lies on an arc around the last one, where u changes its
 sign. Where no start on the arc comes to the saddle f is discontinuous, and the set has a break. It is looked
-for on the other side, within a step, and ends where it is not found.
+for on the other side, and ends where it is not found within a fiftieth of the ranges.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.base.tabled import Columns, Tabled
-from contfric.errors import ParameterError, real_number, shown, whole_number
+from contfric.chaos.running import Progress
+from contfric.errors import ParameterError, function_of, real_number, shown, whole_number
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.simulation import run
@@ -51,8 +52,11 @@ _ARCS, _TURN = (0.04, 0.12, 0.4), 0.3
 _SHORTEST = 1e-3
 #: Returns that a start may take to the saddle, and at it.
 _ARRIVALS, _RETURNS = 40, 400
-#: Behind a break the set is looked for at so many distances up to the longest step, at so many angles (rad).
-_GAPS, _FAN = 6, np.linspace(-1.0, 1.0, 21)
+#: Beyond a break the set is looked for at so many distances, up to this share of the ranges, and at these
+#: angles (rad). A gap is as wide as the map makes it, whatever the step is.
+_GAPS, _REACH, _FAN = 9, 0.02, np.linspace(-1.0, 1.0, 21)
+#: Points between two lines of progress.
+_TOLD = 50
 
 
 class StableEnd(str, Enum):
@@ -102,6 +106,11 @@ class StableSet(Tabled):
         return self.orbit.model
 
     @property
+    def complete(self) -> bool:
+        """Whether it was followed to its ends; False after an interrupt."""
+        return StableEnd.INTERRUPTED not in self.ends
+
+    @property
     def points(self) -> FloatArray:
         """All points in their order along the set, shape (k, 2)."""
         one, other = self.states
@@ -131,6 +140,7 @@ def stable_set(
     phase: float = 0.0,
     max_step: float | None = None,
     max_points: int = 2000,
+    progress: Progress | None = None,
 ) -> StableSet:
     """Follow the stable set of an unstable orbit in the plane of the two states.
 
@@ -147,6 +157,8 @@ def stable_set(
         Longest step along the set; by default a hundredth of the ranges.
     max_points : int
         Most points of each half.
+    progress : callable, optional
+        Called with one line of text now and then.
 
     Raises
     ------
@@ -161,8 +173,11 @@ def stable_set(
     >>> len(found.points) > 20
     True
     """
+    if not isinstance(orbit, Orbit):
+        raise ParameterError(f"a stable set is one of an Orbit, got {shown(orbit)}")
+    low, high = check_ranges(orbit.model, ranges)
     section = _Section(_checked(orbit), real_number("phase", phase))
-    low, high = _corners(orbit.model, ranges)
+    function_of("progress", progress)
     longest = (
         0.01 * float(np.hypot(*(high - low)))
         if max_step is None
@@ -171,7 +186,7 @@ def stable_set(
     whole_number("max_points", max_points, least=2)
     halves, ends, breaks = [], [], []
     for sign in (1.0, -1.0):
-        half = _Half(section, [section.saddle], sign * section.stable, low, high)
+        half = _Half(section, [section.saddle], sign * section.stable, low, high, progress)
         ends.append(half.trace(min(_FIRST * section.size, longest), longest, max_points))
         halves.append(np.array(half.points))
         breaks.append(np.array(half.breaks, dtype=np.int64))
@@ -180,16 +195,7 @@ def stable_set(
     )
 
 
-def _checked(orbit: object) -> Orbit:
-    if not isinstance(orbit, Orbit):
-        raise ParameterError(f"a stable set is one of an Orbit, got {shown(orbit)}")
-    model = orbit.model
-    if model.autonomous or len(model.states) != 2:
-        raise ParameterError(
-            "a stable set is a curve in the section of a model with excitation and two states; "
-            f"'{model.name}' has {len(model.states)} states and {'no' if model.autonomous else 'an'} "
-            "excitation"
-        )
+def _checked(orbit: Orbit) -> Orbit:
     outside = [m for m in orbit.multipliers if abs(m) > 1.0]
     if orbit.system.holds or len(outside) != 1:
         raise ParameterError(
@@ -199,7 +205,20 @@ def _checked(orbit: object) -> Orbit:
     return orbit
 
 
-def _corners(model: Model, ranges: object) -> tuple[FloatArray, FloatArray]:
+def check_ranges(model: Model, ranges: object) -> tuple[FloatArray, FloatArray]:
+    """Return the corners of the ranges that a user gave.
+
+    Raises
+    ------
+    ParameterError
+        If the model has no stable sets that are curves, or they are no ranges of its states.
+    """
+    if model.autonomous or len(model.states) != 2:
+        raise ParameterError(
+            "a stable set is a curve in the section of a model with excitation and two states; "
+            f"'{model.name}' has {len(model.states)} states and {'no' if model.autonomous else 'an'} "
+            "excitation"
+        )
     wanted = (
         f"ranges are {{'{model.states[0]}': (lower, upper), '{model.states[1]}': (lower, upper)}}"
     )
@@ -304,6 +323,7 @@ class _Half:
     direction: FloatArray
     low: FloatArray
     high: FloatArray
+    progress: Progress | None
     breaks: list[int] = field(default_factory=list)
 
     def trace(self, step: float, longest: float, most: int) -> StableEnd:
@@ -315,20 +335,27 @@ class _Half:
                     if step > _SHORTEST * longest:
                         step *= 0.5
                         continue
-                    found = self._behind_break(longest)
+                    found = self._beyond_break(longest)
                     if found is None:
                         return StableEnd.BREAK
-                    self._go_on_behind(found, step)
+                    self._go_on_beyond(found, step)
                     continue
                 turn = self._turn(found)
                 self.direction = (found - self.points[-1]) / np.hypot(*(found - self.points[-1]))
                 self.points.append(found)
+                self._say()
                 if np.any(found < self.low) or np.any(found > self.high):
                     return StableEnd.RANGE
                 step = min(longest, step * (2.0 if turn < 0.5 * _TURN else 1.0))
         except KeyboardInterrupt:
             return StableEnd.INTERRUPTED
         return StableEnd.POINTS
+
+    def _say(self) -> None:
+        count = len(self.points)
+        if self.progress is not None and count % _TOLD == 0:
+            where = ", ".join(f"{value:.6g}" for value in self.points[-1])
+            self.progress(f"{count} points of a half, at ({where})")
 
     def _turn(self, found: FloatArray) -> float:
         chord = found - self.points[-1]
@@ -343,16 +370,17 @@ class _Half:
                 return self._point(step, angle) if abs(angle) < _TURN else None
         return None
 
-    def _behind_break(self, longest: float) -> FloatArray | None:
-        """Return the nearest point of the set across a break; None if there is none within a step."""
-        for step in np.geomspace(_SHORTEST * longest, longest, _GAPS):
+    def _beyond_break(self, longest: float) -> FloatArray | None:
+        """Return the nearest point of the set across a break; None if there is none within reach."""
+        reach = max(longest, _REACH * float(np.hypot(*(self.high - self.low))))
+        for step in np.geomspace(_SHORTEST * longest, reach, _GAPS):
             for one, other in pairwise(_FAN):
                 angle = self._angle(float(step), float(one), float(other))
                 if angle is not None:
                     return self._point(float(step), angle)
         return None
 
-    def _go_on_behind(self, found: FloatArray, step: float) -> None:
+    def _go_on_beyond(self, found: FloatArray, step: float) -> None:
         """Take a point beyond a break, and the direction of the set there: the one that leads away."""
         self.direction = found - self.points[-1]
         self.breaks.append(len(self.points))

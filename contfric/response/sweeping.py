@@ -167,7 +167,7 @@ def sweep(
         at[model.index_of(parameter)] = grid[defined[0 if name == "up" else -1]]
         starts[name] = checked_state(model, at, state)
     job = _Job(model, parameter, grid, vector, defined, _DIRECTIONS[direction], cut, how, starts)
-    kept = None if folder is None else open_tiles(Path(folder), job.record())
+    kept = None if folder is None else open_tiles(folder, job.record())
     runs = _computed(job, executor, kept, progress)
     return Sweep(model, parameter, grid, vector, section, runs)
 

@@ -44,7 +44,11 @@ class Targets(NamedTuple):
 
 
 def targets_of(model: Model, orbits: Sequence[Orbit]) -> Targets:
-    """Return the joints of orbits of the same parameters, with their radii."""
+    """Return the joints of orbits of the same parameters, with their radii.
+
+    A simulation tells both sides of a section within one smooth field apart, and an orbit has one segment
+    across it: each joint has a row for every mode with the field of its segment.
+    """
     n, surfaces = len(model.states), [s.name for s in model.surfaces]
     keys: list[int] = []
     owners: list[int] = []
@@ -54,9 +58,11 @@ def targets_of(model: Model, orbits: Sequence[Orbit]) -> Targets:
         period = orbit.period / orbit.periods
         begins[:, 0] = 0.0 if model.autonomous else np.mod(begins[:, 0], period)
         for i, (mode, _) in enumerate(word):
-            keys.append(model.mode_index[mode] * len(surfaces) + surfaces.index(word[i - 1][1]))
-            owners.append(number)
-        rows.append(begins)
+            on, whole = surfaces.index(word[i - 1][1]), model.whole_mode(mode)
+            alike = [k for k, m in enumerate(model.modes) if model.whole_mode(m.name) == whole]
+            keys += [k * len(surfaces) + on for k in alike]
+            owners += [number] * len(alike)
+            rows.append(np.tile(begins[i], (len(alike), 1)))
     z, key = np.concatenate(rows), np.array(keys, dtype=np.int64)
     owner = np.array(owners, dtype=np.int64)
     least = np.array([_reach(orbit) for orbit in orbits])

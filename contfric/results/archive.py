@@ -29,6 +29,7 @@ from contfric.ensembles.ensemble import Ensemble
 from contfric.equilibria.branch import EquilibriumBranch
 from contfric.equilibria.explore import EquilibriumDiagram
 from contfric.errors import ModelError, ParameterError, ResultFileError, path_of
+from contfric.fitting.result import Fit
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
@@ -57,6 +58,7 @@ Saveable: TypeAlias = (
     | EquilibriumBranch
     | EquilibriumDiagram
     | Ensemble
+    | Fit
 )
 
 #: Version of the format; it grows when this contfric cannot read what an earlier one has written.

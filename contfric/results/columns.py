@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -11,13 +11,28 @@ from numpy.typing import NDArray
 
 from contfric.atlas.diagram import Diagram
 from contfric.atlas.plane import Plane
+from contfric.base.tabled import Tabled
+from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation
 from contfric.curves.curve import Curve
+from contfric.curves.quantity_curve import QuantityCurve
+from contfric.ensembles.ensemble import Ensemble
+from contfric.ensembles.tables import events_table, samples_table
+from contfric.fitting.result import Fit
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.simulation import Trajectory
+from contfric.response.basins import Basins
+from contfric.response.returns import ReleaseMap, Returns
+from contfric.response.stable_set import StableSet
+from contfric.response.sweep import Sweep
 
-Exported: TypeAlias = Orbit | Branch | Diagram | Curve | Plane
+#: Results that are one table.
+OneTable: TypeAlias = (
+    Sweep | Returns | ReleaseMap | Basins | StableSet | LyapunovMap | QuantityCurve | Fit
+)
+Exported: TypeAlias = Orbit | Branch | Diagram | Curve | Plane | Trajectory | Ensemble | OneTable
 
 
 @dataclass
@@ -70,13 +85,21 @@ def points_of(x: Exported) -> Columns:
         return _curve(x, 1)
     if isinstance(x, Plane):
         return stacked([_curve(curve, k) for k, curve in enumerate(x.curves, start=1)])
+    if isinstance(x, Ensemble):
+        return _table(samples_table(x), x.model)
+    if isinstance(x, Trajectory):
+        return _table(x.columns(), x.model)
+    if isinstance(x, Tabled):
+        return _table(x.columns(), x.model, x.length_columns, x.time_columns)
     return stacked([_branch(branch, k) for k, branch in enumerate(x.branches, start=1)])
 
 
 def events_of(x: Exported) -> Columns | None:
-    """Return the events of a branch or diagram, or the special points of curves; None of an orbit."""
-    if isinstance(x, Orbit):
+    """Return the events of a branch, a diagram or an ensemble, or the special points of curves; else None."""
+    if isinstance(x, Orbit | Tabled | Trajectory):
         return None
+    if isinstance(x, Ensemble):
+        return _table(events_table(x), x.model)
     if isinstance(x, Branch):
         return stacked([_event(b, ("1",), (x.name,)) for b in x.bifurcations])
     if isinstance(x, Diagram):
@@ -103,6 +126,22 @@ def _lengths(model: Model) -> tuple[float, float]:
     """Return the units of the displacement and of time."""
     units = dict(model.units)
     return units.get(model.states[0], 1.0), units.get("t", 1.0)
+
+
+def _table(
+    columns: Mapping[str, Any],
+    model: Model,
+    lengths: Sequence[str] = (),
+    times: Sequence[str] = (),
+) -> Columns:
+    """Return the table of a result, with the units that the names of its columns tell."""
+    table, units, (length, time) = Columns(), dict(model.units), _lengths(model)
+    units |= {"t": time, **dict.fromkeys(lengths, length), **dict.fromkeys(times, time)}
+    for name, values in columns.items():
+        column = np.asarray(values)
+        column = column.astype(np.str_) if column.dtype.kind == "O" else column
+        table.add(name, column, None if column.dtype.kind == "U" else units.get(name, 1.0))
+    return table
 
 
 def _motion(orbit: Orbit) -> Columns:

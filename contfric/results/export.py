@@ -20,7 +20,7 @@ _LONGEST = 31
 
 
 def export(x: Exported, path: str | Path) -> tuple[Path, ...]:
-    """Write an orbit, a branch, a diagram, a curve or a plane for other programs; files are replaced.
+    """Write any result for other programs: an orbit, a diagram, a sweep, basins, a fit; files are replaced.
 
     A file that ends with ``.mat`` has structures ``points`` and ``events`` of columns, ``units`` of both,
     ``model``, and of an orbit its parameters, signature, period, multipliers and joints. One that ends with

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from contfric.study.read import Study
 from contfric.study.tasks import STEPS, TASKS
+from contfric.study.tasks.fit import FITTED, RESIDUALS
 from contfric.study.tasks.one_parameter import BIFURCATIONS
 from contfric.study.tasks.orbit import POINTS
 from contfric.study.tasks.plane import CURVES, REGIONS, SPECIAL
@@ -18,7 +19,7 @@ RECORD = "run.json"
 VIEW = "diagram.html"
 #: Written by ``contfric certify``; a new run removes it, too.
 CERTIFICATE = "certificate.json"
-_TABLES = (POINTS, BIFURCATIONS, CURVES, SPECIAL, REGIONS)
+_TABLES = (POINTS, BIFURCATIONS, CURVES, SPECIAL, REGIONS, FITTED, RESIDUALS)
 #: Files that every run may write, figures apart.
 RESULT_FILES = (
     *(RECORD, *_TABLES, VIEW, CERTIFICATE),

@@ -17,11 +17,15 @@ if TYPE_CHECKING:
     from contfric.atlas.plane import Plane
     from contfric.chaos.map import LyapunovMap
     from contfric.continuation.branch import Branch
+    from contfric.curves.extremum import ExtremumCurve
+    from contfric.curves.quantity_curve import QuantityCurve
     from contfric.ensembles.ensemble import Ensemble
     from contfric.equilibria.explore import EquilibriumDiagram
+    from contfric.fitting.result import Fit
     from contfric.orbit.orbit import Orbit
     from contfric.response.basins import Basins
     from contfric.response.returns import Returns
+    from contfric.response.stable_set import StableSet
     from contfric.response.sweep import Sweep
     from contfric.study.tasks.task import Found
 
@@ -104,6 +108,26 @@ class StudyResult(Shown):
     def basins(self) -> Basins | None:
         """The basins."""
         return self.found.get("basins")
+
+    @property
+    def stable_set(self) -> StableSet | None:
+        """The stable set of the orbit of the start."""
+        return self.found.get("stable_set")
+
+    @property
+    def hold(self) -> QuantityCurve | None:
+        """The orbits on which a quantity has one value."""
+        return self.found.get("hold")
+
+    @property
+    def extremum(self) -> ExtremumCurve | None:
+        """The orbits at which a quantity is extreme."""
+        return self.found.get("extremum")
+
+    @property
+    def fit(self) -> Fit | None:
+        """The parameters from measurements."""
+        return self.found.get("fit")
 
     @property
     def equilibria(self) -> EquilibriumDiagram | None:

@@ -113,6 +113,21 @@ def test_escaping_starts_are_named() -> None:
     assert [share.name for share in found.shares] == ["unbounded"]
 
 
+@pytest.mark.parametrize("model", ["impact", "bang-bang", "rocking-block"])
+def test_orbits_whose_segments_cross_a_section(model: str) -> None:
+    """A simulation tells both sides of a section apart where an orbit has one segment across it."""
+    known = cf.find_orbit(model)
+    first, second = known.model.states[:2]
+    at = known.state(0.0)
+    shifts = 0.01 * np.ptp(known.trajectory()[1], axis=0)[:2]
+    grid = {first: at[0] + shifts[0] * np.arange(2), second: at[1] + shifts[1] * np.arange(2)}
+    rest = {name: float(at[k]) for k, name in enumerate(known.model.states) if k > 1}
+    found = cf.basins(model, grid, None, rest)
+    label = found.labels[0, 0]
+    assert label >= 0
+    np.testing.assert_allclose(found.orbits[label].state(0.0), at, atol=1e-9)
+
+
 def test_without_excitation() -> None:
     belt = cf.load_model("belt")
     first, second = belt.states[:2]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -121,7 +122,9 @@ def test_units_of_the_model(tmp_path: Path) -> None:
 def test_bad_input_is_one_line(orbit: cf.Orbit, tmp_path: Path) -> None:
     with pytest.raises(cf.ParameterError, match=r"end with \.mat or \.csv; got .*x\.xls"):
         cf.export(orbit, tmp_path / "x.xls")
-    with pytest.raises(cf.ParameterError, match="Orbit, Branch, Diagram, Curve, Plane; got int"):
+    with pytest.raises(
+        cf.ParameterError, match=r"Orbit, Branch, Diagram, Curve, Plane, .*; got int"
+    ):
         cf.export(3, tmp_path / "x.mat")  # type: ignore[arg-type]
     with pytest.raises(cf.ResultFileError, match="nowhere"):
         cf.export(orbit, tmp_path / "nowhere" / "x.csv")
@@ -158,3 +161,55 @@ def test_a_missing_package_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> N
     swept = cf.sweep("coulomb", "Omega", [0.5, 0.51], {"S": 0.32, "S0": 0.4})
     with pytest.raises(ImportError, match=r"contfric\[xarray\]"):
         swept.to_xarray()
+
+
+def every_table() -> dict[str, Any]:
+    """Return a result of each kind that is one table."""
+    fixed, lower = {"S": 0.32, "S0": 0.4}, {"Omega": (0.48, 0.55), "S": (0.25, 0.35)}
+    orbit = cf.solve_orbit("coulomb", "1a", PARAMS)
+    starts = {"x": [-1.0, 1.0], "v": [-0.5, 0.5]}
+    held = cf.continue_quantity(orbit, "x_max", 1.43, ("Omega", "S"), lower, max_step=0.2)
+    return {
+        "sweep": cf.sweep("coulomb", "Omega", [0.45, 0.5], fixed),
+        "returns": cf.poincare("coulomb", PARAMS, periods=5),
+        "releases": cf.release_map("coulomb", PARAMS, count=20),
+        "basins": cf.basins("coulomb", starts, PARAMS),
+        "map": cf.lyapunov_map("coulomb", {"Omega": [0.4, 0.5], "S": [0.1, 0.2]}, periods=20),
+        "curve": held,
+        "fit": cf.fit("coulomb", [cf.Measured("x_max", 1.42, 0.01)], {**PARAMS, "S": 0.31}, ["S"]),
+        "trajectory": cf.simulate("coulomb", PARAMS, periods=3),
+    }
+
+
+def test_every_table_is_exported(tmp_path: Path) -> None:
+    for name, x in every_table().items():
+        (file,) = cf.export(x, tmp_path / f"{name}.csv")
+        got, units = read_csv(file)
+        (matlab,) = cf.export(x, tmp_path / f"{name}.mat")
+        points = read_mat(matlab)["points"]
+        for column, values in x.columns().items():
+            if np.asarray(values).dtype.kind in "if":
+                np.testing.assert_array_equal(np.array(got[column], dtype=float), values)
+                np.testing.assert_array_equal(points[column.replace("(", "_")], values)
+                assert units[column] == "1", (name, column)
+
+
+def test_an_ensemble_has_samples_and_events(tmp_path: Path) -> None:
+    box = {"S": (0.3, 0.34)}
+    found = cf.ensemble("coulomb", "Omega", (0.48, 0.55), box, {"Omega": 0.5}, samples=4)
+    samples, events = cf.export(found, tmp_path / "e.csv")
+    assert len(read_csv(samples)[0]["S"]) == 4
+    assert read_csv(events)[0]["Omega"] == [str(v) for v in found.rows.event_value.tolist()]
+
+
+def test_units_of_columns_are_those_of_the_model(tmp_path: Path) -> None:
+    """A pendulum's file in its own units, scaled: states and times have theirs."""
+    model = cf.load_model("coulomb")
+    scaled = replace(model, units=(("x", 0.002), ("v", 0.5), ("t", 0.004)))
+    swept = cf.sweep(scaled, "Omega", [0.45, 0.5], {"S": 0.32, "S0": 0.4})
+    _, units = read_csv(cf.export(swept, tmp_path / "s.csv")[0])
+    assert (units["x"], units["v"], units["t"]) == ("0.002", "0.5", "0.004")
+    assert (units["Omega"], units["mode"], units["period"]) == ("1", "", "1")
+    releases = cf.release_map(scaled, PARAMS, count=20)
+    _, units = read_csv(cf.export(releases, tmp_path / "r.csv")[0])
+    assert (units["phase"], units["time"], units["branch"]) == ("0.004", "0.004", "1")

@@ -222,3 +222,18 @@ def test_files_that_are_no_files(orbit: cf.Orbit, tmp_path: Path) -> None:
     os.mkfifo(tiles / "map.json")
     os.mkfifo(tiles / "tile-000000.npz")
     refused(lambda: cf.lyapunov_map("coulomb", GRID, {"S0": 0.4}, folder=tiles), ResultFileError)
+
+
+@pytest.mark.parametrize("folder", [3, "", ["a"], b"\0"], ids=repr)
+def test_folders_of_tiles_that_are_no_paths(folder: Any) -> None:
+    starts = {"x": [0.0, 1.0], "v": [0.0, 1.0]}
+    box = {"S": (0.3, 0.34)}
+    calls: list[Callable[[], object]] = [
+        lambda: cf.sweep("coulomb", "Omega", [0.5], {"S": 0.32}, folder=folder),
+        lambda: cf.lyapunov_map("coulomb", GRID, folder=folder),
+        lambda: cf.ensemble("coulomb", "Omega", (0.4, 0.6), box, samples=1, folder=folder),
+        lambda: cf.basins("coulomb", starts, START, folder=folder),
+    ]
+    for call in calls:
+        with pytest.raises(ResultFileError, match="the folder of finished tiles is a path"):
+            call()

@@ -85,3 +85,12 @@ def test_what_has_none_says_why(orbit: str | None, ranges: Any, words: str) -> N
     with pytest.raises(cf.ParameterError) as caught:
         cf.stable_set(start, ranges)
     assert words in str(caught.value)
+
+
+def test_a_gap_is_crossed_whatever_the_step_is() -> None:
+    """A gap is as wide as the map makes it; a short step must not end the set there."""
+    saddle = cf.solve_orbit("coulomb", "2s", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    for step in (0.1, 0.02, 0.005):
+        found = cf.stable_set(saddle, {"x": (-2, 2), "v": (-1, 1)}, max_step=step)
+        assert [end.name for end in found.ends] == ["RANGE", "RANGE"]
+        assert sum(map(len, found.breaks)) >= 1

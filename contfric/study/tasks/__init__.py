@@ -10,10 +10,13 @@ from contfric.study.tasks.branch import ContinueTask
 from contfric.study.tasks.diagram import ExploreTask
 from contfric.study.tasks.ensemble import EnsembleTask
 from contfric.study.tasks.equilibria import EquilibriaTask
+from contfric.study.tasks.fit import FitTask
 from contfric.study.tasks.lyapunov import LyapunovTask
 from contfric.study.tasks.orbit import Start
 from contfric.study.tasks.plane import PlaneTask
 from contfric.study.tasks.poincare import PoincareTask
+from contfric.study.tasks.quantity_curves import ExtremumTask, HoldTask
+from contfric.study.tasks.stable_set import StableSetTask
 from contfric.study.tasks.sweep import SweepTask
 from contfric.study.tasks.task import Task
 
@@ -26,8 +29,12 @@ TASKS: tuple[type[Task], ...] = (
     SweepTask,
     PoincareTask,
     BasinsTask,
+    StableSetTask,
+    HoldTask,
+    ExtremumTask,
     EquilibriaTask,
     EnsembleTask,
+    FitTask,
 )
 #: The same after the orbit of the start, which any of them may need.
 STEPS: tuple[type[Task], ...] = (Start, *TASKS)

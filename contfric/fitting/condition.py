@@ -1,0 +1,140 @@
+"""One condition of a fit: the orbit, or the event, of some data, and what it says to them.
+
+A condition is solved from where it was in the last trial, and by a simulation where that fails, so that
+signatures may change on the way. It depends on nothing else: any process can solve it, to the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from contfric.continuation.events import Bifurcation
+from contfric.curves.gradient import slope_of
+from contfric.curves.moved import moved_event
+from contfric.errors import ContfricError
+from contfric.fitting.data import Jump, Measured, Series
+from contfric.fitting.predict import predicted
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.find import find_orbit
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.solve import polish
+
+Datum: TypeAlias = Measured | Series | Jump
+Near: TypeAlias = Orbit | Bifurcation | None
+
+
+class Answer(NamedTuple):
+    """What a condition says to its data.
+
+    Attributes
+    ----------
+    near : its orbit or event, from which the next trial starts
+    residuals : of each datum, in standard deviations
+    slopes : their derivatives by the free parameters, shape (values, free)
+    """
+
+    near: Orbit | Bifurcation
+    residuals: tuple[FloatArray, ...]
+    slopes: tuple[FloatArray, ...]
+
+    @property
+    def orbit(self) -> Orbit:
+        """The orbit, that of the event for a jump."""
+        return self.near.orbit if isinstance(self.near, Bifurcation) else self.near
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """Data that were measured at the same parameters; a jump is one by itself.
+
+    Attributes
+    ----------
+    model : Model
+    data : what was measured there
+    free : names of the free parameters
+    """
+
+    model: Model
+    data: tuple[Datum, ...]
+    free: tuple[str, ...]
+
+    def answer(self, params: Mapping[str, float], near: Near) -> Answer:
+        """Solve it at some parameters, from where it was.
+
+        Raises
+        ------
+        ContfricError
+            If there is no orbit or no event.
+        """
+        first = self.data[0]
+        params = {**params, **first.params}
+        return (
+            self._of_jump(first, params, near)
+            if isinstance(first, Jump)
+            else self._of_orbit(params, near)
+        )
+
+    def _of_jump(self, jump: Jump, params: Mapping[str, float], near: Near) -> Answer:
+        values = self.model.mapping(self.model.vector({**params, jump.parameter: jump.value}))
+        event = moved_event(near if isinstance(near, Bifurcation) else jump.event, values)
+        by_free = np.array([[slope_of(event, jump.parameter, name) for name in self.free]])
+        missed = np.array([event.params[jump.parameter] - jump.value])
+        return Answer(event, (missed / jump.sigma,), (by_free / jump.sigma,))
+
+    def _of_orbit(self, params: Mapping[str, float], near: Near) -> Answer:
+        orbit = self._refined(params, near)
+        if orbit is not None:
+            return self._compared(orbit)
+        orbit = find_orbit(self.model, params)
+        images = [orbit]
+        if self.model.symmetry is not None and not orbit.symmetric:
+            # a simulation finds one of two images by chance: the data say which of them was measured
+            images.append(orbit.mirror())
+        return min(
+            map(self._compared, images), key=lambda a: sum(float(r @ r) for r in a.residuals)
+        )
+
+    def _refined(self, params: Mapping[str, float], near: Near) -> Orbit | None:
+        if not isinstance(near, Orbit):
+            return None
+        refined = polish(replace(near, vector=self.model.vector(params)))
+        fits = refined.converged and refined.admissible and refined.stable
+        return refined if fits else None
+
+    def _compared(self, orbit: Orbit) -> Answer:
+        columns = [self.model.index_of(name) for name in self.free]
+        residuals, slopes = [], []
+        for datum in self.data:
+            assert not isinstance(datum, Jump)
+            values, by_all = predicted(datum, orbit)
+            measured = datum.values if isinstance(datum, Series) else datum.value
+            residuals.append((values - measured) / datum.sigma)
+            slopes.append(by_all[:, columns] / datum.sigma)
+        return Answer(orbit, tuple(residuals), tuple(slopes))
+
+
+def attempt(condition: Condition, params: Mapping[str, float], near: Near) -> Answer | None:
+    """Solve a condition in a worker; None where it fails, which the caller finds again, with the reason."""
+    try:
+        return condition.answer(params, near)
+    except ContfricError:
+        return None
+
+
+def conditions_of(
+    model: Model, data: tuple[Datum, ...], free: tuple[str, ...]
+) -> list[tuple[Condition, list[int]]]:
+    """Return the conditions of some data, each with the numbers of its data."""
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for k, datum in enumerate(data):
+        own = (k,) if isinstance(datum, Jump) else ()
+        values = sorted((str(name), float(value)) for name, value in datum.params.items())
+        groups.setdefault((*own, *values), []).append(k)
+    return [
+        (Condition(model, tuple(data[k] for k in numbers), free), numbers)
+        for numbers in groups.values()
+    ]

@@ -1,0 +1,158 @@
+"""What a fit has found: parameters with their covariance, and what the model says to each measurement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contfric.base.extras import need_pandas
+from contfric.base.tabled import Columns, Tabled
+from contfric.errors import ParameterError, shown
+from contfric.fitting.condition import Datum
+from contfric.fitting.data import Jump, Series
+from contfric.models.definition import FloatArray, Model
+from contfric.orbit.orbit import Orbit
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+#: What the message of a fit is that Ctrl-C ended.
+INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True, eq=False)
+class Fit(Tabled):
+    """What :func:`contfric.fit` found.
+
+    Attributes
+    ----------
+    params : dict
+        All parameters, the free ones as they were found.
+    free : tuple of str
+        The free ones.
+    data : tuple of Measured, Series or Jump
+        What was measured.
+    covariance : ndarray, shape (free, free)
+        Of the free ones, in their order.
+    residuals : ndarray
+        Of all data, in standard deviations.
+    jacobian : ndarray, shape (data, free)
+        Derivatives of the residuals.
+    orbits : tuple of Orbit
+        The orbit of each datum, that of the event for a jump.
+    converged : bool
+        Whether the search ended at a minimum.
+    message : str
+        How the search ended.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> data = [cf.Measured("x_max", 1.42, 0.01, {"Omega": 0.5})]
+    >>> found = cf.fit("coulomb", data, {"S": 0.31, "S0": 0.4}, ["S"])
+    >>> found.free, found.converged
+    (('S',), True)
+    """
+
+    params: dict[str, float]
+    free: tuple[str, ...]
+    data: tuple[Datum, ...]
+    covariance: FloatArray
+    residuals: FloatArray
+    jacobian: FloatArray
+    orbits: tuple[Orbit, ...]
+    converged: bool
+    message: str
+
+    @property
+    def model(self) -> Model:
+        """The model that moves."""
+        return self.orbits[0].model
+
+    @property
+    def complete(self) -> bool:
+        """Whether the search ended by itself; False after an interrupt."""
+        return self.message != INTERRUPTED
+
+    @property
+    def sigma(self) -> dict[str, float]:
+        """Standard deviation of each free parameter."""
+        return {
+            name: float(np.sqrt(variance))
+            for name, variance in zip(self.free, np.diag(self.covariance), strict=True)
+        }
+
+    @property
+    def chi_square(self) -> float:
+        """Sum of the squared residuals; about as many as data less free parameters if the model is right."""
+        return float(self.residuals @ self.residuals)
+
+    def columns(self) -> Columns:
+        """Return one row for each measured value, with what the model says and all parameters there."""
+        sizes = [len(d) if isinstance(d, Series) else 1 for d in self.data]
+        at = np.repeat(np.arange(len(sizes)), sizes)
+        times = [d.times if isinstance(d, Series) else [np.nan] for d in self.data]
+        values = np.concatenate(
+            [d.values if isinstance(d, Series) else [d.value] for d in self.data]
+        )
+        sigma = np.array([d.sigma for d in self.data])[at]
+        params = np.array([orbit.vector for orbit in self.orbits])[at]
+        return {
+            "datum": at + 1,
+            "what": np.array([what_of(d) for d in self.data])[at],
+            "t": np.concatenate([np.asarray(t, dtype=np.float64) for t in times]),
+            "value": values,
+            "sigma": sigma,
+            "fitted": values + sigma * self.residuals,
+            "residual": self.residuals,
+            **dict(zip(self.model.parameter_names, params.T, strict=True)),
+        }
+
+    def found(self) -> Columns:
+        """Return one row for each free parameter: value, standard deviation, correlations."""
+        sigma = np.sqrt(np.diag(self.covariance))
+        together = self.covariance / np.outer(sigma, sigma)
+        return {
+            "parameter": np.array(self.free),
+            "value": np.array([self.params[name] for name in self.free]),
+            "sigma": sigma,
+            **{f"correlation_{name}": row for name, row in zip(self.free, together, strict=True)},
+        }
+
+    def to_dataframe(self, table: str = "data") -> pd.DataFrame:
+        """Return a table (needs pandas): "data", or the free "parameters" with their correlations.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such table.
+        """
+        need_pandas()
+        import pandas as pd
+
+        tables: dict[str, Any] = {"data": self.columns, "parameters": self.found}
+        if table not in [*tables]:
+            raise ParameterError(f"a table of a fit is data or parameters, got {shown(table)}")
+        return pd.DataFrame(tables[table]())
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw series with the fitted solution; without any, measured and fitted values."""
+        from contfric.plot.fit import plot_fit
+
+        return plot_fit(self, ax=ax)
+
+    def __repr__(self) -> str:
+        found = ", ".join(
+            f"{name} = {self.params[name]:.6g} +- {s:.2g}" for name, s in self.sigma.items()
+        )
+        return f"<Fit {found}; chi^2 = {self.chi_square:.4g} of {len(self.residuals)} data>"
+
+
+def what_of(datum: Datum) -> str:
+    """Return what was measured, in a word: a quantity, a signal, or an event."""
+    if isinstance(datum, Jump):
+        return f"{datum.parameter} of {datum.event.label}"
+    return datum.signal if isinstance(datum, Series) else datum.quantity

@@ -1,0 +1,153 @@
+"""``hold`` and ``extremum``: orbits on which a quantity has one value, or is extreme, as parameters vary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from pydantic import Field
+
+from contfric.study.tasks.response import Response
+from contfric.study.tasks.task import FigureKind, Found, Job, attempt
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from contfric.base.yaml_lines import LocatedYaml
+    from contfric.curves.quantity_curve import QuantityCurve
+    from contfric.models.definition import Model
+    from contfric.study.drawings import Drawing
+    from contfric.study.read import Study
+    from contfric.study.schema import StudyFile
+
+
+class QuantityCurveTask(Response):
+    """A curve of orbits in two or more parameters, by a quantity."""
+
+    of_orbit = True
+    row_text = "one row an orbit of the curve"
+    own = frozenset({"quantity", "value", "parameters", "range"})
+
+    quantity: str = Field(
+        min_length=1, description="a quantity, by its name or as an expression, such as x_max"
+    )
+    parameters: list[str] = Field(min_length=2, description="the names of parameters of the model")
+    range: dict[str, list[float]] = Field(
+        description="a mapping of these parameters to two finite numbers [low, high]"
+    )
+    max_step: float | None = Field(
+        None,
+        gt=0.0,
+        le=1.0,
+        description="a number in (0, 1]: largest step, as a share of the ranges",
+    )
+    max_points: int | None = Field(
+        None, ge=2, description="a whole number >= 2: most points of each side"
+    )
+
+    def check(
+        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
+    ) -> None:
+        """Check the quantity, the parameters and their ranges."""
+        from contfric.curves.problem import ranges_of
+        from contfric.quantities.registry import number_quantity
+
+        attempt(
+            located,
+            (self.name, "quantity"),
+            lambda: number_quantity(self.quantity, model, "a curve"),
+        )
+        for name, pair in self.range.items():
+            if len(pair) != 2:
+                located.fail(
+                    (self.name, "range", name),
+                    f"the range of '{name}' is two numbers [low, high]",
+                )
+        attempt(
+            located, (self.name,), lambda: ranges_of(model, tuple(self.parameters), self._ranges())
+        )
+
+    def _ranges(self) -> dict[str, tuple[float, float]]:
+        return {name: (pair[0], pair[1]) for name, pair in self.range.items()}
+
+    def _where(self) -> str:
+        return ", ".join(f"{n} from {r[0]:g} to {r[1]:g}" for n, r in self.range.items())
+
+    def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
+        """Draw the curve in the plane of its first two parameters."""
+        from contfric.plot.style import TEXT, full_title, sized
+
+        curve = found[self.result]
+        fixed = {n: float(v[0]) for n, v in curve.params.items() if n not in curve.parameters}
+        text = full_title(title, curve.model.parameter_names, fixed)
+        curve.plot(ax=figure.add_subplot()).set_title(text, fontsize=sized(TEXT))
+
+    def cut_short(self, found: QuantityCurve) -> bool:
+        """Tell whether Ctrl-C ended it."""
+        from contfric.curves.special import CurveEndReason
+
+        return any(end.reason is CurveEndReason.INTERRUPTED for end in found.ends)
+
+    def entry(self, found: QuantityCurve) -> dict[str, Any]:
+        """Return what is held, the number of orbits, and why the curve ends."""
+        return {
+            "label": found.label,
+            "parameters": list(found.parameters),
+            "points": len(found),
+            "signature": found[0].name,
+            "ends": [str(end) for end in found.ends],
+        }
+
+    @classmethod
+    def lines(cls, entry: dict[str, Any]) -> Iterator[str]:
+        """Yield the curve and its ends."""
+        names = ", ".join(entry["parameters"])
+        yield f"{entry['label']} in {names}: {entry['points']} orbits {entry['signature']}"
+        yield from (f"end: {end}" for end in dict.fromkeys(entry["ends"]))
+
+
+class HoldTask(QuantityCurveTask):
+    """Orbits on which a quantity has one value."""
+
+    name = "hold"
+    result = "hold"
+    saved_as = "hold.npz"
+    figures: ClassVar = {"hold": FigureKind(7.0, 5.0)}
+
+    parameters: list[str] = Field(
+        min_length=2, max_length=2, description="the names of two parameters of the model"
+    )
+    value: float = Field(description="a finite number: what the quantity is held at")
+
+    def does(self, study: Study) -> str:
+        """Return the curve in words."""
+        return f"orbits with {self.quantity} = {self.value:g}, {self._where()}"
+
+    def compute(self, job: Job) -> QuantityCurve:
+        """Follow the curve both ways."""
+        from contfric.curves.quantity_trace import continue_quantity
+
+        one, other = self.parameters
+        start = job.found["orbit"], self.quantity, self.value
+        return continue_quantity(*start, (one, other), self._ranges(), **self.options())
+
+
+class ExtremumTask(QuantityCurveTask):
+    """Orbits at which a quantity is extreme in all parameters but the last."""
+
+    name = "extremum"
+    result = "extremum"
+    saved_as = "extremum.npz"
+    figures: ClassVar = {"extremum": FigureKind(7.0, 5.0)}
+
+    def does(self, study: Study) -> str:
+        """Return the curve in words."""
+        extreme = ", ".join(self.parameters[:-1])
+        return f"orbits at which {self.quantity} is extreme in {extreme}, {self._where()}"
+
+    def compute(self, job: Job) -> QuantityCurve:
+        """Follow the curve both ways."""
+        from contfric.curves.extremum import continue_extremum
+
+        start = job.found["orbit"], self.quantity, tuple(self.parameters)
+        return continue_extremum(*start, self._ranges(), **self.options())
