@@ -17,6 +17,9 @@ _NO_TIME = 1e-4
 #: A segment this short is known to the root of rounding only, where it touches a surface; and one that comes
 #: in at an event is longer than this share of the arclength.
 _NO_LENGTH, _NO_SHARE = 1e-6, 1e-2
+#: A branch shorter than this (arclength) is asked whether it is admissible at all: beyond, the march notices.
+#: And what a margin misses by rounding, where states are known to its root.
+_SHORT, _ROUNDING = 1e-3, 1e-11
 #: Places on a branch, as shares of its points, that are asked whether its segments last: a segment that does
 #: not vanish all along lasts at one of them.
 _ASKED = (0.25, 0.5, 0.75)
@@ -89,6 +92,18 @@ def _is_symmetric(branch: Branch) -> bool:
     return sum(branch[k].symmetric for k in asked) > len(asked) / 2
 
 
+def _violates(branch: Branch) -> bool:
+    """Tell whether a short branch violates one condition at all of its points behind the first.
+
+    Near a singular event conditions change by the square of the distance. A branch that leaves it on the
+    wrong side violates them by less than the march notices, until another event ends it.
+    """
+    if branch.arc[-1] >= _SHORT or len(branch) < 2:
+        return False
+    margins = np.array([branch[k].margins for k in range(1, len(branch))])
+    return bool(margins.size and np.min(np.max(margins, axis=0)) < -_ROUNDING)
+
+
 #: What a branch must not be, and why it is refused then.
 _FAULTS = (
     (
@@ -104,5 +119,6 @@ _FAULTS = (
         "a segment of it has no length anywhere: the motion of another word, that touches a surface",
     ),
     (_is_symmetric, "its orbits are symmetric: it is another branch, which is solved on its half"),
+    (_violates, "it violates a condition all along, by little more than rounding"),
     (_repeats, "its orbits are shorter ones, run through several times"),
 )

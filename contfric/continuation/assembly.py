@@ -14,6 +14,7 @@ from contfric.continuation.events import ACCURACY, Bifurcation, End, Kind
 from contfric.continuation.openings import with_openings
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
+from contfric.continuation.vertical import with_families
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 
@@ -103,7 +104,7 @@ def _branch(
     _renew_ends(branch)
     branch = _without_critical_ends(branch, settings)
     branch = replace(branch, notes=(*branch.notes, *continua_of(branch)))
-    return with_openings(branch, settings)
+    return with_openings(with_families(branch, settings), settings)
 
 
 def _known(

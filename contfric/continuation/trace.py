@@ -33,7 +33,7 @@ from contfric.continuation.section_joints import (
     is_on_section,
     move_joints,
 )
-from contfric.continuation.side import Side
+from contfric.continuation.side import Side, first_point
 from contfric.continuation.sliding import nearly_reached
 from contfric.continuation.smooth import SAME_PLACE
 from contfric.continuation.start import start_of
@@ -45,6 +45,7 @@ from contfric.continuation.vertex_ends import (
     end_stalled,
     overshoots_vertex,
 )
+from contfric.continuation.vertical import Family, family_near
 from contfric.errors import ConvergenceError, function_of
 from contfric.orbit.orbit import Orbit
 from contfric.remember.advance import foresee, foreseeable
@@ -135,7 +136,32 @@ def follow_orbit(
     """Continue an orbit both ways, as :func:`continue_orbit` does; ``keep`` is that of :func:`trace_side`."""
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
-    orbit, start = start_of(orbit, settings)
+    try:
+        orbit, start = start_of(orbit, settings)
+    except ConvergenceError:
+        family = family_near(orbit, orbit.model.index_of(settings.parameter))
+        branch = None if family is None else follow_family(family, settings, progress, keep=keep)
+        if branch is None:
+            raise
+        return branch
+    return _both_ways(orbit, start, settings, progress, keep)
+
+
+def follow_family(
+    family: Family, settings: Settings, progress: Progress | None = None, *, keep: bool = False
+) -> Branch | None:
+    """Trace a family of orbits at one value of the parameter, along another one in which it is regular."""
+    inside = family.settings(settings)
+    start = first_point(family.orbit, inside, family.along, 0.0)
+    if start is None:
+        return None
+    return family.at_its_value(_both_ways(family.orbit, start, inside, progress, keep))
+
+
+def _both_ways(
+    orbit: Orbit, start: Point, settings: Settings, progress: Progress | None, keep: bool
+) -> Branch:
+    """Follow a branch from a point to both of its ends."""
     foresee(trace_side, orbit, start.reversed(), settings, keep=keep)
     ahead = trace_side(orbit, start, settings, progress=progress, keep=keep)
     if ahead.end.reason in (EndReason.CLOSED, EndReason.INTERRUPTED):
