@@ -49,6 +49,8 @@ from contfric.orbit.system import Margin, System, Test, inside_sign
 _VANISHED = 1e-3
 #: A load that changes this slowly at a stop stands still there.
 STILL = 1e-4
+#: Where its rate is rounding: a stop at a minimum is known to the root of that.
+_ROUNDED = 1e-6
 #: Time, in periods, by which it is asked before and behind a stop whether it turns there.
 _LATER = 1e-4
 
@@ -127,7 +129,7 @@ def _leaves(system: System, test: Test, orbit: Orbit) -> bool:
     """
     rate = outward_rate(system, test, orbit)
     resting = resting_domain(system, test)
-    if resting is None or abs(rate) >= STILL:
+    if resting is None or abs(rate) >= _ROUNDED:
         return rate > 0.0
     sign, end = resting.signs[test.surface], orbit.ends[test.segment]
     return bends_outward(orbit, resting.mode, test.surface, sign, end)

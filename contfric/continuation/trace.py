@@ -13,8 +13,10 @@ from contfric.continuation.ending import (
     end_at_limit,
     endless,
     ends_at,
+    grows,
     is_point,
     never_leaves,
+    slows_down,
 )
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.limits import is_at_limit, limit_crossed, limit_end
@@ -56,14 +58,6 @@ _AT_LIMIT = 1e-6
 
 #: A margin this negative (nondimensional) is violated; a located limit is good to rounding.
 _VIOLATED = 1e-9
-#: A turn this much longer than at the start, along a parameter whose share of the tangent is below this,
-#: comes to an equilibrium.
-_LONGER, _STANDS = 1.5, 1e-6
-
-#: A parameter that changes by less than this share of the range over hundreds of points, while states are
-#: this large and grow by this factor, comes to a resonance.
-_AT_RESONANCE, _LARGE, _GROWS = 1e-7, 1e3, 1.1
-
 #: A step this short after hundreds of points (arclength) gets nowhere.
 _CRAWLS = 1e-6
 
@@ -259,10 +253,10 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
             side.end = End(EndReason.REST)
         elif why == kernels.STEP and not _end_of_holds(orbit, side, settings, True):
             end_stalled(orbit, side, settings)
-        if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and _slows_down(side, settings):
+        if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and slows_down(side, settings):
             side.end = End(EndReason.PERIOD)
         return True, step
-    if why == kernels.FULL and _grows(side, settings):
+    if why == kernels.FULL and grows(side, settings):
         side.end = End(EndReason.UNBOUNDED)
         return True, step
     if why == kernels.FULL:
@@ -273,34 +267,6 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
 def _tip(orbit: Orbit, side: Side, settings: Settings) -> Orbit:
     """Return the last orbit of a side."""
     return side.tip.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
-
-
-def _slows_down(side: Side, settings: Settings) -> bool:
-    """Tell whether a side has run along one value of the parameter while only its period grew.
-
-    Near a homoclinic orbit the period grows as the logarithm of the distance of the parameter, and
-    Newton fails when that distance is rounding.
-    """
-    if not side.autonomous:
-        return False
-    tip, first = side.tip, side.first
-    return bool(
-        abs(tip.slope) < _STANDS * settings.width
-        and tip.joints[0, 0] < _LONGER * first.joints[0, 0]
-    )
-
-
-def _grows(side: Side, settings: Settings) -> bool:
-    """Tell whether a side has run along one value of the parameter while only its amplitude grew.
-
-    In resonance the amplitude grows as the inverse of the distance of the parameter from a limit that it
-    never reaches; far out the orbits are determined to fewer digits than that distance has.
-    """
-    values, last = side.rows.w[: side.last + 1, 0], side.last
-    if np.ptp(values) > _AT_RESONANCE * settings.width:
-        return False
-    before, now = (float(np.max(np.abs(side.rows.joints[k, :, 1:]))) for k in (0, last))
-    return now > _LARGE and now > _GROWS * before
 
 
 def _end_of_holds(orbit: Orbit, side: Side, settings: Settings, stuck: bool) -> bool:
