@@ -181,13 +181,19 @@ def _joined(diagram: Diagram, number: int) -> tuple[list[int], float]:
             continue
         if same_place(node.bifurcation, b, diagram.parameter, width, ROUNDING):
             found.append(k)
-    slack = max(_BESIDE * diagram.nodes[k].bifurcation.accuracy * width for k in found)
+    slack = _slack(diagram, found)
     value = b.params[diagram.parameter]
     for known in found:  # grows
         for i in diagram.nodes[known].branches:
             for pair in _flat_parts(diagram, i, value, slack):
                 found += [k for k in pair if known in pair and k not in found]
-    return found, slack
+    return found, _slack(diagram, found)
+
+
+def _slack(diagram: Diagram, nodes: list[int]) -> float:
+    """Return how near to events orbits are on no side of them."""
+    width = diagram.range[1] - diagram.range[0]
+    return max(_BESIDE * diagram.nodes[k].bifurcation.accuracy * width for k in nodes)
 
 
 def _flat_parts(diagram: Diagram, i: int, value: float, slack: float) -> Iterator[tuple[int, int]]:
@@ -213,6 +219,8 @@ def _families(
     """Yield (side, orbit) for each half-branch that meets an event."""
     for i in node.branches:
         branch = diagram.branches[i]
+        if is_continuum(branch):
+            continue
         for position, event in _positions(diagram, node, branch):
             for way in (-1, 1):
                 found = _beside(branch, position, event, way, value, slack)

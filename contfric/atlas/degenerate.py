@@ -15,6 +15,7 @@ import numpy as np
 
 from contfric.atlas.matching import stops_distance
 from contfric.continuation.branch import Branch
+from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 
 if TYPE_CHECKING:
@@ -66,7 +67,12 @@ def _alike(a: Bifurcation, b: Bifurcation) -> bool:
 
 
 def unresolved(branch: Branch, width: float) -> bool:
-    """Tell whether the parameter changes along a branch by less than its two ends are known to."""
+    """Tell whether the parameter changes along a branch by less than its two ends are known to.
+
+    A continuum at one value is known to be one, and is compared as such.
+    """
+    if is_continuum(branch):
+        return False
     ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
     known = sum(b.accuracy for b in ends) * width
     return len(ends) == 2 and bool(np.ptp(branch.values) < known)

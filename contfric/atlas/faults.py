@@ -19,6 +19,9 @@ _NO_TIME = 1e-4
 _NO_LENGTH, _NO_SHARE = 1e-6, 1e-2
 #: A bridge on which the parameter changes by less (relative to 1 + its value) may consist of rounding.
 _NARROW = 1e-5
+#: A branch shorter than this (arclength) is asked whether it is admissible at all: beyond, the march notices.
+#: And what a margin misses by rounding, where states are known to its root.
+_SHORT, _ROUNDING = 1e-3, 1e-11
 #: Places on a branch, as shares of its points, that are asked whether its segments last: a segment that does
 #: not vanish all along lasts at one of them.
 _ASKED = (0.25, 0.5, 0.75)
@@ -102,6 +105,18 @@ def _undetermined(branch: Branch) -> bool:
     return bool(branch.bridge and narrow and any(b.accuracy >= 1.0 for b in ends))
 
 
+def _violates(branch: Branch) -> bool:
+    """Tell whether a short branch violates one condition at all of its points behind the first.
+
+    Near a singular event conditions change by the square of the distance. A branch that leaves it on the
+    wrong side violates them by less than the march notices, until another event ends it.
+    """
+    if branch.arc[-1] >= _SHORT or len(branch) < 2:
+        return False
+    margins = np.array([branch[k].margins for k in range(1, len(branch))])
+    return bool(margins.size and np.min(np.max(margins, axis=0)) < -_ROUNDING)
+
+
 #: What a branch must not be, and why it is refused then.
 _FAULTS = (
     (
@@ -117,6 +132,7 @@ _FAULTS = (
         "a segment of it has no length anywhere: the motion of another word, that touches a surface",
     ),
     (_is_symmetric, "its orbits are symmetric: it is another branch, which is solved on its half"),
+    (_violates, "it violates a condition all along, by little more than rounding"),
     (_repeats, "its orbits are shorter ones, run through several times"),
     (
         _undetermined,

@@ -19,6 +19,7 @@ from contfric.atlas.composed import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.crossings import follow_crossing, whole_branch
 from contfric.atlas.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.exploration import Exploration
+from contfric.atlas.families import SHARES, follow_beside_family, follow_family_at, meets
 from contfric.atlas.faults import fault_of
 from contfric.atlas.folds import follow_arms, follow_fold
 from contfric.atlas.leaving_event import (
@@ -26,7 +27,7 @@ from contfric.atlas.leaving_event import (
     leave_singular,
     settings_for,
 )
-from contfric.atlas.matching import SAME_MOTION, same_kind, stops_apart
+from contfric.atlas.matching import SAME_MOTION, same_kind
 from contfric.atlas.splitting import follow_split
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, sequences_of
@@ -54,8 +55,6 @@ from contfric.orbit.system import Word
 from contfric.signature import canonical_word
 from contfric.signature.edits import show
 
-#: Where an orbit near an event is looked for, relative to the range.
-_SHARES = (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6)
 #: The same for an event that is located to the root of rounding only.
 _NOWHERE_ROUGHLY = 1e-3
 #: A bridge shorter than this violates a condition by its square from the start on, which is rounding up to
@@ -113,11 +112,17 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
         for candidate in in_order(proposed) if composes(orbit) else proposed:
             jumps = jumps or candidate.has_hold
             accepted = _judge(state, event, candidate) or accepted
+            if (
+                event.bifurcation.orbit is not orbit
+            ):  # better located: its outcomes are asked for anew
+                state.waiting.appendleft(event)
+                return
             if composes(orbit) and goes_on(state, event):
                 state.judge(event, "other orders of the changes", Verdict.REFUSED, why=GOES_ON)
                 break
             if event.proposals and event.proposals[-1].verdict is not Verdict.REFUSED:
                 words |= candidate.words
+        follow_beside_family(state, event)
         event.kinds |= {n.kind for n in incident.names if n.before & words and n.after & words}
         if accepted or follow_split(state, event):
             return
@@ -131,7 +136,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
     if orbit.system.holds:
         return
     active = orbit.model.index_of(settings.parameter)
-    shifts = tuple((active, share * settings.width) for share in _SHARES)
+    shifts = tuple((active, share * settings.width) for share in SHARES)
     reason = "the word that the flow walks near the event"
     refused: dict[Word, str] = {}
     done: set[Word] = set()
@@ -146,7 +151,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
             refused.setdefault(word, f"no periodic motion is {show(guess.word)}")
             continue
         branch = _through(state, guess)
-        ends = [] if branch is None else [e for e in branch.ends if _meets(e, event, settings)]
+        ends = [] if branch is None else [e for e in branch.ends if meets(e, event, settings)]
         if branch is None or not ends or fault_of(branch):
             refused.setdefault(word, f"no orbit of {show(guess.word)} meets the event")
             continue
@@ -161,20 +166,6 @@ def _follow_flow(state: Exploration, event: Event) -> None:
         state.judge(event, reason, Verdict.REFUSED, why=refused[word])
     if creeps and creeps == refused.keys() and not done and len(event.branches) == 1:
         event.final = EndReason.SHAKEDOWN
-
-
-def _meets(end: End, event: Event, settings: Settings) -> bool:
-    """Tell whether a branch ends at an event, by whatever name it calls it.
-
-    A stop that comes in there is one of the new orbit only.
-    """
-    a, b = end.bifurcation, event.bifurcation
-    if a is None or a.kind not in TERMINAL:
-        return False
-    gap = abs(a.params[settings.parameter] - b.params[settings.parameter])
-    if gap > max(a.accuracy, b.accuracy) * settings.width:
-        return False
-    return stops_apart(a.orbit, b.orbit) < SAME_MOTION
 
 
 def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:
@@ -192,6 +183,11 @@ def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:
 
 
 def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
+    assert candidate.orbit is not None
+    if event.bifurcation.accuracy > ACCURACY and follow_family_at(
+        state, event, candidate.orbit, candidate.reason
+    ):
+        return True
     branch = leave_event(state, candidate, event)
     if branch is None and event.bifurcation.accuracy > ACCURACY:
         assert candidate.orbit is not None
@@ -226,8 +222,28 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
             why = EndReason.CONTINUUM.value
         state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
         return False
+    branch, ends = _located_by(state, branch, event)
     state.accept(event, candidate.reason, branch)
+    for end in ends:
+        state.merge(event, end)
+        assert end.bifurcation is not None
+        event.bifurcation = end.bifurcation
     return True
+
+
+def _located_by(state: Exploration, branch: Branch, event: Event) -> tuple[Branch, list[End]]:
+    """Return a branch from an event that is known roughly, with its own end there where that is known better.
+
+    Where the equations of the branch that arrives are singular at its end, those of another one need not be.
+    From a place off by the root of rounding that one would begin outside of its conditions.
+    """
+    known = event.bifurcation.accuracy
+    if known <= ACCURACY or branch.bridge or branch.arc[-1] < _NOWHERE_ROUGHLY:
+        return branch, []
+    whole = whole_branch(branch[len(branch) // 2], state.settings)
+    ends = [end for end in whole.ends if meets(end, event, state.settings)]
+    better = [end for end in ends if end.bifurcation and end.bifurcation.accuracy <= ACCURACY]
+    return (whole, better[:1]) if better and not fault_of(whole) else (branch, [])
 
 
 def _begins_continuum(state: Exploration, orbit: Orbit | None, event: Event) -> bool:
@@ -254,6 +270,10 @@ def _has_no_width(branch: Branch, event: Event, settings: Settings) -> bool:
 
 def _follow_branch_point(state: Exploration, event: Event) -> None:
     orbit = event.bifurcation.orbit
+    if follow_family_at(state, event, orbit, "the family of orbits at this value"):
+        if not any(state.branches[i].system.half for i in event.branches):
+            _follow_both_ways(state, orbit, event)
+        return
     crossing = crossing_near(orbit, state.settings, LOCATED)
     if crossing is not None:
         follow_crossing(state, crossing, event, follow_departure)
@@ -285,7 +305,7 @@ def _through(state: Exploration, orbit: Orbit) -> Branch | None:
     settings = state.settings
     value = settings_value(orbit, settings)
     active = orbit.model.index_of(settings.parameter)
-    for share in _SHARES:
+    for share in SHARES:
         beside = value + share * settings.width
         if not settings.low <= beside <= settings.high:
             continue

@@ -248,7 +248,11 @@ def _covers(known: Branch, branch: Branch) -> bool:
     """Tell whether a branch lies on another one: some point in its middle does."""
     if known.mirrored or known.system.periods != branch.system.periods:
         return False
-    inside = chain((_inside(branch, share) for share in _INSIDE), _starts(branch))
+    # by arclength: near a vertex at which Newton fails there may be a thousand points
+    length = float(branch.arc[-1])
+    places = (int(np.searchsorted(branch.arc, share * length)) for share in _INSIDE)
+    along = (branch[k] for k in places if 0 < k < len(branch) - 1)
+    inside = chain(along, (_inside(branch, share) for share in _INSIDE), _starts(branch))
     return any(on_branch(orbit, known) for orbit in inside if orbit.converged)
 
 

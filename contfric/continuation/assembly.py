@@ -14,6 +14,7 @@ from contfric.continuation.events import ACCURACY, Bifurcation, End, Kind
 from contfric.continuation.openings import with_openings
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
+from contfric.continuation.vertical import with_families
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 
@@ -104,7 +105,7 @@ def _branch(
     branch = _without_critical_ends(branch, settings)
     if continua := tuple(continua_of(branch)):
         branch = replace(branch, notes=(*branch.notes, *continua))
-    return with_openings(branch, settings)
+    return with_openings(with_families(branch, settings), settings)
 
 
 def _known(

@@ -32,6 +32,13 @@ _AT_EQUILIBRIUM = 1e-6
 #: Duration, in parts of a segment, over which its field is asked for an equilibrium: short enough that no
 #: eigenvalue makes a whole turn, long enough to be seen above rounding.
 _PART = 1e-2
+#: A turn this much longer than at the start, along a parameter whose share of the tangent is below this,
+#: comes to an equilibrium.
+_LONGER, _STANDS = 1.5, 1e-6
+
+#: A parameter that changes by less than this share of the range over hundreds of points, while states are
+#: this large and grow by this factor, comes to a resonance.
+_AT_RESONANCE, _LARGE, _GROWS = 1e-7, 1e3, 1.1
 
 
 def is_point(orbit: Orbit) -> bool:
@@ -207,3 +214,31 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
         except NotationError:
             return ""
     return ""
+
+
+def slows_down(side: Side, settings: Settings) -> bool:
+    """Tell whether a side has run along one value of the parameter while only its period grew.
+
+    Near a homoclinic orbit the period grows as the logarithm of the distance of the parameter, and
+    Newton fails when that distance is rounding.
+    """
+    if not side.autonomous:
+        return False
+    tip, first = side.tip, side.first
+    return bool(
+        abs(tip.slope) < _STANDS * settings.width
+        and tip.joints[0, 0] < _LONGER * first.joints[0, 0]
+    )
+
+
+def grows(side: Side, settings: Settings) -> bool:
+    """Tell whether a side has run along one value of the parameter while only its amplitude grew.
+
+    In resonance the amplitude grows as the inverse of the distance of the parameter from a limit that it
+    never reaches; far out the orbits are determined to fewer digits than that distance has.
+    """
+    values, last = side.rows.w[: side.last + 1, 0], side.last
+    if np.ptp(values) > _AT_RESONANCE * settings.width:
+        return False
+    before, now = (float(np.max(np.abs(side.rows.joints[k, :, 1:]))) for k in (0, last))
+    return now > _LARGE and now > _GROWS * before

@@ -39,6 +39,7 @@ from contfric.continuation.touching import (
     resting_domain,
     touched_at_joint,
 )
+from contfric.models.definition import FloatArray
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, System, Test, inside_sign
@@ -46,6 +47,12 @@ from contfric.orbit.system import Margin, System, Test, inside_sign
 #: A slide behind a hold that is this short has vanished where one of its margins has: they are its length
 #: times a rate of the load, and Newton may fail before they are below 1e-5.
 _VANISHED = 1e-3
+#: A load that changes this slowly at a stop stands still there.
+STILL = 1e-4
+#: Where its rate is rounding: a stop at a minimum is known to the root of that.
+_ROUNDED = 1e-6
+#: Time, in periods, by which it is asked before and behind a stop whether it turns there.
+_LATER = 1e-4
 
 
 def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
@@ -70,8 +77,7 @@ def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
         if model.mode_by_name[mode].sliding and not begins_to_slide(model, mode, touched):
             return Kind.AS
         return Kind.T if inside_sign(model, mode, touched) == 0 else Kind.GS
-    # a load that stands still at rest: from beyond the limit the slide leads back into it, as at SS
-    return Kind.CS if outward_rate(system, test, orbit) > 0.0 else Kind.SS
+    return Kind.CS if _leaves(system, test, orbit) else Kind.SS
 
 
 def hold_of_test(test: Test, orbit: Orbit) -> Hold | None:
@@ -113,3 +119,28 @@ def outward_rate(system: System, test: Test, orbit: Orbit) -> float:
         return np.inf
     end = orbit.ends[test.segment]
     return -resting.signs[test.surface] * rate_along(orbit, resting.mode, test.surface, end)
+
+
+def _leaves(system: System, test: Test, orbit: Orbit) -> bool:
+    """Tell whether rest is left behind a stop on its limit (CS), and not entered (SS).
+
+    A load that stands still at the stop grows behind it where it has its minimum: a stick around the minimum
+    shrinks to nothing there, and the map is continuous. At its maximum motion from below is held.
+    """
+    rate = outward_rate(system, test, orbit)
+    resting = resting_domain(system, test)
+    if resting is None or abs(rate) >= _ROUNDED:
+        return rate > 0.0
+    sign, end = resting.signs[test.surface], orbit.ends[test.segment]
+    return bends_outward(orbit, resting.mode, test.surface, sign, end)
+
+
+def bends_outward(orbit: Orbit, mode: str, surface: str, inside: int, joint: FloatArray) -> bool:
+    """Tell whether a load that stands still at its limit is beyond it before and behind that.
+
+    ``inside`` is the sign of the surface within it.
+    """
+    later = np.zeros_like(joint)
+    later[0] = _LATER * (1.0 + orbit.period)
+    before, behind = (rate_along(orbit, mode, surface, joint + s * later) for s in (-1.0, 1.0))
+    return inside * (behind - before) < 0.0

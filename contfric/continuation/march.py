@@ -59,6 +59,9 @@ _WANTED_ANGLE, _MOST_ANGLE = 0.12, 0.35
 _GROWTH = 2.5
 #: Distance from predictor to orbit in units of the step: beyond it the step may change branches.
 _MOST_MISS = 0.3
+#: A miss below this is no other branch: where equations are singular together, at a branch point, a solved
+#: point is off by as much, and steps were as short as that for thousands of points.
+_BLUR = 1e-8
 #: A state this large (nondimensional) is on its way to infinity: resonance without damping.
 _UNBOUNDED = 1e6
 #: A turn this long (nondimensional) of an autonomous model is on its way to an infinite one.
@@ -125,7 +128,9 @@ def trying(correct_at: Any, observe_at: Any) -> Any:
             miss = distance(zs[row], ws[row], guess_z, guess_w, way.scale)
             cosine = product(tzs[row], tws[row], tzs[k], tws[k], way.scale)
             angle = math.acos(min(1.0, max(-1.0, cosine)))
-            if (angle > _MOST_ANGLE or miss > _MOST_MISS * step) and step > options[GIVES_WAY]:
+            if (angle > _MOST_ANGLE or miss > _MOST_MISS * step + _BLUR) and step > options[
+                GIVES_WAY
+            ]:
                 return False, finite, angle
         if fine:
             tests, labels, mu = points.tests[row], points.labels[row], points.mu[row]

@@ -43,7 +43,7 @@ def with_openings(branch: Branch, settings: Settings) -> Branch:
                 found.append(event)
     if not found:
         return branch
-    return replace(branch, bifurcations=_in_order(branch, found))
+    return replace(branch, bifurcations=in_order(branch, found))
 
 
 def _located(branch: Branch, k: int, before: int, settings: Settings) -> Bifurcation | None:
@@ -98,7 +98,7 @@ def _belongs_to_another(branch: Branch, event: Bifurcation, width: float) -> boo
     )
 
 
-def _in_order(branch: Branch, found: list[Bifurcation]) -> tuple[Bifurcation, ...]:
+def in_order(branch: Branch, found: list[Bifurcation]) -> tuple[Bifurcation, ...]:
     """Return the bifurcations of a branch with others, in order; those at its ends stay there."""
     first, last = (end.bifurcation for end in branch.ends)
     inner = [b for b in branch.bifurcations if b is not first and b is not last]

@@ -6,7 +6,7 @@ import numpy as np
 
 from contfric.continuation.accuracy import Estimate
 from contfric.continuation.events import Bifurcation, Kind
-from contfric.continuation.kinds import outward_rate
+from contfric.continuation.kinds import STILL, outward_rate
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.split_touch import splits
 from contfric.orbit.orbit import Orbit
@@ -15,8 +15,6 @@ from contfric.orbit.system import Test
 #: Accuracy of an event (relative to the range) where CS and AS, or the two ends of a slide, coincide: the
 #: root of rounding.
 ROUGH = 1e-6
-#: A load that changes this slowly at a stop stands still there.
-_STILL = 1e-4
 
 
 def bifurcation_at(
@@ -58,7 +56,7 @@ def _stability(
 def _is_rough(kind: Kind, here: Orbit, tests: tuple[Test, ...]) -> bool:
     """Tell whether an event is located to the root of rounding only: where the load stands still."""
     return kind in (Kind.CS, Kind.SS) and any(
-        abs(outward_rate(here.system, test, here)) < _STILL for test in tests
+        abs(outward_rate(here.system, test, here)) < STILL for test in tests
     )
 
 

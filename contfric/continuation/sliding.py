@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from contfric.continuation.events import Bifurcation, Kind
-from contfric.continuation.kinds import hold_of_test, kind_of_margin
+from contfric.continuation.kinds import bends_outward, hold_of_test, kind_of_margin
 from contfric.continuation.locate_change import locate_change
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import bifurcation_at
 from contfric.continuation.side import first_point
 from contfric.continuation.touching import is_rate_of, rate_along
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import Margin, Test, inside_sign
 from contfric.signature.holds import is_hold
 
 #: Margins below this at a located event vanish with it: they form a group. Located margins are
@@ -230,7 +230,7 @@ def _vanished_stick(here: Orbit, kind: Kind, test: Test) -> Test | None:
     if kind is not Kind.AS or of_hold:
         return None
     start, end = here.cycle[test.segment, 0], here.ends[test.segment, 0]
-    if end - start >= _VANISHED * here.period:
+    if end - start >= _VANISHED * here.period and not _is_at_least_load(here, test):
         return None
     surface, segment = here.word[test.segment][1], test.segment - 1
     if segment < 0:  # of a half: the stop is the mirror image of the last one
@@ -242,6 +242,15 @@ def _vanished_stick(here: Orbit, kind: Kind, test: Test) -> Test | None:
     return (
         stop if stop in here.system.tests else None
     )  # of several contacts: another one cut it short
+
+
+def _is_at_least_load(here: Orbit, test: Test) -> bool:
+    """Tell whether a stick is released where its load is least: it lasts no longer than that is known to."""
+    mode, surface = here.word[test.segment]
+    if test.margin is not Margin.EXIT or surface not in here.model.surface_by_name:
+        return False
+    inside = inside_sign(here.model, mode, surface)
+    return inside != 0 and bends_outward(here, mode, surface, inside, here.ends[test.segment])
 
 
 def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation | None:

@@ -4,32 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-import numpy as np
-
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
-from contfric.continuation.ending import endless, never_leaves
+from contfric.continuation.ending import endless, grows, never_leaves, slows_down
 from contfric.continuation.events import TERMINAL, End, EndReason
 from contfric.continuation.limits import is_at_limit, limit_end
 from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point, Settings, settings_of
 from contfric.continuation.resolve import end_of_holds, resolve
 from contfric.continuation.section_joints import move_joints
-from contfric.continuation.side import Side
+from contfric.continuation.side import Side, first_point
 from contfric.continuation.start import start_of
 from contfric.continuation.stopping import stop_among
 from contfric.continuation.vertex_ends import Overshoot, end_stalled, overshoots_vertex
+from contfric.continuation.vertical import Family, family_near
 from contfric.errors import ConvergenceError, function_of
 from contfric.orbit.orbit import Orbit
 from contfric.remember.advance import foresee, foreseeable
 from contfric.remember.journal import remembered
-
-#: A turn this much longer than at the start, along a parameter whose share of the tangent is below this,
-#: comes to an equilibrium.
-_LONGER, _STANDS = 1.5, 1e-6
-
-#: A parameter that changes by less than this share of the range over hundreds of points, while states are
-#: this large and grow by this factor, comes to a resonance.
-_AT_RESONANCE, _LARGE, _GROWS = 1e-7, 1e3, 1.1
 
 #: A step this short after hundreds of points (arclength) gets nowhere.
 _CRAWLS = 1e-6
@@ -103,7 +94,32 @@ def follow_orbit(
     """Continue an orbit both ways, as :func:`continue_orbit` does; ``keep`` is that of :func:`trace_side`."""
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
-    orbit, start = start_of(orbit, settings)
+    try:
+        orbit, start = start_of(orbit, settings)
+    except ConvergenceError:
+        family = family_near(orbit, orbit.model.index_of(settings.parameter))
+        branch = None if family is None else follow_family(family, settings, progress, keep=keep)
+        if branch is None:
+            raise
+        return branch
+    return _both_ways(orbit, start, settings, progress, keep)
+
+
+def follow_family(
+    family: Family, settings: Settings, progress: Progress | None = None, *, keep: bool = False
+) -> Branch | None:
+    """Trace a family of orbits at one value of the parameter, along another one in which it is regular."""
+    inside = family.settings(settings)
+    start = first_point(family.orbit, inside, family.along, 0.0)
+    if start is None:
+        return None
+    return family.at_its_value(_both_ways(family.orbit, start, inside, progress, keep))
+
+
+def _both_ways(
+    orbit: Orbit, start: Point, settings: Settings, progress: Progress | None, keep: bool
+) -> Branch:
+    """Follow a branch from a point to both of its ends."""
     foresee(trace_side, orbit, start.reversed(), settings, keep=keep)
     ahead = trace_side(orbit, start, settings, progress=progress, keep=keep)
     if ahead.end.reason in (EndReason.CLOSED, EndReason.INTERRUPTED):
@@ -202,10 +218,10 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
             side.end = End(EndReason.REST)
         elif why == kernels.STEP and not end_of_holds(orbit, side, settings, True):
             end_stalled(orbit, side, settings)
-        if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and _slows_down(side, settings):
+        if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and slows_down(side, settings):
             side.end = End(EndReason.PERIOD)
         return True, step
-    if why == kernels.FULL and _grows(side, settings):
+    if why == kernels.FULL and grows(side, settings):
         side.end = End(EndReason.UNBOUNDED)
         return True, step
     if why == kernels.FULL:
@@ -216,31 +232,3 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
 def _tip(orbit: Orbit, side: Side, settings: Settings) -> Orbit:
     """Return the last orbit of a side."""
     return side.tip.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
-
-
-def _slows_down(side: Side, settings: Settings) -> bool:
-    """Tell whether a side has run along one value of the parameter while only its period grew.
-
-    Near a homoclinic orbit the period grows as the logarithm of the distance of the parameter, and
-    Newton fails when that distance is rounding.
-    """
-    if not side.autonomous:
-        return False
-    tip, first = side.tip, side.first
-    return bool(
-        abs(tip.slope) < _STANDS * settings.width
-        and tip.joints[0, 0] < _LONGER * first.joints[0, 0]
-    )
-
-
-def _grows(side: Side, settings: Settings) -> bool:
-    """Tell whether a side has run along one value of the parameter while only its amplitude grew.
-
-    In resonance the amplitude grows as the inverse of the distance of the parameter from a limit that it
-    never reaches; far out the orbits are determined to fewer digits than that distance has.
-    """
-    values, last = side.rows.w[: side.last + 1, 0], side.last
-    if np.ptp(values) > _AT_RESONANCE * settings.width:
-        return False
-    before, now = (float(np.max(np.abs(side.rows.joints[k, :, 1:]))) for k in (0, last))
-    return now > _LARGE and now > _GROWS * before

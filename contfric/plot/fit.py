@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
+from contfric.plot.names import parameter_label
 from contfric.plot.save import axes_or_new, name_axes
-from contfric.plot.style import LINE_WIDTH, SMALL, parameter_label, sized
+from contfric.plot.style import LINE_WIDTH, SMALL, sized
 
 if TYPE_CHECKING:
     from contfric.base.tabled import Columns

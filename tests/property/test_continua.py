@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.atlas.verification import differences
 from contfric.continuation.continuum import in_continuum, is_continuum
 
 #: Scenes with no sticks: a large excitation against friction, drawn at random.
@@ -148,3 +149,44 @@ def test_rest_for_ever_counts_in_the_sum() -> None:
     found = diagram.verify()
     assert found.passed, str(found)
     assert not found.missing
+
+
+#: Scenes with a family of orbits at Omega = 1/2 that is met by one branch twice, by two, and is short.
+AT_ONE_HALF = [
+    {"Omega": 0.5, "S": 0.22, "S0": 0.3},
+    {"Omega": 0.49, "S": 0.32, "S0": 0.33},
+    {"Omega": 0.55, "S": 0.32, "S0": 0.325},
+]
+
+
+@pytest.mark.parametrize("params", AT_ONE_HALF)
+def test_a_family_at_one_value_is_one_branch_from_whatever_side(params: dict[str, float]) -> None:
+    """Along Omega the equations are singular at every orbit of it, and the sign of the slope is rounding."""
+    diagram = cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.48, 0.55))
+    (family,) = (b for b in diagram.branches if is_continuum(b) and not b.mirrored)
+    assert diagram.loose_ends == ()
+    assert abs(family.values[0] - 0.5) < 1e-12
+    assert {end.bifurcation.kind.name for end in family.ends if end.bifurcation} == {"CS", "BP"}
+    # x returns to itself whatever the amplitude, and without sticks only the limit S0 ends it
+    (end,) = (
+        e.bifurcation for e in family.ends if e.bifurcation and e.bifurcation.kind.name == "CS"
+    )
+    loads = [abs(x - np.cos(0.5 * t)) for t, x in end.orbit.cycle[:, :2]]
+    assert abs(min(loads) - params["S0"]) < 1e-12
+    symmetric = next(b for b in diagram.branches if b.name == "0s")
+    again = cf.explore(symmetric[len(symmetric) // 2], "Omega", (0.48, 0.55), max_step=0.0031)
+    (other,) = (b for b in again.branches if is_continuum(b) and not b.mirrored)
+    assert abs(other.values[0] - 0.5) < 1e-12
+    assert {b.name for b in again.branches} == {b.name for b in diagram.branches}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_last_digits_of_the_parameters_change_nothing(seed: int) -> None:
+    """Fig. 7: its triple point and its family at Omega = 1/2, with parameters moved by a few units."""
+    rng = np.random.default_rng([7, seed])
+    params = {"Omega": 0.5, "S": 0.22, "S0": 0.3}
+    whole = cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.3, 0.7))
+    moved = {name: value * (1.0 + 1e-15 * rng.uniform(-1.0, 1.0)) for name, value in params.items()}
+    again = cf.explore(cf.find_orbit("coulomb", moved), "Omega", (0.3, 0.7))
+    assert not again.loose_ends
+    assert [*differences(whole, again), *differences(again, whole)] == []

@@ -49,7 +49,7 @@ class QuantityCurveTask(Response):
         self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
     ) -> None:
         """Check the quantity, the parameters and their ranges."""
-        from contfric.curves.problem import ranges_of
+        from contfric.curves.ranges import ranges_of
         from contfric.quantities.registry import number_quantity
 
         attempt(
@@ -75,7 +75,8 @@ class QuantityCurveTask(Response):
 
     def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
         """Draw the curve in the plane of its first two parameters."""
-        from contfric.plot.style import TEXT, full_title, sized
+        from contfric.plot.names import full_title
+        from contfric.plot.style import TEXT, sized
 
         curve = found[self.result]
         fixed = {n: float(v[0]) for n, v in curve.params.items() if n not in curve.parameters}

@@ -66,7 +66,8 @@ class StableSetTask(Response):
 
     def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
         """Draw the set, over the basins of the same study."""
-        from contfric.plot.style import TEXT, full_title, sized
+        from contfric.plot.names import full_title
+        from contfric.plot.style import TEXT, sized
 
         edge, axes = found["stable_set"], figure.add_subplot()
         if "basins" in found:

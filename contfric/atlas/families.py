@@ -1,0 +1,135 @@
+"""Families of orbits at one value of the parameter in an exploration, and what meets their ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contfric.atlas.collect import Event
+from contfric.atlas.crossings import whole_branch
+from contfric.atlas.exploration import Exploration
+from contfric.atlas.faults import fault_of
+from contfric.atlas.matching import SAME_MOTION, stops_apart
+from contfric.continuation.candidates import candidates
+from contfric.continuation.continuum import is_continuum
+from contfric.continuation.events import TERMINAL, End, Kind, Verdict
+from contfric.continuation.points import Settings
+from contfric.continuation.switching import settings_value
+from contfric.continuation.trace import follow_family
+from contfric.continuation.vertical import family_near
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.repetition import shortest
+from contfric.orbit.solve import polish
+
+#: Where an orbit near an event is looked for, relative to the range.
+SHARES = (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6)
+#: The same on both sides of the end of a family, where equations are singular: the farthest first.
+_BOTH = (1e-3, -1e-3, 1e-4, -1e-4)
+#: Lengths of a segment at which the second of two branches of one word is looked for, in those of the first.
+_LONGER = (3.0, 10.0, 30.0)
+#: How much farther from the end it is traced from, if it can be.
+_FARTHER = (30.0, 10.0, 3.0)
+
+
+def follow_family_at(state: Exploration, event: Event, orbit: Orbit, reason: str) -> bool:
+    """Follow the family of orbits at one value of the parameter that begins at an event, if one does."""
+    family = family_near(orbit, orbit.model.index_of(state.settings.parameter))
+    if family is None:
+        return False
+    if (known := state.known(family.orbit)) is not None:
+        state.judge(event, reason, Verdict.KNOWN, known)
+        return True
+    branch = follow_family(family, state.settings, state.progress)
+    if branch is None or fault_of(branch):
+        return False
+    kinds = TERMINAL if event.bifurcation.kind in TERMINAL else frozenset({Kind.BP})
+    ends = [end for end in branch.ends if meets(end, event, state.settings, kinds)]
+    if not ends:
+        return False
+    state.accept(event, reason, branch)
+    for end in ends:
+        state.merge(event, end)
+    return True
+
+
+def follow_beside_family(state: Exploration, event: Event) -> None:
+    """Follow what meets the end of a family on either side of its value: up to two branches of one word.
+
+    There the equations left over begin with a quadratic form in the distances of the stop and of the
+    parameter: each of its two lines is a branch on one side, and both may be of one word.
+    """
+    families = [state.branches[i] for i in event.branches if is_continuum(state.branches[i])]
+    own = [end.bifurcation for branch in families for end in branch.ends]
+    known = [b for b in event.members if any(b is end for end in own)]
+    if not known:
+        return
+    event.bifurcation = known[0]  # better located than where others meet it
+    for candidate in candidates(known[0]):
+        if candidate.orbit is None or candidate.has_hold:
+            continue
+        for share in _BOTH:
+            beside = _beside_family(state, candidate.orbit, share)
+            if beside is None or state.known(beside) is not None:
+                continue
+            branch = whole_branch(shortest(beside), state.settings)
+            ends = [end for end in branch.ends if meets(end, event, state.settings)]
+            if ends and not fault_of(branch):
+                state.accept(event, candidate.reason, branch)
+                for end in ends:
+                    state.merge(event, end)
+
+
+def _beside_family(state: Exploration, orbit: Orbit, share: float) -> Orbit | None:
+    """Return an admissible orbit of a word next to the end of a family, on one side of its value.
+
+    The two lines are two lengths of the segment that vanishes, in proportion to the distance: if the one that
+    Newton finds is negative the other one is looked for from a segment that is longer.
+    """
+    settings = state.settings
+    value = settings_value(orbit, settings) + share * settings.width
+    if not settings.low <= value <= settings.high:
+        return None
+    vector = orbit.vector.copy()
+    vector[orbit.model.index_of(settings.parameter)] = value
+    guess = Orbit(orbit.system, orbit.joints, vector, np.inf)
+    found = polish(guess)
+    lasts = found.ends[:, 0] - found.cycle[:, 0]
+    k = int(np.argmin(lasts))
+    if found.converged and not found.admissible and lasts[k] < 0.0:
+        for times in _LONGER:
+            joints = orbit.joints.copy()
+            joints[k, 0] += times * lasts[k]
+            joints[(k + 1) % len(joints), 0] -= times * lasts[k]
+            found = polish(replace(guess, joints=joints))
+            if found.converged and found.admissible:
+                break
+    if not (found.converged and found.admissible):
+        return None
+    for times in _FARTHER:  # along the line: near its end steps lead to the other one
+        vector = orbit.vector + times * (found.vector - orbit.vector)
+        joints = orbit.joints + times * (found.joints - orbit.joints)
+        farther = polish(Orbit(orbit.system, joints, vector, np.inf))
+        lasts = farther.ends[:, 0] - farther.cycle[:, 0]
+        if farther.converged and farther.admissible and lasts[k] > 0.5 * times * _lasts(found, k):
+            return farther
+    return found
+
+
+def _lasts(orbit: Orbit, k: int) -> float:
+    return float(orbit.ends[k, 0] - orbit.cycle[k, 0])
+
+
+def meets(end: End, event: Event, settings: Settings, kinds: frozenset[Kind] = TERMINAL) -> bool:
+    """Tell whether a branch ends at an event, by whatever name it calls it.
+
+    A stop that comes in there is one of the new orbit only.
+    """
+    a, b = end.bifurcation, event.bifurcation
+    if a is None or a.kind not in kinds:
+        return False
+    gap = abs(a.params[settings.parameter] - b.params[settings.parameter])
+    if gap > max(a.accuracy, b.accuracy) * settings.width:
+        return False
+    apart = stops_apart(a.orbit, b.orbit) < SAME_MOTION
+    return apart or a.outline.apart(b.outline) < SAME_MOTION  # or its mirror image
