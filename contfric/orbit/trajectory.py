@@ -375,19 +375,9 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         if reset:
             if target == -1:
                 return IMPOSSIBLE, event, mode, cycle, t
+            struck_at = rows.states[event]
             pressed, chatter = behind_impact(
-                functions,
-                tables,
-                mode,
-                surface,
-                target,
-                t,
-                rows.states[event],
-                y,
-                p,
-                unit,
-                carry,
-                workspace,
+                functions, tables, mode, surface, target, t, struck_at, y, p, unit, carry, workspace
             )
         if chatter >= 0:
             target, carry[AT_ONCE] = chatter, 0.0
