@@ -22,6 +22,7 @@ FURTHER = (
     "Further: [cost at scale](benchmarks-scale.md) (segments, a million points, each monitor on and off),",
     "[cost of a scene](benchmarks-scenes.md) (what it does and skips, cold and warm),",
     "[run time against error](benchmarks-error.md) (beside other packages),",
+    "[AUTO-07p](benchmarks-auto.md) (a branch, paired),",
     "[number of states](benchmarks-states.md) (a chain with a contact, beside scipy and heyoka).",
 )
 
