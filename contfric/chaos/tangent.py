@@ -36,6 +36,7 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.models.definition import FloatArray
 from contfric.orbit.system import IntArray
+from contfric.orbit.together import mode_together
 from contfric.orbit.trajectory import (
     CHATTER,
     HELD,
@@ -51,7 +52,6 @@ from contfric.orbit.trajectory import (
     first_hit,
     leads_to_rest,
     mode_after,
-    mode_together,
     sign_code,
     whole_turns,
 )
