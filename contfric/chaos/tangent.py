@@ -37,6 +37,7 @@ from contfric.compiled import allocating_helper, helper
 from contfric.flow.without import SINGLY
 from contfric.models.definition import FloatArray
 from contfric.orbit.system import IntArray
+from contfric.orbit.together import mode_together
 from contfric.orbit.trajectory import (
     CHATTER,
     HELD,
@@ -52,7 +53,6 @@ from contfric.orbit.trajectory import (
     first_hit,
     leads_to_rest,
     mode_after,
-    mode_together,
     sign_code,
     whole_turns,
 )

@@ -21,6 +21,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import MOST_SURFACES, Tables
+from contfric.orbit.together import mode_together
 from contfric.orbit.walls import MOST_AT_ONCE, NO_FLIGHT, NO_TIME, in_flight, is_pressed, lying_on
 
 #: Types of the model's tables and of the rows of events, as kernels take them.
@@ -54,9 +55,6 @@ _WIDER = 4.0
 #: A mass that a wall lets go moves off it with the third power of time: at this share of a period by far more
 #: than rounding, and less than anything else does.
 _AHEAD = 1e-3
-#: Distance, relative to 1 + its level, within which a surface is met together with another one: far above
-#: what rounding leaves of the same motion, far below what tells two events apart.
-_TOGETHER = 1e-12
 #: Numbers that a simulation hands over to the call that goes on with it: whether there are any, the period
 #: and phase it began in, the period it is in, events at once, whether one was an impact, surfaces it is on,
 #: 1 + the wall that was met last if no other event came since, the speed behind that impact, and the unit of
@@ -100,27 +98,6 @@ def mode_after(tables, mode, surface, code):  # type: ignore[no-untyped-def]
     place = mode * tables.observables.shape[0] + surface
     for k in range(tables.first[place], tables.first[place + 1]):
         if code & tables.rules[k, 0] == tables.rules[k, 1]:
-            return tables.rules[k, 2]
-    return -1
-
-
-@helper
-def mode_together(functions, tables, mode, surface, code, t, y, p, workspace):  # type: ignore[no-untyped-def]
-    """Return the mode that follows where motion meets other surfaces with this one; -1 if none does.
-
-    Friction elements that turned together reach their limits together. On which side of those the state lies
-    is rounding; each ends the mode that follows, at once.
-    """
-    none, empty, together = workspace.none, workspace.empty, 0
-    for k in range(min(tables.observables.shape[0], MOST_SURFACES)):
-        if k != surface and tables.bounds[mode, k] == 1:
-            level = functions.level(k, p, none, empty)
-            value = functions.observe(tables.observables[k], t, y, p, none, empty)
-            if abs(value - level) <= _TOGETHER * (1.0 + abs(level)):
-                together |= 1 << k
-    place = mode * tables.observables.shape[0] + surface
-    for k in range(tables.first[place], tables.first[place + 1]):
-        if together and (code ^ tables.rules[k, 1]) & tables.rules[k, 0] & ~together == 0:
             return tables.rules[k, 2]
     return -1
 

@@ -246,3 +246,15 @@ def test_parameters_before_the_grid_are_understood_and_warned_of() -> None:
     with pytest.warns(DeprecationWarning, match="grid stands before the parameters"):
         old = cf.basins("coulomb", THREE, small)
     np.testing.assert_array_equal(old.labels, cf.basins("coulomb", small, THREE).labels)
+
+
+def test_the_legend_is_inside_the_figure_of_a_study(write, tmp_path: Path) -> None:
+    from matplotlib.image import imread
+
+    path = write(
+        "model: coulomb\nparams: {Omega: 0.541, S: 0.32, S0: 0.4}\n"
+        "basins: {grid: {x: [-2, 2, 5], v: [-1, 1, 5]}}\nfigures: [{kind: basins}]\n"
+    )
+    cf.run_study(path, out=tmp_path / "run")
+    pixels = imread(tmp_path / "run" / "basins.png")[..., :3]
+    assert (pixels[:, -4:] == 1.0).all()  # what is cut reaches the edge
