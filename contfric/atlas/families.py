@@ -34,7 +34,8 @@ _FARTHER = (30.0, 10.0, 3.0)
 
 def follow_family_at(state: Exploration, event: Event, orbit: Orbit, reason: str) -> bool:
     """Follow the family of orbits at one value of the parameter that begins at an event, if one does."""
-    family = family_near(orbit, orbit.model.index_of(state.settings.parameter))
+    within = event.bifurcation.accuracy * state.settings.width
+    family = family_near(orbit, orbit.model.index_of(state.settings.parameter), within)
     if family is None:
         return False
     if (known := state.known(family.orbit)) is not None:

@@ -52,6 +52,8 @@ _TRIAL, _FAR = 1e-6, 1e-2
 #: What is left of the equations at an orbit of the family, and of w F there. (A damping q that is nearly
 #: nothing leaves w F_q q, in proportion to the distance from the symmetric orbit: no family.)
 _SOLVED, _MISSED = 1e-11, 1e-13
+#: The same at the first trial of the value.
+_NEAR = 1e-10
 #: Rounding of w F_b relative to F_b; and of q along a family.
 _ROUNDED, _CONSTANT = 1e-12, 1e-11
 #: Slope of w F_b, and w F_q relative to F_b, below which they are rounding.
@@ -123,8 +125,10 @@ def _end_at(end: End, moved: dict[int, Bifurcation], vector: FloatArray) -> End:
     return replace(end, bifurcation=known or _at(end.bifurcation, vector))
 
 
-def family_near(orbit: Orbit, active: int) -> Family | None:
+def family_near(orbit: Orbit, active: int, within: float = 1e-6) -> Family | None:
     """Return the family at one value of a parameter that an orbit belongs to, or is next to; None if none is.
+
+    ``within`` is how far from the orbit's parameter its value may be.
 
     Examples
     --------
@@ -140,6 +144,13 @@ def family_near(orbit: Orbit, active: int) -> Family | None:
         return None
     along = right[-1].reshape(whole.joints.shape)
     along = along * np.sqrt(len(along)) / np.linalg.norm(along)
+    first = replace(whole, joints=whole.joints + _INSIDE[0] * along)
+    joints = _least(first, whole.vector)
+    if joints is None:
+        return None
+    residual, _, _ = equations_at(whole.system, joints, whole.vector)
+    if not np.max(np.abs(residual)) < _NEAR + within**2:  # it is c b^2 beside an orbit of a family
+        return None
     for distance in _INSIDE:
         beside = replace(whole, joints=whole.joints + distance * along)
         found = _at_value(beside, active)
@@ -221,7 +232,9 @@ def with_families(branch: Branch, settings: Settings) -> Branch:
         return branch
     away = np.min(np.abs(mu + 1.0), axis=1)
     near = (away[1:-1] < _TOUCHES) & (away[1:-1] <= away[:-2]) & (away[1:-1] < away[2:])
-    events = [_passed(branch, mu, int(k)) for k in 1 + np.flatnonzero(near)]
+    sides = np.min((mu + 1.0).real, axis=1)
+    touches = near & (sides[:-2] * sides[2:] > 0.0)
+    events = [_passed(branch, mu, int(k)) for k in 1 + np.flatnonzero(touches)]
     found = [b for b in events if b is not None and not _is_listed(branch, b, settings)]
     return replace(branch, bifurcations=in_order(branch, found)) if found else branch
 
@@ -238,11 +251,11 @@ def _is_listed(branch: Branch, event: Bifurcation, settings: Settings) -> bool:
 def _passed(branch: Branch, mu: NDArray[np.complex128], k: int) -> Bifurcation | None:
     """Return the branch point next to a point of a symmetric branch, if it passes a family there."""
     active = branch.model.index_of(branch.parameter)
-    family = family_near(branch[k], active)
+    before, after = branch.values[k - 1], branch.values[k + 1]
+    family = family_near(branch[k], active, abs(float(after - before)))
     if family is None:
         return None
     value = float(family.orbit.vector[active])
-    before, after = branch.values[k - 1], branch.values[k + 1]
     if not min(before, after) <= value <= max(before, after):
         return None
     j = k if (branch.values[k] - value) * (after - value) <= 0.0 else k - 1
