@@ -36,7 +36,7 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
     if not _is_regular(data):
         return read(data)  # which says what is wrong, and where
     if not data.get("surfaces") and "modes" not in data and "field" in data:
-        data = {**data, "modes": {"smooth": {}}}
+        data = {**data, **_smooth(data)}
     data = _divided_by_resets(_with_observables(with_ties_put_in(data)))
     walls, data = _chattering(data)
     surfaces, plain = _derived_sliding(with_angles(with_clock(data)))
@@ -53,6 +53,22 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
         plain = plain | chatter_parts(found, walls, _with_fields(plain))
         found = read(plain)
     return _divided(found, plain, read)
+
+
+def _smooth(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the modes of a smooth model: one, or two at a section where nothing else can be a joint.
+
+    Along any cycle the first state stands still somewhere.
+    """
+    state = next(iter(data["states"]), "")
+    rate = data["field"].get(state)
+    if not data.get("autonomous") or data.get("angles") or rate is None:
+        return {"modes": {"smooth": {}}}
+    sides = {"smooth": "+", "smooth-": "-"}
+    return {
+        "surfaces": {"section": {"observable": str(rate)}},
+        "modes": {mode: {"in": {"section": side}} for mode, side in sides.items()},
+    }
 
 
 def _divided(

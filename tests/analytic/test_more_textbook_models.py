@@ -456,3 +456,26 @@ modes:
     }
     found = automaton(modes, "rest", [0.0, 0.0], 60, longest=20.0)
     assert max(y[0] for _, _, y in found[-10:]) == pytest.approx(orbit.x_max, abs=1e-6)
+
+
+@pytest.mark.parametrize("mu", [0.5, 1.0, 2.0])
+def test_a_smooth_model_without_excitation_needs_no_surface(tmp_path, mu: float) -> None:
+    """Van der Pol's oscillator, by its states, parameters and field alone."""
+    text = """
+name: vdp
+states: [x, y]
+parameters: {mu: 1.0}
+autonomous: true
+field: {x: y, y: mu*(1 - x**2)*y - x}
+"""
+    model = model_of(tmp_path, text)
+    assert cf.check_model(model).ok
+
+    def field(t: float, y: np.ndarray) -> Sequence[float]:
+        return [y[1], mu * (1 - y[0] ** 2) * y[1] - y[0]]
+
+    modes: dict[str, Any] = {"whole": (field, [(lambda t, y: y[1], 1, "whole", same)])}
+    found = automaton(modes, "whole", [1.0, 0.5], 30, longest=40.0)
+    orbit = cf.find_orbit(model, {"mu": mu})
+    assert orbit.period == pytest.approx(found[-1][0] - found[-2][0], abs=1e-7)
+    assert orbit.x_min == pytest.approx(found[-1][2][0], abs=1e-7)
