@@ -20,9 +20,9 @@ import math
 import numpy as np
 
 from contfric.compiled import allocating_helper, inlined_helper
-from contfric.compiling.shared import numbers_at, try_lock, unlock
+from contfric.compiling.shared import numbers_at, unlock
 from contfric.flow.folding import folded
-from contfric.flow.linear.kept import NUMBERS, advance_kept, growth_known, space_of
+from contfric.flow.linear.kept import NUMBERS, advance_kept, growth_known, locked, space_of
 from contfric.flow.linear.responses import pairs_space
 from contfric.flow.linear.steps import SMALL, advance, exponential
 from contfric.flow.linear.system import (
@@ -98,13 +98,13 @@ def linear_flow(motion, piece, t0, y0, dt, p, which, y1, jac):  # type: ignore[n
     period = motion.period(p, wanted, grad)
     cycles = folded(t0, period)
     keeps = full and n > SMALL
-    locked = keeps and try_lock(motion.memory) != 0
-    space = space_of(n, coefficients.shape[1], waves.shape[1]) if keeps and not locked else 0
-    memory = numbers_at(motion.memory, NUMBERS) if locked else np.zeros(space)
+    taken = keeps and locked(motion.memory)
+    space = space_of(n, coefficients.shape[1], waves.shape[1]) if keeps and not taken else 0
+    memory = numbers_at(motion.memory, NUMBERS) if taken else np.zeros(space)
     pairs = np.empty(pairs_space(n, motion.waves_count, free) if keeps else 0)
     workspace = (coefficients, waves, rows, memory, pairs)
     flow_in(motion, piece, t0 - cycles * period, y0, dt, p, wanted, y1, jac, workspace)
-    if locked:
+    if taken:
         unlock(motion.memory)
     if cycles != 0.0:
         for i in range(jac.shape[0]):

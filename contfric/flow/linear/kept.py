@@ -20,6 +20,7 @@ import math
 from typing import NamedTuple
 
 from contfric.compiled import helper, inlined_helper
+from contfric.compiling.shared import try_lock
 from contfric.flow.linear.ladder import (
     FIRST,
     LEVELS,
@@ -43,6 +44,8 @@ from contfric.flow.linear.system import TERMS, FloatArray, growth, start_waves, 
 NUMBERS = 2**22
 #: Most motions that are kept, and most matrices.
 _SLOTS, _LADDERS = 64, 32
+#: Attempts to take the memory, about 50 microseconds: what is kept takes longer to find anew.
+_PATIENCE = 3000
 #: h is at most this over the rate, and at least half of it.
 _SHARE = 0.125
 #: Most steps of a motion whose responses to unit forces are kept.
@@ -54,6 +57,15 @@ _LOCK, _LENGTH, _HEIGHT, _NEXT, _NEXT_LADDER, _COUNT, _KEYS = range(7)
 _BEGIN = _KEYS + 2 * _SLOTS + _LADDERS
 #: Where things are in a slot: the matrix that it is of, whether what depends on frequencies is there.
 OF, FORCED, HEAD = range(3)
+
+
+@helper
+def locked(place):  # type: ignore[no-untyped-def]
+    """Take the lock of a memory; tell whether it was free within the time of some calls."""
+    for _ in range(_PATIENCE):
+        if try_lock(place) != 0:
+            return True
+    return False
 
 
 @inlined_helper

@@ -13,10 +13,10 @@ import math
 import numpy as np
 
 from contfric.compiled import allocating_helper, helper, inlined_helper
-from contfric.compiling.shared import numbers_at, try_lock, unlock
+from contfric.compiling.shared import numbers_at, unlock
 from contfric.flow.folding import folded
 from contfric.flow.linear.flow import MOST_STEPS
-from contfric.flow.linear.kept import NUMBERS, growth_known, space_of
+from contfric.flow.linear.kept import NUMBERS, growth_known, locked, space_of
 from contfric.flow.linear.responses import pairs_space
 from contfric.flow.linear.sighted import advance_seen, sight_of, write_seen
 from contfric.flow.linear.steps import SMALL
@@ -367,14 +367,14 @@ def linear_stationary(motion, piece, c, t0, y0, dt, p, times, values):  # type: 
     rows, poly = np.empty((rows_of(0, 2 * n if keeps else 0), n)), np.empty((2, TERMS + 2))
     period = motion.period(p, none, poly[0, :0])
     t = t0 - folded(t0, period) * period
-    locked = keeps and try_lock(motion.memory) != 0
-    space = space_of(n, entries, waves.shape[1]) if keeps and not locked else 0
-    memory = numbers_at(motion.memory, NUMBERS) if locked else np.zeros(space)
+    taken = keeps and locked(motion.memory)
+    space = space_of(n, entries, waves.shape[1]) if keeps and not taken else 0
+    memory = numbers_at(motion.memory, NUMBERS) if taken else np.zeros(space)
     pairs = np.empty(pairs_space(n, motion.waves_count, 0) if keeps else 0)
     seen = np.empty((2 * motion.waves_count + 2 if keeps else 0, TERMS + 1))
     workspace = (coefficients, waves, rows, poly, memory, pairs, seen)
     found = search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, values)
-    if locked:
+    if taken:
         unlock(motion.memory)
     return found
 
