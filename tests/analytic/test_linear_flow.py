@@ -326,3 +326,17 @@ def test_stationary_points_of_many_states(wide, seed):
             assert values[k] == pytest.approx(
                 flow.observe(observable, t0 + times[k], y, p, NONE, empty), abs=1e-13, rel=1e-13
             )
+
+
+def test_stationary_points_do_not_depend_on_the_steps(wide):
+    """Those of a shorter motion are the first ones of a longer one, wherever steps end."""
+    rng = np.random.default_rng(1)
+    a = twice(rng.uniform(-1, 1, (SIZE, SIZE)) - 0.5 * np.eye(SIZE))
+    forces, y0 = rng.uniform(-1, 1, (WIDE, 3)), rng.uniform(-1, 1, WIDE)
+    p = vector_of(wide, a, forces, 2.3)
+    most, times, values = np.empty(64), np.empty(64), np.empty(64)
+    count = wide.flow.stationary(0, 1, 0.7, y0, 9.0, p, most, values)
+    for dt in np.geomspace(0.5, 9.0, 700):
+        found = wide.flow.stationary(0, 1, 0.7, y0, dt, p, times, values)
+        assert found == np.count_nonzero(most[:count] < dt)
+        assert np.allclose(times[:found], most[:found], atol=1e-9)

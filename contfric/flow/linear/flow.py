@@ -20,16 +20,17 @@ import math
 import numpy as np
 
 from contfric.compiled import allocating_helper, inlined_helper
-from contfric.compiling.shared import numbers_at, try_lock, unlock
+from contfric.compiling.shared import numbers_at, unlock
 from contfric.flow.folding import folded
-from contfric.flow.linear.kept import NUMBERS, advance_kept, space_of
+from contfric.flow.linear.kept import NUMBERS, advance_kept, growth_known, locked, space_of
 from contfric.flow.linear.responses import pairs_space
 from contfric.flow.linear.steps import SMALL, advance, exponential
 from contfric.flow.linear.system import (
     REACH,
     WAVES,
+    evaluate,
+    growth,
     rows_of,
-    set_up,
     silenced,
     start_waves,
     system_in,
@@ -46,8 +47,12 @@ def flow_in(motion, piece, t, y0, dt, p, which, y1, jac, workspace):  # type: ig
     n, free = y0.shape[0], which.shape[0]
     system = system_in(workspace[0], workspace[1], workspace[2], free)
     memory = workspace[3]
-    rate, spread = set_up(motion, piece, p, which, system)
-    rate = silenced(rate, system)
+    evaluate(motion, piece, p, which, system)
+    if memory.shape[0] > 0:
+        grown, spread = growth_known(motion, piece, memory, system)
+    else:
+        grown, spread = growth(motion, piece, system)
+    rate = silenced(grown, system)
     fine = rate * abs(dt) < REACH * MOST_STEPS  # not so where it is no number
     for i in range(n):
         y1[i] = y0[i] if fine else math.nan
@@ -57,7 +62,9 @@ def flow_in(motion, piece, t, y0, dt, p, which, y1, jac, workspace):  # type: ig
         full = jac.shape[0] > 0
         if not (
             memory.shape[0] > 0
-            and advance_kept(motion, piece, t, dt, rate, spread, y1, memory, workspace[4], system)
+            and advance_kept(
+                motion, piece, t, dt, rate, spread, grown, y1, memory, workspace[4], system
+            )
         ):
             advance(motion, piece, t, dt, rate, spread, y1, system)
             if full:
@@ -91,13 +98,13 @@ def linear_flow(motion, piece, t0, y0, dt, p, which, y1, jac):  # type: ignore[n
     period = motion.period(p, wanted, grad)
     cycles = folded(t0, period)
     keeps = full and n > SMALL
-    locked = keeps and try_lock(motion.memory) != 0
-    space = space_of(n, coefficients.shape[1], waves.shape[1]) if keeps and not locked else 0
-    memory = numbers_at(motion.memory, NUMBERS) if locked else np.zeros(space)
+    taken = keeps and locked(motion.memory)
+    space = space_of(n, coefficients.shape[1], waves.shape[1]) if keeps and not taken else 0
+    memory = numbers_at(motion.memory, NUMBERS) if taken else np.zeros(space)
     pairs = np.empty(pairs_space(n, motion.waves_count, free) if keeps else 0)
     workspace = (coefficients, waves, rows, memory, pairs)
     flow_in(motion, piece, t0 - cycles * period, y0, dt, p, wanted, y1, jac, workspace)
-    if locked:
+    if taken:
         unlock(motion.memory)
     if cycles != 0.0:
         for i in range(jac.shape[0]):

@@ -20,10 +20,13 @@ import math
 from typing import NamedTuple
 
 from contfric.compiled import helper, inlined_helper
+from contfric.compiling.shared import try_lock
 from contfric.flow.linear.ladder import (
     FIRST,
     LEVELS,
+    RATE,
     ROWS,
+    SPREAD,
     STAMP,
     H,
     add_product,
@@ -34,13 +37,15 @@ from contfric.flow.linear.ladder import (
     power_of,
 )
 from contfric.flow.linear.responses import pairs_in, respond_to_forces, respond_to_units
-from contfric.flow.linear.steps import advance, carry_by_series, step_over
-from contfric.flow.linear.system import TERMS, FloatArray, start_waves, terms_for
+from contfric.flow.linear.steps import advance, carry_by_series, step_by_forces
+from contfric.flow.linear.system import TERMS, FloatArray, growth, start_waves, terms_for
 
 #: Numbers that a model's memory has, 32 MB: it is taken from the system as it is used.
 NUMBERS = 2**22
 #: Most motions that are kept, and most matrices.
 _SLOTS, _LADDERS = 64, 32
+#: Attempts to take the memory, about 50 microseconds: what is kept takes longer to find anew.
+_PATIENCE = 3000
 #: h is at most this over the rate, and at least half of it.
 _SHARE = 0.125
 #: Most steps of a motion whose responses to unit forces are kept.
@@ -52,6 +57,15 @@ _LOCK, _LENGTH, _HEIGHT, _NEXT, _NEXT_LADDER, _COUNT, _KEYS = range(7)
 _BEGIN = _KEYS + 2 * _SLOTS + _LADDERS
 #: Where things are in a slot: the matrix that it is of, whether what depends on frequencies is there.
 OF, FORCED, HEAD = range(3)
+
+
+@helper
+def locked(place):  # type: ignore[no-untyped-def]
+    """Take the lock of a memory; tell whether it was free within the time of some calls."""
+    for _ in range(_PATIENCE):
+        if try_lock(place) != 0:
+            return True
+    return False
 
 
 @inlined_helper
@@ -132,17 +146,41 @@ def places_in(memory, n, entries, waves):  # type: ignore[no-untyped-def]
 
 
 @helper
-def ladder_of(motion, piece, h, rate, spread, memory, system):  # type: ignore[no-untyped-def]
-    """Return where the powers of a matrix are, the first of which is there; -1 without space."""
+def place_of(memory, piece, ladders):  # type: ignore[no-untyped-def]
+    """Return which of the matrices is that of a piece; -1: none."""
+    for j in range(ladders):
+        if memory[_KEYS + 2 * _SLOTS + j] == piece + 1:
+            return j
+    return -1
+
+
+@helper
+def growth_known(motion, piece, memory, system):  # type: ignore[no-untyped-def]
+    """Return the rate of the matrix and the spread of its units, from what is kept where it is there."""
+    n, entries = system.work.shape[1], system.co.shape[0]
+    _, ladders = places_in(memory, n, entries, system.w.shape[0])
+    place = place_of(memory, piece, ladders)
+    if place >= 0:
+        at = memory.shape[0] - (place + 1) * int(memory[_HEIGHT])
+        ladder = ladder_in(memory, at, n, entries)
+        if same(ladder.co, system.co, int(ladder.head[FIRST])):
+            return ladder.head[RATE], ladder.head[SPREAD]
+    return growth(motion, piece, system)
+
+
+@helper
+def ladder_of(motion, piece, h, rate, spread, grown, memory, system):  # type: ignore[no-untyped-def]
+    """Return where the powers of a matrix are, the first of which is there; -1 without space.
+
+    Parameters
+    ----------
+    grown : the rate of the matrix alone, of which and of frequencies ``rate`` is the largest
+    """
     n, entries, waves = system.work.shape[1], system.co.shape[0], system.w.shape[0]
     slots, ladders = places_in(memory, n, entries, waves)
     if slots == 0:
         return -1
-    keys, found = _KEYS + 2 * _SLOTS, -1
-    for j in range(ladders):
-        if memory[keys + j] == piece + 1:
-            found = j
-            break
+    keys, found = _KEYS + 2 * _SLOTS, place_of(memory, piece, ladders)
     place = found if found >= 0 else int(memory[_NEXT_LADDER])
     at = memory.shape[0] - (place + 1) * int(memory[_HEIGHT])
     ladder = ladder_in(memory, at, n, entries)
@@ -152,7 +190,7 @@ def ladder_of(motion, piece, h, rate, spread, memory, system):  # type: ignore[n
     elif ladder.head[H] == h and same(ladder.co, system.co, int(ladder.head[FIRST])):
         return at
     memory[_COUNT] += 1.0
-    ladder.head[STAMP] = memory[_COUNT]
+    ladder.head[STAMP], ladder.head[RATE], ladder.head[SPREAD] = memory[_COUNT], grown, spread
     for j in range(entries):
         ladder.co[j] = system.co[j]
     begin(motion, piece, h, rate, spread, ladder, system)
@@ -283,13 +321,13 @@ def in_frequency(system):  # type: ignore[no-untyped-def]
 
 
 @inlined_helper
-def advance_kept(motion, piece, t, dt, rate, spread, y, memory, space, system):  # type: ignore[no-untyped-def]
+def advance_kept(motion, piece, t, dt, rate, spread, grown, y, memory, space, system):  # type: ignore[no-untyped-def]
     """Advance a state, its derivatives and the exponential by what is kept; False if nothing is."""
     k, h = cut(rate, dt)
     if k == 0:
         return False
     n, long = y.shape[0], k * h
-    at = ladder_of(motion, piece, h, rate, spread, memory, system)
+    at = ladder_of(motion, piece, h, rate, spread, grown, memory, system)
     if at < 0:
         return False
     ladder = ladder_in(memory, at, n, system.co.shape[0])
@@ -312,6 +350,6 @@ def advance_kept(motion, piece, t, dt, rate, spread, y, memory, space, system): 
         else:
             know_responses(motion, piece, k, rate, spread, ladder, space, slot, system)
             advance_by_responses(slot, ladder, t, y, system)
-        step_over(motion, piece, t + long, rest, terms, y, system)
+        step_by_forces(motion, piece, int(ladder.head[FIRST]), t + long, rest, terms, y, system)
     carry_by_series(motion, piece, rest, terms, system, system.maps[:n])
     return True

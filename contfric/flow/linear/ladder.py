@@ -35,8 +35,8 @@ from contfric.flow.linear.system import TERMS, FloatArray, terms_for
 #: Doublings: 2**24 steps.
 LEVELS = 24
 #: Where things are in the head: h, a number that no other matrix has, powers that are there, first
-#: coefficient of a wave, rows with waves.
-H, STAMP, KNOWN, FIRST, ROWS, HEAD = range(6)
+#: coefficient of a wave, rows with waves, rate of the matrix and spread of its units.
+H, STAMP, KNOWN, FIRST, ROWS, RATE, SPREAD, HEAD = range(8)
 #: Powers whose place is used for other things before the first one is there.
 _LEFT, _ZERO, _SUM, _SUM_LOW = 2, 3, 4, 5
 #: Further terms of a series: those of F_0 are smaller than those of the state.

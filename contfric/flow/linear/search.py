@@ -13,10 +13,10 @@ import math
 import numpy as np
 
 from contfric.compiled import allocating_helper, helper, inlined_helper
-from contfric.compiling.shared import numbers_at, try_lock, unlock
+from contfric.compiling.shared import numbers_at, unlock
 from contfric.flow.folding import folded
 from contfric.flow.linear.flow import MOST_STEPS
-from contfric.flow.linear.kept import NUMBERS, space_of
+from contfric.flow.linear.kept import NUMBERS, growth_known, locked, space_of
 from contfric.flow.linear.responses import pairs_space
 from contfric.flow.linear.sighted import advance_seen, sight_of, write_seen
 from contfric.flow.linear.steps import SMALL
@@ -24,8 +24,9 @@ from contfric.flow.linear.system import (
     REACH,
     TERMS,
     WAVES,
+    evaluate,
+    growth,
     rows_of,
-    set_up,
     silenced,
     start_waves,
     system_in,
@@ -199,19 +200,26 @@ def state_at(series, terms, s, out):  # type: ignore[no-untyped-def]
 
 
 @inlined_helper
-def begin_search(motion, piece, c, t0, y0, dt, p, none, system, sight):  # type: ignore[no-untyped-def]
-    """Evaluate the system and the observable; return the rate (no number: no motion) and the spread."""
-    rate, spread = set_up(motion, piece, p, none, system)
+def begin_search(motion, piece, c, t0, y0, dt, p, none, memory, system, sight):  # type: ignore[no-untyped-def]
+    """Evaluate the system and the observable; return the rate (no number: no motion) and the spread.
+
+    And the rate of the matrix alone.
+    """
+    evaluate(motion, piece, p, none, system)
+    if memory.shape[0] > 0:
+        grown, spread = growth_known(motion, piece, memory, system)
+    else:
+        grown, spread = growth(motion, piece, system)
     motion.entries_seen(c, p, none, sight, system.slopes)
     motion.audible_seen(c, sight, system.waves[5])
-    rate = silenced(rate, system)
+    rate = silenced(grown, system)
     size = t0 + dt
     for i in range(y0.shape[0]):
         size += y0[i]
         system.work[4, i] = y0[i]
     if not (math.isfinite(size) and rate * dt < REACH * MOST_STEPS):
-        return math.nan, spread
-    return rate, spread
+        return math.nan, spread, grown
+    return rate, spread, grown
 
 
 @inlined_helper
@@ -274,7 +282,9 @@ def linear_hit(motion, piece, c, target, on, t0, y0, dt_max, p, y1):  # type: ig
 def search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, workspace, y1):  # type: ignore[no-untyped-def]
     """Search the first hit, from a folded time, in a workspace that is given."""
     system, sight = system_in(workspace[0][:1], workspace[1], workspace[2], 0), workspace[0][1]
-    rate, spread = begin_search(motion, piece, c, t, y0, dt_max, p, none, system, sight)
+    rate, spread, _ = begin_search(
+        motion, piece, c, t, y0, dt_max, p, none, workspace[3][:0], system, sight
+    )
     if math.isnan(rate):
         for i in range(y1.shape[0]):
             y1[i] = rate
@@ -357,14 +367,14 @@ def linear_stationary(motion, piece, c, t0, y0, dt, p, times, values):  # type: 
     rows, poly = np.empty((rows_of(0, 2 * n if keeps else 0), n)), np.empty((2, TERMS + 2))
     period = motion.period(p, none, poly[0, :0])
     t = t0 - folded(t0, period) * period
-    locked = keeps and try_lock(motion.memory) != 0
-    space = space_of(n, entries, waves.shape[1]) if keeps and not locked else 0
-    memory = numbers_at(motion.memory, NUMBERS) if locked else np.zeros(space)
+    taken = keeps and locked(motion.memory)
+    space = space_of(n, entries, waves.shape[1]) if keeps and not taken else 0
+    memory = numbers_at(motion.memory, NUMBERS) if taken else np.zeros(space)
     pairs = np.empty(pairs_space(n, motion.waves_count, 0) if keeps else 0)
     seen = np.empty((2 * motion.waves_count + 2 if keeps else 0, TERMS + 1))
     workspace = (coefficients, waves, rows, poly, memory, pairs, seen)
     found = search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, values)
-    if locked:
+    if taken:
         unlock(motion.memory)
     return found
 
@@ -378,14 +388,16 @@ def search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, va
     for _ in range(
         2
     ):  # a double zero at the very end of a step has no sign on either side: other steps
-        rate, spread = begin_search(motion, piece, c, t, y0, dt, p, none, system, sight)
+        rate, spread, grown = begin_search(
+            motion, piece, c, t, y0, dt, p, none, memory, system, sight
+        )
         if math.isnan(rate):
             return -1
         reach = (rate * shorter, spread)
         place, at, by, step, forces = -1, -1, -1, 0.0, -1
         if memory.shape[0] > 0 and shorter == 1.0:
             place, at, by, step, forces = sight_of(
-                motion, piece, c, rate, spread, dt, sight, memory, pairs, waves, system
+                motion, piece, c, rate, spread, grown, dt, sight, memory, pairs, waves, system
             )
         seen = (place, at, by, step, forces, memory, pairs, waves)
         found = stationary_in(

@@ -36,8 +36,8 @@ from contfric.flow.linear.ladder import FIRST, ROWS, STAMP, add_product, ladder_
 from contfric.flow.linear.responses import add_pair, double, pairs_in, write_pairs
 from contfric.flow.linear.system import REACH, TERMS, FloatArray, start_waves, terms_for
 
-#: Longest step that the kept terms are enough for, in steps.
-LONGER = 1.06
+#: A motion that is no longer than this, in steps, takes one step: the search allows a little more.
+_ONE_STEP = 1.04
 #: Rows with waves, against the number of frequencies, up to which responses to unit forces are kept.
 _FEW = 4
 
@@ -117,7 +117,7 @@ def write_waves(motion, piece, h, sight, seen, system):  # type: ignore[no-untyp
 
 
 @helper
-def sight_of(motion, piece, c, rate, spread, dt, co, memory, space, seen, system):  # type: ignore[no-untyped-def]
+def sight_of(motion, piece, c, rate, spread, grown, dt, co, memory, space, seen, system):  # type: ignore[no-untyped-def]
     """Return where powers, an observable and its step are kept, -1 for nowhere; and the step's length.
 
     And the number of forces whose responses are in ``space``: those to unit forces are kept instead (-1)
@@ -125,7 +125,7 @@ def sight_of(motion, piece, c, rate, spread, dt, co, memory, space, seen, system
     """
     n, entries, waves = system.work.shape[1], system.co.shape[0], system.w.shape[0]
     k, h = cut(rate, dt)
-    place = ladder_of(motion, piece, h, rate, spread, memory, system) if k > 0 else -1
+    place = ladder_of(motion, piece, h, rate, spread, grown, memory, system) if k > 0 else -1
     if place < 0:
         return -1, -1, -1, 0.0, -1
     ladder, pairs = ladder_in(memory, place, n, entries), pairs_in(space, n)
@@ -140,7 +140,7 @@ def sight_of(motion, piece, c, rate, spread, dt, co, memory, space, seen, system
         write_rows(motion, c, step, ladder, sight, system)
     write_waves(motion, piece, step, sight, seen, system)
     by, count = -1, -1
-    if dt > LONGER * step:
+    if dt > _ONE_STEP * step:
         by = kept_slot(piece, k, ladder, at, system.maps[n:], memory, system)
         slot = slot_in(memory, by, n, waves)
         if ladder.head[ROWS] > min(n, _FEW * waves):

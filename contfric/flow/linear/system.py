@@ -153,14 +153,20 @@ def growth(motion, piece, system):  # type: ignore[no-untyped-def]
 
 
 @inlined_helper
-def set_up(motion, piece, p, which, system):  # type: ignore[no-untyped-def]
-    """Evaluate the coefficients; return the rate of the matrix and the spread of its units."""
+def evaluate(motion, piece, p, which, system):  # type: ignore[no-untyped-def]
+    """Evaluate the coefficients and the frequencies."""
     motion.entries(piece, p, which, system.co, system.slopes)
     motion.frequencies(p, which, system.w, system.dw)
     audible = system.waves[5]
     motion.audible(piece, system.co, audible)
     for k in range(system.slopes.shape[0]):
         motion.audible(piece, system.slopes[k], audible)
+
+
+@inlined_helper
+def set_up(motion, piece, p, which, system):  # type: ignore[no-untyped-def]
+    """Evaluate the coefficients; return the rate of the matrix and the spread of its units."""
+    evaluate(motion, piece, p, which, system)
     return growth(motion, piece, system)
 
 
