@@ -32,6 +32,10 @@ from contfric.compiled import (
 )
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
+from contfric.orbit.sides import (
+    mode_after,
+    sign_code,
+)
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
 from contfric.orbit.trajectory import (
@@ -41,8 +45,6 @@ from contfric.orbit.trajectory import (
     TablesType,
     copy_state,
     follow,
-    mode_after,
-    sign_code,
 )
 
 #: Most surfaces that a trajectory meets for each of its events: one that is only touched is no event.

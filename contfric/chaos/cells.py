@@ -14,70 +14,46 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from contfric.chaos.averaging import Averages, clear, gather, new_averages
+from contfric.chaos.averaging import clear, gather
 from contfric.chaos.cycle import (
-    AT_A_POINT,
-    CycleWorkspace,
-    Memory,
-    doubt,
     forget,
-    new_cycle_workspace,
-    new_memory,
     returned,
-    shortest,
-    solve_cycle,
 )
 from contfric.chaos.endings import (
-    BROKEN,
     NO_MOTION,
-    PERIODIC,
-    TRANSIENT,
     averaged,
     starts_at_rest,
-    write_end,
-    write_equilibrium,
     write_nothing,
-    write_quiet,
 )
+from contfric.chaos.one_motion import carry_behind, carry_on, try_cycle, write_last
 from contfric.chaos.rows import CellRows, Limits, Starting
+from contfric.chaos.starting import start_mode
 from contfric.chaos.tangent import (
     ARRIVED,
-    Walk,
-    behind,
-    differentiate,
-    new_walk,
-    orthonormalise,
-    push,
     seed,
-    state_workspace,
-    to_joint,
 )
+from contfric.chaos.workspaces import new_cell_workspaces, place, words_for
 from contfric.compiled import (
     allocating_helper,
     f8,
     helper,
     i8,
     indices,
-    inlined_helper,
     kernel,
     matrix,
 )
-from contfric.compiling.references import by_reference, reference_at, store_at, words_of
+from contfric.compiling.references import by_reference, reference_at, store_at
 from contfric.flow.layouts import FlowType, TogetherType
 from contfric.flow.without import SINGLY
 from contfric.models.definition import FloatArray
+from contfric.orbit.sides import (
+    behind_event,
+)
 from contfric.orbit.system import IntArray
 from contfric.orbit.trajectory import (
     HOLD_PERIODS,
-    QUIET,
-    StateWorkspace,
     TablesType,
-    behind_event,
 )
-
-#: A separation that grew by this factor has grown from rounding to the size of the motion: the motion
-#: forgot where it started, which one that only converges never does.
-_FORGOTTEN = -math.log(np.finfo(np.float64).eps)
 
 StartingType = types.NamedTuple([indices, indices, indices], Starting)
 LimitsType = types.NamedTuple([i8, i8, f8, i8], Limits)
@@ -90,18 +66,6 @@ SIDE_BY_SIDE = 32
 #: The mode of a place without a motion, and how far a motion is: before the averages, in them, or behind.
 IDLE = -1
 BEFORE, AVERAGING, BEHIND = range(3)
-
-
-class CellWorkspaces(NamedTuple):
-    """All workspace of some motions, with one more axis before the others; or of one of them."""
-
-    walk: Walk
-    state: StateWorkspace
-    frame: FloatArray
-    growth: FloatArray
-    memory: Memory
-    averages: Averages
-    cycle: CycleWorkspace
 
 
 class Motions(NamedTuple):
@@ -143,235 +107,6 @@ def new_motions(width, n, parameters):  # type: ignore[no-untyped-def]
         *(real[0], real[1], real[2], real[3], real[4], real[5]),
         np.empty((width, parameters)),
     )
-
-
-@allocating_helper
-def new_cell_workspaces(width, n):  # type: ignore[no-untyped-def]
-    """Return the workspace for so many motions of n states."""
-    walk, state, memory, averages = new_walk(n), state_workspace(n), new_memory(n), new_averages(n)
-    return CellWorkspaces(
-        Walk(
-            beside(width, walk.y),
-            walk.start,
-            beside(width, walk.jac),
-            walk.grad,
-            walk.end,
-            walk.image,
-            np.zeros((width, 3), dtype=np.int64),
-            np.zeros(width),
-            np.full(width, SINGLY),
-        ),
-        StateWorkspace(
-            state.none, state.empty, state.nothing, beside(width, state.after), state.trial
-        ),
-        np.empty((width, n, n + 1)),
-        np.empty(n),
-        Memory(
-            beside(width, memory.key),
-            beside(width, memory.cycle),
-            beside(width, memory.event),
-            beside(width, memory.span),
-            beside(width, memory.z),
-            beside(width, memory.near),
-        ),
-        Averages(
-            beside(width, averages.growth),
-            beside(width, averages.time),
-            beside(width, averages.size),
-            beside(width, averages.pending),
-            beside(width, averages.place),
-        ),
-        new_cycle_workspace(n),
-    )
-
-
-@allocating_helper
-def beside(width, array):  # type: ignore[no-untyped-def]
-    """Return space for as many arrays like one."""
-    return np.empty((width, *array.shape), array.dtype)
-
-
-@inlined_helper
-def place(space, k):  # type: ignore[no-untyped-def]
-    """Return the workspace of the motion in place k."""
-    walk, state, memory, averages = space.walk, space.state, space.memory, space.averages
-    return CellWorkspaces(
-        Walk(
-            walk.y[k],
-            walk.start,
-            walk.jac[k],
-            walk.grad,
-            walk.end,
-            walk.image,
-            walk.at_once[k],
-            walk.ahead[k : k + 1],
-            walk.meets[k : k + 1],
-        ),
-        StateWorkspace(state.none, state.empty, state.nothing, state.after[k], state.trial),
-        space.frame[k],
-        space.growth,
-        Memory(
-            memory.key[k],
-            memory.cycle[k],
-            memory.event[k],
-            memory.span[k],
-            memory.z[k],
-            memory.near[k],
-        ),
-        Averages(
-            averages.growth[k],
-            averages.time[k],
-            averages.size[k],
-            averages.pending[k],
-            averages.place[k],
-        ),
-        space.cycle,
-    )
-
-
-@helper
-def words_for(space):  # type: ignore[no-untyped-def]
-    """Return how many whole numbers the references to the workspace of one motion take."""
-    return words_of(place(by_reference(space), 0))
-
-
-@helper
-def start_code(functions, observables, t, y, p, workspace):  # type: ignore[no-untyped-def]
-    """Return the row of an initial state in the table of starts: the signs as digits."""
-    code, place = 0, 1
-    for k in range(observables.shape[0]):
-        value = functions.observe(observables[k], t, y, p, workspace.none, workspace.empty)
-        value -= functions.level(k, p, workspace.none, workspace.empty)
-        code += place * (1 if value == 0.0 else (2 if value > 0.0 else 0))
-        place *= 3
-    return code
-
-
-@helper
-def start_mode(functions, tables, starting, t, y, p, workspace):  # type: ignore[no-untyped-def]
-    """Return (mode, surfaces that it leaves as bits) of an initial state; (-1, 0) if it is in no domain.
-
-    A state on surfaces that the signs alone do not decide goes to the side that its rates lead to.
-    """
-    observables, bounds = tables.observables, tables.bounds
-    code = start_code(functions, observables, t, y, p, workspace)
-    if starting.mode[code] >= 0:
-        return starting.mode[code], starting.on[code]
-    count = observables.shape[0]
-    for choice in range(1 << count):
-        other, place, fits, rest = code, 1, True, code
-        for k in range(count):
-            side = 1 if (choice >> k) & 1 == 1 else -1
-            if rest % 3 == 1:
-                other += side * place
-            elif side < 0:
-                fits = False  # a sign that is given: counted once
-            rest //= 3
-            place *= 3
-        mode = starting.mode[other] if fits else -1
-        if mode < 0:
-            continue
-        on, rest = 0, code
-        for k in range(count):
-            if rest % 3 == 1 and bounds[mode, k] != 0:
-                sense = 1.0 if (choice >> k) & 1 == 1 else -1.0
-                rate = functions.rate(
-                    mode, observables[k], t, y, p, workspace.none, workspace.empty
-                )
-                fits = fits and sense * rate > 0.0
-                on |= 1 << k
-            rest //= 3
-        if fits:
-            return mode, on
-    return -1, 0
-
-
-@helper
-def try_cycle(  # type: ignore[no-untyped-def]
-    functions, tables, ranks, at, back, p, period, rise, workspaces, rows, cell
-):
-    """Solve for the cycle that the last joint seems to be on, and write what the motion is if it is."""
-    cycle, walk, state = workspaces.cycle, workspaces.walk, workspaces.state
-    (mode, on, key, t), (joints, turns), n = at, back, walk.y.shape[0]
-    cycle.z[0] = t
-    for j in range(n):
-        cycle.z[1 + j] = walk.y[j]
-        for k in range(n + 1):
-            cycle.frame[j, k] = workspaces.frame[j, k]
-    error = solve_cycle(
-        functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, state
-    )
-    if error == AT_A_POINT:
-        for j in range(n):
-            cycle.walk.y[j] = cycle.z[1 + j]
-        if write_equilibrium(functions, tables, ranks, mode, t, p, cycle.walk, cycle, rows, cell):
-            return True
-    if error < 0.0:
-        doubt(workspaces.memory)
-        return False
-    rows.motions[cell] = TRANSIENT if rise > _FORGOTTEN else PERIODIC
-    for k in range(n):
-        rows.exponents[cell, k] = cycle.rates[k]
-        rows.errors[cell, k] = error
-    rows.turns[cell] = 1  # without excitation: a cycle
-    if walk.at_once[1] & 1 == 0:
-        rows.turns[cell] = shortest(
-            functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, state
-        )
-    return True
-
-
-@helper
-def carry_on(functions, tables, ranks, mode, on, t, p, period, live, workspaces):  # type: ignore[no-untyped-def]
-    """Go on to the next joint, and carry the frame there.
-
-    Returns
-    -------
-    tuple
-        (outcome, surface, mode that follows, duration, periods completed, phase, directions left).
-    """
-    walk, workspace = workspaces.walk, workspaces.state
-    outcome, surface, following, duration, turns, t = to_joint(
-        functions, tables, mode, on, t, p, period, walk, workspace
-    )
-    if outcome == ARRIVED:
-        observable = tables.observables[surface]
-        rate = differentiate(functions, observable, mode, duration, t, p, walk, workspace.none)
-        live = min(live, ranks[mode])
-        push(workspaces.frame, live, rate, walk.jac, walk.grad, walk.image)
-        if not orthonormalise(workspaces.frame, live, workspaces.growth):
-            outcome = BROKEN
-    return outcome, surface, following, duration, turns, t, live
-
-
-@helper
-def carry_behind(functions, tables, ranks, mode, on, t, p, period, live, workspaces):  # type: ignore[no-untyped-def]
-    """Do the same where there are resets or no excitation (apart: it would cost all others a tenth)."""
-    walk, workspace = workspaces.walk, workspaces.state
-    outcome, surface, following, duration, turns, t = to_joint(
-        functions, tables, mode, on, t, p, period, walk, workspace
-    )
-    if outcome == ARRIVED:
-        observable = tables.observables[surface]
-        rate = differentiate(functions, observable, mode, duration, t, p, walk, workspace.none)
-        live = min(live, ranks[mode])
-        push(workspaces.frame, live, rate, walk.jac, walk.grad, walk.image)
-        reset = tables.bounds[mode, surface] == 2
-        if reset or walk.at_once[1] & 1 != 0:
-            behind(functions, surface, t, p, workspaces.frame, live, walk, workspace, reset)
-        if not orthonormalise(workspaces.frame, live, workspaces.growth):
-            outcome = BROKEN
-    return outcome, surface, following, duration, turns, t, live
-
-
-@helper
-def write_last(functions, tables, outcome, ranks, mode, t, p, period, workspaces, rows, cell):  # type: ignore[no-untyped-def]
-    """Write what a motion is that meets nothing any more, or breaks off."""
-    walk, cycle = workspaces.walk, workspaces.cycle
-    if outcome == QUIET:
-        write_quiet(functions, tables, ranks, mode, t, p, period, walk, cycle, rows, cell)
-    else:
-        write_end(functions, outcome, ranks, mode, t, p, period, walk, cycle, rows, cell)
 
 
 @helper

@@ -34,9 +34,11 @@ from contfric.chaos.tangent import (
 from contfric.compiled import allocating_helper, helper, inlined_helper
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import dense_solve
+from contfric.orbit.sides import (
+    behind_event,
+)
 from contfric.orbit.spectrum import spectrum
 from contfric.orbit.system import IntArray
-from contfric.orbit.trajectory import behind_event
 
 #: Joints that are remembered.
 _MEMORIES = 3

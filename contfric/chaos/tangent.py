@@ -36,6 +36,10 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.without import SINGLY
 from contfric.models.definition import FloatArray
+from contfric.orbit.sides import (
+    mode_after,
+    sign_code,
+)
 from contfric.orbit.system import IntArray
 from contfric.orbit.together import mode_together
 from contfric.orbit.trajectory import (
@@ -52,8 +56,6 @@ from contfric.orbit.trajectory import (
     copy_state,
     first_hit,
     leads_to_rest,
-    mode_after,
-    sign_code,
     whole_turns,
 )
 from contfric.orbit.walls import MOST_AT_ONCE, NO_FLIGHT, NO_TIME, is_pressed, lying_on

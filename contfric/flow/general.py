@@ -28,7 +28,8 @@ from contfric.flow.kinked import kinked_flow, kinked_hit, kinked_stationary
 from contfric.flow.layouts import MODEL
 from contfric.flow.linear.flow import linear_flow
 from contfric.flow.linear.method import explicit_or_linear, explicit_or_linear_probe
-from contfric.flow.linear.search import linear_hit, linear_stationary
+from contfric.flow.linear.search import linear_hit
+from contfric.flow.linear.stationary import linear_stationary
 from contfric.flow.radau import IMPLICIT_STAGES
 from contfric.flow.stiffness import automatic, automatic_probe
 from contfric.handle import HandleType, with_handle

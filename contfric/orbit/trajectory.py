@@ -18,6 +18,7 @@ from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, ve
 from contfric.flow.chatter import FASTER
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
+from contfric.orbit.sides import behind_event, mode_after, sign_code
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import MOST_SURFACES, Tables
@@ -72,40 +73,6 @@ def copy_state(source, target):  # type: ignore[no-untyped-def]
     """Copy a state."""
     for j in range(source.shape[0]):
         target[j] = source[j]
-
-
-@helper
-def sign_code(functions, observables, landed, t, y, p, none, empty):  # type: ignore[no-untyped-def]
-    """Return the sides of all surfaces but those that the state is on, as bits."""
-    code, observed, value = 0, -1, 0.0
-    for k in range(min(observables.shape[0], MOST_SURFACES)):
-        if landed >> k & 1:
-            continue
-        if observables[k] != observed:  # surfaces of one observable stand together
-            observed = observables[k]
-            value = functions.observe(observed, t, y, p, none, empty)
-        if value > functions.level(k, p, none, empty):
-            code |= 1 << k
-    return code
-
-
-@helper
-def mode_after(tables, mode, surface, code):  # type: ignore[no-untyped-def]
-    """Return the mode that follows where motion meets a surface, by the sides of all; -1 if none does.
-
-    A number below that stands for a mode that was not visited yet (:mod:`contfric.orbit.growing_tables`).
-    """
-    place = mode * tables.observables.shape[0] + surface
-    for k in range(tables.first[place], tables.first[place + 1]):
-        if code & tables.rules[k, 0] == tables.rules[k, 1]:
-            return tables.rules[k, 2]
-    return -1
-
-
-@helper
-def behind_event(tables, mode, surface):  # type: ignore[no-untyped-def]
-    """Return the surfaces that the state is on when motion in a mode has met one, as bits."""
-    return tables.landed[surface] | (tables.lies_on[mode] & tables.kept[surface])
 
 
 @helper

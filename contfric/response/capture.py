@@ -11,11 +11,21 @@ import math
 
 from numba import types
 
-from contfric.chaos.cells import StartingType, start_mode
+from contfric.chaos.cells import (
+    StartingType,
+)
+from contfric.chaos.starting import (
+    start_mode,
+)
 from contfric.chaos.tangent import ARRIVED, new_walk, state_workspace, to_joint
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
-from contfric.orbit.trajectory import TablesType, behind_event
+from contfric.orbit.sides import (
+    behind_event,
+)
+from contfric.orbit.trajectory import (
+    TablesType,
+)
 from contfric.response.targets import Targets
 
 TargetsType = types.NamedTuple([indices, matrix, indices, vector], Targets)

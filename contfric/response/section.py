@@ -14,8 +14,13 @@ import math
 
 from numba import types
 
-from contfric.chaos.cells import StartingType, start_mode
+from contfric.chaos.cells import (
+    StartingType,
+)
 from contfric.chaos.cycle import nearest_turn
+from contfric.chaos.starting import (
+    start_mode,
+)
 from contfric.compiled import (
     f8,
     helper,
@@ -27,6 +32,9 @@ from contfric.compiled import (
     vector,
 )
 from contfric.flow.layouts import FlowType
+from contfric.orbit.sides import (
+    behind_event,
+)
 from contfric.orbit.trajectory import (
     ALL_EVENTS,
     ALL_TIME,
@@ -36,7 +44,6 @@ from contfric.orbit.trajectory import (
     QUIET,
     RowsType,
     TablesType,
-    behind_event,
     copy_state,
     follow,
 )

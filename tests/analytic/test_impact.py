@@ -125,9 +125,9 @@ def test_jacobian_agrees_with_differences() -> None:
         n, m = joints.shape
         a, b = np.empty((n, m, m)), np.empty((n, m, m))
         c, r = np.empty((n, m, len(found.vector))), np.empty((n, m, 1))
-        linearise(
-            system.functions(), system.layout, joints, found.vector, a, b, c, r, np.empty((m, m))
-        )
+        which = np.arange(len(found.vector))
+        at = system.functions(), system.layout, joints, found.vector, which
+        linearise(*at, a, b, c, r, np.empty((m, m)))
         return -r.ravel()
 
     for k in range(found.joints.size):

@@ -28,7 +28,8 @@ def newton_step(orbit: cf.Orbit) -> np.ndarray:
     a, b = np.empty((count, m, m)), np.empty((count, m, m))
     c, r = np.empty((count, m, size)), np.empty((count, m, 1))
     close = np.empty((m, m))
-    args = (system.functions(), system.layout, orbit.joints, orbit.vector, a, b, c, r, close)
+    which = np.arange(size)
+    args = (system.functions(), system.layout, orbit.joints, orbit.vector, which, a, b, c, r, close)
     assert linearise(*args)
     full = np.zeros((count * m, count * m))
     for i in range(count):
@@ -76,7 +77,8 @@ def test_jacobian_in_the_parameters(name: str) -> None:
         a, b = np.empty((count, m, m)), np.empty((count, m, m))
         c, r = np.empty((count, m, len(vector))), np.empty((count, m, 1))
         system = orbit.system
-        args = (system.functions(), system.layout, orbit.joints, vector, a, b, c, r)
+        which = np.arange(len(vector))
+        args = (system.functions(), system.layout, orbit.joints, vector, which, a, b, c, r)
         assert linearise(*args, np.empty((m, m)))
         return -r[:, :, 0], c
 

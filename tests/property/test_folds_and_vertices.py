@@ -44,15 +44,27 @@ def symmetric() -> cf.Branch:
     return cf.continue_orbit(orbit, "Omega", (0.45, 0.52))
 
 
-@pytest.mark.parametrize("rate, kind", [(1e-9, "CS"), (0.0, "SS"), (-1e-9, "SS")])
-def test_a_load_that_stands_still_at_a_stop_is_held(
-    rate: float, kind: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    "rate, outward, kind",
+    [
+        (1e-2, False, "CS"),
+        (1e-9, True, "CS"),
+        (0.0, True, "CS"),
+        (0.0, False, "SS"),
+        (-1e-9, False, "SS"),
+        (-1e-2, True, "SS"),
+    ],
+)
+def test_a_load_that_stands_still_at_a_stop_is_told_by_its_bend(
+    rate: float, outward: bool, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """At its minimum it grows behind the stop, which is left; at its maximum it is held."""
     (event,) = [b for b in asymmetric().bifurcations if b.tests and b.kind is not cf.Kind.T]
     (test, *_) = event.tests
     assert test.margin is Margin.JOINT and event.orbit.system.holds == ()
     assert kinds.kind_of_margin(event.orbit.system, test, event.orbit) is event.kind
     monkeypatch.setattr(kinds, "outward_rate", lambda *_: rate)
+    monkeypatch.setattr(kinds, "bends_outward", lambda *_: outward)
     assert kinds.kind_of_margin(event.orbit.system, test, event.orbit).value == kind
 
 

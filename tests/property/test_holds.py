@@ -212,9 +212,8 @@ def residuals(orbit: cf.Orbit, joints: np.ndarray, vector: np.ndarray) -> np.nda
     workspace = np.empty((count, m, m)), np.empty((count, m, m)), np.empty((count, m, len(vector)))
     right = np.empty((count, m, 1))
     system = orbit.system
-    linearise(
-        system.functions(), system.layout, joints, vector, *workspace, right, np.empty((m, m))
-    )
+    at = system.functions(), system.layout, joints, vector, np.arange(len(vector))
+    linearise(*at, *workspace, right, np.empty((m, m)))
     return -right.ravel()
 
 

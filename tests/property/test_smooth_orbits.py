@@ -156,17 +156,20 @@ def test_a_model_needs_no_surface_at_all(tmp_path: Path) -> None:
         assert np.abs(np.linalg.eigvals(columns) - 1.0).min() < 1e-4
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "name: a\nstates: [x, v]\nparameters: {c: 1}\nautonomous: true\nfield: {x: v, v: -c*x}\n",
-        "name: a\nstates: [x, v]\nparameters: {c: 1}\nperiod: 2*pi/c\nfield: {x: 0, v: 0}\n",
-    ],
-)
-def test_a_model_without_surfaces_that_has_no_orbits_is_refused(tmp_path: Path, text: str) -> None:
+def test_a_model_without_surfaces_in_which_nothing_moves_is_refused(tmp_path: Path) -> None:
+    text = "name: a\nstates: [x, v]\nparameters: {c: 1}\nperiod: 2*pi/c\nfield: {x: 0, v: 0}\n"
     (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
     with pytest.raises(cf.ModelError, match="surface"):
         cf.load_model(tmp_path / "a.yaml")
+
+
+def test_an_orbit_around_a_centre_is_one_of_a_family(tmp_path: Path) -> None:
+    """Of ``x'' = -c x`` every motion is an orbit, of period ``2 pi / c^(1/2)`` and with a multiplier 1."""
+    text = "name: a\nstates: [x, v]\nparameters: {c: 4}\nautonomous: true\nfield: {x: v, v: -c*x}\n"
+    (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
+    found = cf.find_orbit(cf.load_model(tmp_path / "a.yaml"), {}, state=[0.7, 0.0])
+    assert found.period == pytest.approx(np.pi, rel=1e-12)
+    assert np.abs(found.multipliers - 1.0).min() < 1e-6
 
 
 @pytest.mark.parametrize("gap", [0.3, 0.8, 1.2, 2.0])

@@ -1,0 +1,133 @@
+"""Workspaces of motions side by side, and that of one of them, compiled."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from contfric.chaos.averaging import Averages, new_averages
+from contfric.chaos.cycle import (
+    CycleWorkspace,
+    Memory,
+    new_cycle_workspace,
+    new_memory,
+)
+from contfric.chaos.tangent import (
+    Walk,
+    new_walk,
+    state_workspace,
+)
+from contfric.compiled import (
+    allocating_helper,
+    helper,
+    inlined_helper,
+)
+from contfric.compiling.references import by_reference, words_of
+from contfric.flow.without import SINGLY
+from contfric.models.definition import FloatArray
+from contfric.orbit.trajectory import (
+    StateWorkspace,
+)
+
+
+class CellWorkspaces(NamedTuple):
+    """All workspace of some motions, with one more axis before the others; or of one of them."""
+
+    walk: Walk
+    state: StateWorkspace
+    frame: FloatArray
+    growth: FloatArray
+    memory: Memory
+    averages: Averages
+    cycle: CycleWorkspace
+
+
+@allocating_helper
+def new_cell_workspaces(width, n):  # type: ignore[no-untyped-def]
+    """Return the workspace for so many motions of n states."""
+    walk, state, memory, averages = new_walk(n), state_workspace(n), new_memory(n), new_averages(n)
+    return CellWorkspaces(
+        Walk(
+            beside(width, walk.y),
+            walk.start,
+            beside(width, walk.jac),
+            walk.grad,
+            walk.end,
+            walk.image,
+            np.zeros((width, 3), dtype=np.int64),
+            np.zeros(width),
+            np.full(width, SINGLY),
+        ),
+        StateWorkspace(
+            state.none, state.empty, state.nothing, beside(width, state.after), state.trial
+        ),
+        np.empty((width, n, n + 1)),
+        np.empty(n),
+        Memory(
+            beside(width, memory.key),
+            beside(width, memory.cycle),
+            beside(width, memory.event),
+            beside(width, memory.span),
+            beside(width, memory.z),
+            beside(width, memory.near),
+        ),
+        Averages(
+            beside(width, averages.growth),
+            beside(width, averages.time),
+            beside(width, averages.size),
+            beside(width, averages.pending),
+            beside(width, averages.place),
+        ),
+        new_cycle_workspace(n),
+    )
+
+
+@allocating_helper
+def beside(width, array):  # type: ignore[no-untyped-def]
+    """Return space for as many arrays like one."""
+    return np.empty((width, *array.shape), array.dtype)
+
+
+@inlined_helper
+def place(space, k):  # type: ignore[no-untyped-def]
+    """Return the workspace of the motion in place k."""
+    walk, state, memory, averages = space.walk, space.state, space.memory, space.averages
+    return CellWorkspaces(
+        Walk(
+            walk.y[k],
+            walk.start,
+            walk.jac[k],
+            walk.grad,
+            walk.end,
+            walk.image,
+            walk.at_once[k],
+            walk.ahead[k : k + 1],
+            walk.meets[k : k + 1],
+        ),
+        StateWorkspace(state.none, state.empty, state.nothing, state.after[k], state.trial),
+        space.frame[k],
+        space.growth,
+        Memory(
+            memory.key[k],
+            memory.cycle[k],
+            memory.event[k],
+            memory.span[k],
+            memory.z[k],
+            memory.near[k],
+        ),
+        Averages(
+            averages.growth[k],
+            averages.time[k],
+            averages.size[k],
+            averages.pending[k],
+            averages.place[k],
+        ),
+        space.cycle,
+    )
+
+
+@helper
+def words_for(space):  # type: ignore[no-untyped-def]
+    """Return how many whole numbers the references to the workspace of one motion take."""
+    return words_of(place(by_reference(space), 0))
