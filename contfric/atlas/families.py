@@ -20,13 +20,14 @@ from contfric.continuation.trace import follow_family
 from contfric.continuation.vertical import family_near
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 #: Where an orbit near an event is looked for, relative to the range.
 SHARES = (1e-4, -1e-4, 1e-3, -1e-3, 1e-6, -1e-6)
 #: The same on both sides of the end of a family, where equations are singular: the farthest first.
 _BOTH = (1e-3, -1e-3, 1e-4, -1e-4)
-#: Lengths of a segment at which the second of two branches of one word is looked for, in those of the first.
+#: Lengths of a segment at which the second of two branches of one itinerary is looked for, in those of the
+#: first.
 _LONGER = (3.0, 10.0, 30.0)
 #: How much farther from the end it is traced from, if it can be.
 _FARTHER = (30.0, 10.0, 3.0)
@@ -55,10 +56,10 @@ def follow_family_at(state: Exploration, event: Event, orbit: Orbit, reason: str
 
 
 def follow_beside_family(state: Exploration, event: Event) -> None:
-    """Follow what meets the end of a family on either side of its value: up to two branches of one word.
+    """Follow what meets the end of a family on either side of its value: up to two branches of one itinerary.
 
     There the equations left over begin with a quadratic form in the distances of the stop and of the
-    parameter: each of its two lines is a branch on one side, and both may be of one word.
+    parameter: each of its two lines is a branch on one side, and both may be of one itinerary.
     """
     families = [state.branches[i] for i in event.branches if is_continuum(state.branches[i])]
     own = [end.bifurcation for branch in families for end in branch.ends]
@@ -82,7 +83,7 @@ def follow_beside_family(state: Exploration, event: Event) -> None:
 
 
 def _beside_family(state: Exploration, orbit: Orbit, share: float) -> Orbit | None:
-    """Return an admissible orbit of a word next to the end of a family, on one side of its value.
+    """Return an admissible orbit of an itinerary next to the end of a family, on one side of its value.
 
     The two lines are two lengths of the segment that vanishes, in proportion to the distance: if the one that
     Newton finds is negative the other one is looked for from a segment that is longer.
@@ -94,7 +95,7 @@ def _beside_family(state: Exploration, orbit: Orbit, share: float) -> Orbit | No
     vector = orbit.vector.copy()
     vector[orbit.model.index_of(settings.parameter)] = value
     guess = Orbit(orbit.system, orbit.joints, vector, np.inf)
-    found = polish(guess)
+    found = refine(guess)
     lasts = found.ends[:, 0] - found.cycle[:, 0]
     k = int(np.argmin(lasts))
     if found.converged and not found.admissible and lasts[k] < 0.0:
@@ -102,7 +103,7 @@ def _beside_family(state: Exploration, orbit: Orbit, share: float) -> Orbit | No
             joints = orbit.joints.copy()
             joints[k, 0] += times * lasts[k]
             joints[(k + 1) % len(joints), 0] -= times * lasts[k]
-            found = polish(replace(guess, joints=joints))
+            found = refine(replace(guess, joints=joints))
             if found.converged and found.admissible:
                 break
     if not (found.converged and found.admissible):
@@ -110,7 +111,7 @@ def _beside_family(state: Exploration, orbit: Orbit, share: float) -> Orbit | No
     for times in _FARTHER:  # along the line: near its end steps lead to the other one
         vector = orbit.vector + times * (found.vector - orbit.vector)
         joints = orbit.joints + times * (found.joints - orbit.joints)
-        farther = polish(Orbit(orbit.system, joints, vector, np.inf))
+        farther = refine(Orbit(orbit.system, joints, vector, np.inf))
         lasts = farther.ends[:, 0] - farther.cycle[:, 0]
         if farther.converged and farther.admissible and lasts[k] > 0.5 * times * _lasts(found, k):
             return farther

@@ -67,7 +67,7 @@ def certificate_data(certificate: Certificate) -> dict[str, Any]:
         "params": orbit.params,
         "periods": orbit.periods,
         "half": bool(orbit.system.half),
-        "segments": [list(pair) for pair in orbit.system.word],
+        "segments": [list(pair) for pair in orbit.system.itinerary],
         "joints": orbit.joints.tolist(),
         "radius": [radii[i : i + m] for i in range(0, len(radii), m)],
         "enclosure": [balls[i : i + m] for i in range(0, len(balls), m)],
@@ -122,7 +122,7 @@ def event_data(proof: EventCertificate) -> dict[str, Any]:
         "value": value,
         "periods": orbit.periods,
         "half": bool(orbit.system.half),
-        "segments": [list(pair) for pair in orbit.system.word],
+        "segments": [list(pair) for pair in orbit.system.itinerary],
         "near": [balls[i : i + m] for i in range(0, len(balls), m)],
         "at": at,
     }

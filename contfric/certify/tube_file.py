@@ -32,7 +32,7 @@ def tubes_of(proof: BranchCertificate) -> list[dict[str, Any]]:
     So is a tube that the checker does not decide, which would spoil its file.
     """
     branch = proof.branch
-    size = len(branch.system.word) * branch[0].joints.shape[1] + 1
+    size = len(branch.system.itinerary) * branch[0].joints.shape[1] + 1
     if branch.model.name not in CHECKED_MODELS or branch.system.holds:
         return []
     runs: list[list[Piece]] = [[]]
@@ -81,7 +81,7 @@ def _data(proof: BranchCertificate, run: list[Piece], ends: list[Any]) -> dict[s
         "parameter": branch.parameter,
         "periods": orbit.periods,
         "half": bool(system.half),
-        "segments": [list(pair) for pair in system.word],
+        "segments": [list(pair) for pair in system.itinerary],
         "knots": [knot[columns].tolist() for knot in knots],
         "events": events,
         "ends": ends,
@@ -104,13 +104,15 @@ def _end(proof: BranchCertificate, run: list[Piece], k: int) -> list[Any] | None
 
 
 def _places(proof: BranchCertificate, piece: Piece, label: str) -> list[list[Any]]:
-    """Return what vanishes in the words of the checker: loads at stops, or what is touched and when."""
+    """Return what vanishes in the itineraries of the checker: loads at stops, or what is touched and when."""
     system, found = proof.branch.system, list[list[Any]]()
     for name in piece.ends:
         i, level = name.segment, 1 if name.surface == "F+" else -1
         if name.what == DURATION:  # the load at the stop before
-            level = (-1 if system.half and i == 0 else 1) * (1 if system.word[i][1] == "F+" else -1)
-            i = (i - 1) % len(system.word)
+            level = (-1 if system.half and i == 0 else 1) * (
+                1 if system.itinerary[i][1] == "F+" else -1
+            )
+            i = (i - 1) % len(system.itinerary)
         if name.what in (JOINT, DURATION) and [i, level] not in found:
             found.append([i, level])
     own = next((p for p in proof.proofs if p.event.label == label), None)

@@ -168,7 +168,7 @@ def simulate(options: argparse.Namespace) -> int:
     writer = csv.writer(sys.stdout, lineterminator="\n")
     writer.writerow(["cycle", "phase", *model.states, "mode", "surface"])
     columns = (found.cycles.tolist(), found.times.tolist(), *found.states.T.tolist())
-    for row, pair in zip(zip(*columns, strict=True), found.word, strict=True):
+    for row, pair in zip(zip(*columns, strict=True), found.itinerary, strict=True):
         writer.writerow([*row, *pair])
     sys.stdout.flush()
     say(f"{len(found)} events: {found.end.value}")

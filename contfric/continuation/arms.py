@@ -30,7 +30,7 @@ from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import assembled, null_vectors
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.system import System
 
 #: A singular value this small (relative to the largest) is zero at a fold: the length of a hold is known
@@ -42,7 +42,7 @@ _OTHER_SIDE = 0.5
 
 def passages(system: System) -> list[list[int]]:
     """Return the joints that follow from each hold: from its end to the start of the next one."""
-    count, starts = len(system.word), [hold.segment for hold in system.holds]
+    count, starts = len(system.itinerary), [hold.segment for hold in system.holds]
     ahead = [*starts[1:], starts[0] + count] if starts else []
     return [
         [j % count for j in range(start + 1, after + 1)]
@@ -107,7 +107,7 @@ class Arms:
         active = fold.model.index_of(settings.parameter)
         longer = point.orbit(fold.system, fold.vector, active)
         guess = replace(longer, joints=2.0 * fold.joints - longer.joints)
-        shorter = polish(replace(guess, residual=np.inf), damped=False)
+        shorter = refine(replace(guess, residual=np.inf), damped=False)
         if not (longer.converged and shorter.converged):
             return None
         ends = [passages(fold.system)[hold][0] for hold in self.turning]
@@ -134,11 +134,11 @@ class Arms:
             bit = 0 if self.as_one else short.index(hold) if hold in self.turning else self.letters
             if sequence[unit] >> bit & 1:
                 joints[places] = other[places]
-        return polish(replace(orbit, joints=joints, residual=np.inf), damped=False)
+        return refine(replace(orbit, joints=joints, residual=np.inf), damped=False)
 
     def _repeated(self, orbit: Orbit, count: int) -> Orbit:
         unit = replace(self.unit, vector=orbit.vector, duration=orbit.turn)
-        form = Form(orbit.system.word, orbit.joints, np.zeros(len(orbit.joints)), "", unit)
+        form = Form(orbit.system.itinerary, orbit.joints, np.zeros(len(orbit.joints)), "", unit)
         return unit.orbit((form,) * count)[0]
 
 
@@ -149,7 +149,7 @@ def arms_at(orbit: Orbit) -> Arms | None:
     whole = orbit.as_whole()
     unit = unit_of(whole)
     try:
-        form = form_of(whole, np.zeros(len(whole.word)), unit, pieces(whole, unit)[0], "")
+        form = form_of(whole, np.zeros(len(whole.itinerary)), unit, pieces(whole, unit)[0], "")
         fold = form.orbit
     except (NotationError, ValueError):
         return None

@@ -10,7 +10,7 @@ import numpy as np
 from contfric.continuation.along_curve import Line
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 #: Distance of a fold to its mirror image (or to its own second half) below which it may be the vertex
 #: of a pitchfork (of a period doubling). There the system is singular and the state is good to about
@@ -38,7 +38,7 @@ EVEN = 1e-9
 
 def solved_at_vertex(orbit: Orbit, active: int) -> Orbit | None:
     """Return the orbit solved if its turn has a multiplier -1, else None."""
-    solved = polish(orbit, damped=False)
+    solved = refine(orbit, damped=False)
     if not solved.converged:  # the simpler orbits turn there, too
         return _refined_along(orbit, active)
     if not abs(opening(solved)) < _OPENS:
@@ -182,4 +182,4 @@ def moved(orbit: Orbit, active: int, value: float) -> Orbit:
     """Return an orbit solved at another value of a parameter; its status says whether it is."""
     vector = orbit.vector.copy()
     vector[active] = value
-    return polish(replace(orbit, vector=vector), damped=False)
+    return refine(replace(orbit, vector=vector), damped=False)

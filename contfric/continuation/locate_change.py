@@ -12,7 +12,7 @@ from contfric.continuation.points import Point, Rows, Settings
 from contfric.continuation.side import branch_problem
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.system import System
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def locate_value(
     # the bracket ends within rounding of the value: solve at the value itself
     vector = orbit.vector.copy()
     vector[orbit.model.index_of(settings.parameter)] = target
-    exact = polish(Orbit(orbit.system, found.joints, vector, np.inf), damped=False)
+    exact = refine(Orbit(orbit.system, found.joints, vector, np.inf), damped=False)
     if exact.converged and np.max(np.abs(exact.joints - found.joints)) < 1e-6:
         found.joints, found.w = exact.joints, np.array([target])
     return found

@@ -92,7 +92,9 @@ class Settings:
         if not self.grows or any(map(len, (layout.interior, layout.joint, layout.labels))):
             return self.largest
         return (
-            max(self.largest, SMOOTH_STEP) if is_smooth(system.model, system.word) else self.largest
+            max(self.largest, SMOOTH_STEP)
+            if is_smooth(system.model, system.itinerary)
+            else self.largest
         )
 
     @property

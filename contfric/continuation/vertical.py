@@ -39,7 +39,7 @@ from contfric.continuation.report import ROUGH
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import equations_at, null_space
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 #: Smallest singular value of the equations (joints alone), relative to the largest, next to a family.
 _NEARLY = 1e-2
@@ -261,7 +261,7 @@ def _passed(branch: Branch, mu: NDArray[np.complex128], k: int) -> Bifurcation |
     j = k if (branch.values[k] - value) * (after - value) <= 0.0 else k - 1
     share = (value - branch.values[j]) / (branch.values[j + 1] - branch.values[j])
     position = float(branch.arc[j] + share * (branch.arc[j + 1] - branch.arc[j]))
-    there = polish(replace(branch.between(position), vector=family.orbit.vector), damped=False)
+    there = refine(replace(branch.between(position), vector=family.orbit.vector), damped=False)
     if not there.converged:
         return None
     low, high = (k - 1, k + 1) if before < after else (k + 1, k - 1)

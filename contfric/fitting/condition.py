@@ -21,7 +21,7 @@ from contfric.fitting.predict import predicted
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 Datum: TypeAlias = Measured | Series | Jump
 Near: TypeAlias = Orbit | Bifurcation | None
@@ -101,7 +101,7 @@ class Condition:
     def _refined(self, params: Mapping[str, float], near: Near) -> Orbit | None:
         if not isinstance(near, Orbit):
             return None
-        refined = polish(replace(near, vector=self.model.vector(params)))
+        refined = refine(replace(near, vector=self.model.vector(params)))
         fits = refined.converged and refined.admissible and refined.stable
         return refined if fits else None
 

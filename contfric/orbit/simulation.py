@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.base.extras import need_pandas
+from contfric.base.renamed import renamed
 from contfric.base.shown import Shown
 from contfric.base.tally import tally
 from contfric.errors import function_of, real_number, whole_number
@@ -122,12 +123,14 @@ class Trajectory(Shown):
         return f"<Trajectory of {self.model.name}: {len(self)} events, ended by {self.end.name}>"
 
     @property
-    def word(self) -> tuple[tuple[str, str], ...]:
+    def itinerary(self) -> tuple[tuple[str, str], ...]:
         """The (mode, exit surface) pairs of the segments that ended."""
         modes = [m.name for m in self.model.modes]
         surfaces = [s.name for s in self.model.surfaces]
         pairs = zip(self.modes.tolist(), self.exits.tolist(), strict=True)
         return tuple((modes[m], surfaces[k]) for m, k in pairs)
+
+    word = renamed("word", "itinerary")
 
     def sample(self, times: ArrayLike) -> FloatArray:
         """Return the states at times between begin and end, shape (k, n): exact, nothing is interpolated.
@@ -188,7 +191,7 @@ def simulate(
     Examples
     --------
     >>> import contfric as cf
-    >>> cf.simulate("coulomb", {"Omega": 0.5}, state=[1.3, 0.0], periods=2).word[0]
+    >>> cf.simulate("coulomb", {"Omega": 0.5}, state=[1.3, 0.0], periods=2).itinerary[0]
     ('stick', 'F+')
     """
     model, params = tied(model, params)

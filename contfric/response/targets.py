@@ -54,11 +54,11 @@ def targets_of(model: Model, orbits: Sequence[Orbit]) -> Targets:
     owners: list[int] = []
     rows = [np.empty((0, 1 + n))]
     for number, orbit in enumerate(orbits):
-        word, begins = orbit.word, orbit.begins.copy()
+        itinerary, begins = orbit.itinerary, orbit.begins.copy()
         period = orbit.period / orbit.periods
         begins[:, 0] = 0.0 if model.autonomous else np.mod(begins[:, 0], period)
-        for i, (mode, _) in enumerate(word):
-            on, whole = surfaces.index(word[i - 1][1]), model.whole_mode(mode)
+        for i, (mode, _) in enumerate(itinerary):
+            on, whole = surfaces.index(itinerary[i - 1][1]), model.whole_mode(mode)
             alike = [k for k, m in enumerate(model.modes) if model.whole_mode(m.name) == whole]
             keys += [k * len(surfaces) + on for k in alike]
             owners += [number] * len(alike)

@@ -36,7 +36,7 @@ LONG = ("fig17", "fig18")
 STUDIES = tuple(study for studies in PAGES.values() for study in studies)
 #: Digits behind the point in the tables: events are located to about 1e-10.
 DIGITS = 9
-#: Most turns of a word in the table of windows: longer ones have windows of 1e-6 and less.
+#: Most turns of an itinerary in the table of windows: longer ones have windows of 1e-6 and less.
 LONGEST = 6
 #: An event belongs to what was published if it is this near to it.
 NEAR = 3e-5
@@ -131,14 +131,14 @@ def table_of(name: str, result: cf.StudyResult) -> list[str]:
 
 
 def windows_of(diagram: cf.Diagram) -> list[str]:
-    """Return the table of the orbits between the two ends of the first bridge: words over both."""
+    """Return the table of the orbits between the two ends of the first bridge: itineraries over both."""
     bridge = next(branch for branch in diagram.branches if branch.bridge)
     rows = [
-        f"| {window.word} | {window.branch.name} | {window.range[0]:.{DIGITS}f} "
+        f"| {window.itinerary} | {window.branch.name} | {window.range[0]:.{DIGITS}f} "
         f"| {window.range[1]:.{DIGITS}f} | {'yes' if window.branch.stable.all() else 'in part'} |"
         for window in cf.period_adding(bridge, longest=LONGEST)
     ]
-    head = f"| word | orbit | {diagram.parameter} from | to | stable |"
+    head = f"| itinerary | orbit | {diagram.parameter} from | to | stable |"
     return [head, "|---|---|---|---|---|", *rows]
 
 

@@ -126,7 +126,7 @@ def test_gears_are_shifted(tmp_path, F2: float) -> None:
     joints = [
         b[0] % (2 * np.pi / p["W"])
         for (mode, _), b, e in zip(
-            orbit.word, np.roll(orbit.begins, -1, axis=0), orbit.ends, strict=True
+            orbit.itinerary, np.roll(orbit.begins, -1, axis=0), orbit.ends, strict=True
         )
         if min(abs(e[1] - p["up"]), abs(e[1] - p["down"])) < 1e-9
         and orbit.model.whole_mode(mode) == ("first" if abs(e[1] - p["up"]) < 1e-9 else "second")
@@ -242,7 +242,7 @@ def test_a_reset_that_only_changes_the_mode(tmp_path) -> None:
     orbit = cf.find_orbit(model)
     lasts = {
         mode: e[0] - b[0]
-        for (mode, _), b, e in zip(orbit.word, orbit.cycle, orbit.ends, strict=True)
+        for (mode, _), b, e in zip(orbit.itinerary, orbit.cycle, orbit.ends, strict=True)
     }
     shares = [lasts[name] / orbit.period for name in ("s1", "s2", "s3")]
     assert shares == pytest.approx([0.25, 0.3, 0.45], abs=1e-12)
@@ -403,7 +403,7 @@ def test_the_next_mode_depends_on_the_one_before(tmp_path) -> None:
     end = 2.0 / 0.3
     wanted = (np.log((end - 1.0) / (end - 1.4)) + np.log(1.4)) / 0.3
     assert orbit.period == pytest.approx(wanted, abs=1e-11)
-    assert [mode for mode, _ in orbit.word].count("may_stop") == 1
+    assert [mode for mode, _ in orbit.itinerary].count("may_stop") == 1
 
 
 @pytest.mark.parametrize("zone", [0.05, 0.1, 0.2])

@@ -182,7 +182,7 @@ def _by_hand(params: dict[str, float], parameter: str, span: tuple[float, float]
         "params": dict(branch[0].params),
         "parameter": parameter,
         "half": bool(branch.system.half),
-        "segments": [list(pair) for pair in branch.system.word],
+        "segments": [list(pair) for pair in branch.system.itinerary],
         "knots": rows,
         "events": [],
         "ends": [None, None],

@@ -1,0 +1,27 @@
+"""Old names of attributes, which work for one version more."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+
+def renamed(old: str, new: str) -> property:
+    """Return a property that gives what has a new name, with a warning that says so.
+
+    Examples
+    --------
+    >>> class Orbit:
+    ...     itinerary = ("stick",)
+    ...     word = renamed("word", "itinerary")
+    >>> import warnings
+    >>> with warnings.catch_warnings(record=True) as told:
+    ...     Orbit().word
+    ('stick',)
+    """
+
+    def value(self: Any) -> Any:
+        warnings.warn(f"'{old}' is now '{new}'", DeprecationWarning, stacklevel=2)
+        return getattr(self, new)
+
+    return property(value, doc=f"Old name of ``{new}``.")
