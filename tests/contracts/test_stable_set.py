@@ -80,11 +80,11 @@ def test_it_is_a_table_a_figure_and_a_file(edge: Any, tmp_path: Path) -> None:
         (None, RANGES, "a stable set is one of an Orbit, got None"),
     ],
 )
-def test_what_has_none_says_why(orbit: str | None, ranges: Any, itineraries: str) -> None:
+def test_what_has_none_says_why(orbit: str | None, ranges: Any, words: str) -> None:
     start: Any = None if orbit is None else cf.solve_orbit("coulomb", orbit, PARAMS)
     with pytest.raises(cf.ParameterError) as caught:
         cf.stable_set(start, ranges)
-    assert itineraries in str(caught.value)
+    assert words in str(caught.value)
 
 
 def test_a_gap_is_crossed_whatever_the_step_is() -> None:
