@@ -2,12 +2,16 @@
 
 A file holds the knots between which the boxes are, the events of multipliers that are in them, and the event
 at which the branch ends in the first or last of them. The checker makes its own boxes of these knots, which
-are shorter than those of the proof: here they are halved until it decides each.
+are mostly shorter than those of the proof. So here a :class:`_Run` goes along the boxes of the proof by steps
+that the checker decides, each of about the length of the last one. Where they would be far shorter than the
+box of the proof, the tube ends, with the reason.
 """
 
 from __future__ import annotations
 
 import json
+import math
+import time
 from typing import TYPE_CHECKING, Any
 
 from flint import ctx
@@ -34,8 +38,13 @@ if TYPE_CHECKING:
 
 #: Half-width of the times at which a surface may be touched in the box of an end.
 _TIMES = 1e-3
-#: How often a box of the proof is halved.
-_HALVINGS = 14
+#: How often a box of the proof is halved; and one in which the branch ends.
+_HALVINGS, _END_HALVINGS = 8, 14
+#: Most boxes that are tried along a branch.
+_MOST = 20_000
+#: How much longer than the last box that was decided the next one is: after some in a row, and before; and
+#: how much shorter if one is not.
+_STEADY, _GROWTH, _SLOW, _SHORTER = 8, 1.3, 1.04, 0.75
 #: Share of a branch that is left out next to the BP or PD where it is born: boxes shrink in proportion to the
 #: distance from there.
 _BORN = 0.02
@@ -43,35 +52,144 @@ _BORN = 0.02
 _UNCHECKED = "what lies between an open end (null) and the event at which the branch ends"
 
 _Row = list[float]
-#: Knots, and the kinds of the events between each two.
-_Part = tuple[list[_Row], list[list[str]]]
 
 
-def tubes_of(proof: BranchCertificate) -> list[dict[str, Any]]:
+class _Run:
+    """A tube that grows from knot to knot by boxes that the checker decides.
+
+    Parameters
+    ----------
+    data : the file, without knots
+    start : its first knot
+    until : when to end, by ``time.time``
+    """
+
+    def __init__(self, data: dict[str, Any], start: _Row, until: float) -> None:
+        self.data, self.until = data, until
+        self.rows, self.kinds, self.ends = [start], list[list[str]](), list[Any]([None, None])
+        self.point: Box | None = None
+        self.tried, self.length, self.steady, self.why = 0, math.inf, _STEADY, ""
+
+    def may_try(self) -> bool:
+        """Tell whether there is time for another box; else say what ended the work."""
+        if self.tried < _MOST and time.time() < self.until:
+            return True
+        self.why = f"{_MOST} boxes were tried" if self.tried >= _MOST else "the time limit ended it"
+        return False
+
+    def step(self, row: _Row, end: Any = None) -> bool:
+        """Go on to a knot, or to an end before it, in one box; else say why not."""
+        if not self.may_try():
+            return False
+        self.tried += 1
+        known = [self.point] if self.point else []
+        try:
+            first, last = orbits_at(self.data | {"knots": [self.rows[-1], row]}, known)
+            kinds, _ = events_between(self.data, first, last, end)
+            if end:
+                check_admissible(*first.orbits(0))
+        except (Refused, Undecided, ArithmeticError, ValueError) as error:
+            self.why = str(error)
+            return False
+        self.kinds.append([kind for kind in kinds if not end or kind != end[0]])
+        self.rows.append(row)
+        self.point, self.why = last, ""
+        return True
+
+    def march(self, row: _Row) -> bool:
+        """Go on to a knot in as many boxes as it takes; tell whether it is reached."""
+        start, whole, done = self.rows[-1], math.dist(self.rows[-1], row), 0.0
+        while done < 1:
+            boxes = math.ceil(min((1 - done) * whole / self.length, 2**_HALVINGS)) or 1
+            there = done + (1 - done) / boxes if boxes > 1 else 1.0
+            length = (there - done) * whole
+            if self.step(_between(start, row, there)):
+                done, self.steady = there, self.steady + 1
+                growth = _GROWTH if self.steady > _STEADY else _SLOW
+                self.length = max(self.length, growth * length)
+            elif length * 2**_HALVINGS < whole or not self.may_try():
+                return False
+            else:
+                self.length, self.steady = length * (_SHORTER if self.steady else 0.5), 0
+        return True
+
+    def finish(self, row: _Row, end: Any) -> bool:
+        """Go on to an end of the branch before a knot."""
+        for _ in range(_END_HALVINGS):
+            if self.step(row, end):
+                return True
+            middle = _between(self.rows[-1], row)
+            if not self._obeys(middle, row):
+                row = middle
+            elif not self.march(middle):
+                return False
+        return False
+
+    def _obeys(self, row: _Row, other: _Row) -> bool:
+        """Tell whether the orbit at a knot is admissible."""
+        try:
+            (_, point) = orbits_at(self.data | {"knots": [other, row]})
+            check_admissible(*point.orbits(0))
+        except (Refused, Undecided, ArithmeticError, ValueError):
+            return False
+        return True
+
+    def turned(self) -> _Run:
+        """Return the same tube in the other direction."""
+        run = _Run(self.data, self.rows[-1], self.until)
+        run.rows, run.kinds = self.rows[::-1], self.kinds[::-1]
+        run.ends, run.tried, run.length = self.ends[::-1], self.tried, self.length
+        _, run.point = orbits_at(self.data | {"knots": run.rows[-2:]})
+        return run
+
+
+def _between(a: _Row, b: _Row, share: float = 0.5) -> _Row:
+    return [x + share * (y - x) for x, y in zip(a, b, strict=True)] if share < 1 else b
+
+
+def tubes_of(proof: BranchCertificate, until: float = math.inf) -> list[dict[str, Any]]:
     """Return the tubes along a branch as plain data: one for each run of boxes that the checker decides.
 
     There are none if the checker does not know the model, or the orbits have holds.
+
+    Parameters
+    ----------
+    until : when to end, by ``time.time``; the last tube ends there
     """
-    branch = proof.branch
+    branch, cap = proof.branch, ctx.cap
     if branch.model.name not in CHECKED_MODELS or branch.system.holds:
         return []
+    ctx.cap = 3
+    try:
+        with working(BITS[0]):
+            runs = _runs(proof, until)
+    finally:
+        ctx.cap = cap
+    return [_data(proof, run) for run in runs if len(run.rows) > 1 + all(run.ends)]
+
+
+def _runs(proof: BranchCertificate, until: float) -> list[_Run]:
+    branch, runs, run = proof.branch, list[_Run](), None
     size = len(branch.system.word) * branch[0].joints.shape[1] + 1
-    runs: list[tuple[list[Any], _Part]] = []
-    joined, kept, zeta = False, _kept(branch), branch.parameter == "zeta"
+    kept, zeta = _kept(branch), branch.parameter == "zeta"
     for k, piece in enumerate(proof.pieces):
         known = piece.proved and bool(piece.knots) and len(piece.knots[0]) == size
         known = known and kept[0] <= piece.start and piece.stop <= kept[1]
         # the checker's square root of zeta^2 - 1 has no power series at 0
-        known = known and not (zeta and min(piece.values) <= 1 <= max(piece.values))
-        part, ends = _decided(proof, k) if known else (None, [None, None])
-        if part is not None and joined and piece.linked and not ends[0]:
-            (first, _), (rows, kinds) = runs[-1]
-            runs[-1] = [first, ends[1]], (rows + part[0][1:], kinds + part[1])
-        elif part is not None:
-            runs.append((ends, part))
-        joined = part is not None and not ends[1]
-    found = [_data(proof, ends, *part) for ends, part in runs]
-    return [tube for tube in found if check_text(json.dumps(tube)).yes]
+        if not known or (zeta and min(piece.values) <= 1 <= max(piece.values)):
+            run = None
+            continue
+        a, b = ([*unknowns_of(c[:-1].tolist()), float(c[-1])] for c in piece.knots)
+        if piece.ends and k == 0:
+            run = _from_end(proof, b, a, until)
+        else:
+            if run is None or not piece.linked:
+                run = _Run(_data(proof), a, until)
+            _on(proof, k, run, b)
+        if run is not None and run not in runs:
+            runs.append(run)
+        run = None if run is None or run.why or run.ends[1] else run
+    return runs
 
 
 def _kept(branch: Branch) -> tuple[float, float]:
@@ -82,10 +200,10 @@ def _kept(branch: Branch) -> tuple[float, float]:
     return first + left_out[0], last - left_out[1]
 
 
-def _data(
-    proof: BranchCertificate, ends: list[Any], rows: list[_Row], kinds: list[list[str]]
-) -> dict[str, Any]:
+def _data(proof: BranchCertificate, run: _Run | None = None) -> dict[str, Any]:
+    """Return a tube as plain data; without a run one that has no knots yet."""
     branch, system = proof.branch, proof.branch.system
+    kinds = run.kinds if run else []
     return {
         "certificate": "tube",
         "format": FORMAT,
@@ -95,60 +213,34 @@ def _data(
         "periods": branch[0].periods,
         "half": bool(system.half),
         "segments": [list(pair) for pair in system.word],
-        "knots": rows,
+        "knots": run.rows if run else [],
         "events": [[k, kind] for k, found in enumerate(kinds) for kind in found],
-        "ends": ends,
-        "unchecked": _UNCHECKED,
+        "ends": run.ends if run else [None, None],
+        "unchecked": _UNCHECKED + (f"; it goes no further: {run.why}" if run and run.why else ""),
     }
 
 
-def _decided(proof: BranchCertificate, k: int) -> tuple[_Part | None, list[Any]]:
-    """Return a box of the proof as boxes that the checker decides, and the event at each of its ends."""
+def _from_end(proof: BranchCertificate, row: _Row, before: _Row, until: float) -> _Run | None:
+    """Return the tube from an end of the branch before a knot to another knot, if one is decided."""
+    for end in _ends(proof, proof.pieces[0]):
+        run = _Run(_data(proof), row, until)
+        if run.finish(before, end):
+            run.ends[1] = end
+            run = run.turned()
+            return run if check_text(json.dumps(_data(proof, run))).yes else None
+    return None
+
+
+def _on(proof: BranchCertificate, k: int, run: _Run, row: _Row) -> None:
+    """Let a tube go on through a box of the proof, or to the end of the branch in it."""
     piece = proof.pieces[k]
-    a, b = ([*unknowns_of(c[:-1].tolist()), float(c[-1])] for c in piece.knots)
-    data, cap = _data(proof, [None, None], [], []), ctx.cap
-    ctx.cap = 3
-    try:
-        with working(BITS[0]):
-            if not piece.ends:
-                return _halved(data, a, b), [None, None]
-            for end in _ends(proof, piece):
-                if k == 0 and (part := _halved(data, b, a, end)):
-                    return (part[0][::-1], part[1][::-1]), [end, None]
-                if k == len(proof.pieces) - 1 and (part := _halved(data, a, b, end)):
-                    return part, [None, end]
-    finally:
-        ctx.cap = cap
-    return None, [None, None]
-
-
-def _halved(data: Any, a: _Row, b: _Row, end: Any = None, level: int = 0) -> _Part | None:
-    """Return boxes from a to b, or to an end before b, that the checker decides; None if there are none."""
-    try:
-        first, last = orbits_at(data | {"knots": [a, b]})
-        kinds, _ = events_between(data, first, last, end)
-        if end:
-            check_admissible(*first.orbits(0))
-        return [a, b], [[kind for kind in kinds if not end or kind != end[0]]]
-    except (Refused, Undecided, ArithmeticError, ValueError):
-        if level == _HALVINGS:
-            return None
-    middle = [(x + y) / 2 for x, y in zip(a, b, strict=True)]
-    if end and not _obeys(data, a, middle, b):
-        return _halved(data, a, middle, end, level + 1)
-    before = _halved(data, a, middle, None, level + 1)
-    after = _halved(data, middle, b, end, level + 1) if before else None
-    return (before[0] + after[0][1:], before[1] + after[1]) if before and after else None
-
-
-def _obeys(data: Any, *knots: _Row) -> bool:
-    """Tell whether the orbit in the middle of three is admissible."""
-    try:
-        points: list[Box] = orbits_at(data | {"knots": list(knots)})
-        check_admissible(*points[1].orbits(0))
-    except (Refused, Undecided, ArithmeticError, ValueError):
-        return False
-    return True
+    if not piece.ends:
+        run.march(row)
+    elif k == len(proof.pieces) - 1:
+        for end in _ends(proof, piece):
+            if run.finish(row, end):
+                run.ends[1] = end
+                break
 
 
 def _ends(proof: BranchCertificate, piece: Piece) -> list[list[Any]]:

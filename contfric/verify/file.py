@@ -64,11 +64,11 @@ def _knot(data: Any, row: Any) -> list[arb]:
     return [*(c if k % 2 else c * omega for k, c in enumerate(joints)), value]
 
 
-def orbits_at(data: Any) -> list[Box]:
-    """Return the orbits next to the knots of a curve; near a fold along the normal of the curve."""
+def orbits_at(data: Any, known: Any = ()) -> list[Box]:
+    """Return the orbits next to the knots of a curve, the first ones if known; near folds normal to it."""
     knots = [_knot(data, row) for row in data["knots"]]
-    around = zip([knots[0], *knots], knots, [*knots[1:], knots[-1]], strict=False)
-    return [Box(data, at, None, Box(data, a, b).border).proved() for a, at, b in around]
+    pairs = list(zip(knots, [*knots[1:2], *knots], strict=False))[len(known) :]
+    return [*known, *(Box(data, at, None, Box(data, by, at).border).proved() for at, by in pairs)]
 
 
 def events_between(data: Any, a: Box, b: Box, end: Any) -> tuple[list[str], arb]:
