@@ -100,13 +100,13 @@ class _Run:
         """Go on to a knot in as many boxes as it takes; tell whether it is reached."""
         start, whole, done = self.rows[-1], math.dist(self.rows[-1], row), 0.0
         while done < 1:
-            boxes = math.ceil(min((1 - done) * whole / self.length, 2**_HALVINGS)) or 1
+            # not two because one would be a little too long
+            boxes = math.ceil(min((1 - done) * whole / self.length - 0.1, 2**_HALVINGS)) or 1
             there = done + (1 - done) / boxes if boxes > 1 else 1.0
             length = (there - done) * whole
             if self.step(_between(start, row, there)):
                 done, self.steady = there, self.steady + 1
-                growth = _GROWTH if self.steady > _STEADY else _SLOW
-                self.length = max(self.length, growth * length)
+                self.length *= _GROWTH if self.steady > _STEADY else _SLOW
             elif length * 2**_HALVINGS < whole or not self.may_try():
                 return False
             else:
